@@ -1,0 +1,45 @@
+"""Constant starting torque: the baseline."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import ASK_AGAIN, TORQUE, Vector
+from softstart.drive import Drive
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """One torque, once and for all."""
+    command[TORQUE] = parameters[0]
+    command[ASK_AGAIN] = math.inf
+
+
+@dataclass(frozen=True)
+class Direct(CompiledController):
+    """Direct start: u = Ms from the first instant on.
+
+    [G]: K_dyn = 1 + sqrt(1 + (c dw12/(Omega M12avg))^2), (17) with M1(1) = Ms.
+
+    >>> from softstart import Drive, simulate
+    >>> round(simulate(Drive.load("crane-4amtkf"), Direct()).k_dyn, 4)
+    3.1179
+    """
+
+    name: ClassVar[str] = "direct"
+    summary: ClassVar[str] = "constant starting torque, the baseline"
+    source: ClassVar[str] = "[G]"
+    kernel: ClassVar[Any] = step
+
+    torque: float | None = parameter("N*m", "motor torque", "starting torque Ms")
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """The starting torque."""
+        return {"torque": drive.Ms}
+
+    def vector(self, drive: Drive) -> Vector:
+        """(torque,)."""
+        return stack(drive, self.torque)

@@ -1,0 +1,166 @@
+"""Many starts in one call, with labelled results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart import metrics
+from softstart.controller.base import CompiledController, Controller, Sensor
+from softstart.drive import Drive
+from softstart.engine import Book, run_plain
+from softstart.errors import InputError
+from softstart.plant import layout as at
+from softstart.plant import start as kernel
+from softstart.plant.vector import plant_vector
+from softstart.status import status_of
+
+if TYPE_CHECKING:
+    import xarray
+
+# name in the results, column of the kernel's notes, unit, meaning
+_COLUMNS = (
+    ("start_time", at.START_TIME, "s", "first instant at which the load has its target speed"),
+    ("peak_time", at.PEAK_TIME, "s", "when |T| is largest"),
+    ("first_contact", at.FIRST_CONTACT, "s", "instant of the first contact"),
+    ("stage_2_end", at.STAGE_2_END, "s", "end of the first contact"),
+    ("impact_speed", at.IMPACT_SPEED, "rad/s", "speed at which the flanks first meet"),
+    ("torque_at_contact", at.CONTACT_TORQUE, "N*m", "motor torque at the first contact"),
+    ("contacts", at.CONTACTS, "1", "how often the gap closed"),
+    ("gap_events", at.GAP_EVENTS, "1", "closings and openings of the gap"),
+    ("end_time", at.TIME, "s", "end of the run"),
+)
+
+
+def simulate_many(
+    drives: Drive | Sequence[Drive],
+    controller: Controller,
+    until: float | None,
+    fitted_to: Drive | None,
+    base: Drive | None,
+    time_limit: float | None,
+    max_events: int,
+) -> xarray.Dataset:
+    """`simulate` for a Drive with array fields or a list of Drives; see there.
+
+    The dimension is `start` for a list and for one-dimensional fields, `axis_0`, `axis_1`, ... otherwise;
+    the fields that differ become coordinates. Starts that could not be finished have status sentences of
+    their own and NaN in every figure.
+    """
+    if isinstance(drives, Drive):
+        results = _array_starts(drives, controller, until, fitted_to, time_limit, max_events)
+        return _label(drives, results, until, base or drives)
+    listed = list(drives)
+    if not listed or not all(isinstance(drive, Drive) and drive.shape == () for drive in listed):
+        raise InputError("drive: give one Drive, a Drive with array fields, or a list of Drives, not empty.")
+    rows = []
+    for drive in listed:
+        own = fitted_to or drive
+        rows.append(_starts(controller.fitted(own), own, plant_vector(drive, time_limit, max_events), until))
+    return _label_list(listed, np.concatenate(rows), until, base)
+
+
+def _array_starts(
+    drive: Drive,
+    controller: Controller,
+    until: float | None,
+    fitted_to: Drive | None,
+    time_limit: float | None,
+    max_events: int,
+) -> at.Matrix:
+    own = fitted_to or drive
+    p = plant_vector(drive, time_limit, max_events)
+    if isinstance(controller, CompiledController):
+        return _starts(controller.fitted(own), own, p, until)
+    return np.concatenate(
+        [
+            _starts(controller.fitted(fitted_to or one), fitted_to or one, p[i : i + 1], until)
+            for i, one in enumerate(drive.elements())
+        ]
+    )
+
+
+def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | None) -> at.Matrix:
+    """The kernel's notes, one row a start."""
+    end = math.inf if until is None else float(until)
+    results = np.empty((p.shape[0], at.N_X))
+    if isinstance(controller, CompiledController):
+        numbers = np.ascontiguousarray(controller.vector(own), dtype=np.float64)
+        numbers = np.ascontiguousarray(numbers.reshape(-1, numbers.shape[-1]))
+        size = controller.state_size
+        kernel.run_many(
+            type(controller).kernel, p, numbers, int(controller.sensors),
+            bool(controller.sensors & Sensor.STAGE), np.array([end]), results,
+            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
+            np.zeros(2 + size), np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+        )  # fmt: skip
+        return results
+    for row, one in zip(results, p, strict=True):
+        book = Book(int(controller.sensors), recording=False)
+        book.x[at.STATUS] = run_plain(controller, one, book, end)
+        row[:] = book.x
+    return results
+
+
+def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tuple[Any, str, str]]:
+    """The labelled figures as name -> (values, unit, meaning)."""
+    reached = ~np.isnan(results[:, at.START_TIME])
+    status = [
+        status_of(int(reason), bool(yes), until is not None)
+        for reason, yes in zip(results[:, at.STATUS], reached, strict=True)
+    ]
+    good = np.array([state.finished for state in status])
+
+    def kept(values: Any) -> Any:
+        return np.where(good, values, np.nan)
+
+    peak = np.abs(results[:, at.PEAK])
+    first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
+    figures: dict[str, tuple[Any, str, str]] = {
+        "k_dyn": (kept(peak / base), "1", "dynamic coefficient of the whole run, [G](16)"),
+        "k_dyn_first_contact": (kept(first / base), "1", "dynamic coefficient of stage 2, [G](17), (18)"),
+        "peak_torque": (kept(peak), "N*m", "largest |T| of the run"),
+    }
+    for name, column, unit, meaning in _COLUMNS:
+        figures[name] = (kept(results[:, column]), unit, meaning)
+    figures["status"] = (np.array([state.name for state in status]), "", "how the start ended")
+    return figures
+
+
+def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -> xarray.Dataset:
+    import xarray
+
+    shape = drive.shape
+    dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
+    per_start = np.broadcast_to(metrics.base_torque(base), shape).reshape(-1)
+    data = {
+        name: (dims, values.reshape(shape), {"units": unit, "long_name": meaning})
+        for name, (values, unit, meaning) in _figures(results, per_start, until).items()
+    }
+    coordinates = {
+        name: (dims, np.broadcast_to(values, shape).copy())
+        for name in type(drive).model_fields
+        if isinstance(values := getattr(drive, name), np.ndarray)
+    }
+    return xarray.Dataset(data, coords=coordinates)
+
+
+def _label_list(
+    drives: list[Drive], results: at.Matrix, until: float | None, base: Drive | None
+) -> xarray.Dataset:
+    import xarray
+
+    per_start = np.array([metrics.base_torque(base or drive) for drive in drives])
+    data = {
+        name: (("start",), values, {"units": unit, "long_name": meaning})
+        for name, (values, unit, meaning) in _figures(results, per_start, until).items()
+    }
+    coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
+    for name in type(drives[0]).model_fields:
+        values = [getattr(drive, name) for drive in drives]
+        if name != "name" and any(value != values[0] for value in values):
+            coordinates[name] = (("start",), values)
+    return xarray.Dataset(data, coords=coordinates)

@@ -1,0 +1,29 @@
+"""The controller interface, and how controllers are found."""
+
+from softstart.controller.base import (
+    Command,
+    CompiledController,
+    Controller,
+    Measured,
+    PlainController,
+    Sensor,
+    parameter,
+    stack,
+)
+from softstart.controller.compiled import compiled_step
+from softstart.controller.finding import controller_class, controller_names, make_controller
+
+__all__ = [
+    "Command",
+    "CompiledController",
+    "Controller",
+    "Measured",
+    "PlainController",
+    "Sensor",
+    "compiled_step",
+    "controller_class",
+    "controller_names",
+    "make_controller",
+    "parameter",
+    "stack",
+]

@@ -1,0 +1,159 @@
+"""What a controller is: state in, state out.
+
+A controller is asked at certain instants. It is given what a drive can measure and its own state;
+it answers with a torque demand, the instant at which it wants to be asked next, and its new state.
+It keeps nothing in itself, so a start can be replayed, and a hundred thousand starts run at once.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from enum import IntFlag
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.drive import Drive
+from softstart.plant.start import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+
+Vector = NDArray[np.float64]
+
+
+class Sensor(IntFlag):
+    """What a controller may see beyond time, encoder and motor torque; it must declare it.
+
+    >>> Sensor.STAGE | Sensor.LOAD_SPEED
+    <Sensor.STAGE|LOAD_SPEED: 5>
+    """
+
+    NONE = 0
+    STAGE = SEES_STAGE  # number of the stage, and to be asked at each closing and opening of the gap
+    SHAFT_TORQUE = SEES_SHAFT_TORQUE
+    LOAD_SPEED = SEES_LOAD_SPEED
+
+
+class Measured(NamedTuple):
+    """What is measured at the instant of asking. What the controller has not declared is NaN."""
+
+    time: float  # s since the start
+    motor_angle: float  # rad, rounded to the encoder's counts
+    motor_speed: float  # rad/s, difference of encoder angles since the last asking
+    motor_torque: float  # N m, the realised torque, after limits, slew and lag
+    stage: float  # 1, 2, ... as in [G]: odd gap open, even gap closed
+    shaft_torque: float  # N m
+    load_speed: float  # rad/s
+
+
+class Command(NamedTuple):
+    """A controller's answer: torque demand (N m), when to be asked again (s), new state.
+
+    >>> Command(62.0)
+    Command(torque=62.0, ask_again=inf, state=())
+    """
+
+    torque: float
+    ask_again: float = math.inf
+    state: tuple[float, ...] = ()
+
+
+def parameter(unit: str, meaning: str, default: str = "") -> Any:
+    """A parameter of a controller, for use as a dataclass field.
+
+    `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
+    the drive when none is given.
+    """
+    return field(default=None, metadata={"unit": unit, "meaning": meaning, "default": default})
+
+
+@dataclass(frozen=True)
+class Controller(ABC):
+    """A strategy for the start. Subclass `PlainController` or `CompiledController`."""
+
+    name: ClassVar[str] = ""
+    summary: ClassVar[str] = ""  # one line: what it does
+    source: ClassVar[str] = ""  # where it comes from
+    sensors: ClassVar[Sensor] = Sensor.NONE
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """Values of the parameters that were not given, derived from the drive (never from the answer)."""
+        return {}
+
+    def fitted(self, drive: Drive) -> Self:
+        """The same controller with every parameter a number."""
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        missing = [name for name, value in given.items() if value is None]
+        if not missing:
+            return self
+        derived = self.defaults(drive)
+        return replace(self, **{name: derived[name] for name in missing if name in derived})
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Parameter names and values."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class PlainController(Controller):
+    """A controller in plain Python: needs no numba, is slower.
+
+    >>> class Half(PlainController):
+    ...     name = "half"
+    ...     def step(self, measured, state):
+    ...         return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.001)
+    """
+
+    initial_state: ClassVar[tuple[float, ...]] = ()
+
+    @abstractmethod
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+        """The answer to what is measured now; `state` is what the last answer returned."""
+
+
+@dataclass(frozen=True)
+class CompiledController(Controller):
+    """A controller whose step is compiled: `kernel(parameters, measured, state, command)`.
+
+    All four are float64 vectors: `parameters` is `vector(drive)`, `measured` holds the fields of
+    `Measured` in order, `state` the last state (zeros at first), and `command` receives torque, ask_again
+    and the new state. See `softstart.controller.compiled_step`.
+    """
+
+    kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]
+    state_size: ClassVar[int] = 0
+
+    @abstractmethod
+    def vector(self, drive: Drive) -> Vector:
+        """The numbers the kernel needs, shape drive.shape + (n,); called on a fitted controller."""
+
+    def as_plain(self, drive: Drive) -> PlainController:
+        """Its twin in plain Python, step by step the same numbers."""
+        fitted = self.fitted(drive)
+        return PlainTwin(fitted, tuple(np.asarray(fitted.vector(drive), dtype=np.float64).ravel()))
+
+
+@dataclass(frozen=True)
+class PlainTwin(PlainController):
+    """A compiled controller run in plain Python."""
+
+    twin: CompiledController
+    numbers: tuple[float, ...]
+
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+        """The compiled controller's own lines, not compiled."""
+        size = self.twin.state_size
+        command = np.zeros(2 + size)
+        before = np.array(state) if state else np.zeros(size)
+        kernel = type(self.twin).kernel
+        lines = getattr(kernel, "py_func", kernel)
+        lines(np.array(self.numbers), np.array(measured), before, command)
+        return Command(float(command[0]), float(command[1]), tuple(command[2:].tolist()))
+
+
+def stack(drive: Drive, *values: Any) -> Vector:
+    """Numbers and arrays of the drive's shape, stacked to shape drive.shape + (n,)."""
+    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), drive.shape) for v in values], axis=-1)

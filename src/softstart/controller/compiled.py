@@ -1,0 +1,66 @@
+"""Compiling a controller's step for the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from softstart.plant.start import STEP_SIGNATURE
+
+# indices of `measured`
+from softstart.plant.start import (  # isort: skip
+    M_LOAD_SPEED as LOAD_SPEED,
+    M_MOTOR_ANGLE as MOTOR_ANGLE,
+    M_MOTOR_SPEED as MOTOR_SPEED,
+    M_MOTOR_TORQUE as MOTOR_TORQUE,
+    M_SHAFT_TORQUE as SHAFT_TORQUE,
+    M_STAGE as STAGE,
+    M_TIME as TIME,
+)
+
+# indices of `command`; the new state follows from STATE on
+from softstart.plant.start import ASK_AGAIN, TORQUE  # isort: skip
+
+STATE = 2
+Vector = NDArray[np.float64]
+
+__all__ = [
+    "ASK_AGAIN",
+    "LOAD_SPEED",
+    "MOTOR_ANGLE",
+    "MOTOR_SPEED",
+    "MOTOR_TORQUE",
+    "SHAFT_TORQUE",
+    "STAGE",
+    "STATE",
+    "TIME",
+    "TORQUE",
+    "Vector",
+    "compiled_step",
+]
+
+
+def compiled_step(function: Callable[..., None]) -> Any:
+    """Compile `step(parameters, measured, state, command)` with the kernel's one signature.
+
+    All arguments are float64 vectors. The step must fill all of `command` and must not allocate arrays
+    (that keeps it near 10 ns a call). It is cached on disk, and the kernel is not compiled again for it.
+
+    >>> @compiled_step
+    ... def step(parameters, measured, state, command):
+    ...     command[TORQUE] = parameters[0]
+    ...     command[ASK_AGAIN] = measured[TIME] + 0.001
+    >>> import numpy as np
+    >>> command = np.zeros(2)
+    >>> step(np.array([62.0]), np.zeros(7), np.zeros(0), command)
+    >>> command.tolist()
+    [62.0, 0.001]
+    """
+    source = getattr(function, "__code__", None)
+    cache = source is not None and not source.co_filename.startswith("<")
+    decorate = njit(STEP_SIGNATURE, cache=cache, nogil=True, error_model="numpy", _nrt=False)
+    return decorate(function)

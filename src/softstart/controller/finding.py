@@ -1,0 +1,144 @@
+"""Finding controllers: by entry point, or in a file of the user's own."""
+
+from __future__ import annotations
+
+import difflib
+import importlib.util
+import sys
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from softstart.controller.base import Controller
+from softstart.errors import InputError
+from softstart.units import to_si
+
+GROUP = "softstart.controllers"
+
+
+@cache
+def _registered() -> dict[str, EntryPoint]:
+    return {point.name: point for point in sorted(entry_points(group=GROUP), key=lambda point: point.name)}
+
+
+def controller_names() -> tuple[str, ...]:
+    """Names of all installed controllers, the built-in ones and those of other packages.
+
+    >>> "direct" in controller_names()
+    True
+    """
+    return tuple(_registered())
+
+
+def controller_class(name: str) -> type[Controller]:
+    """The class behind a name or behind `path/to/file.py:ClassName`.
+
+    Raises InputError in one sentence for an unknown name, a missing file or class.
+
+    >>> controller_class("direct").__name__
+    'Direct'
+    """
+    if ".py" in name:
+        return _from_file(name)
+    point = _registered().get(name)
+    if point is None:
+        near = difflib.get_close_matches(name, controller_names(), n=1, cutoff=0.4)
+        hint = f'did you mean "{near[0]}"?' if near else "`softstart controllers` lists them."
+        raise InputError(f'controller = "{name}": there is no controller of this name; {hint}')
+    found = point.load()
+    return _checked(found, name)
+
+
+def make_controller(name: str | Controller, parameters: Mapping[str, object] | None = None) -> Controller:
+    """A controller from its name and parameters (bare SI numbers or strings with a unit).
+
+    >>> make_controller("ramp", {"time": "120 ms"}).time
+    0.12
+    """
+    if isinstance(name, Controller):
+        if parameters:
+            raise InputError(
+                f"parameters {sorted(parameters)} were given beside a finished controller "
+                f"{type(name).__name__}; give them to the controller itself."
+            )
+        return name
+    if not isinstance(name, str):
+        raise InputError(
+            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, or a Controller object."
+        )
+    cls = controller_class(name)
+    known = {f.name: f for f in fields(cls)}
+    values: dict[str, Any] = {}
+    wrong: list[str] = []
+    for key, value in (parameters or {}).items():
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
+            hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(known) or 'no parameters'}."
+            wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
+            continue
+        try:
+            values[key] = to_si(value, known[key].metadata.get("unit", ""))
+        except InputError as error:
+            wrong.extend(f"{key} = {value}: {sentence}" for sentence in error.sentences)
+    missing = [
+        f.name
+        for f in fields(cls)
+        if f.name not in values and f.default is MISSING and f.default_factory is MISSING
+    ]
+    wrong += [
+        f"{key}: the controller {name} needs this parameter; give it with --param {key}=VALUE."
+        for key in missing
+    ]
+    if wrong:
+        raise InputError(wrong)
+    return cls(**values)
+
+
+def _from_file(text: str) -> type[Controller]:
+    path_text, _, class_name = text.partition(".py:")
+    path = Path(path_text if path_text.endswith(".py") else path_text + ".py")
+    if not path.is_file():
+        raise InputError(f'controller = "{text}": there is no file {path}; give path/to/file.py:ClassName.')
+    module_name = f"softstart_loose_{path.stem}_{abs(hash(path.resolve()))}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f'controller = "{text}": {path} cannot be read as a Python file.')
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # the user's own code may fail in any way
+        del sys.modules[module_name]
+        raise InputError(
+            f'controller = "{text}": {path} does not run: {type(error).__name__}: {error}.'
+        ) from error
+    classes = {
+        key: value
+        for key, value in vars(module).items()
+        if isinstance(value, type) and value.__module__ == module_name
+    }
+    if not class_name:
+        own = [value for value in classes.values() if issubclass(value, Controller)]
+        if len(own) != 1:
+            raise InputError(
+                f'controller = "{text}": say which class, as {path}:ClassName; it has '
+                f"{', '.join(classes) or 'none'}."
+            )
+        return own[0]
+    if class_name not in classes:
+        near = difflib.get_close_matches(class_name, classes, n=1, cutoff=0.4)
+        hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(classes) or 'none'}."
+        raise InputError(f'controller = "{text}": {path} has no class {class_name}; {hint}')
+    return _checked(classes[class_name], text)
+
+
+def _checked(found: object, name: str) -> type[Controller]:
+    if isinstance(found, type) and issubclass(found, Controller):
+        return found
+    raise InputError(
+        f'controller = "{name}": {found!r} is no controller; derive the class from '
+        "softstart.controller.PlainController or CompiledController."
+    )

@@ -1,0 +1,13 @@
+"""The parameters of a drive, from Python, from TOML files, and from the shipped library.
+
+>>> from softstart.drive import Drive
+>>> Drive.load("crane-4amtkf").name
+'Crane travel drive 4AMTKF(H)112L6'
+"""
+
+from __future__ import annotations
+
+from softstart.drive.model import Drive
+from softstart.drive.parameters import PARAMETERS, TABLES, Parameter
+
+__all__ = ["PARAMETERS", "TABLES", "Drive", "Parameter"]

@@ -1,0 +1,100 @@
+"""The kernel driven from Python: scratch, growing records, compiled and plain controllers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.plant import layout as at
+from softstart.plant import start as kernel
+from softstart.plant.advance import advance
+
+FIRST_ROWS = 256
+
+
+class Book:
+    """Scratch and growing records of one start."""
+
+    def __init__(self, sees: int, recording: bool = True) -> None:
+        self.sees = sees
+        rows = FIRST_ROWS if recording else 0
+        self.x = np.zeros(at.N_X)
+        self.m = np.zeros(at.N_M)
+        self.measured = np.zeros(kernel.N_MEASURED)
+        self.segments = np.zeros((rows, at.N_SEGMENT))
+        self.events = np.zeros((rows, at.N_EVENT))
+        self.stages = np.zeros((rows, at.N_STAGE))
+
+    def grow(self) -> None:
+        """Twice the room for whatever is nearly full."""
+        for name, count in (("segments", at.N_SEGMENTS), ("events", at.N_EVENTS), ("stages", at.N_STAGES)):
+            rows = getattr(self, name)
+            if self.x[count] + 8 >= rows.shape[0]:
+                setattr(self, name, np.concatenate([rows, np.zeros_like(rows)]))
+
+    def rows(self) -> tuple[at.Matrix, at.Matrix, at.Matrix]:
+        """The records that are filled."""
+        return (
+            self.segments[: int(self.x[at.N_SEGMENTS])].copy(),
+            self.events[: int(self.x[at.N_EVENTS])].copy(),
+            self.stages[: int(self.x[at.N_STAGES])].copy(),
+        )
+
+
+def run_one(controller: Controller, drive: Drive, p: at.Vector, book: Book, until: float | None) -> int:
+    """A start from its beginning to `until`; `drive` is the one the (fitted) controller is set up for."""
+    end = math.inf if until is None else float(until)
+    if isinstance(controller, CompiledController):
+        return run_compiled(controller, drive, p, book, end)
+    return run_plain(controller, p, book, end)
+
+
+def run_compiled(controller: CompiledController, drive: Drive, p: at.Vector, book: Book, end: float) -> int:
+    """A compiled controller: the loop itself runs in the kernel."""
+    kernel.begin(p, book.x, end, book.events)
+    book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
+    numbers = np.ascontiguousarray(controller.vector(drive), dtype=np.float64).ravel()
+    size = controller.state_size
+    state, command = np.zeros(size), np.zeros(2 + size)
+    step = type(controller).kernel
+    while True:
+        reason: int = kernel.run(
+            step, p, numbers, book.sees, book.x, book.m, book.measured, state, command,
+            book.segments, book.events, book.stages,
+        )  # fmt: skip
+        if reason != at.BUFFER_FULL:
+            return reason
+        book.grow()
+
+
+def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> int:
+    """A plain Python controller through the same kernel, one control instant at a time."""
+    if not isinstance(controller, PlainController):
+        raise InputError(
+            f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
+        )
+    kernel.begin(p, book.x, end, book.events)
+    book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
+    state = tuple(controller.initial_state)
+    while True:
+        reason: int = advance(p, book.x, book.m, book.segments, book.events, book.stages)
+        if reason == at.BUFFER_FULL:
+            book.grow()
+        elif reason == at.ASK:
+            kernel.measure(p, book.x, book.sees, book.measured)
+            answer = controller.step(Measured(*book.measured.tolist()), state)
+            try:
+                torque, ask_again, state = float(answer[0]), float(answer[1]), tuple(answer[2])
+            except (TypeError, IndexError, ValueError):
+                raise InputError(
+                    f"controller {type(controller).__name__}: its step answered {answer!r}; "
+                    "answer with Command(torque, ask_again, state)."
+                ) from None
+            if not kernel.obey(p, book.x, torque, ask_again):
+                return at.BAD_COMMAND
+        else:
+            return reason

@@ -1,0 +1,186 @@
+"""One start under a controller, and many of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+
+from softstart.plant.advance import advance, engage, shaft_torque
+from softstart.plant.layout import (
+    ASK,
+    ASK_AT,
+    ASK_ON_GAP,
+    ASKED,
+    BAD_COMMAND,
+    BEYOND,
+    CONTACT_TORQUE,
+    CONTACTS,
+    DEAD_ZONE,
+    DEMAND,
+    ENCODER,
+    FIRST_CONTACT,
+    GAP,
+    IMPACT_SPEED,
+    LAW,
+    LOAD,
+    N_P,
+    N_X,
+    PHI2,
+    REACTIVE,
+    SAMPLE_ANGLE,
+    SAMPLE_TIME,
+    SIDE,
+    STAGE,
+    STAGE_2_END,
+    START_TIME,
+    STATUS,
+    T_END,
+    THETA,
+    THETA_0,
+    TIME,
+    U_MAX,
+    U_MIN,
+    W1_0,
+    W2,
+    W2_0,
+    C,
+    D,
+    U,
+    V,
+    Vector,
+)  # fmt: skip
+
+# what a controller is given: the indices of `measured`
+N_MEASURED = 7
+M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M_LOAD_SPEED = range(7)
+# what it may declare to see beyond time, motor angle, speed and torque
+SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
+# what it returns: torque demand, when to be asked again; its new state follows
+TORQUE, ASK_AGAIN = 0, 1
+
+_A = types.Array(types.float64, 1, "C")
+STEP_SIGNATURE = types.void(_A, _A, _A, _A)
+_STEP = types.FunctionType(STEP_SIGNATURE)
+_M = types.Array(types.float64, 2, "C")
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+def begin(p: Vector, x: Vector, until: float, events: Vector) -> None:
+    """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
+    for i in range(x.shape[0]):
+        x[i] = 0.0
+    x[THETA] = p[THETA_0]
+    x[V] = p[W1_0] - p[W2_0]
+    x[W2] = p[W2_0]
+    x[T_END] = until
+    x[START_TIME] = math.nan
+    x[FIRST_CONTACT] = math.nan
+    x[STAGE_2_END] = math.nan
+    x[IMPACT_SPEED] = math.nan
+    x[CONTACT_TORQUE] = math.nan
+    x[STAGE] = 1.0
+    x[LOAD] = 1.0
+    if p[REACTIVE] != 0.0:
+        x[LOAD] = np.sign(p[W2_0])
+    half = 0.5 * p[GAP]
+    overlap = abs(p[THETA_0]) - half
+    if overlap > 0.0:
+        side = math.copysign(1.0, p[THETA_0])
+        if p[LAW] != DEAD_ZONE and p[C] * overlap + p[D] * side * x[V] < 0.0:
+            x[BEYOND] = side
+        else:
+            x[STAGE] = 2.0
+            x[SIDE] = side
+            x[CONTACTS] = 1.0
+            x[FIRST_CONTACT] = 0.0
+            x[IMPACT_SPEED] = side * x[V]
+            engage(p, x, events)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
+    """What the controller sees now: the encoder rounds, and what it has not declared is NaN."""
+    t = x[TIME]
+    angle = x[PHI2] + x[THETA]
+    speed = x[V] + x[W2]
+    count = p[ENCODER]
+    if count > 0.0:
+        angle = math.floor(angle / count + 0.5) * count
+        if x[ASKED] != 0.0 and t > x[SAMPLE_TIME]:
+            speed = (angle - x[SAMPLE_ANGLE]) / (t - x[SAMPLE_TIME])
+    x[SAMPLE_ANGLE] = angle
+    x[SAMPLE_TIME] = t
+    measured[M_TIME] = t
+    measured[M_MOTOR_ANGLE] = angle
+    measured[M_MOTOR_SPEED] = speed
+    measured[M_MOTOR_TORQUE] = x[U]
+    measured[M_STAGE] = x[STAGE] if sees & SEES_STAGE else math.nan
+    measured[M_SHAFT_TORQUE] = shaft_torque(p, x) if sees & SEES_SHAFT_TORQUE else math.nan
+    measured[M_LOAD_SPEED] = x[W2] if sees & SEES_LOAD_SPEED else math.nan
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
+    """Take the controller's answer; False if it is none: not a number, or a past instant."""
+    if math.isnan(torque) or not ask_again > x[TIME]:
+        return False
+    x[DEMAND] = min(max(torque, p[U_MIN]), p[U_MAX])
+    x[ASK_AT] = ask_again
+    x[ASKED] += 1.0
+    if x[CONTACTS] == 1.0 and math.isnan(x[CONTACT_TORQUE]):
+        x[CONTACT_TORQUE] = x[U]
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+def _run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages):  # type: ignore[no-untyped-def]
+    while True:
+        reason = advance(p, x, m, segments, events, stages)
+        if reason != ASK:
+            x[STATUS] = reason
+            return reason
+        measure(p, x, sees, measured)
+        step(parameters, measured, state, command)
+        if not obey(p, x, command[TORQUE], command[ASK_AGAIN]):
+            x[STATUS] = BAD_COMMAND
+            return BAD_COMMAND
+        for i in range(state.shape[0]):
+            state[i] = command[2 + i]
+
+
+@njit(
+    types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M),
+    cache=True, nogil=True, error_model="numpy", _nrt=False,
+)  # fmt: skip
+def run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages):  # type: ignore[no-untyped-def]
+    """One start to its end, or until a buffer is full: call again with larger ones."""
+    return _run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages)
+
+
+@njit(
+    types.void(_STEP, _M, _M, types.int64, types.boolean, _A, _M, _A, _A, _A, _A, _A, _A, _A, _M),
+    cache=True, nogil=True, error_model="numpy", _nrt=False,
+)  # fmt: skip
+def run_many(
+    step, p, parameters, sees, on_gap, until, results, x, m, measured, state, command, drive, own, nothing
+):  # type: ignore[no-untyped-def]
+    """Start i has row i of p, parameters and until (one row serves all); its x goes to results[i].
+
+    The arrays from x on are scratch: the kernel itself allocates nothing.
+    """
+    for i in range(results.shape[0]):
+        if i == 0 or p.shape[0] > 1:
+            for j in range(N_P):
+                drive[j] = p[i, j]
+        if i == 0 or parameters.shape[0] > 1:
+            for j in range(own.shape[0]):
+                own[j] = parameters[i, j]
+        for j in range(state.shape[0]):
+            state[j] = 0.0
+        begin(drive, x, until[i if until.shape[0] > 1 else 0], nothing)
+        x[ASK_ON_GAP] = 1.0 if on_gap else 0.0
+        _run(step, drive, own, sees, x, m, measured, state, command, nothing, nothing, nothing)
+        for j in range(N_X):
+            results[i, j] = x[j]

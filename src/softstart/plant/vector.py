@@ -1,0 +1,54 @@
+"""A Drive as the kernel's vector p."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from softstart.drive import Drive
+from softstart.plant import layout as at
+
+LAWS: Final = {"no-pull": at.NO_PULL, "dead-zone": at.DEAD_ZONE, "modelica": at.MODELICA}
+COUNTS_PER_LINE: Final = 4  # quadrature
+
+
+def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int = 1_000_000) -> at.Matrix:
+    """One row of p for each start of the drive (one row for a scalar drive).
+
+    Without `time_limit` a start that never reaches its target speed is given up after a hundred times
+    the duration of a stiff drive's start plus a hundred elastic periods.
+    """
+    shape = drive.shape
+    count = math.prod(shape)
+
+    def column(values: object) -> at.Vector:
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).reshape(count)
+
+    J1, J2, c = column(drive.J1), column(drive.J2), column(drive.c)
+    Mc, Ms = column(drive.Mc), column(drive.Ms)
+    target = column(drive.target_speed)
+    p = np.zeros((count, at.N_P))
+    p[:, at.J1], p[:, at.J2], p[:, at.C], p[:, at.D] = J1, J2, c, column(drive.d)
+    p[:, at.GAP], p[:, at.MC] = column(drive.gap), Mc
+    # a reactive load without torque never sticks: it is the same as an active one
+    p[:, at.REACTIVE] = (Mc > 0.0) if drive.load_kind == "reactive" else 0.0
+    p[:, at.LAW] = LAWS[drive.contact_law]
+    p[:, at.LAG], p[:, at.RATE] = column(drive.torque_lag), column(drive.torque_rate)
+    p[:, at.U_MIN], p[:, at.U_MAX] = column(drive.minimum_torque), column(drive.maximum_torque)
+    p[:, at.TARGET] = target
+    lines = column(drive.encoder_lines)
+    with np.errstate(divide="ignore"):
+        p[:, at.ENCODER] = np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * lines), 0.0)
+    p[:, at.THETA_0] = column(drive.start_position)
+    p[:, at.W1_0] = column(drive.initial_motor_speed)
+    p[:, at.W2_0] = column(drive.initial_load_speed)
+    w0sq = c * (1.0 / J1 + 1.0 / J2)
+    p[:, at.PERIOD] = 2.0 * math.pi / np.sqrt(w0sq)
+    stiff = (J1 + J2) * (target + np.abs(p[:, at.W2_0]) + np.abs(p[:, at.W1_0])) / (Ms - Mc)
+    p[:, at.TIME_LIMIT] = 100.0 * (stiff + p[:, at.PERIOD]) if time_limit is None else time_limit
+    p[:, at.EVENT_CAP] = max_events
+    p[:, at.INV_J1], p[:, at.INV_J2], p[:, at.INV_J] = 1.0 / J1, 1.0 / J2, 1.0 / (J1 + J2)
+    p[:, at.W0SQ_SLIP], p[:, at.INV_W0SQ], p[:, at.W0_SLIP] = w0sq, 1.0 / w0sq, np.sqrt(w0sq)
+    return p

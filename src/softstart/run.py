@@ -1,0 +1,285 @@
+"""One start, finished: its states at any instant, its events, stages and figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softstart import metrics
+from softstart.controller.base import Controller
+from softstart.drive import Drive
+from softstart.energy import Energy, energy_balance
+from softstart.export import write_run
+from softstart.figures import run_figure
+from softstart.plant import layout as at
+from softstart.plant import record
+from softstart.status import Status
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Vector = NDArray[np.float64]
+
+EVENT_NAMES = {
+    at.CLOSED: "gap closed",
+    at.OPENED: "gap opened",
+    at.LOAD_STARTS: "load starts",
+    at.LOAD_STOPS: "load stops",
+    at.TARGET_REACHED: "target speed reached",
+}
+PLOT_POINTS = 1500
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a located instant: time in s, what, and with which flank or sign."""
+
+    time: float
+    kind: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A span with the gap open (odd number) or closed (even), [G]; times in s, peak torque in N m."""
+
+    number: int
+    start: float
+    end: float
+    side: int  # 0 gap open, +1 driving flank, -1 other flank
+    peak_torque: float  # signed, largest |T| of the stage
+    peak_time: float
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One start under one controller. All angles in rad at the motor shaft, SI units.
+
+    `.t, .phi1, .phi2, .w1, .w2, .u, .T` are traces for plotting; `at(times)` evaluates any instant exactly;
+    peaks and events are located, not read off these traces.
+
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
+    >>> run.status.value
+    'The load reached its target speed.'
+    >>> [round(stage.duration, 4) for stage in run.stages[:2]]
+    [0.0166, 0.0367]
+    """
+
+    drive: Drive
+    controller: Controller
+    base: Drive
+    status: Status
+    plant: Vector
+    final: Vector
+    segments: at.Matrix
+    event_rows: at.Matrix
+    stage_rows: at.Matrix
+
+    # figures -------------------------------------------------------------------------------------------
+
+    @property
+    def peak_torque(self) -> float:
+        """Largest |T| of the run, N m, located."""
+        return abs(float(self.final[at.PEAK]))
+
+    @property
+    def peak_time(self) -> float:
+        """When |T| is largest, s."""
+        return float(self.final[at.PEAK_TIME])
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16)."""
+        return float(metrics.k_dyn(self.peak_torque, self.base))
+
+    @property
+    def k_dyn_first_contact(self) -> float:
+        """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one."""
+        if math.isnan(self.final[at.STAGE_2_END]):
+            return math.nan
+        return float(metrics.k_dyn(self.final[at.FIRST_PEAK], self.base))
+
+    @property
+    def start_time(self) -> float:
+        """First instant at which the load has its target speed, s; NaN if it never has."""
+        return float(self.final[at.START_TIME])
+
+    @property
+    def end_time(self) -> float:
+        """End of the run, s."""
+        return float(self.final[at.TIME])
+
+    @property
+    def first_contact(self) -> float:
+        """Instant of the first contact, s: the length of stage 1."""
+        return float(self.final[at.FIRST_CONTACT])
+
+    @property
+    def impact_speed(self) -> float:
+        """Speed at which the flanks first meet, rad/s: dw12 of [G](10)."""
+        return float(self.final[at.IMPACT_SPEED])
+
+    @property
+    def torque_at_contact(self) -> float:
+        """Motor torque at the first contact, N m."""
+        return float(self.final[at.CONTACT_TORQUE])
+
+    @property
+    def contacts(self) -> int:
+        """How often the gap closed."""
+        return int(self.final[at.CONTACTS])
+
+    @property
+    def stage_durations(self) -> tuple[float, float]:
+        """Lengths of stages 1 and 2, s; NaN for a stage that does not end within the run or is not there."""
+        by_number = {stage.number: stage for stage in self.stages}
+        last = self.stages[-1].number if self.stages else 0
+        first, second = (by_number[n].duration if n in by_number and n != last else math.nan for n in (1, 2))
+        return first, second
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All events in order of time."""
+        return tuple(Event(float(t), EVENT_NAMES[float(kind)], float(v)) for t, kind, v in self.event_rows)
+
+    @cached_property
+    def stages(self) -> tuple[Stage, ...]:
+        """All stages; the last one ends with the run."""
+        return tuple(
+            Stage(int(n), float(start), float(end), int(side), float(peak), float(when))
+            for n, start, end, side, peak, when in self.stage_rows
+        )
+
+    # states --------------------------------------------------------------------------------------------
+
+    def at(self, times: ArrayLike) -> dict[str, Vector]:
+        """States at any instants within the run, evaluated from the closed forms.
+
+        Returns arrays of the shape of `times` under phi1, phi2, w1, w2, u, T, theta (= phi1 - phi2) and v
+        (= w1 - w2). At an instant where a torque jumps the value is the one after the jump.
+        """
+        when = np.asarray(times, dtype=np.float64)
+        flat = np.ascontiguousarray(when.ravel())
+        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
+            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
+        index = np.searchsorted(self.segments[:, at.S_START], flat, side="right") - 1
+        states = self.states_in(index.clip(0), flat)
+        return {name: values.reshape(when.shape) for name, values in states.items()}
+
+    def states_in(self, segment: NDArray[np.int64], times: Vector) -> dict[str, Vector]:
+        """States at `times` by the motion of the given recorded spans: at a jump, the side one wants."""
+        out = np.empty((times.size, record.N_OUT))
+        record.states_at(self.plant, self.segments, segment.ravel(), np.ascontiguousarray(times.ravel()), out)
+        names = ("phi1", "phi2", "w1", "w2", "u", "T", "theta", "v")
+        return {name: out[:, i].reshape(times.shape) for i, name in enumerate(names)}
+
+    @cached_property
+    def t(self) -> Vector:
+        """Instants of the traces, s: an even grid and every event and stage peak."""
+        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
+        edges = self.event_rows[:, at.E_TIME]
+        just_before = np.nextafter(edges, 0.0)
+        peaks = self.stage_rows[:, at.G_PEAK_TIME]
+        return np.unique(np.concatenate([grid, edges, just_before, peaks]).clip(0.0, self.end_time))
+
+    @cached_property
+    def _traces(self) -> dict[str, Vector]:
+        return self.at(self.t)
+
+    @property
+    def phi1(self) -> Vector:
+        """Motor angle, rad."""
+        return self._traces["phi1"]
+
+    @property
+    def phi2(self) -> Vector:
+        """Load angle, rad."""
+        return self._traces["phi2"]
+
+    @property
+    def w1(self) -> Vector:
+        """Motor speed, rad/s."""
+        return self._traces["w1"]
+
+    @property
+    def w2(self) -> Vector:
+        """Load speed, rad/s."""
+        return self._traces["w2"]
+
+    @property
+    def u(self) -> Vector:
+        """Motor torque, N m."""
+        return self._traces["u"]
+
+    @property
+    def T(self) -> Vector:
+        """Shaft torque, N m."""
+        return self._traces["T"]
+
+    @property
+    def theta(self) -> Vector:
+        """Twist phi1 - phi2, rad; contact is at |theta| = gap/2."""
+        return self._traces["theta"]
+
+    # what follows from them ----------------------------------------------------------------------------
+
+    def settling_time(self, band: float = 0.1) -> float:
+        """From when on the shaft torque stays settled, s; NaN if it does not within the run.
+
+        Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg = (u J2 + Mc J1)/(J1 + J2)
+        is the mean shaft torque under the motor torque of the instant.
+        """
+        from softstart.settling import settling_time  # imports scipy.optimize: only when asked
+
+        return settling_time(self, band)
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energy balance of the run."""
+        return energy_balance(self)
+
+    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
+        """Write t, phi1, phi2, w1, w2, u, T (one header line with units); at `times` or the plot's instants."""
+        write_run(self, Path(path), times)
+
+    def plot(self) -> Figure:
+        """Torques, speeds and twist over time, stages shaded."""
+        return run_figure(self)
+
+    def summary(self) -> dict[str, Any]:
+        """All figures under the names used everywhere (JSON, tables, docs)."""
+        first, second = self.stage_durations
+        return {
+            "drive": self.drive.name,
+            "controller": self.controller.name or type(self.controller).__name__,
+            "parameters": self.controller.parameters,
+            "status": self.status.name,
+            "status_text": self.status.value,
+            "contact_law": self.drive.contact_law,
+            "load_kind": self.drive.load_kind,
+            "k_dyn": self.k_dyn,
+            "k_dyn_first_contact": self.k_dyn_first_contact,
+            "peak_torque": self.peak_torque,
+            "peak_time": self.peak_time,
+            "start_time": self.start_time,
+            "first_contact": self.first_contact,
+            "contacts": self.contacts,
+            "impact_speed": self.impact_speed,
+            "torque_at_contact": self.torque_at_contact,
+            "stage_1_duration": first,
+            "stage_2_duration": second,
+            "settling_time": self.settling_time(),
+            "end_time": self.end_time,
+        }

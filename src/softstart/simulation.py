@@ -1,0 +1,106 @@
+"""One start, or many, under one controller: `simulate`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+from softstart.batch import simulate_many
+from softstart.controller.base import Controller
+from softstart.controller.finding import make_controller
+from softstart.drive import Drive
+from softstart.engine import Book, run_one
+from softstart.errors import InputError, SimulationError
+from softstart.plant import layout as at
+from softstart.plant.vector import plant_vector
+from softstart.run import Run
+from softstart.status import status_of
+
+if TYPE_CHECKING:
+    import xarray
+
+MAX_EVENTS = 1_000_000
+
+
+@overload
+def simulate(
+    drive: Drive,
+    controller: str | Controller,
+    until: float | None = ...,
+    *,
+    parameters: Mapping[str, object] | None = ...,
+    fitted_to: Drive | None = ...,
+    base: Drive | None = ...,
+    time_limit: float | None = ...,
+    max_events: int = ...,
+) -> Run: ...
+@overload
+def simulate(
+    drive: Sequence[Drive],
+    controller: str | Controller,
+    until: float | None = ...,
+    *,
+    parameters: Mapping[str, object] | None = ...,
+    fitted_to: Drive | None = ...,
+    base: Drive | None = ...,
+    time_limit: float | None = ...,
+    max_events: int = ...,
+) -> xarray.Dataset: ...
+def simulate(
+    drive: Drive | Sequence[Drive],
+    controller: str | Controller,
+    until: float | None = None,
+    *,
+    parameters: Mapping[str, object] | None = None,
+    fitted_to: Drive | None = None,
+    base: Drive | None = None,
+    time_limit: float | None = None,
+    max_events: int = MAX_EVENTS,
+) -> Any:
+    """Simulate the start of a drive under a controller, exactly.
+
+    Parameters
+    ----------
+    drive : a Drive, a Drive whose fields hold arrays, or a list of Drives.
+    controller : a name, `path/to/file.py:ClassName`, or a Controller object.
+    until : end of the run in s. Without it the run ends one elastic period 2 pi/Omega after the start time,
+        the instant at which the load first has its target speed.
+    parameters : parameters of a controller given by name.
+    fitted_to : the drive from which the controller's own defaults are derived, if not `drive`: what happens
+        to a controller set up for one drive when the gap has worn or the load changed.
+    base : the drive whose mean torque K_dyn refers to, if not `drive`.
+    time_limit : s, after which a start that has not reached its target speed is given up as not reached.
+    max_events : cap on the events of one start; going over it is an error, not a result.
+
+    Returns
+    -------
+    A Run for one drive; for many an xarray.Dataset with one entry a start (see `softstart.batch`).
+
+    Raises InputError for bad input and SimulationError for a start that cannot be finished.
+
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
+    >>> round(run.k_dyn, 4), round(run.start_time, 4)
+    (3.1179, 0.3735)
+    """
+    made = make_controller(controller, parameters)
+    if until is not None and not (isinstance(until, int | float) and 0.0 < until < math.inf):
+        raise InputError(
+            f"until = {until}: the end of the run is a time above 0 s; leave it out to run to the start time."
+        )
+    if not isinstance(max_events, int) or max_events < 1:
+        raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
+    if not isinstance(drive, Drive) or drive.shape != ():
+        return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
+    fitted = made.fitted(fitted_to or drive)
+    p = plant_vector(drive, time_limit, max_events)[0]
+    book = Book(int(fitted.sensors))
+    reason = run_one(fitted, fitted_to or drive, p, book, until)
+    status = status_of(reason, not math.isnan(book.x[at.START_TIME]), until is not None)
+    if not status.finished:
+        raise SimulationError(
+            f"{status.value} Drive {drive.name}, controller {fitted.name or type(fitted).__name__}, "
+            f"t = {book.x[at.TIME]:.6g} s, {int(book.x[at.EVENTS])} events."
+        )
+    return Run(drive, fitted, base or drive, status, p, book.x.copy(), *book.rows())

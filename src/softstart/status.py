@@ -1,0 +1,46 @@
+"""How a start ended."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from softstart.plant import layout as at
+
+
+class Status(Enum):
+    """How a start ended; the value is the sentence shown.
+
+    >>> Status.REACHED.value
+    'The load reached its target speed.'
+    """
+
+    REACHED = "The load reached its target speed."
+    STOPPED_EARLY = "The run ended at the time asked for, before the load reached its target speed."
+    NOT_REACHED = "The load did not reach its target speed within the time limit."
+    TOO_MANY_EVENTS = "The start was given up: it has more events than max_events allows."
+    NOT_LOCATED = "The start was given up: an event could not be located to machine precision."
+    NOT_FINITE = "The start was given up: a state is no longer a finite number."
+    BAD_COMMAND = "The start was given up: the controller answered with NaN or with a past instant."
+
+    @property
+    def finished(self) -> bool:
+        """True if the run went to its end, so that its figures stand."""
+        return self in _FINISHED
+
+
+_FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED})
+_BROKEN = {
+    at.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
+    at.NOT_LOCATED: Status.NOT_LOCATED,
+    at.NOT_FINITE: Status.NOT_FINITE,
+    at.BAD_COMMAND: Status.BAD_COMMAND,
+}
+
+
+def status_of(reason: int, reached: bool, asked_for_end: bool) -> Status:
+    """The status from the kernel's reason for coming back."""
+    if reason in _BROKEN:
+        return _BROKEN[reason]
+    if reached:
+        return Status.REACHED
+    return Status.STOPPED_EARLY if asked_for_end else Status.NOT_REACHED

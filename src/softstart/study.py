@@ -1,0 +1,180 @@
+"""What a study is, and how studies are found.
+
+A study answers questions of the literature with numbers: it returns tables, claims with a verdict each, and
+figures. It is registered in the entry-point group `softstart.studies` and run by `softstart study NAME`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from softstart.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+GROUP = "softstart.studies"
+
+Progress = Callable[[str], None]  # told, in a few words, what is being done now
+
+
+class Verdict(Enum):
+    """What became of a claim; the value is the word shown.
+
+    >>> Verdict("partly")
+    <Verdict.PARTLY: 'partly'>
+    """
+
+    CONFIRMED = "confirmed"
+    REFUTED = "refuted"
+    PARTLY = "partly"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of a source, the verdict on it, and the sentence with the number that says so.
+
+    `verdict` may be given as its word; another word is a ValueError.
+
+    >>> Claim("Method 1 never brings K_dyn below 2.", "confirmed", "Smallest found: 2.0003.").verdict
+    <Verdict.CONFIRMED: 'confirmed'>
+    """
+
+    statement: str
+    verdict: Verdict | str
+    evidence: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verdict", Verdict(self.verdict))
+
+    def summary(self) -> dict[str, str]:
+        """Everything as plain data, for JSON."""
+        return {
+            "statement": self.statement,
+            "verdict": Verdict(self.verdict).value,
+            "evidence": self.evidence,
+        }
+
+
+@dataclass(frozen=True)
+class Table:
+    """A titled table; each row has one cell (text, number or None) a column. Units go into the column names.
+
+    >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5, 3.1179)]).rows
+    ((0.5, 3.1179),)
+    >>> Table("Peak", ("gap, rad", "K_dyn"), [(0.5,)])
+    Traceback (most recent call last):
+    ValueError: table Peak, row 1: 1 cells for 2 columns.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", tuple(self.columns))
+        object.__setattr__(self, "rows", tuple(tuple(row) for row in self.rows))
+        for index, row in enumerate(self.rows, start=1):
+            if len(row) != len(self.columns):
+                raise ValueError(
+                    f"table {self.title}, row {index}: {len(row)} cells for {len(self.columns)} columns."
+                )
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON."""
+        return {"title": self.title, "columns": list(self.columns), "rows": [list(row) for row in self.rows]}
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """What a study found: tables, claims, and figures by file stem.
+
+    >>> StudyResult(claims=[Claim("A wider gap raises K_dyn.", "confirmed", "3.12 becomes 4.87.")]).tables
+    ()
+    """
+
+    tables: Sequence[Table] = ()
+    claims: Sequence[Claim] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+
+    def summary(self) -> dict[str, Any]:
+        """Tables and claims as plain data, for JSON."""
+        return {
+            "claims": [claim.summary() for claim in self.claims],
+            "tables": [table.summary() for table in self.tables],
+        }
+
+
+class Study(ABC):
+    """One study. Made without arguments; `run` does the work.
+
+    `pictures` are the file stems of the figures it draws, known without running it.
+
+    >>> class Nothing(Study):
+    ...     name, title = "nothing", "Nothing at all"
+    ...     def run(self, out=None, progress=print):
+    ...         progress("doing nothing")
+    ...         return StudyResult()
+    >>> Nothing().run().claims
+    doing nothing
+    ()
+    """
+
+    name: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    pictures: ClassVar[tuple[str, ...]] = ()
+
+    @abstractmethod
+    def run(self, out: Path | None, progress: Progress) -> StudyResult:
+        """Do the study; tell `progress` what is being done.
+
+        `out` is a folder for files beyond the tables and pictures, which the caller writes; None if nothing
+        is to be written. Raises InputError or SimulationError like everything else.
+        """
+
+
+@cache
+def _registered() -> dict[str, EntryPoint]:
+    return {point.name: point for point in sorted(entry_points(group=GROUP), key=lambda point: point.name)}
+
+
+def study_names() -> tuple[str, ...]:
+    """Names of all installed studies, those of other packages too.
+
+    >>> "paper-g" in study_names()
+    True
+    """
+    return tuple(_registered())
+
+
+def find_study(name: str) -> Study:
+    """The study of this name.
+
+    Raises InputError in one sentence if there is none, or if it cannot be loaded.
+
+    >>> find_study("paper-q")
+    Traceback (most recent call last):
+    softstart.errors.InputError: study = "paper-q": there is no study of this name; did you mean "paper-g"?
+    """
+    point = _registered().get(name)
+    if point is None:
+        near = difflib.get_close_matches(name, study_names(), n=1, cutoff=0.4)
+        hint = f'did you mean "{near[0]}"?' if near else "`softstart study --list` lists them."
+        raise InputError(f'study = "{name}": there is no study of this name; {hint}')
+    try:
+        found = point.load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(f'study = "{name}": {point.value} cannot be loaded: {error}.') from None
+    if not (isinstance(found, type) and issubclass(found, Study)):
+        raise InputError(
+            f'study = "{name}": {point.value} is no study; derive it from softstart.study.Study.'
+        )
+    return found()
