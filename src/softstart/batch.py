@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart import metrics
+from softstart import metrics, stages
 from softstart.controller.base import CompiledController, Controller, Sensor
 from softstart.drive import Drive
 from softstart.engine import Book, run_plain
@@ -119,9 +119,15 @@ def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tu
 
     peak = np.abs(results[:, at.PEAK])
     first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
+    k_dyn = stages.dynamic_coefficient(np.where(good, peak, 0.0), base)
+    k_first = stages.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
     figures: dict[str, tuple[Any, str, str]] = {
-        "k_dyn": (kept(peak / base), "1", "dynamic coefficient of the whole run, [G](16)"),
-        "k_dyn_first_contact": (kept(first / base), "1", "dynamic coefficient of stage 2, [G](17), (18)"),
+        "k_dyn": (kept(k_dyn), "1", "dynamic coefficient of the whole run, [G](16)"),
+        "k_dyn_first_contact": (
+            np.where(np.isnan(kept(first)), np.nan, k_first),
+            "1",
+            "dynamic coefficient of stage 2, [G](17), (18)",
+        ),
         "peak_torque": (kept(peak), "N*m", "largest |T| of the run"),
     }
     for name, column, unit, meaning in _COLUMNS:

@@ -52,7 +52,7 @@ def energy_balance(run: Run) -> Energy:
     z = np.where(side != 0.0, side * states["theta"] - 0.5 * drive.gap, 0.0)
     spring = side * drive.c * z
 
-    def integral(power: np.ndarray) -> float:  # type: ignore[type-arg]
+    def integral(power: np.ndarray) -> float:
         return float(np.sum(half * (power @ WEIGHTS)))
 
     motor = integral(states["u"] * states["w1"])
@@ -65,7 +65,7 @@ def energy_balance(run: Run) -> Energy:
     return Energy(motor, against_load, kinetic, elastic, dissipated, residual)
 
 
-def _pieces(rows: at.Matrix, scale: float) -> tuple[at.Vector, at.Vector, np.ndarray]:  # type: ignore[type-arg]
+def _pieces(rows: at.Matrix, scale: float) -> tuple[at.Vector, at.Vector, np.ndarray]:
     length = rows[:, at.S_END] - rows[:, at.S_START]
     count = np.maximum(1, np.ceil(length / scale)).astype(np.int64)
     owner = np.repeat(np.arange(rows.shape[0]), count)

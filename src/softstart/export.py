@@ -31,9 +31,7 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
         ) from None
     temporary = Path(name)
     try:
-        with os.fdopen(
-            handle, "wb" if binary else "w", **({} if binary else {"encoding": "utf-8"})
-        ) as stream:
+        with os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream:
             write(stream)
         umask = os.umask(0)
         os.umask(umask)
@@ -42,7 +40,8 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise InputError(
-            f"output = {path}: the file could not be finished: {error.strerror or error}; nothing was left behind."
+            f"output = {path}: the file could not be finished: {error.strerror or error}; "
+            "nothing was left behind."
         ) from None
     except BaseException:
         temporary.unlink(missing_ok=True)

@@ -42,7 +42,8 @@ def drawing() -> Iterator[None]:
     """Softstart's look, without touching the caller's settings or needing a screen."""
     import matplotlib as mpl
 
-    with mpl.rc_context(STYLE):
+    settings: Any = STYLE
+    with mpl.rc_context(settings):
         yield
 
 
@@ -74,7 +75,7 @@ def shade_open_gap(axes: Axes, run: Run) -> None:
             axes.axvspan(stage.start, stage.end, color=GAP_SHADE, lw=0, zorder=0)
 
 
-def run_figure(run: Run) -> Figure:
+def run_figure(run: Run) -> Any:
     """Torques, speeds and the place in the gap over time; grey where the gap is open."""
     with drawing():
         figure, (torque, speed, twist) = new_figure(3, 1, (8.0, 7.5), sharex=True)
@@ -93,7 +94,7 @@ def run_figure(run: Run) -> Figure:
             fontsize=9,
         )
         torque.set_ylabel("torque, N m")
-        torque.legend(loc="lower right", ncols=3)
+        torque.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
         speed.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
         speed.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
         speed.axhline(float(run.drive.target_speed), color="#666666", lw=0.8, ls=":")
@@ -101,14 +102,15 @@ def run_figure(run: Run) -> Figure:
             speed.axvline(run.start_time, color="#666666", lw=0.8, ls=":")
             speed.annotate(
                 f"start time {run.start_time:.4f} s",
-                (run.start_time, 0.0),
-                xytext=(-6, 4),
+                (run.start_time, float(run.w1.min())),
+                xytext=(-6, 2),
                 textcoords="offset points",
                 ha="right",
+                backgroundcolor="white",
                 fontsize=9,
             )
         speed.set_ylabel("speed, rad/s")
-        speed.legend(loc="upper left", ncols=2)
+        speed.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
         half = 0.5 * float(run.drive.gap)
         twist.plot(run.t, run.theta, color=COLOURS[2], label="twist phi1 - phi2")
         for flank in (half, -half):
@@ -127,7 +129,7 @@ def _signed_peak(run: Run) -> float:
     return stage.peak_torque
 
 
-def comparison_figure(runs: Sequence[Run], title: str) -> Figure:
+def comparison_figure(runs: Sequence[Run], title: str) -> Any:
     """Shaft torque (above) and motor torque (below) of several starts, one row of panels each."""
     with drawing():
         figure, axes = new_figure(
@@ -154,7 +156,7 @@ def comparison_figure(runs: Sequence[Run], title: str) -> Figure:
     return figure
 
 
-def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> Figure:
+def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> Any:
     """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
     markers = "osD^vPX*"
     with drawing():

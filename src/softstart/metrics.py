@@ -1,10 +1,8 @@
-"""The figures by which starts are judged. Every K_dyn shown anywhere comes from `k_dyn`."""
+"""The figures by which starts are judged. Every K_dyn comes from `stages.dynamic_coefficient`."""
 
 from __future__ import annotations
 
 from typing import Any
-
-import numpy as np
 
 from softstart import stages
 from softstart.drive import Drive
@@ -25,5 +23,4 @@ def k_dyn(peak_torque: Any, drive: Drive) -> Any:
     >>> round(k_dyn(105.72, Drive.load("crane-4amtkf")), 3)
     2.0
     """
-    value = np.abs(peak_torque) / base_torque(drive)
-    return value if np.ndim(value) else float(value)
+    return stages.dynamic_coefficient(peak_torque, base_torque(drive))

@@ -22,7 +22,7 @@ from softstart.plant import record
 from softstart.status import Status
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 Vector = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Stage:
         return self.end - self.start
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """One start under one controller. All angles in rad at the motor shaft, SI units.
 
@@ -86,6 +86,19 @@ class Run:
     segments: at.Matrix
     event_rows: at.Matrix
     stage_rows: at.Matrix
+
+    def __repr__(self) -> str:
+        """One line that says what came out.
+
+        >>> from softstart import Drive, simulate
+        >>> simulate(Drive.load("crane-4amtkf"), "direct")
+        <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
+        """
+        name = self.controller.name or type(self.controller).__name__
+        time = (
+            f"start time {self.start_time:.4f} s" if self.start_time == self.start_time else self.status.value
+        )
+        return f"<Run: {name} on {self.drive.name}, K_dyn {self.k_dyn:.3f}, {time}>"
 
     # figures -------------------------------------------------------------------------------------------
 
@@ -181,7 +194,9 @@ class Run:
     def states_in(self, segment: NDArray[np.int64], times: Vector) -> dict[str, Vector]:
         """States at `times` by the motion of the given recorded spans: at a jump, the side one wants."""
         out = np.empty((times.size, record.N_OUT))
-        record.states_at(self.plant, self.segments, segment.ravel(), np.ascontiguousarray(times.ravel()), out)
+        flat = np.ascontiguousarray(times.ravel())
+        scratch = np.zeros(at.N_X), np.zeros(at.N_M)
+        record.states_at(self.plant, self.segments, segment.ravel(), flat, *scratch, out)
         names = ("phi1", "phi2", "w1", "w2", "u", "T", "theta", "v")
         return {name: out[:, i].reshape(times.shape) for i, name in enumerate(names)}
 
@@ -238,8 +253,8 @@ class Run:
     def settling_time(self, band: float = 0.1) -> float:
         """From when on the shaft torque stays settled, s; NaN if it does not within the run.
 
-        Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg = (u J2 + Mc J1)/(J1 + J2)
-        is the mean shaft torque under the motor torque of the instant.
+        Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
+        torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant.
         """
         from softstart.settling import settling_time  # imports scipy.optimize: only when asked
 
@@ -251,10 +266,10 @@ class Run:
         return energy_balance(self)
 
     def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
-        """Write t, phi1, phi2, w1, w2, u, T (one header line with units); at `times` or the plot's instants."""
+        """Write t, phi1, phi2, w1, w2, u, T under a header with units, at `times` or the plot's instants."""
         write_run(self, Path(path), times)
 
-    def plot(self) -> Figure:
+    def plot(self) -> Any:
         """Torques, speeds and twist over time, stages shaded."""
         return run_figure(self)
 

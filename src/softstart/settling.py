@@ -29,7 +29,7 @@ def settling_time(run: Run, band: float) -> float:
         return math.nan
     limit = band * float(metrics.base_torque(run.base))
 
-    def excess(times: float | np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def excess(times: float | np.ndarray) -> np.ndarray:
         state = run.at(times)
         return np.abs(state["T"] - stages.mean_shaft_torque(state["u"], drive.J1, drive.J2, drive.Mc)) - limit
 

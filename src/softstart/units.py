@@ -10,6 +10,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable
+from datetime import date, time
 from decimal import Decimal
 from numbers import Real
 from typing import Any
@@ -239,6 +240,10 @@ def show(value: object, *, toml: bool = False) -> str:
     """
     if isinstance(value, str):
         shown = json.dumps(value, ensure_ascii=False)
+    elif toml and isinstance(value, list | dict):
+        shown = json.dumps(value, ensure_ascii=False, default=str)
+    elif toml and isinstance(value, date | time):
+        shown = str(value)
     elif isinstance(value, bool | np.bool_):
         shown = str(bool(value)).lower() if toml else str(bool(value))
     elif isinstance(value, np.generic):

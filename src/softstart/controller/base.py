@@ -70,7 +70,7 @@ def parameter(unit: str, meaning: str, default: str = "") -> Any:
 
 
 @dataclass(frozen=True)
-class Controller(ABC):
+class Controller:
     """A strategy for the start. Subclass `PlainController` or `CompiledController`."""
 
     name: ClassVar[str] = ""
@@ -98,7 +98,7 @@ class Controller(ABC):
 
 
 @dataclass(frozen=True)
-class PlainController(Controller):
+class PlainController(Controller, ABC):
     """A controller in plain Python: needs no numba, is slower.
 
     >>> class Half(PlainController):
@@ -115,7 +115,7 @@ class PlainController(Controller):
 
 
 @dataclass(frozen=True)
-class CompiledController(Controller):
+class CompiledController(Controller, ABC):
     """A controller whose step is compiled: `kernel(parameters, measured, state, command)`.
 
     All four are float64 vectors: `parameters` is `vector(drive)`, `measured` holds the fields of
@@ -142,6 +142,11 @@ class PlainTwin(PlainController):
 
     twin: CompiledController
     numbers: tuple[float, ...]
+
+    @property
+    def sensors(self) -> Sensor:  # type: ignore[override]
+        """Those of the compiled controller."""
+        return self.twin.sensors
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         """The compiled controller's own lines, not compiled."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from softstart.plant.jit import compiled_as, inlined
 from softstart.plant.start import STEP_SIGNATURE
 
 # indices of `measured`
@@ -41,6 +41,7 @@ __all__ = [
     "TORQUE",
     "Vector",
     "compiled_step",
+    "inlined",
 ]
 
 
@@ -61,6 +62,5 @@ def compiled_step(function: Callable[..., None]) -> Any:
     [62.0, 0.001]
     """
     source = getattr(function, "__code__", None)
-    cache = source is not None and not source.co_filename.startswith("<")
-    decorate = njit(STEP_SIGNATURE, cache=cache, nogil=True, error_model="numpy", _nrt=False)
-    return decorate(function)
+    in_a_file = source is not None and not source.co_filename.startswith("<")
+    return compiled_as(STEP_SIGNATURE, cache=in_a_file)(function)

@@ -67,7 +67,8 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
         return name
     if not isinstance(name, str):
         raise InputError(
-            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, or a Controller object."
+            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, "
+            "or a Controller object."
         )
     cls = controller_class(name)
     known = {f.name: f for f in fields(cls)}

@@ -89,7 +89,9 @@ def in_contact(drive: _Drive) -> control.StateSpace:
     """The drive in contact: inputs `motor_torque`, `load_torque` (N m, braking); states `z`, `w1`, `w2`.
 
     Outputs are the states and `shaft_torque`. Holds while the flank presses (`shaft_torque > 0`; with
-    the `modelica` law also while the damping torque is below that of the spring). Raises `InputError` for a batch.
+    the `modelica` law also while the damping torque is below that of the spring).
+
+    Raises `InputError` for a batch.
 
     >>> from softstart.drive import Drive
     >>> in_contact(Drive.load("crane-4amtkf")).output_labels
@@ -117,18 +119,19 @@ def shaft_torque(theta: float, rate: float, c: float, d: float, gap: float, *, l
     """Torque in N m that the shaft passes to the load at the twist `theta` (rad) and its rate (rad/s).
 
     On the touching side, `z = |theta| - gap/2 > 0` and `z'` its rate: `no-pull` max(0, c z + d z'),
-    `dead-zone` c z + d z', `modelica` c z + min(c z, d z'); 0 while the gap is open.
+    `dead-zone` c z + d z', `modelica` 0 if c z + d z' <= 0, else c z + min(c z, d z') (ElastoBacklash of the
+    Modelica Standard Library); 0 while the gap is open.
 
     >>> [shaft_torque(1.0, -8.0, 4.0, 1.0, 0.5, law=law) for law in ("no-pull", "dead-zone", "modelica")]
-    [0.0, -5.0, -5.0]
+    [0.0, -5.0, 0.0]
     """
     z = abs(theta) - 0.5 * gap
     if z <= 0.0:
         return 0.0
     side = math.copysign(1.0, theta)
     spring, damper = c * z, d * side * rate
-    if law == "no-pull":
-        return side * max(0.0, spring + damper)
+    if law != "dead-zone" and spring + damper <= 0.0:
+        return 0.0
     return side * (spring + (min(spring, damper) if law == "modelica" else damper))
 
 

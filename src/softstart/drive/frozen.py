@@ -29,13 +29,13 @@ class FrozenModel(BaseModel):
         }
 
     @classmethod
-    def model_validate(cls, obj: Any, **_options: Any) -> Self:  # type: ignore[override]
+    def model_validate(cls, obj: Any, **_options: Any) -> Self:
         """The same as calling the class with the items of `obj`."""
         if isinstance(obj, cls):
             return obj
         if not isinstance(obj, Mapping):
             raise InputError(f"{show(obj)}: a table of parameters is needed to make a {cls.__name__}.")
-        return cls(**obj)
+        return cls(**{str(name): value for name, value in obj.items()})
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with changes, which are checked."""

@@ -94,9 +94,8 @@ class Drive(FrozenModel):
             values = _valid(given)
         else:
             values = dict(self)
-        if values.get("target_speed", values.get("rated_speed")) is None and not (
-            {"target_speed", "rated_speed"} & given.keys()
-        ):
+        named = given.keys() | {mistake.meant for mistake in mistakes}
+        if not {"target_speed", "rated_speed"} & named:
             mistakes = [*mistakes, Mistake(wording.missing("target_speed"), missing="target_speed")]
         sentences = [*told(mistakes), *cross_checks(values, wording)]
         if sentences:

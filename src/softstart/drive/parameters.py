@@ -54,7 +54,7 @@ class Parameter(NamedTuple):
 
 _TABLE = (
     Parameter("name", "", "name", "", "", "name of the drive", '"my drive"', default="unnamed drive"),
-    Parameter("source", "", "source", "", "", "where the numbers come from", '"data sheet"', default=""),
+    Parameter("source", "", "source", "", "", "source of the numbers", '"data sheet"', default=""),
     Parameter(
         "motor_inertia", "motor", "inertia", "J1", "kg*m^2", "inertia of the motor",
         '"0.035 kg*m^2"', "above 0", required=True,
@@ -87,7 +87,7 @@ _TABLE = (
     ),
     Parameter(
         "encoder_lines", "motor", "encoder_lines", "", "1",
-        "lines of the encoder, four counts each (0 is an ideal encoder)",
+        "number of encoder lines (four counts each; 0 for an ideal encoder)",
         "4096", "a whole number, 0 or more", default=4096.0,
     ),
     Parameter(

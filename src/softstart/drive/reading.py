@@ -72,7 +72,7 @@ def elastic_frequency(J1: Value, J2: Value, c: Value) -> Value:
     """`Omega = sqrt(c (J1 + J2)/(J1 J2))` in rad/s, [G](8), written so that small inertias do not underflow.
 
     >>> round(elastic_frequency(0.035, 0.175, 368.465), 6)
-    112.396998
+    112.397
     """
     with np.errstate(over="ignore"):
         Omega = np.sqrt(np.divide(c, J1) + np.divide(c, J2))

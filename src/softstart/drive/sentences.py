@@ -91,9 +91,10 @@ def flat_name_meant(name: str, given: Iterable[str]) -> tuple[str, ...]:
     """
     present = set(given)
     free = [p for p in PARAMETERS.values() if p.name not in present] or list(PARAMETERS.values())
-    same = tuple(p.name for p in free if name in (p.key, p.symbol, p.path))
-    if same:
-        return same
+    for among in (free, PARAMETERS.values()):
+        same = tuple(p.name for p in among if name in (p.key, p.symbol, p.path))
+        if same:
+            return same
     close = nearest(name, [p.name for p in free]) or nearest(name, [p.name for p in PARAMETERS.values()])
     return (close,) if close else ()
 

@@ -59,14 +59,16 @@ def _name_of(key: str) -> str | None:
 
 
 def _hint(key: str) -> str:
+    if key in TABLES:
+        first = next(path for path in _BY_PATH if path.startswith(key))
+        return f"; {key} is a table, name one of its keys, such as {first}"
     symbols = [p.path for p in PARAMETERS.values() if key in (p.key, p.symbol)]
     if symbols:
         return f"; did you mean {' or '.join(symbols)}?"
     meant = nearest(key, [*_BY_PATH, *PARAMETERS])
     if meant:
         return f"; did you mean {meant}?"
-    keys = ", ".join(_BY_PATH)
-    return f"; {key} is a table, name one of its keys" if key in TABLES else f"; there are {keys}"
+    return f"; there are {', '.join(_BY_PATH)}"
 
 
 def _unquoted(value: str) -> str:

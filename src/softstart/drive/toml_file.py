@@ -66,7 +66,10 @@ def _invalid(message: str, text: str, wording: Wording) -> str:
     remedy = (
         '; write text and quantities in quotes: gap = "0.5 rad"' if what.startswith(_NEEDS_QUOTES) else ""
     )
-    return wording.sentence(f"{where} ({wording.show(shown)})", f"this is not valid TOML ({what}){remedy}")
+    cut = shown if len(shown) <= 60 else f"{shown[:60]}..."
+    return wording.sentence(
+        f"{where}, {cut!r}" if shown else where, f"this is not valid TOML ({what}){remedy}"
+    )
 
 
 _NEEDS_QUOTES = ("invalid value", "expected newline or end of document")
@@ -142,7 +145,8 @@ class _Reader:
         where = f"[{table}]" if table else "a drive file"
         own = _KEYS[table] if table else _TOP
         by_symbol = {p.symbol: p for p in PARAMETERS.values() if p.symbol}
-        meant = own.get(nearest(key, own) or "") or by_symbol.get(key)
+        plain = key.removeprefix(f"{table}_")
+        meant = own.get(nearest(plain, own) or "") or by_symbol.get(key)
         if meant is None:
             everywhere = {p.key: p for p in PARAMETERS.values()}
             meant = everywhere.get(nearest(key, everywhere) or "")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from softstart.plant.crossing import RISING, first_crossing, load_speed
+from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     ASK,
     ASK_AT,
@@ -129,7 +128,7 @@ from softstart.plant.motion import derivatives, forcing_tail, motion
 from softstart.plant.span import begin_span, next_event, torque_course
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def keep_peak(x: Vector, torque: float, time: float) -> None:
     """Note a candidate for the largest |T| of the stage."""
     if abs(torque) > abs(x[STAGE_PEAK]):
@@ -137,7 +136,7 @@ def keep_peak(x: Vector, torque: float, time: float) -> None:
         x[STAGE_PEAK_TIME] = time
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
     """Locate the extremes of T within the span that ends at s; nothing is read off a grid."""
     side = x[SIDE]
@@ -184,7 +183,7 @@ def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
     return ASK
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def move(p: Vector, x: Vector, m: Vector, load: Septuple, s: float) -> None:
     """Bring the state to the end of the span."""
     tail = 1.0 - math.exp(-m[LAMBDA] * s) if m[UE] != 0.0 else 0.0
@@ -217,7 +216,7 @@ def move(p: Vector, x: Vector, m: Vector, load: Septuple, s: float) -> None:
     x[TIME] += s
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def note_event(x: Vector, events: Vector, kind: float, value: float) -> None:
     """One event of the start; `events` may have no rows, then it is only counted."""
     x[EVENTS] += 1.0
@@ -229,7 +228,7 @@ def note_event(x: Vector, events: Vector, kind: float, value: float) -> None:
         x[N_EVENTS] += 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def end_stage(x: Vector, stages: Vector) -> None:
     """Close the books of the stage that ends now."""
     if abs(x[STAGE_PEAK]) > abs(x[PEAK]):
@@ -253,7 +252,7 @@ def end_stage(x: Vector, stages: Vector) -> None:
     x[STAGE_PEAK_TIME] = x[TIME]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def close_gap(p: Vector, x: Vector, side: float, events: Vector, stages: Vector) -> None:
     """The flank `side` comes into contact."""
     end_stage(x, stages)
@@ -269,7 +268,7 @@ def close_gap(p: Vector, x: Vector, side: float, events: Vector, stages: Vector)
     engage(p, x, events)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def engage(p: Vector, x: Vector, events: Vector) -> None:
     """Damping regime and, since damping makes the torque jump, breakaway at the start of a contact."""
     side = x[SIDE]
@@ -282,7 +281,7 @@ def engage(p: Vector, x: Vector, events: Vector) -> None:
         note_event(x, events, LOAD_STARTS, x[LOAD])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def handle(p: Vector, x: Vector, m: Vector, event: int, events: Vector, stages: Vector) -> bool:
     """Change of mode at an event; True if the gap closed or opened."""
     half = 0.5 * p[GAP]
@@ -343,7 +342,7 @@ def handle(p: Vector, x: Vector, m: Vector, event: int, events: Vector, stages: 
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def shaft_torque(p: Vector, x: Vector) -> float:
     """T of the present state."""
     side = x[SIDE]
@@ -355,7 +354,7 @@ def shaft_torque(p: Vector, x: Vector) -> float:
     return side * (p[C] * z + p[D] * side * x[V])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def note_segment(x: Vector, m: Vector, s: float, segments: Vector) -> None:
     """Record what is needed to evaluate any instant of this span exactly."""
     row = segments[int(x[N_SEGMENTS])]
@@ -376,7 +375,7 @@ def note_segment(x: Vector, m: Vector, s: float, segments: Vector) -> None:
     x[N_SEGMENTS] += 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, stages: Vector) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way.
 

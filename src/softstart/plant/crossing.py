@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from softstart.plant.jit import compiled
 from softstart.plant.layout import (
     DD,
     FA,
@@ -47,7 +46,7 @@ ROUNDING = 4.0 * 2.220446049250313e-16
 MAX_STEPS = 20_000
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def bounds(m: Vector, s: float, end: float, z: float, v: float, tail: float) -> Quintuple:
     """Upper bounds of |z'| to |z'''''| on [s, end]."""
     tail = abs(tail)
@@ -72,7 +71,7 @@ def bounds(m: Vector, s: float, end: float, z: float, v: float, tail: float) -> 
     return radius + abs(m[P1]), y2, y3, y4, y5
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def load_speed(m: Vector, load: Septuple, s: float, v: float) -> float:
     """w2 at s from the total momentum; load = (w2_0, a, b, e, ratio, factor, offset), see `advance`."""
     w2 = load[0] + s * (load[1] + 0.5 * s * load[2]) - load[4] * (v - m[V0])
@@ -81,7 +80,7 @@ def load_speed(m: Vector, load: Septuple, s: float, v: float) -> float:
     return w2
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def first_crossing(
     m: Vector, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
     load: Septuple, start: int, begin: float, end: float,

@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import (
     BRANCH,
     DD,
@@ -46,7 +45,7 @@ from softstart.plant.layout import (
 NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def prepare(
     m: Vector, z0: float, v0: float, k: float, dd: float, w0sq: float, w0: float, inverse_w0sq: float,
     zeta: float, a: float, b: float, e: float, rate: float,
@@ -99,7 +98,7 @@ def prepare(
         m[BRANCH] = REAL_ROOTS if -q > 1e-4 * w0sq else NEAR_TRIPLE
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def decaying_pair(zeta: float, q: float, root_q: float, s: float) -> Pair:
     """exp(-zeta s) cos(sqrt(q) s) and exp(-zeta s) sin(sqrt(q) s)/sqrt(q), smooth through q = 0."""
     x = q * s * s
@@ -119,7 +118,7 @@ def decaying_pair(zeta: float, q: float, root_q: float, s: float) -> Pair:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def exponential_response(m: Vector, s: float) -> Pair:
     """Z and z' from rest under E exp(-lambda s) alone, where lambda meets a decay rate of the spring."""
     e = m[FE]
@@ -161,7 +160,7 @@ def exponential_response(m: Vector, s: float) -> Pair:
     return e * tail * total, e * tail * (total_rate - rate * total)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def motion(m: Vector, s: float) -> Pair:
     """Z and z' at s."""
     if m[FREE] != 0.0:
@@ -195,7 +194,7 @@ def motion(m: Vector, s: float) -> Pair:
     return z, v
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def forcing_tail(m: Vector, s: float) -> float:
     """E exp(-lambda s), what is left of the torque lag."""
     if m[FE] == 0.0 or s == 0.0:
@@ -203,7 +202,7 @@ def forcing_tail(m: Vector, s: float) -> float:
     return m[FE] * math.exp(-m[LAMBDA] * s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def derivatives(m: Vector, s: float, z: float, v: float, tail: float) -> Triple:
     """z'', z''' and z'''' at s, from the equation of motion."""
     a = m[FA] + m[FB] * s + tail - 2.0 * m[ZETA] * v - m[W0SQ] * z

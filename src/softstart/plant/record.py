@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from softstart.plant.advance import move, shaft_torque
+from softstart.plant.jit import compiled
 from softstart.plant.layout import (
     DEMAND,
     DOUBLED,
     LOAD,
-    N_M,
-    N_X,
     PHI2,
     S_DD,
     S_END,
@@ -47,11 +46,11 @@ PHI1_OUT, PHI2_OUT, W1_OUT, W2_OUT, U_OUT, T_OUT, THETA_OUT, V_OUT = range(8)
 N_OUT = 8
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def states_at(p: Vector, segments: Matrix, index: np.ndarray, times: Vector, out: Matrix) -> None:  # type: ignore[type-arg]
-    """Row i of out is the state at times[i], which lies in the span segments[index[i]]."""
-    x = np.zeros(N_X)
-    m = np.zeros(N_M)
+@compiled
+def states_at(
+    p: Vector, segments: Matrix, index: NDArray[np.int64], times: Vector, x: Vector, m: Vector, out: Matrix
+) -> None:
+    """Row i of out is the state at times[i], which lies in the span segments[index[i]]; x, m are scratch."""
     for i in range(times.shape[0]):
         row = segments[index[i]]
         s = times[i] - row[S_START]

@@ -1,7 +1,7 @@
 """One span: the motion between two instants, and the event that ends it.
 
-`torque_course` and `begin_span` turn the state into the coefficients of the motion; `next_event` finds the earliest
-event within the horizon. Every event that has just fired is masked, so that a start on the
+`torque_course` and `begin_span` turn the state into the coefficients of the motion; `next_event` finds the
+earliest event within the horizon. Every event that has just fired is masked, so that a start on the
 switching surface does not fire it for ever.
 """
 
@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from softstart.plant.crossing import RISING, WATCH, first_crossing
+from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK,
     BEYOND,
@@ -90,7 +89,7 @@ from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 GRAZE = 1e-12
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def torque_course(p: Vector, x: Vector, m: Vector) -> None:
     """The motor torque of the span: u(s) = ua + ub s + ue exp(-s/lag), after slew limiter and lag."""
     demand = x[DEMAND]
@@ -115,7 +114,7 @@ def torque_course(p: Vector, x: Vector, m: Vector) -> None:
     m[UE] = ue
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def begin_span(p: Vector, x: Vector, m: Vector) -> Septuple:
     """Coefficients of the motion from the state x on; returns those of the load speed."""
     ua = m[UA]
@@ -163,7 +162,7 @@ def begin_span(p: Vector, x: Vector, m: Vector) -> Septuple:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def time_to_flank(distance: float, v: float, a: float, just_left: bool, tolerance: float) -> float:
     """First s > 0 with v s + a s^2/2 = distance >= 0, inf without one; no cancellation, no 0/0."""
     if distance <= 0.0:
@@ -179,7 +178,7 @@ def time_to_flank(distance: float, v: float, a: float, just_left: bool, toleranc
     return (root - v) / a if a > 0.0 else math.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def flank_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
     """The flank that is reached first while the gap is open."""
     half = 0.5 * p[GAP]
@@ -227,7 +226,7 @@ def flank_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float)
     return (LOWER if lower else UPPER), s
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
     """[G](15): y = rho cos(w0 s - alpha) falls back to -p0 at w0 s = alpha + acos(-p0/rho)."""
     w0 = m[W0]
@@ -255,7 +254,7 @@ def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
     return EXIT, s
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def exit_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
     """The instant at which the flanks part (or the damping regime of `modelica` changes)."""
     modelica = p[LAW] == MODELICA and p[D] > 0.0
@@ -282,7 +281,7 @@ def exit_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) 
     return (EXIT, s) if s >= 0.0 else (NO_EVENT, horizon)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def load_event_open(p: Vector, x: Vector, load: Septuple) -> tuple[int, float]:
     """Stop of the load or target speed while the gap is open: the load speed is linear then."""
     slope = load[6]
@@ -297,7 +296,7 @@ def load_event_open(p: Vector, x: Vector, load: Septuple) -> tuple[int, float]:
     return NO_EVENT, math.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
     """Breakaway, stop or target speed of the load while the gap is closed."""
     event = NO_EVENT
@@ -335,7 +334,7 @@ def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon:
     return (event, end) if s >= -1.0 else (UNSOLVED, 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@inlined
 def next_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
     """The event that ends this span and when, at most `horizon` from now."""
     if x[SIDE] == 0.0:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from softstart.plant.advance import advance, engage, shaft_torque
+from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
     ASK,
     ASK_AT,
@@ -66,7 +67,7 @@ _STEP = types.FunctionType(STEP_SIGNATURE)
 _M = types.Array(types.float64, 2, "C")
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def begin(p: Vector, x: Vector, until: float, events: Vector) -> None:
     """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
     for i in range(x.shape[0]):
@@ -99,7 +100,7 @@ def begin(p: Vector, x: Vector, until: float, events: Vector) -> None:
             engage(p, x, events)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
     """What the controller sees now: the encoder rounds, and what it has not declared is NaN."""
     t = x[TIME]
@@ -121,7 +122,7 @@ def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
     measured[M_LOAD_SPEED] = x[W2] if sees & SEES_LOAD_SPEED else math.nan
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
     """Take the controller's answer; False if it is none: not a number, or a past instant."""
     if math.isnan(torque) or not ask_again > x[TIME]:
@@ -134,7 +135,7 @@ def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@compiled
 def _run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages):  # type: ignore[no-untyped-def]
     while True:
         reason = advance(p, x, m, segments, events, stages)
@@ -150,22 +151,16 @@ def _run(step, p, parameters, sees, x, m, measured, state, command, segments, ev
             state[i] = command[2 + i]
 
 
-@njit(
-    types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M),
-    cache=True, nogil=True, error_model="numpy", _nrt=False,
-)  # fmt: skip
+@compiled_as(types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M))
 def run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages):  # type: ignore[no-untyped-def]
     """One start to its end, or until a buffer is full: call again with larger ones."""
     return _run(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages)
 
 
-@njit(
-    types.void(_STEP, _M, _M, types.int64, types.boolean, _A, _M, _A, _A, _A, _A, _A, _A, _A, _M),
-    cache=True, nogil=True, error_model="numpy", _nrt=False,
-)  # fmt: skip
-def run_many(
+@compiled_as(types.void(_STEP, _M, _M, types.int64, types.boolean, _A, _M, _A, _A, _A, _A, _A, _A, _A, _M))
+def run_many(  # type: ignore[no-untyped-def]
     step, p, parameters, sees, on_gap, until, results, x, m, measured, state, command, drive, own, nothing
-):  # type: ignore[no-untyped-def]
+):
     """Start i has row i of p, parameters and until (one row serves all); its x goes to results[i].
 
     The arrays from x on are scratch: the kernel itself allocates nothing.

@@ -35,7 +35,7 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     # a reactive load without torque never sticks: it is the same as an active one
     p[:, at.REACTIVE] = (Mc > 0.0) if drive.load_kind == "reactive" else 0.0
     p[:, at.LAW] = LAWS[drive.contact_law]
-    p[:, at.LAG], p[:, at.RATE] = column(drive.torque_lag), column(drive.torque_rate)
+    p[:, at.RATE] = column(drive.torque_rate)
     p[:, at.U_MIN], p[:, at.U_MAX] = column(drive.minimum_torque), column(drive.maximum_torque)
     p[:, at.TARGET] = target
     lines = column(drive.encoder_lines)
@@ -46,6 +46,9 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     p[:, at.W2_0] = column(drive.initial_load_speed)
     w0sq = c * (1.0 / J1 + 1.0 / J2)
     p[:, at.PERIOD] = 2.0 * math.pi / np.sqrt(w0sq)
+    # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
+    lag = column(drive.torque_lag)
+    p[:, at.LAG] = np.where(lag > 1e-12 * p[:, at.PERIOD], lag, 0.0)
     stiff = (J1 + J2) * (target + np.abs(p[:, at.W2_0]) + np.abs(p[:, at.W1_0])) / (Ms - Mc)
     p[:, at.TIME_LIMIT] = 100.0 * (stiff + p[:, at.PERIOD]) if time_limit is None else time_limit
     p[:, at.EVENT_CAP] = max_events

@@ -1,0 +1,272 @@
+"""[G]: reduced torque until the motor's acceleration drops, and for a delay after that."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from softstart import stages
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import (
+    ASK_AGAIN,
+    MOTOR_ANGLE,
+    MOTOR_SPEED,
+    MOTOR_TORQUE,
+    STATE,
+    TIME,
+    TORQUE,
+    Vector,
+)
+from softstart.drive import Drive
+from softstart_controllers.reduced import reduced_torque
+from softstart_controllers.sampled import (
+    PATIENCE_DEFAULT,
+    PERIOD_DEFAULT,
+    check,
+    encoder_count,
+    mean_torque,
+    number,
+    patience,
+    sample_period,
+)
+
+LONGEST_WINDOW = 30  # samples kept of half a window
+RING = 2 * LONGEST_WINDOW + 1
+SHORTEST_WINDOW = 2
+DROP = 0.3
+SMALLEST_DROP = 0.05
+ROUNDING_SHARE = 1.0 / 3.0  # of the drop, that the encoder's rounding may feign at the worst
+BISECTIONS = 40
+
+# indices of the parameter vector
+P_TORQUE, P_FULL, P_PERIOD, P_J1, P_HALF, P_STRIDE, P_DROP, P_WAIT, P_PATIENCE = range(9)
+# indices of the state; the ring of the last differences follows
+S_SAMPLE, S_FREE_ANGLE, S_FREE_SPEED, S_DEMAND, S_TORQUE, S_RAISE_AT, S_RING = range(7)
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """The angle lost against a free motor, its second difference, and the wait after contact."""
+    period = parameters[P_PERIOD]
+    sample = int(state[S_SAMPLE])
+    t = measured[TIME]
+    u = measured[MOTOR_TORQUE]
+    raise_at = state[S_RAISE_AT]
+    for i in range(RING):
+        command[STATE + S_RING + i] = state[S_RING + i]
+    if sample == 0:
+        angle = measured[MOTOR_ANGLE]
+        speed = measured[MOTOR_SPEED]
+        raise_at = math.inf
+    else:
+        a = mean_torque(state[S_TORQUE], u, state[S_DEMAND]) / parameters[P_J1]
+        angle = state[S_FREE_ANGLE] + period * (state[S_FREE_SPEED] + 0.5 * period * a)
+        speed = state[S_FREE_SPEED] + period * a
+        stride = int(parameters[P_STRIDE])
+        if sample % stride == 0:
+            half = int(parameters[P_HALF])
+            kept = sample // stride
+            lost = angle - measured[MOTOR_ANGLE]
+            # the slots not yet written are zero: before the start nothing was lost
+            middle = state[S_RING + (kept + RING - half) % RING]
+            oldest = state[S_RING + (kept + RING - 2 * half) % RING]
+            command[STATE + S_RING + kept % RING] = lost
+            if raise_at == math.inf and lost - 2.0 * middle + oldest > parameters[P_DROP]:
+                raise_at = t + parameters[P_WAIT]
+        if raise_at == math.inf and t >= parameters[P_PATIENCE]:
+            raise_at = t
+    waiting = t + 0.5 * period < raise_at
+    demand = parameters[P_TORQUE] if waiting else parameters[P_FULL]
+    command[TORQUE] = demand
+    command[ASK_AGAIN] = (sample + 1) * period if waiting else math.inf
+    command[STATE + S_SAMPLE] = sample + 1
+    command[STATE + S_FREE_ANGLE] = angle
+    command[STATE + S_FREE_SPEED] = speed
+    command[STATE + S_DEMAND] = demand
+    command[STATE + S_TORQUE] = u
+    command[STATE + S_RAISE_AT] = raise_at
+
+
+@dataclass(frozen=True)
+class AccelerationDelay(CompiledController):
+    """Torque reduced until the acceleration of the motor drops, then for a delay, then Ms.
+
+    *Contact.* The encoder angle phi(t) gives the acceleration over a window of length 2 W,
+
+        a(t) = (phi(t) - 2 phi(t - W) + phi(t - 2 W))/W^2
+
+    and the same difference of the angle which a free motor would have had under the torque realised so far,
+    int int u/J1, gives the acceleration a0(t) to be expected with the gap open. Contact is seen when
+    a < a0 - drop torque/J1, that is when the shaft has taken the share `drop` of the torque, on the
+    mean over the window. As a0 follows the realised torque, a lag that lets the acceleration rise first, a
+    window not yet filled, and a motor already turning change nothing.
+
+    *Window.* The encoder rounds each angle by at most half a count q, so a is wrong by at most
+    2 q/W^2. W is the smallest number of periods, at least 2, for which that is below a third of the drop,
+    W^2 >= 6 q J1/(drop torque); so rounding alone never looks like a contact. Up to 30 periods each sample is
+    used, with longer windows every second, third, ... one, so that 61 angles are always enough to keep.
+
+    *Delay.* From contact the torque stays reduced for `delay`, by default the length of stage 2, [G](15), from
+    the nominal drive. What passes between contact and its being seen is known: `latency` is the time after
+    which the shaft torque of [G](11) alone brings the window to the threshold, and half a period for
+    the sampling (half of each second, third, ... with a long window). Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
+    at the nearest sample. Damping is left out of both, as in [G].
+
+    Contact that is not seen within `patience` (a load that shares next to nothing of the torque, an encoder too
+    coarse) is waited for no longer: the torque is raised then.
+
+    At the end of stage 2 the gap opens again, with the masses parting at the speed they met with. The torque
+    raised there, as [G] proposes, drives them into the second contact about as hard as method 1 does
+    into the first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`), the whole start is
+    not (`run.k_dyn`). Another `delay` may serve better.
+
+    Source: [G], conclusions; stages by [G](10), (11), (15).
+
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), AccelerationDelay())
+    >>> run.k_dyn_first_contact < 1.3, run.k_dyn > 2
+    (True, True)
+    """
+
+    name: ClassVar[str] = "acceleration-delay"
+    summary: ClassVar[str] = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
+    source: ClassVar[str] = "[G]"
+    kernel: ClassVar[Any] = step
+    state_size: ClassVar[int] = S_RING + RING
+
+    torque: float | None = parameter(
+        "N*m", "reduced torque", "load torque plus 15 % of the accelerating torque"
+    )
+    full_torque: float | None = parameter("N*m", "torque after the delay", "starting torque Ms")
+    delay: float | None = parameter(
+        "s", "how long the torque stays reduced after contact", "length of stage 2, [G](15)"
+    )
+    drop: float | None = parameter(
+        "1",
+        "drop of the acceleration that means contact, as a share of torque/J1",
+        "0.3, or half the share that a closed drive takes on the mean where that is less, at least 0.05",
+    )
+    latency: float | None = parameter(
+        "s", "time from contact until it is seen", "from the window and the shaft torque of [G](11)"
+    )
+    patience: float | None = parameter("s", "longest wait for contact", PATIENCE_DEFAULT)
+    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            above_zero=("torque", "drop", "period"),
+            not_negative=("full_torque", "delay", "latency", "patience"),
+        )
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """Torque, drop, delay, latency and patience from the nominal drive."""
+        torque = reduced_torque(drive) if self.torque is None else self.torque
+        period = sample_period(drive) if self.period is None else self.period
+        drop = _drop(drive, torque) if self.drop is None else self.drop
+        return {
+            "torque": number(torque),
+            "full_torque": drive.Ms,
+            "delay": number(stage_2_duration(drive, torque)),
+            "drop": number(drop),
+            "latency": number(detection_latency(drive, torque, drop, period)),
+            "patience": patience(drive),
+            "period": period,
+        }
+
+    def vector(self, drive: Drive) -> Vector:
+        """(torque, full torque, period, J1, kept samples in W, stride, threshold, wait, patience)."""
+        half, stride, threshold = window(drive, self.torque, self.drop, self.period)
+        wait = np.maximum(np.asarray(self.delay) - np.asarray(self.latency), 0.0)
+        return stack(
+            drive, self.torque, self.full_torque, self.period, drive.J1, half, stride, threshold, wait,
+            self.patience,
+        )  # fmt: skip
+
+
+def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[Any, Any, Any]:
+    """Kept samples in half a window, stride between them in periods, threshold of the second difference in rad.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> half, stride, threshold = window(crane, 15.386, 0.3, 0.001)
+    >>> int(half), int(stride), round(float(threshold) / encoder_count(crane), 1)
+    (5, 1, 8.6)
+    """
+    rounding = 2.0 * np.asarray(encoder_count(drive))
+    a = np.asarray(drop) * torque / drive.J1
+    samples = np.maximum(np.ceil(np.sqrt(rounding / (ROUNDING_SHARE * a)) / period), SHORTEST_WINDOW)
+    stride = np.ceil(samples / LONGEST_WINDOW)
+    half = np.ceil(samples / stride)
+    return half, stride, a * (half * stride * period) ** 2
+
+
+def closing_speed(drive: Drive, torque: Any) -> Any:
+    """Speed in rad/s at which the driving flanks first meet, [G](10), from any start position and speeds.
+
+    >>> round(closing_speed(Drive.load("crane-4amtkf"), 62), 3)
+    30.103
+    """
+    rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
+    a = np.asarray(torque) / drive.J1 + rolling * drive.Mc / drive.J2
+    way = np.maximum(0.5 * np.asarray(drive.gap) - drive.start_position, 0.0)
+    v = np.asarray(drive.initial_motor_speed) - drive.initial_load_speed
+    return number(np.sqrt(np.maximum(v * v + 2.0 * a * way, 0.0)))
+
+
+def stage_2_duration(drive: Drive, torque: Any) -> Any:
+    """Length of stage 2 in s under the reduced torque: [G](15), for a stuck reactive load the exact one.
+
+    Where friction keeps the gap of a reactive load closed for good, [G](15) is taken all the same.
+
+    >>> round(stage_2_duration(Drive.load("crane-4amtkf"), 15.5), 4)
+    0.0327
+    """
+    dw12 = closing_speed(drive, torque)
+    mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
+    duration = np.asarray(stages.contact_stage_duration(mean, dw12, drive.c, drive.Omega))
+    if drive.load_kind == "reactive":
+        stuck = stages.reactive_contact_stage_duration(
+            torque, drive.Mc, dw12, J1=drive.J1, J2=drive.J2, c=drive.c
+        )
+        resting = np.asarray(drive.initial_load_speed) == 0.0
+        duration = np.where(resting & np.isfinite(stuck), stuck, duration)
+    return duration
+
+
+def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
+    """Time in s from contact until the window is at its threshold, at most the length of stage 2.
+
+    The angle lost to the shaft is l(s) = int int T/J1 with T of [G](11), so
+    l(s) = (mean (s^2/2 - (1 - cos Omega s)/Omega^2) + (c dw12/Omega^2)(s - sin(Omega s)/Omega))/J1; solved for
+    l(s) - 2 l(s - W) + l(s - 2 W) = threshold by bisection, plus half the time between two looks.
+
+    >>> round(detection_latency(Drive.load("crane-4amtkf"), 15.386, 0.3, 0.001), 4)
+    0.0054
+    """
+    half, stride, threshold = window(drive, torque, drop, period)
+    dw12, Omega = closing_speed(drive, torque), drive.Omega
+    mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
+
+    def lost(s: Any) -> Any:
+        s = np.maximum(s, 0.0)
+        angle = Omega * s
+        swing = mean * (0.5 * angle**2 - 2.0 * np.sin(0.5 * angle) ** 2)
+        return (swing + drive.c * dw12 / Omega * (angle - np.sin(angle))) / (drive.J1 * Omega**2)
+
+    low = np.zeros(np.broadcast_shapes(np.shape(threshold), drive.shape))
+    high = low + stages.contact_stage_duration(mean, dw12, drive.c, Omega)
+    back = half * stride * np.asarray(period)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        seen = lost(middle) - 2.0 * lost(middle - back) + lost(middle - 2.0 * back) > threshold
+        low, high = np.where(seen, low, middle), np.where(seen, middle, high)
+    return number(high + 0.5 * stride * np.asarray(period))
+
+
+def _drop(drive: Drive, torque: Any) -> Any:
+    """Half of M12avg/M1 in contact, within 0.05 and 0.3."""
+    mean = np.asarray(stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))
+    return np.clip(0.5 * mean / torque, SMALLEST_DROP, DROP)

@@ -1,0 +1,282 @@
+"""[G]: current limit with a flexible feedback of the estimated shaft torque."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import (
+    ASK_AGAIN,
+    MOTOR_ANGLE,
+    MOTOR_SPEED,
+    MOTOR_TORQUE,
+    STATE,
+    TIME,
+    TORQUE,
+    Vector,
+)
+from softstart.drive import Drive
+from softstart.metrics import base_torque
+from softstart_controllers.reduced import reduced_torque
+from softstart_controllers.sampled import (
+    PATIENCE_DEFAULT,
+    PERIOD_DEFAULT,
+    check,
+    mean_torque,
+    number,
+    patience,
+    pulling_load,
+    sample_period,
+)
+from softstart_controllers.shaft_observer import Observer, observer, predict
+
+DAMPING_RATIO = 0.7
+PHASE_LEFT = math.pi / 6  # phase margin that the delays must leave
+UNCERTAINTY = 0.05
+RIPPLE = 0.2  # standard deviation of kd T', of Ms, that a coarse encoder may cause
+THRESHOLD = 0.1  # of M12avg_base
+LOW_SHARE = 0.5  # of the shaft torque under the low limit: what the threshold may be at most
+CERTAINTY = 5.0  # standard deviations of the estimate
+REFINEMENTS = 4
+OPEN_AGAIN = 0.3  # of the threshold
+
+# indices of the parameter vector
+(
+    P_PERIOD, P_J1, P_LOW, P_FULL, P_FEEDBACK, P_CLOSED, P_OPEN, P_RISE, P_APPROACH, P_HORIZON, P_LOAD_SPEED,
+    P_DRIFT, P_PATIENCE, P_C, P_MOTOR_BEND, P_LOAD_BEND, P_DAMPING_BEND, P_MC,
+    P_K_ANGLE, P_K_SPEED, P_K_TORQUE, P_K_RATE,
+) = range(22)  # fmt: skip
+# indices of the state
+(
+    S_SAMPLE, S_ANGLE, S_SPEED, S_TORQUE, S_RATE, S_DEMAND, S_MOTOR_TORQUE, S_PHASE, S_PROGRESS,
+    S_LOAD_SPEED, N_STATE,
+) = range(11)  # fmt: skip
+# values of S_PHASE
+GAP_OPEN, CLOSED, OPEN_AGAIN_PHASE, IMPATIENT = 0.0, 1.0, 2.0, 3.0
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Estimate T and T', tell whether the gap is closed, set the torque."""
+    p = parameters
+    h = p[P_PERIOD]
+    t = measured[TIME]
+    u = measured[MOTOR_TORQUE]
+    sample = state[S_SAMPLE]
+    phase = state[S_PHASE]
+    progress = state[S_PROGRESS]
+    load_speed = state[S_LOAD_SPEED]
+    if sample == 0.0:
+        angle = measured[MOTOR_ANGLE]
+        speed = measured[MOTOR_SPEED]
+        torque = 0.0
+        rate = 0.0
+        load_speed = p[P_LOAD_SPEED]
+    else:
+        mean = mean_torque(state[S_MOTOR_TORQUE], u, state[S_DEMAND])
+        torque = state[S_TORQUE]
+        rate = state[S_RATE]
+        bend = 0.0
+        if phase == CLOSED:
+            middle = torque + 0.5 * h * rate
+            bend = p[P_MOTOR_BEND] * (mean - middle) - p[P_LOAD_BEND] * (middle - p[P_MC])
+            bend -= p[P_DAMPING_BEND] * rate
+        angle, speed, torque, rate = predict(
+            state[S_ANGLE], state[S_SPEED], torque, rate, bend, mean, p[P_J1], h
+        )
+        error = measured[MOTOR_ANGLE] - angle
+        angle += p[P_K_ANGLE] * error
+        speed += p[P_K_SPEED] * error
+        torque += p[P_K_TORQUE] * error
+        rate += p[P_K_RATE] * error
+
+    if phase == CLOSED:
+        if torque < p[P_OPEN]:
+            phase = OPEN_AGAIN_PHASE
+            load_speed = speed - rate / p[P_C]
+    elif torque > p[P_CLOSED] and phase != IMPATIENT:
+        phase = CLOSED
+    if t >= p[P_PATIENCE]:
+        phase = IMPATIENT
+
+    limit = p[P_LOW] + (p[P_FULL] - p[P_LOW]) * progress
+    if phase == CLOSED:
+        demand = min(max(limit - p[P_FEEDBACK] * rate, 0.0), p[P_FULL])
+        progress = min(1.0, progress + p[P_RISE])
+    elif phase == IMPATIENT:
+        demand = limit
+        progress = min(1.0, progress + p[P_RISE])
+    else:
+        allowed = load_speed + p[P_APPROACH]
+        if phase == GAP_OPEN:  # never less than half: a contact not seen must not let the load run back
+            allowed -= min(p[P_DRIFT] * t, 0.5 * p[P_APPROACH])
+        demand = min(max(p[P_J1] * (allowed - speed) / p[P_HORIZON], 0.0), p[P_LOW])
+
+    command[TORQUE] = demand
+    command[ASK_AGAIN] = (sample + 1.0) * h
+    command[STATE + S_SAMPLE] = sample + 1.0
+    command[STATE + S_ANGLE] = angle
+    command[STATE + S_SPEED] = speed
+    command[STATE + S_TORQUE] = torque
+    command[STATE + S_RATE] = rate
+    command[STATE + S_DEMAND] = demand
+    command[STATE + S_MOTOR_TORQUE] = u
+    command[STATE + S_PHASE] = phase
+    command[STATE + S_PROGRESS] = progress
+    command[STATE + S_LOAD_SPEED] = load_speed
+
+
+@dataclass(frozen=True)
+class CurrentLimitFeedback(CompiledController):
+    """Torque limit with a derivative ("flexible") feedback of the estimated shaft torque.
+
+    It measures the motor angle (encoder) and the motor torque. The gap is nowhere among its numbers.
+
+    *Observer.* Every `period` the estimates of phi1, w1, T and T' go on by J1 w1' = u - T under the torque
+    realised, with T'' = 0 while the gap is open and, while it is closed,
+
+        T'' = (c/J1)(u - T) - (c/J2)(T - Mc) - (d Omega^2/c) T'
+
+    and are corrected by the encoder with Kalman gains from `control.dlqe` (`shaft_observer`), designed for an
+    unknown part `uncertainty` Omega^2 Ms of T'' and for the rounding of the encoder. The gap counts
+    as closed from T > `threshold` on, and as open again from T < 0.3 `threshold`. The threshold is 0.1
+    M12avg_base, or half of what the shaft carries under the low limit where that is less. A coarse encoder makes
+    the observer slower: the uncertainty is lowered until 5 standard deviations of T are below the threshold
+    and those of kd T' below 0.2 Ms.
+
+    *Gap open.* The limit is low. It accelerates the motor until it is `approach_speed` faster than the load, whose
+    speed is known (at the start w2(0) - Mc t/J2 under an active load, counted to half of the approach speed at
+    most; after a contact the estimate w1 - T'/c at its end), and keeps that speed:
+    u = clip(J1 (allowed - w1)/(2 (period + lag)), 0, low_torque). With
+    approach_speed = Omega M12avg_base/c, the impact alone swings the shaft to M12avg_base, [G](12), so to K_dyn = 1,
+    which the full torque will need anyway, from however wide a gap.
+
+    *Gap closed.* The limit rises from `low_torque` to `full_torque` in the time `rise`, and
+
+        u = clip(limit - kd T', 0, full_torque),     kd = 2 damping_ratio J1 Omega/c
+
+    With [G](7): T'' + (kd c/J1) T' + Omega^2 T = c (limit/J1 + Mc/J2), so kd gives the shaft the damping ratio
+    asked for on top of its own. A delay tau in the loop (torque lag, half a period, and the observer's lag as far
+    as its model may miss the load, J1/(J1 + J2)) turns damping into its opposite: the loop gain is one at
+    Omega (zeta + sqrt(zeta^2 + 1)), and a phase margin of 30 degrees is kept there by
+    zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). A drive whose torque lags too far behind its elastic
+    frequency (m <= 1) gets no feedback, but the soft approach and the rise all the same.
+
+    If the load is not at its target speed within `patience`, the feedback is dropped and the limit raised,
+    so that an estimate gone wrong does not hold up the start for ever.
+
+    Source: [G], conclusions ("regulators acting on the current-limit level or as a flexible feedback").
+
+    >>> from softstart import Drive, simulate
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> [round(simulate(crane.replace(gap=gap), CurrentLimitFeedback()).k_dyn, 1) for gap in (0.5, 2)]
+    [1.0, 1.1]
+    """
+
+    name: ClassVar[str] = "current-limit-feedback"
+    summary: ClassVar[str] = "low limit while the gap is open, then a limit with feedback of the estimated dT/dt"
+    source: ClassVar[str] = "[G]"
+    kernel: ClassVar[Any] = step
+    state_size: ClassVar[int] = N_STATE
+
+    low_torque: float | None = parameter(
+        "N*m", "torque limit while the gap is open", "load torque plus 15 % of the accelerating torque"
+    )
+    approach_speed: float | None = parameter(
+        "rad/s", "speed at which the gap is closed", "Omega M12avg_base/c: the impact alone makes K_dyn = 1"
+    )
+    full_torque: float | None = parameter("N*m", "torque limit after the rise", "starting torque Ms")
+    rise: float | None = parameter("s", "time in which the limit rises after contact", "one elastic period")
+    damping_ratio: float | None = parameter(
+        "1", "damping ratio added by the feedback", "0.7 less that of the shaft, or what the delays allow"
+    )
+    threshold: float | None = parameter(
+        "N*m",
+        "estimated shaft torque that means contact",
+        "0.1 M12avg_base, at most half the shaft torque under the low limit, at least 5 standard deviations",
+    )
+    uncertainty: float | None = parameter(
+        "1", "unknown part of the second derivative of T, as a share of Omega^2 Ms", "0.05, less for a coarse encoder"
+    )
+    patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
+    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            above_zero=("approach_speed", "full_torque", "threshold", "uncertainty", "period"),
+            not_negative=("low_torque", "rise", "damping_ratio", "patience"),
+        )
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """From the nominal drive; neither gap nor start position enter."""
+        period = sample_period(drive) if self.period is None else self.period
+        low = reduced_torque(drive) if self.low_torque is None else self.low_torque
+        base = base_torque(drive)
+        threshold = np.minimum(THRESHOLD * base, LOW_SHARE * _shaft_torque_under(drive, low))
+        if self.uncertainty is None:
+            uncertainty = _uncertainty(drive, period, threshold if self.threshold is None else self.threshold)
+        else:
+            uncertainty = self.uncertainty
+        eyes = observer(drive, period, uncertainty)
+        return {
+            "low_torque": number(low),
+            "approach_speed": number(drive.Omega * base / drive.c),
+            "full_torque": drive.Ms,
+            "rise": number(drive.elastic_period),
+            "damping_ratio": number(_damping_ratio(drive, eyes, period)),
+            "threshold": number(np.maximum(threshold, CERTAINTY * np.asarray(eyes.torque_deviation))),
+            "uncertainty": number(uncertainty),
+            "patience": patience(drive),
+            "period": period,
+        }
+
+    def vector(self, drive: Drive) -> Vector:
+        """The numbers in the order of the indices P_PERIOD to P_K_RATE."""
+        eyes = observer(drive, self.period, self.uncertainty)
+        period, ratio = np.asarray(self.period), np.asarray(self.damping_ratio)
+        rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
+        return stack(
+            drive, period, drive.J1, self.low_torque, self.full_torque, 2.0 * ratio * drive.J1 * drive.Omega / drive.c,
+            self.threshold, OPEN_AGAIN * np.asarray(self.threshold), period / np.maximum(self.rise, period),
+            self.approach_speed, 2.0 * (period + drive.torque_lag), drive.initial_load_speed, rolling * drive.Mc / drive.J2,
+            self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
+            drive.d * drive.Omega**2 / drive.c, drive.Mc, eyes.angle_gain, eyes.speed_gain, eyes.torque_gain,
+            eyes.rate_gain,
+        )  # fmt: skip
+
+
+def _damping_ratio(drive: Drive, eyes: Observer, period: Any) -> Any:
+    """0.7 less that of the shaft, and at most what leaves the phase margin at the delay of the loop."""
+    unforeseen = drive.J1 / (drive.J1 + drive.J2)
+    delay = drive.torque_lag + 0.5 * np.asarray(period) + unforeseen * eyes.rate_lag
+    m = (0.5 * math.pi - PHASE_LEFT) / (drive.Omega * delay)
+    own = 0.5 * drive.d * drive.Omega / drive.c
+    return np.clip(DAMPING_RATIO - own, 0.0, np.maximum(0.5 * (m - 1.0 / m), 0.0))
+
+
+def _shaft_torque_under(drive: Drive, low: Any) -> Any:
+    """Mean shaft torque in contact under the low limit; a load that pushes is not counted."""
+    return (np.asarray(low) * drive.J2 + drive.J1 * pulling_load(drive)) / (drive.J1 + drive.J2)
+
+
+def _uncertainty(drive: Drive, period: Any, threshold: Any) -> Any:
+    """0.05, or less, so that the encoder's rounding neither feigns contacts nor shakes the motor torque.
+
+    With a fast sampler the observer's bandwidth goes with S^(1/8), the deviation of T with S^(5/16) and that
+    of T' with S^(7/16), where S is proportional to the square of the uncertainty.
+    """
+    kd = 2.0 * DAMPING_RATIO * drive.J1 * drive.Omega / drive.c
+    uncertainty = np.full(drive.shape, UNCERTAINTY)
+    for _ in range(REFINEMENTS):
+        eyes = observer(drive, period, uncertainty)
+        excess = np.maximum(
+            (CERTAINTY * np.asarray(eyes.torque_deviation) / threshold) ** (8 / 5),
+            (kd * eyes.rate_deviation / (RIPPLE * np.asarray(drive.Ms))) ** (8 / 7),
+        )
+        uncertainty = uncertainty / np.maximum(excess, 1.0)
+    return uncertainty

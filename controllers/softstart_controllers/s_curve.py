@@ -1,0 +1,99 @@
+"""Torque ramp with rounded ends: what every inverter offers as S-curve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import ASK_AGAIN, STATE, TIME, TORQUE, Vector
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """parameters = (initial, full torque, time, rounding, period), state = (number of samples taken)."""
+    initial = parameters[0]
+    full = parameters[1]
+    time = parameters[2]
+    end = 0.5 * parameters[3]  # each rounded end, as a share of the time
+    t = measured[TIME]
+    sample = state[0] + 1.0
+    command[STATE] = sample
+    if t < time:
+        x = t / time
+        if x < end:
+            share = 0.5 * x * x / (end * (1.0 - end))
+        elif x <= 1.0 - end:
+            share = (x - 0.5 * end) / (1.0 - end)
+        else:
+            share = 1.0 - 0.5 * (1.0 - x) * (1.0 - x) / (end * (1.0 - end))
+        command[TORQUE] = initial + (full - initial) * share
+        command[ASK_AGAIN] = sample * parameters[4]
+    else:
+        command[TORQUE] = full
+        command[ASK_AGAIN] = math.inf
+
+
+@dataclass(frozen=True)
+class SCurve(CompiledController):
+    """Torque that rises in an S: its rate is a trapezoid over time, so the jerk of the motor is limited.
+
+    With x = t_k/time, e = rounding/2 and the samples t_k = k `period`, each held until the next one:
+
+        u(t_k) = initial + (full_torque - initial) s(x)
+        s(x) = x^2/(2 e (1 - e))               x < e
+               (x - e/2)/(1 - e)               e <= x <= 1 - e
+               1 - (1 - x)^2/(2 e (1 - e))     x > 1 - e
+
+    rounding = 0 is the ramp, 1 (default) has no straight part. By default it begins with the load torque and
+    takes two elastic periods: the full S is a ramp over one elastic period passed through a mean over another
+    one, and each alone leaves no oscillation in a closed, undamped drive; so it is forgiving where the
+    elastic frequency is not well known.
+
+    Source: practice of inverters.
+
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), SCurve(initial=0, time=0.1))
+    >>> run.at([0.0255, 0.0505, 0.0755])["u"].round(9).tolist()
+    [7.75, 31.0, 54.25]
+    """
+
+    name: ClassVar[str] = "s-curve"
+    summary: ClassVar[str] = "torque rises in an S from the load torque to the starting torque"
+    source: ClassVar[str] = "practice"
+    kernel: ClassVar[Any] = step
+    state_size: ClassVar[int] = 1
+
+    initial: float | None = parameter("N*m", "torque at the start", "load torque, 0 where it does not brake")
+    time: float | None = parameter("s", "duration of the rise", "two elastic periods")
+    rounding: float | None = parameter("1", "share of the time spent in the rounded ends, 0 to 1", "1")
+    full_torque: float | None = parameter("N*m", "torque after the rise", "starting torque Ms")
+    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+
+    def __post_init__(self) -> None:
+        check(self, above_zero=("period",), not_negative=("time", "rounding"))
+        if self.rounding is not None and np.any(np.asarray(self.rounding) > 1.0):
+            raise InputError(
+                f"rounding = {float(np.max(self.rounding)):g}: the parameter of the controller s-curve is a "
+                "share of the time, 0 to 1."
+            )
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """From load torque, starting torque and elastic period."""
+        return {
+            "initial": pulling_load(drive),
+            "time": number(2.0 * drive.elastic_period),
+            "rounding": 1.0,
+            "full_torque": drive.Ms,
+            "period": sample_period(drive),
+        }
+
+    def vector(self, drive: Drive) -> Vector:
+        """(initial, full torque, time, rounding, period)."""
+        return stack(drive, self.initial, self.full_torque, self.time, self.rounding, self.period)

@@ -1,0 +1,49 @@
+"""All commands under `softstart`, and what it says when called alone."""
+
+from __future__ import annotations
+
+import click
+
+from softstart import __version__
+from softstart.cli.compare import compare
+from softstart.cli.lists import controllers, drives
+from softstart.cli.simulate import simulate
+from softstart.cli.study import study
+from softstart.cli.usage import HELP_NAMES, Commands
+
+GREETING = f"""\
+softstart {__version__}: start a drive with a gap in its transmission gently, and quickly.
+
+  softstart compare                              strategies side by side on the crane drive of the literature
+  softstart drives crane-4amtkf > mine.toml      a drive of your own: change the file, then
+  softstart compare mine.toml --out results        compare on it, with figures, traces and a report
+  softstart study                                what the papers claim, confirmed or refuted with numbers
+
+softstart --help lists all commands."""
+
+EPILOG = """\
+Exit codes: 0 done, 2 bad input or usage, 3 no solution, 130 interrupted.
+
+\b
+Completion of names, in bash (also zsh_source, fish_source):
+  eval "$(_SOFTSTART_COMPLETE=bash_source softstart)"
+"""
+
+
+@click.group(
+    cls=Commands,
+    invoke_without_command=True,
+    context_settings=HELP_NAMES,
+    epilog=EPILOG,
+    no_args_is_help=False,
+)
+@click.version_option(__version__, prog_name="softstart", message="%(prog)s %(version)s")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Which soft-start strategy loads the shaft of a drive with a gap least, and what it costs in time."""
+    if context.invoked_subcommand is None:
+        print(GREETING)
+
+
+for command in (compare, simulate, drives, controllers, study):
+    cli.add_command(command)

@@ -1,0 +1,125 @@
+"""The folder of --out: everything is made ready beside it and then put in place, or nothing is."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from softstart.errors import InputError
+from softstart.export import write_whole
+
+
+@contextmanager
+def output_folder(asked: str | None) -> Iterator[Path | None]:
+    """A folder to write into, whose files are in DIR when the block ends well, and nowhere otherwise.
+
+    None if nothing was asked for. A DIR that does not exist yet appears whole by one rename; into one that is
+    there each file is renamed, so that none is ever half-written and other files stay. That DIR cannot be
+    written is found before the block begins. Raises InputError.
+    """
+    if asked is None:
+        yield None
+        return
+    target = Path(asked)
+    stage = _stage(asked, target)
+    try:
+        yield stage
+        _put_in_place(asked, stage, target)
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """A table as CSV; numbers with all their digits, None as an empty cell."""
+
+    def write(stream: IO[Any]) -> None:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+    write_whole(path, write)
+
+
+def write_text(path: Path, text: str) -> None:
+    """A text file."""
+    write_whole(path, lambda stream: stream.write(text))
+
+
+def file_stem(name: str, taken: Sequence[str] = ()) -> str:
+    """A name that can be part of a file name, and is not taken.
+
+    >>> file_stem("my/own: start"), file_stem("ramp", ["ramp"])
+    ('my-own-start', 'ramp-2')
+    """
+    stem = (
+        "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in name).split()).strip(".") or "start"
+    )
+    number, free = 1, stem
+    while free in taken:
+        number += 1
+        free = f"{stem}-{number}"
+    return free
+
+
+def _refused(asked: str, reason: str) -> InputError:
+    return InputError(f'--out = "{asked}": {reason}; give a folder that you may write to.')
+
+
+def _stage(asked: str, target: Path) -> Path:
+    """A fresh hidden folder on the same disk: in DIR if it is there, else in the nearest folder above it."""
+    if not asked.strip():
+        raise _refused(asked, "the name of the folder is empty")
+    if "\0" in asked:
+        raise _refused(asked.replace("\0", "\\0"), "this cannot be the path of a folder")
+    try:
+        home = target
+        while not home.exists() and home != home.parent:
+            if home.is_symlink():
+                raise _refused(asked, f"{home} is a link that leads nowhere")
+            home = home.parent
+        if not home.is_dir():
+            raise _refused(asked, f"{home} is a file, not a folder")
+        return Path(tempfile.mkdtemp(prefix=".softstart-", suffix=".part", dir=home))
+    except OSError as error:
+        raise _refused(asked, f"nothing can be written there ({error.strerror or error})") from None
+
+
+def _put_in_place(asked: str, stage: Path, target: Path) -> None:
+    try:
+        if not target.exists():
+            _make_parents_and_rename(stage, target)
+            return
+        files = sorted(path for path in stage.rglob("*") if path.is_file())
+        for path in files:
+            place = target / path.relative_to(stage)
+            if place.is_dir():
+                raise _refused(asked, f"{place.name} in it is a folder, where a file is to go")
+        for path in files:
+            place = target / path.relative_to(stage)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            path.replace(place)
+    except OSError as error:
+        raise _refused(asked, f"the files could not be put there ({error.strerror or error})") from None
+
+
+def _make_parents_and_rename(stage: Path, target: Path) -> None:
+    umask = os.umask(0)
+    os.umask(umask)
+    stage.chmod(0o777 & ~umask)
+    made: list[Path] = []
+    try:
+        for parent in reversed(target.parents):
+            if not parent.exists():
+                parent.mkdir()
+                made.append(parent)
+        stage.rename(target)
+    except BaseException:
+        for parent in reversed(made):
+            parent.rmdir()
+        raise

@@ -1,0 +1,248 @@
+"""The options that commands share, and reading them: all mistakes of one command line are told at once."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from softstart.cli.usage import did_you_mean
+from softstart.errors import InputError
+
+if TYPE_CHECKING:
+    from softstart.drive import Drive
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+DEFAULT_DRIVE = "crane-4amtkf"
+CONTROLLER_GROUP = "softstart.controllers"  # read here so that names are checked before numba is imported
+
+
+class Mistakes:
+    """Collects what is wrong with the input, to raise it as one InputError.
+
+    >>> mistakes = Mistakes()
+    >>> with mistakes.noted():
+    ...     raise InputError("gap = -1: a gap is 0 or more.")
+    >>> mistakes.settle()
+    Traceback (most recent call last):
+    softstart.errors.InputError: gap = -1: a gap is 0 or more.
+    """
+
+    def __init__(self) -> None:
+        self.sentences: list[str] = []
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Keep the sentences of an InputError raised inside, and go on."""
+        try:
+            yield
+        except InputError as error:
+            self.sentences.extend(error.sentences)
+
+    def settle(self) -> None:
+        """Raise what was noted, if anything was."""
+        if self.sentences:
+            raise InputError(self.sentences)
+
+
+# the options ---------------------------------------------------------------------------------------------
+
+
+def _starting(names: Callable[[], Iterable[str]]) -> Callable[..., list[CompletionItem]]:
+    """Shell completion from a list of names, after the last comma; files are offered beside them."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        done, comma, begun = incomplete.rpartition(",")
+        found = [CompletionItem(done + comma + name) for name in names() if name.startswith(begun)]
+        return found or [CompletionItem(incomplete, type="file")]
+
+    return complete
+
+
+def drive_names() -> tuple[str, ...]:
+    """Names of the shipped drives."""
+    from softstart.drive import library
+
+    return tuple(library.names())
+
+
+@cache
+def controller_names() -> tuple[str, ...]:
+    """Names of the installed controllers, found without importing any."""
+    return tuple(sorted(point.name for point in entry_points(group=CONTROLLER_GROUP)))
+
+
+def drive_argument(default: str | None = None) -> Decorator:
+    """DRIVE: a TOML file or the name of a shipped drive."""
+    return click.argument(
+        "drive",
+        metavar="[DRIVE]" if default else "DRIVE",
+        required=default is None,
+        default=default,
+        shell_complete=_starting(drive_names),
+    )
+
+
+def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
+    """An option that takes one or more controllers."""
+    return click.option(
+        name, metavar=metavar, required=required, help=text, shell_complete=_starting(controller_names)
+    )
+
+
+set_option = click.option(
+    "--set",
+    "settings",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'. May be repeated.",
+)
+until_option = click.option(
+    "--until",
+    metavar="TIME",
+    help="End of the run, as 0.5 (s) or '500 ms'. By default one elastic period after the start time.",
+)
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object on standard output and nothing else."
+)
+
+
+def param_option(metavar: str, text: str) -> Decorator:
+    """--param, which differs between one controller and several."""
+    return click.option("--param", "params", metavar=metavar, multiple=True, help=text)
+
+
+def out_option(text: str) -> Decorator:
+    """--out DIR."""
+    return click.option("--out", metavar="DIR", help=text, shell_complete=_directories)
+
+
+def _directories(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    return [CompletionItem(incomplete, type="dir")]
+
+
+def command_line() -> str:
+    """The command that runs now, as one would type it."""
+    return shlex.join(["softstart", *(click.get_current_context().obj or ())])
+
+
+# reading them --------------------------------------------------------------------------------------------
+
+
+def read_drive(name: str, settings: Sequence[str]) -> Drive:
+    """The one drive asked for, with its changes."""
+    from softstart.drive import Drive
+
+    drive = Drive.load(name)
+    if settings:
+        drive = drive.with_settings(settings)
+    if drive.shape != ():
+        raise InputError(
+            f'"{name}": lists of values make {math.prod(drive.shape)} drives, and the command line starts '
+            "one at a time; give one value a key (softstart.simulate in Python takes batches)."
+        )
+    return drive
+
+
+def read_until(text: str | None) -> float | None:
+    """The end of the run in s.
+
+    >>> read_until("500 ms")
+    0.5
+    """
+    if text is None:
+        return None
+    from softstart.units import to_si
+
+    value = float(to_si(text, "s", name="--until"))
+    if not value > 0.0:
+        raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 0.5 or "500 ms".')
+    return value
+
+
+def read_names(text: str | None) -> list[str] | None:
+    """The controllers of a comma-separated list, each known and named once; None if none was given."""
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise InputError(
+            f'--controllers = "{text}": a name is empty; write names with commas between, as direct,ramp.'
+        )
+    mistakes = Mistakes()
+    for index, name in enumerate(names):
+        with mistakes.noted():
+            check_name(name, "--controllers")
+            if name in names[:index]:
+                raise InputError(f'--controllers = "{text}": {name} is named twice; name it once.')
+    mistakes.settle()
+    return names
+
+
+def check_name(name: str, option: str) -> str:
+    """The name, if it is that of an installed controller or leads to a Python file that is there."""
+    if ".py" in name:
+        path = Path(name[: name.index(".py") + 3])
+        if not path.is_file():
+            what = "is a directory" if path.is_dir() else "is not there"
+            raise InputError(f'{option} = "{name}": the file {path} {what}; give path/to/file.py:ClassName.')
+    elif name not in controller_names():
+        hint = did_you_mean(name, controller_names())
+        raise InputError(f'{option} = "{name}": there is no controller of this name; {hint}')
+    return name
+
+
+def read_params(texts: Sequence[str]) -> dict[str, str]:
+    """`key=value` texts as a mapping; the controller reads the values.
+
+    >>> read_params(["torque=15 N*m"])
+    {'torque': '15 N*m'}
+    """
+    found: dict[str, str] = {}
+    mistakes = Mistakes()
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        with mistakes.noted():
+            if not (key and equals and value):
+                raise InputError(
+                    f'--param "{text}": write a key, an equals sign and a value, as torque="15 N*m".'
+                )
+            if key in found:
+                raise InputError(f'--param "{text}": {key} is given twice; keep one of the two.')
+            found[key] = value
+    mistakes.settle()
+    return found
+
+
+def read_params_of(texts: Sequence[str], names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """`controller.key=value` texts, by controller.
+
+    >>> read_params_of(["ramp.time=0.2"], ["direct", "ramp"])
+    {'ramp': {'time': '0.2'}}
+    """
+    found: dict[str, dict[str, str]] = {}
+    mistakes = Mistakes()
+    for text in texts:
+        whole, equals, value = (part.strip() for part in text.partition("="))
+        name, dot, key = whole.rpartition(".")
+        with mistakes.noted():
+            if not (dot and name and key and equals and value):
+                raise InputError(f'--param "{text}": write CONTROLLER.key=value, as ramp.time=0.2.')
+            if name not in names:
+                raise InputError(
+                    f'--param "{text}": {name} is not compared here; {did_you_mean(name, names)}'
+                )
+            if key in found.setdefault(name, {}):
+                raise InputError(f'--param "{text}": {name}.{key} is given twice; keep one of the two.')
+            found[name][key] = value
+    mistakes.settle()
+    return found

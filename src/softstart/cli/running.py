@@ -1,0 +1,140 @@
+"""Run controllers from the command line: say when the kernel is compiled, and whose mistake a failure is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from importlib.metadata import entry_points
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from softstart.cli.options import CONTROLLER_GROUP, Mistakes
+from softstart.errors import InputError, SimulationError
+
+if TYPE_CHECKING:
+    from numba.core.event import Event
+    from rich.status import Status
+
+    from softstart.controller import Controller
+
+LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
+COMPILING = "compiling the simulation kernel: this may take half a minute, once, and is kept on disk ..."
+
+
+@contextmanager
+def working(doing: str) -> Iterator[Status | None]:
+    """A status line on a terminal while something is done; what anyone prints goes to standard error.
+
+    Whatever is compiled meanwhile is announced, on a terminal or not: a first start takes a while.
+    """
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False, markup=False)
+    with redirect_stdout(sys.stderr):
+        if not console.is_terminal:
+            with _announced(None):
+                yield None
+            return
+        with console.status(doing) as status, _announced(status):
+            yield status
+
+
+@contextmanager
+def _announced(status: Status | None) -> Iterator[None]:
+    from numba.core import event
+
+    class Notice(event.Listener):
+        """Speaks when numba compiles for the first time; what comes from its cache is not compiled."""
+
+        said = False
+
+        def on_start(self, event: Event) -> None:
+            if not self.said:
+                self.said = True
+                if status is not None:
+                    status.console.print(f"softstart: {COMPILING}")
+                else:
+                    print(f"softstart: {COMPILING}", file=sys.stderr, flush=True)
+
+        def on_end(self, event: Event) -> None:
+            pass
+
+    notice = Notice()
+    event.register("numba:compile", notice)  # type: ignore[no-untyped-call]
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", notice)  # type: ignore[no-untyped-call]
+
+
+class Attributed:
+    """Turns an exception from the lines of a controller into a sentence that names the place.
+
+    A controller is anyone's code and may fail in any way; an exception in which none has a part passes.
+    With the name of a controller that is being loaded or made, what fails is bad input; without one, a start
+    that could not be finished.
+    """
+
+    def __init__(self, loading: str = "") -> None:
+        self.loading = loading
+        self.modules = {point.module for point in entry_points(group=CONTROLLER_GROUP)}
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if isinstance(error, KeyboardInterrupt | MemoryError | InputError | SimulationError | None):
+            return
+        place = self._place(traceback)
+        what = ": ".join(filter(None, [type(error).__name__, " ".join(str(error).split())]))
+        if self.loading and (place or isinstance(error, ImportError | AttributeError | TypeError)):
+            at = f" in {place}" if place else ""
+            raise InputError(f'controller = "{self.loading}": it cannot be loaded{at} ({what}).') from error
+        if place:
+            raise SimulationError(
+                f"The start was given up: the controller failed in {place} ({what})."
+            ) from error
+
+    def _place(self, traceback: TracebackType | None) -> str:
+        """File and line of the innermost frame in a controller, empty if there is none."""
+        place = ""
+        while traceback is not None:
+            module = str(traceback.tb_frame.f_globals.get("__name__", ""))
+            if module in self.modules or module.startswith(LOOSE_MODULE):
+                place = f"{traceback.tb_frame.f_code.co_filename}, line {traceback.tb_lineno}"
+            traceback = traceback.tb_next
+        return place
+
+
+def make_controllers(
+    names: Sequence[str], parameters: Mapping[str, Mapping[str, str]], prefix: bool
+) -> list[Controller]:
+    """The controllers of these names with their parameters; all mistakes at once.
+
+    `prefix` puts the controller's name before each key in the sentences.
+    """
+    from softstart.controller import make_controller
+
+    mistakes = Mistakes()
+    made: list[Controller] = []
+    for name in names:
+        given = parameters.get(name, {})
+        try:
+            with Attributed(name):
+                made.append(make_controller(name, given))
+        except InputError as error:
+            mistakes.sentences += [
+                f"--param {name + '.' if prefix else ''}{s}" if s.startswith(tuple(given)) else s
+                for s in map(_one_line, error.sentences)
+            ]
+    mistakes.settle()
+    return made
+
+
+def _one_line(sentence: str) -> str:
+    """Numba tells its mistakes in long reports: the first lines say it."""
+    lines = [line.strip() for line in sentence.splitlines() if line.strip()]
+    return " ".join(lines[:3]) + (" ..." if len(lines) > 3 else "") if len(lines) > 1 else sentence

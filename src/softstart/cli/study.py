@@ -1,0 +1,149 @@
+"""`softstart study`: questions of the literature, answered with numbers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from softstart.cli.folder import file_stem, output_folder, write_table
+from softstart.cli.options import Mistakes, json_option, out_option
+from softstart.cli.usage import Command
+from softstart.errors import InputError
+from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+MARKS = {Verdict.CONFIRMED: "green", Verdict.REFUTED: "red", Verdict.PARTLY: "yellow"}
+
+
+@click.command(cls=Command)
+@click.argument("name", required=False)
+@click.option("--list", "only_list", is_flag=True, help="List the studies, as without NAME.")
+@json_option
+@out_option("Write pictures (SVG, PNG) and tables (CSV) into this folder.")
+def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> None:
+    """List the studies, or run one."""
+    if name is None or only_list:
+        if out is not None:
+            raise InputError(f'--out = "{out}": a list writes no files; name a study: softstart study NAME.')
+        _list(as_json)
+        return
+    found = find_study(name)
+    with output_folder(out) as folder:
+        from softstart.cli.running import working
+
+        with working(f"{found.name}: beginning ...") as status:
+
+            def progress(doing: str) -> None:
+                if status is not None:
+                    status.update(f"{found.name}: {doing} ...")
+
+            result = found.run(folder, progress)
+            if folder is not None:
+                progress("writing")
+                write_study(found, result, folder)
+
+    from softstart.cli.show import console, print_json
+
+    if as_json:
+        print_json({"study": found.name, "title": found.title, **result.summary()})
+    else:
+        _show(console(), found, result)
+        if out is not None:
+            pictures = ", ".join(result.figures) or "none"
+            print(f"\nWritten to {out}: {len(result.tables)} tables, claims.csv; pictures: {pictures}.")
+
+
+def write_study(found: Study, result: StudyResult, folder: Path) -> None:
+    """Pictures as SVG and PNG, each table and the claims as CSV."""
+    if result.figures:
+        from softstart.figures import save_figure
+
+        for stem, figure in result.figures.items():
+            save_figure(figure, folder, stem)
+    taken: list[str] = ["claims"]
+    for table in result.tables:
+        taken.append(file_stem(table.title.lower(), taken))
+        write_table(folder / f"{taken[-1]}.csv", table.columns, table.rows)
+    if result.claims:
+        rows = [list(claim.summary().values()) for claim in result.claims]
+        write_table(folder / "claims.csv", ("statement", "verdict", "evidence"), rows)
+
+
+def _list(as_json: bool) -> None:
+    from softstart.cli.show import Column, console, print_json, print_table, sentence
+
+    found: list[Study] = []
+    broken = Mistakes()
+    for name in study_names():
+        with broken.noted():
+            found.append(find_study(name))
+    if as_json:
+        print_json({"studies": [{"name": s.name, "title": s.title, "pictures": s.pictures} for s in found]})
+        return
+    to = console()
+    rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
+    print_table(to, [Column(heading, False) for heading in ("study", "question", "pictures")], rows)
+    to.print()
+    sentence(to, "Run one, with its pictures: softstart study NAME --out DIR")
+    for one in broken.sentences:
+        sentence(to, one)
+
+
+def _show(to: Console, found: Study, result: StudyResult) -> None:
+    from softstart.cli.show import sentence
+
+    sentence(to, f"{found.name}: {found.title}", "bold")
+    for table in result.tables:
+        to.print()
+        _show_table(to, table)
+    if result.claims:
+        to.print()
+        _show_claims(to, result.claims)
+
+
+def _show_table(to: Console, table: Table) -> None:
+    from softstart.cli.show import Column, print_table, printable
+
+    numeric = [
+        all(isinstance(row[i], int | float | None) for row in table.rows) for i in range(len(table.columns))
+    ]
+    columns = [Column(name, number) for name, number in zip(table.columns, numeric, strict=True)]
+    rows = [[printable(_cell(cell)) for cell in row] for row in table.rows]
+    print_table(to, columns, rows, title=table.title)
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _show_claims(to: Console, claims: Any) -> None:
+    from rich.text import Text
+
+    to.print(Text("Claims", style="bold"))
+    claim: Claim
+    for number, claim in enumerate(claims, start=1):
+        verdict = Verdict(claim.verdict)
+        head = Text(f"{number:2}. ").append(f"{verdict.value:9}  ", style=f"bold {MARKS[verdict]}")
+        to.print(_hanging(head, claim.statement, ""))
+        to.print(_hanging(Text(" " * len(head)), claim.evidence, "dim"))
+
+
+def _hanging(head: Any, text: str, style: str) -> Any:
+    """A paragraph that hangs to the right of its head."""
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    from softstart.cli.show import printable
+
+    grid = Grid.grid()
+    grid.add_column(no_wrap=True, width=len(head))
+    grid.add_column(overflow="fold")
+    grid.add_row(head, Text(printable(text), style=style))
+    return grid

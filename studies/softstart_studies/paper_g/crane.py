@@ -1,0 +1,69 @@
+"""The worked example of [G]: its drives, its reduced torques, and what every part of the study asks."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart import Drive, Run, simulate, stages
+from softstart.metrics import base_torque
+
+Vector = NDArray[np.float64]
+Method = Literal[1, 2]
+
+CRANE = Drive.load("crane-4amtkf")  # J2'' = 5 J1, delta1 = 0.5 rad
+GAP_1, GAP_2 = 0.5, 2.0  # rad, new and worn
+LIGHT, HEAVY = 2, 5  # J2'/J1, J2''/J1
+SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the table of REFERENCE
+RATIOS: Vector = np.linspace(0.0, 1.0, 101)[1:]  # the axis of figs. 2-4
+POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
+CONTROLLERS = {1: "reduced-first-stage", 2: "reduced-two-stage"}
+
+
+def crane(ratio: float = HEAVY, gap: float = GAP_1) -> Drive:
+    """The drive of [G] with J2 = ratio J1 and this total gap in rad.
+
+    >>> crane(2, 2.0).J2, crane(2, 2.0).gap
+    (0.07, 2.0)
+    """
+    return CRANE.replace(load_inertia=ratio * CRANE.J1, gap=gap)
+
+
+def base() -> float:
+    """Mean torque in N m that K_dyn refers to in fig. 2 of [G]: that of J2'' = 5 J1 for all curves.
+
+    >>> round(base(), 2)
+    52.86
+    """
+    return float(base_torque(CRANE))
+
+
+def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None) -> stages.TwoStages:
+    """Stages 1 and 2 with M1 = r Ms by [G](3), (15), (17), (18); `base` in N m, else that of the drive.
+
+    >>> round(closed_form(crane(), 0.25, 2).k_dyn, 4)
+    1.2677
+    """
+    compute = stages.method_1 if method == 1 else stages.method_2
+    symbols = {"J1": drive.J1, "J2": drive.J2, "c": drive.c, "gap": drive.gap, "Ms": drive.Ms, "Mc": drive.Mc}
+    return compute(r, base=base, **symbols)
+
+
+def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None) -> Run:
+    """The whole start by the plant, torque r Ms in stage 1 (method 1) or in stages 1 and 2 (method 2).
+
+    >>> round(simulated(crane(), 0.25, 2).k_dyn_first_contact, 4)
+    1.2677
+    """
+    return simulate(drive, CONTROLLERS[method], parameters={"torque": r * float(drive.Ms)}, base=base)
+
+
+def percent(ratio: float) -> str:
+    """How much more or less than 1, as text.
+
+    >>> percent(1.56), percent(0.827)
+    ('+56 %', '-17 %')
+    """
+    return f"{100 * (ratio - 1):+.0f} %"

@@ -1,0 +1,148 @@
+"""Running the command line in this process and in its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from softstart.cli import main
+
+CONTROLLERS = '''
+from softstart import Command, PlainController, Sensor
+from softstart.controller import parameter
+from dataclasses import dataclass
+
+class Good(PlainController):
+    name = "own"
+    summary = "half the torque, then all of it"
+    def step(self, measured, state):
+        return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.01)
+
+@dataclass(frozen=True)
+class Needy(PlainController):
+    share: float = parameter("1", "share of the starting torque", "one half")
+    def step(self, measured, state):
+        return Command(62.0 * (self.share or 0.5), measured.time + 0.01)
+
+class Chatty(PlainController):
+    def step(self, measured, state):
+        print("this belongs to standard error")
+        return Command(62.0)
+
+class Raises(PlainController):
+    def step(self, measured, state):
+        return Command(1.0 / (measured.time * 0.0))
+
+class Leaves(PlainController):
+    def step(self, measured, state):
+        raise SystemExit(7)
+
+class Nan(PlainController):
+    def step(self, measured, state):
+        return Command(float("nan"))
+
+class Past(PlainController):
+    def step(self, measured, state):
+        return Command(62.0, measured.time - 1.0)
+
+class Text(PlainController):
+    def step(self, measured, state):
+        return "full torque"
+
+class Hollow(PlainController):
+    pass
+
+class NoController:
+    pass
+'''
+
+DRIVE = """
+name = "a drive of my own"
+[motor]
+inertia = 0.035
+starting_torque = "62 N*m"
+rated_speed = "880 rpm"
+[shaft]
+stiffness = 368.465
+gap = 0.5
+[load]
+inertia = 0.175
+torque = 7.16
+"""
+
+
+class Ended(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder that is the current one, with some files to use."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(CONTROLLERS)
+    (tmp_path / "only.py").write_text("from own_missing_module import x\n")
+    (tmp_path / "syntax.py").write_text("x = (\n")
+    (tmp_path / "nothing.py").write_text("x = 1\n")
+    (tmp_path / "quits.py").write_text("raise SystemExit(5)\n")
+    (tmp_path / "good.toml").write_text(DRIVE)
+    (tmp_path / "empty.toml").write_text("")
+    (tmp_path / "broken.toml").write_text("name = \n")
+    (tmp_path / "latin.toml").write_bytes(b'name = "caf\xe9"\n')
+    (tmp_path / "list.toml").write_text(DRIVE.replace("gap = 0.5", "gap = [0.5, 1.0]"))
+    (tmp_path / "weak.toml").write_text(DRIVE.replace('"62 N*m"', "5"))
+    (tmp_path / "misspelt.toml").write_text(DRIVE.replace("stiffness", "stifness"))
+    (tmp_path / "wrong.toml").write_text(DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan"))
+    (tmp_path / "missing.toml").write_text(DRIVE.replace("gap = 0.5", ""))
+    (tmp_path / "folder").mkdir()
+    return tmp_path
+
+
+@pytest.fixture
+def run(place, capfd):
+    """softstart ARGUMENTS in this process."""
+
+    def go(*arguments: str) -> Ended:
+        capfd.readouterr()
+        code = main(list(arguments))
+        return Ended(code, *capfd.readouterr())
+
+    return go
+
+
+@pytest.fixture
+def spawn(place):
+    """softstart ARGUMENTS in a process of its own."""
+
+    def go(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*COMMAND, *arguments], capture_output=True, text=True, timeout=300, check=False, **options
+        )
+
+    return go
+
+
+COMMAND = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
+
+
+def snapshot(folder: Path) -> set[str]:
+    """All files below a folder, caches of Python aside."""
+    found = (os.path.relpath(path, folder) for path in folder.rglob("*"))
+    return {name for name in found if "__pycache__" not in name}
+
+
+@pytest.fixture
+def nothing_left(place):
+    """A check that no file was added or removed since the test began."""
+    before = snapshot(place)
+
+    def check() -> None:
+        assert snapshot(place) == before
+
+    return check

@@ -1,0 +1,167 @@
+"""Every kind of bad input: clear sentences on standard error, exit 2, nothing on standard output, no file."""
+
+import pytest
+
+START = ("simulate", "crane-4amtkf", "--controller")
+
+# name: arguments, what the one sentence must say
+ONE_SENTENCE = {
+    # the command line
+    "unknown command": (["compre"], ['"compre"', "did you mean softstart compare?"]),
+    "command unlike any": (["zzzzzz"], ["there are compare, simulate, drives, controllers and study"]),
+    "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
+    "unknown option before a command": (["--verion"], ["did you mean --version?"]),
+    "unknown short option": (["compare", "-z"], ["no option -z"]),
+    "option without value": (["compare", "--set"], ["compare:", "--set needs a value", "KEY=VALUE"]),
+    "flag with value": (["compare", "--json=yes"], ["--json takes no value"]),
+    "too many arguments": (["compare", "good.toml", "good.toml"], ["compare:", "extra argument"]),
+    "no drive": (["simulate", "--controller", "direct"], ["DRIVE is missing"]),
+    "no controller": (["simulate", "good.toml"], ["--controller NAME is missing"]),
+    # the drive
+    "missing file": (["compare", "nowhere.toml"], ['"nowhere.toml"', "no such file"]),
+    "misspelt drive": (["compare", "crane-4amtk"], ["did you mean crane-4amtkf?"]),
+    "folder as drive": (["compare", "folder"], ["directory"]),
+    "empty name": (["compare", ""], ["empty"]),
+    "empty file": (["compare", "empty.toml"], ["empty"]),
+    "not UTF-8": (["compare", "latin.toml"], ["UTF-8"]),
+    "not TOML": (["compare", "broken.toml"], ["line 1", "not valid TOML"]),
+    "unknown key": (["compare", "misspelt.toml"], ["stifness", "did you mean stiffness?"]),
+    "missing key": (["compare", "missing.toml"], ["[shaft] gap is missing"]),
+    "too weak": (["compare", "weak.toml"], ["starting_torque", "7.16"]),
+    "several drives": (["compare", "list.toml"], ["2 drives", "one at a time"]),
+    "several drives by --set": ([*START, "direct", "--set", "gap=[1, 2]"], ["gap"]),
+    # --set
+    "setting without value": (["compare", "--set", "load.inertia"], ['"load.inertia"', "equals sign"]),
+    "unknown setting": (["compare", "--set", "load.inerta=1"], ["did you mean load.inertia?"]),
+    "setting twice": (["compare", "--set", "gap=1", "--set", "gap=2"], ["set before"]),
+    "negative inertia": (["compare", "--set", "load.inertia=-1"], ['load.inertia = "-1"', "above 0"]),
+    "zero inertia": (["compare", "--set", "motor.inertia=0"], ["above 0"]),
+    "negative gap": (["compare", "--set", "gap=-0.1"], ["0 or more"]),
+    "NaN": (["compare", "--set", "shaft.gap=nan"], ["not a number"]),
+    "infinite": (["compare", "--set", "shaft.stiffness=inf"], ["finite"]),
+    "wrong unit": (["compare", "--set", "shaft.gap=2 m"], ["m is a length, not an angle"]),
+    "frequency for a speed": (["compare", "--set", "start.target_speed=50 Hz"], ["frequency", "turn/s"]),
+    "unknown unit": (["compare", "--set", "shaft.gap=2 furlogs"], ["furlogs"]),
+    "unknown choice": (["compare", "--set", "load.kind=reactiv"], ["reactive"]),
+    # --until
+    "until 0": (["compare", "--until", "0"], ['--until = "0"', "above 0 s"]),
+    "until negative": (["compare", "--until", "-0.5"], ["above 0 s"]),
+    "until NaN": (["compare", "--until", "nan"], ["not a number"]),
+    "until infinite": (["compare", "--until", "inf"], ["finite"]),
+    "until a word": (["compare", "--until", "soon"], ['--until = "soon"', "a time"]),
+    "until a speed": (["compare", "--until", "5 rad/s"], ["not a time"]),
+    # controllers by name
+    "unknown controller": (["compare", "--controllers", "dirct"], ["--controllers", "did you mean direct?"]),
+    "controller unlike any": ([*START, "zzzzzz"], ["--controller", "there are"]),
+    "empty controller": (["compare", "--controllers", "direct,,ramp"], ["a name is empty"]),
+    "controller twice": (["compare", "--controllers", "ramp,ramp"], ["named twice"]),
+    # their parameters
+    "parameter without value": ([*START, "ramp", "--param", "time"], ["--param", "equals sign"]),
+    "unknown parameter": ([*START, "ramp", "--param", "tim=1"], ["--param tim = 1", "time"]),
+    "parameter of wrong unit": ([*START, "ramp", "--param", "time=3 kg"], ["--param time", "not a time"]),
+    "parameter NaN": ([*START, "direct", "--param", "torque=nan"], ["--param torque", "not a number"]),
+    "parameter twice": ([*START, "ramp", "--param", "time=1", "--param", "time=2"], ["given twice"]),
+    "parameter of no controller": (["compare", "--param", "time=1"], ["CONTROLLER.key=value"]),
+    "parameter of another controller": (
+        ["compare", "--controllers", "direct", "--param", "ramp.time=1"],
+        ["ramp is not compared here"],
+    ),
+    "unknown parameter in a comparison": (
+        ["compare", "--controllers", "direct,ramp", "--param", "ramp.tim=1"],
+        ["--param ramp.tim = 1", "time"],
+    ),
+    # controllers in files
+    "no such file": ([*START, "gone.py:Good"], ["gone.py is not there"]),
+    "folder as file": ([*START, "folder.py"], ["folder.py is not there"]),
+    "no such class": ([*START, "own.py:God"], ["no class God", "Good"]),
+    "which class": ([*START, "own.py"], ["say which class"]),
+    "file without classes": ([*START, "nothing.py"], ["say which class"]),
+    "file that does not import": ([*START, "only.py:X"], ["does not run", "own_missing_module"]),
+    "file with wrong syntax": ([*START, "syntax.py:X"], ["does not run", "SyntaxError"]),
+    "file that quits": ([*START, "quits.py:X"], ["does not run", "SystemExit"]),
+    "no controller class": ([*START, "own.py:NoController"], ["derive the class"]),
+    "controller without step": ([*START, "own.py:Hollow"], ["step"]),
+    "controller that answers text": ([*START, "own.py:Text"], ["answer with Command"]),
+    # --out
+    "output is a file": ([*START, "direct", "--out", "good.toml"], ["is a file, not a folder"]),
+    "output below a file": ([*START, "direct", "--out", "good.toml/deeper"], ["is a file, not a folder"]),
+    "unwritable output": ([*START, "direct", "--out", "/proc/softstart"], ["nothing can be written there"]),
+    "empty output": ([*START, "direct", "--out", ""], ["name of the folder is empty"]),
+    "impossible output": ([*START, "direct", "--out", "a\0b"], ["cannot be the path"]),
+    "too long output": ([*START, "direct", "--out", "x" * 300], ["--out"]),
+    # the rest
+    "unknown shipped drive": (["drives", "crane"], ["did you mean crane-4amtkf?"]),
+    "unknown controller to describe": (["controllers", "rmp"], ["did you mean ramp?"]),
+    "unknown study": (["study", "papr-g"], ['did you mean "paper-g"?']),
+    "files of a list": (["study", "--out", "here"], ["a list writes no files"]),
+}
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind, run, nothing_left):
+    arguments, says = ONE_SENTENCE[kind]
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: ")
+    assert err.count("\n") == 1
+    assert err.endswith((".\n", "?\n"))
+    assert "Traceback" not in err
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_all_mistakes_are_told_at_once(run, nothing_left):
+    code, out, err = run(
+        "compare", "wrong.toml", "--controllers", "dirct,ramp", "--until", "-1", "--param", "ramp"
+    )
+    assert (code, out) == (2, "")
+    lines = err.splitlines()
+    assert lines[0] == "softstart: 5 things are wrong:"
+    assert [line.split(". ")[0].strip() for line in lines[1:]] == ["1", "2", "3", "4", "5"]
+    assert "starting_torque" in err
+    assert "gap = nan" in err
+    assert "did you mean direct?" in err
+    nothing_left()
+
+
+UNFINISHED = {
+    "raises": ("own.py:Raises", ["own.py, line", "ZeroDivisionError"]),
+    "leaves the program": ("own.py:Leaves", ["own.py, line", "SystemExit: 7"]),
+    "answers NaN": ("own.py:Nan", ["NaN", "Nan"]),
+    "wants to be asked in the past": ("own.py:Past", ["past instant"]),
+}
+
+
+@pytest.mark.parametrize("kind", UNFINISHED)
+@pytest.mark.parametrize("output", [(), ("--json",), ("--out", "results")])
+def test_a_start_that_cannot_be_finished(kind, output, run, nothing_left):
+    controller, says = UNFINISHED[kind]
+    code, out, err = run("simulate", "good.toml", "--controller", controller, *output)
+    assert (code, out) == (3, "")
+    assert err.startswith("softstart: The start was given up: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_a_failing_controller_fails_the_comparison(run, nothing_left):
+    code, out, err = run("compare", "good.toml", "--controllers", "direct,own.py:Raises", "--out", "results")
+    assert (code, out) == (3, "")
+    assert "ZeroDivisionError" in err
+    nothing_left()
+
+
+def test_a_mistake_of_softstart_itself_shows_no_traceback(spawn, monkeypatch):
+    broken = "import sys, softstart.cli.commands as c; c.GREETING = property(); c.print = None\n"
+    run_it = "from softstart.cli.main import main; sys.exit(main())"
+    from subprocess import run as start
+    from sys import executable
+
+    ended = start([executable, "-c", broken + run_it], capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stdout == ""
+    assert "this is a mistake in softstart" in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -1,0 +1,23 @@
+"""What the tests of bad input share."""
+
+import re
+
+import pytest
+
+from softstart.errors import InputError
+
+
+@pytest.fixture
+def sentences():
+    """The sentences of the InputError that an attempt must raise: clear text, nothing of pydantic's own."""
+
+    def raised(attempt):
+        with pytest.raises(InputError) as error:
+            attempt()
+        found = error.value.sentences
+        assert str(error.value) == "\n".join(found)
+        assert all(re.search(r"[.?]$", sentence) and "\n" not in sentence for sentence in found)
+        assert not any("pydantic" in sentence or "Traceback" in sentence for sentence in found)
+        return found
+
+    return raised

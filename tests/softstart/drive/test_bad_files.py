@@ -1,0 +1,181 @@
+"""Everything that can be wrong with the file of a drive: one sentence a mistake, with file, table and key."""
+
+import re
+
+import pytest
+
+from softstart.drive import Drive
+
+GOOD = {
+    "motor_inertia": 0.035,
+    "starting_torque": 62.0,
+    "stiffness": 368.465,
+    "gap": 0.5,
+    "load_inertia": 0.175,
+    "load_torque": 7.16,
+    "target_speed": 92.0,
+}
+GOOD_TOML = Drive(**GOOD).to_toml()
+
+
+# a line of the good file, what stands there instead, what the sentence begins with, what it says
+TOML = [
+    ("gap = 0.5", 'gap = "5 m"', '[shaft] gap = "5 m": ', "m is a length"),
+    ("gap = 0.5", "gap = true", "[shaft] gap = true: ", "true and false are no quantities"),
+    ("gap = 0.5", "gap = nan", "[shaft] gap = nan: ", "not a number"),
+    ("gap = 0.5", "gap = -inf", "[shaft] gap = -inf: ", "must be finite"),
+    ("gap = 0.5", "gap = 2024-01-01", "[shaft] gap = 2024-01-01: ", "a date is no quantity"),
+    ("gap = 0.5", 'gap = { rad = "x" }', '[shaft] gap = {"rad": "x"}: ', "a table is no quantity"),
+    ("gap = 0.5", 'gap = [1, "2 m"]', '[shaft] gap[1] = "2 m": ', "m is a length"),
+    ("gap = 0.5", "", "[shaft] gap is missing: ", 'write for example gap = "0.5 rad"'),
+    ("gap = 0.5", "gapp = 0.5", "[shaft] gapp = 0.5: ", "[shaft] has no key gapp; did you mean gap?"),
+    ("gap = 0.5", "Gap = 0.5", "[shaft] Gap = 0.5: ", "did you mean gap?"),
+    ("gap = 0.5", "gap = 0.5\ninertia = 1", "[shaft] inertia = 1: ", "belongs below [motor] or below [load]"),
+    ("gap = 0.5", "gap = 0.5\ntarget_speed = 2", "[shaft] target_speed = 2: ", "belongs below [start]"),
+    ("gap = 0.5", "gap = 0.5\nshaft_gap = 2", "[shaft] shaft_gap = 2: ", "did you mean gap?"),
+    ("gap = 0.5", "gap = 0.5\nJ1 = 2", "[shaft] J1 = 2: ", "did you mean [motor] inertia?"),
+    ("gap = 0.5", 'gap = 0.5\nname = "x"', '[shaft] name = "x": ', "belongs above the first table"),
+    ("gap = 0.5", "gap = 0.5\nqqq = 2", "[shaft] qqq = 2: ", "it has stiffness, damping, gap, contact_law"),
+    ("gap = 0.5", "gap = 0.5\ngap = 2", "line ", "not valid TOML (cannot overwrite a value)"),
+    ("gap = 0.5", "gap = 0.5 rad", "line ", 'in quotes: gap = "0.5 rad"'),
+    ("gap = 0.5", "gap =", "line ", "not valid TOML (invalid value)"),
+    ("[load]", "[lode]", "[lode]: ", "did you mean [load]?"),
+    ("[load]", "[LOAD]", "[LOAD]: ", "did you mean [load]?"),
+    ("[load]", "[load", "line ", "not valid TOML"),
+    ("[load]", "[[load]]", 'load = [{"inertia": 0.175', "one table, not a list of tables"),
+    ("[load]", "[shaft]", "line ", "not valid TOML"),
+    ("[load]", "[brake]\ntorque = 3\n[load]", "[brake]: ", "its tables are [motor], [shaft], "),
+    ("[motor]", "gap = 0.5\n[motor]", "gap = 0.5: ", "gap belongs below [shaft]"),
+    ("[motor]", "load_kind = 'active'\n[motor]", 'load_kind = "active": ', "written kind, below [load]"),
+    ("[motor]", "nam = 'x'\n[motor]", 'nam = "x": ', "did you mean name?"),
+    ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, [motor], [shaft]"),
+    ("[motor]", "brake = 3\n[motor]", "brake = 3: ", "has no key brake"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("line", "instead", "subject", "reason"), TOML, ids=lambda v: str(v)[:24])
+def test_one_sentence_from_a_file(line, instead, subject, reason, sentences):
+    text = "".join(
+        instead + "\n" if part.split("  #")[0].strip() == line else part
+        for part in GOOD_TOML.splitlines(True)
+    )
+    assert text != GOOD_TOML
+    (sentence,) = sentences(lambda: Drive.from_toml(text, where="my.toml"))
+    assert sentence.startswith(f"my.toml: {subject}")
+    assert reason in sentence
+    (same,) = sentences(lambda: Drive.from_toml(text))
+    assert f"my.toml: {same}" == sentence
+
+
+@pytest.mark.parametrize("table", ["motor", "shaft", "load", "start"])
+def test_a_table_that_is_none_is_one_sentence(table, sentences):
+    text = f"{table} = 5\n" + re.sub(rf"\[{table}\][^\[]*", "", GOOD_TOML)
+    text = text if table != "start" else text.replace("[motor]", "[motor]\nrated_speed = 92")
+    if table == "motor":
+        text += "\n"
+    (sentence,) = sentences(lambda: Drive.from_toml(text))
+    assert sentence.startswith(f"{table} = 5: {table} is a table; write [{table}] on a line of its own")
+
+
+def test_an_empty_file_is_one_sentence(sentences):
+    for text in ("", "\n\n", "# nothing but a comment\n"):
+        (sentence,) = sentences(lambda text=text: Drive.from_toml(text, where="x.toml"))
+        assert sentence.startswith("x.toml: it is empty; a drive file has the tables [motor]")
+
+
+def test_the_line_of_a_mistake_in_toml_is_named(sentences):
+    (sentence,) = sentences(
+        lambda: Drive.from_toml('name = "x"\n\n[motor]\ninertia = 5 kg\n', where="x.toml")
+    )
+    assert sentence.startswith("x.toml: line 4, column 13, 'inertia = 5 kg': ")
+
+
+def test_deep_nesting_is_a_sentence(sentences):
+    (sentence,) = sentences(lambda: Drive.from_toml("a = " + "[" * 100_000))
+    assert "nested too deeply" in sentence or "not valid TOML" in sentence
+
+
+def test_a_missing_table_names_each_of_its_keys(sentences):
+    text = re.sub(r"\[load\][^\[]*", "", GOOD_TOML)
+    assert [s.split(":")[0] for s in sentences(lambda: Drive.from_toml(text))] == [
+        "[load] inertia is missing",
+        "[load] torque is missing",
+    ]
+
+
+def test_all_mistakes_of_a_file_come_at_once(sentences):
+    text = """
+        gap = "-2 rad"
+        [moter]
+        inertia = "5 kg"
+        startin_torque = true
+        [shaft]
+        stiffness = "5 N*m"
+        contact_law = "dead zone"
+        [load]
+        inertia = 0
+        torque = -1
+        kind = "reactive"
+        [start]
+        target_speed = "50 Hz"
+    """
+    found = sentences(lambda: Drive.from_toml(text, where="d.toml"))
+    assert [s.removeprefix("d.toml: ").split(":")[0] for s in found] == [
+        'gap = "-2 rad"',
+        "[moter]",
+        "[moter] startin_torque = true",
+        '[motor] inertia = "5 kg"',
+        '[shaft] stiffness = "5 N*m"',
+        '[shaft] gap = "-2 rad"',
+        '[shaft] contact_law = "dead zone"',
+        "[load] inertia = 0",
+        '[start] target_speed = "50 Hz"',
+        "[load] torque = -1 N*m",
+    ]
+
+
+FILES = [
+    ("crane-4amtk", "did you mean crane-4amtkf?"),
+    ("Crane-4AMTKF", "did you mean crane-4amtkf?"),
+    ("no-such-drive-at-all", "shipped drives are crane-4amtkf, "),
+    ("missing.toml", "there is no such file"),
+    ("crane-4amtkf.toml", "did you mean crane-4amtkf?"),
+    ("mine.tml", "did you mean mine.toml?"),
+    ("nowhere/mine.toml", 'there is no directory "nowhere"'),
+    ("mine.toml/inner.toml", "there is no directory"),
+    ("", "the name of the drive is empty"),
+    ("folder", "this is a directory"),
+    ("\0", "cannot be the path of a file"),
+    ("a" * 5000, "the file cannot be read (File name too long)"),
+    ("latin.toml", "the file is not UTF-8 text (line 2)"),
+    ("utf16.toml", "the file is not UTF-8 text (line 1)"),
+    ("image.toml", "the file is not UTF-8 text (line 1)"),
+    ("nul.toml", "not valid TOML"),
+    ("empty.toml", "it is empty"),
+    (5, "named by text"),
+    (b"mine.toml", "named by text"),
+    (None, "named by text"),
+]
+
+
+@pytest.mark.parametrize(("path", "reason"), FILES, ids=lambda v: repr(v)[:24])
+def test_one_sentence_for_a_file_that_is_none(path, reason, tmp_path, monkeypatch, sentences):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(GOOD_TOML, encoding="utf-8")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "latin.toml").write_bytes("\nname = 'Größe'\n".encode("latin-1"))
+    (tmp_path / "utf16.toml").write_bytes(GOOD_TOML.encode("utf-16"))
+    (tmp_path / "image.toml").write_bytes(b"\x89PNG\r\n\x1a\n")
+    (tmp_path / "nul.toml").write_bytes(b"name = \x00")
+    (tmp_path / "empty.toml").touch()
+    (sentence,) = sentences(lambda: Drive.load(path))
+    assert reason in sentence
+
+
+def test_a_read_that_fails_is_a_sentence(tmp_path, monkeypatch, sentences):
+    def refuse(self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.read_bytes", refuse)
+    (sentence,) = sentences(lambda: Drive.load("mine.toml"))
+    assert sentence == '"mine.toml": the file cannot be read (Permission denied).'

@@ -1,0 +1,173 @@
+"""Everything that can be wrong with a drive made in Python or changed by settings: one sentence a mistake."""
+
+import math
+
+import numpy as np
+import pytest
+
+from softstart.drive import PARAMETERS, Drive
+
+GOOD = {
+    "motor_inertia": 0.035,
+    "starting_torque": 62.0,
+    "stiffness": 368.465,
+    "gap": 0.5,
+    "load_inertia": 0.175,
+    "load_torque": 7.16,
+    "target_speed": 92.0,
+}
+
+# parameter, value, what the sentence begins with, what it says
+PYTHON = [
+    ("gap", "5 m", 'gap = "5 m": ', "m is a length, not an angle"),
+    ("gap", "5 radd", 'gap = "5 radd": ', 'did you mean "rad"?'),
+    ("gap", "wide", 'gap = "wide": ', "no number with a unit"),
+    ("gap", "", 'gap = "": ', "no number with a unit"),
+    ("gap", "0,5 rad", 'gap = "0,5 rad": ', "decimal point"),
+    ("gap", True, "gap = True: ", "true and false are no quantities"),
+    ("gap", None, "gap = None: ", "there is no value"),
+    ("gap", math.nan, "gap = nan: ", "not a number"),
+    ("gap", math.inf, "gap = inf: ", "must be finite"),
+    ("gap", -0.5, "gap = -0.5: ", "the total angular gap must be 0 or more"),
+    ("gap", "-30 deg", 'gap = "-30 deg": ', "must be 0 or more"),
+    ("gap", {"rad": 1}, "gap = {'rad': 1}: ", "a table is no quantity"),
+    ("gap", 1j, "gap = 1j: ", "a complex number is no quantity"),
+    ("gap", b"1", "gap = b'1': ", "a bytes is no quantity"),
+    ("gap", [], "gap = []: ", "an empty list holds no value"),
+    ("gap", [[1, 2], [3]], "gap[0] = [1, 2]: ", "the same length"),
+    ("gap", [0.5, -2.0, -3.0], "gap[1] = -2.0: ", "must be 0 or more"),
+    ("gap", [0.5, "2 m"], 'gap[1] = "2 m": ', "m is a length"),
+    ("gap", np.array([[1.0], [np.nan]]), "gap[1, 0] = nan: ", "not a number"),
+    ("gap", np.array([True, False]), "gap[0] = True: ", "true and false are no quantities"),
+    ("gap", 10**400, "gap = an integer beyond 10^30: ", "too large"),
+    ("motor_inertia", 0, "motor_inertia = 0: ", "must be above 0"),
+    ("motor_inertia", "0.035 kg", 'motor_inertia = "0.035 kg": ', "kg is a mass, not an inertia"),
+    ("motor_inertia", "14 kgf*m^2", 'motor_inertia = "14 kgf*m^2": ', "flywheel moment (GD^2)"),
+    ("load_inertia", -1, "load_inertia = -1: ", "the inertia of the load at the motor shaft must be above 0"),
+    ("stiffness", 0.0, "stiffness = 0.0: ", "must be above 0"),
+    ("stiffness", "368 N*m", 'stiffness = "368 N*m": ', 'is per angle; write "368 N*m/rad"'),
+    ("stiffness", "368 N/m", 'stiffness = "368 N/m": ', "a stiffness along a line"),
+    ("damping", -1, "damping = -1: ", "must be 0 or more"),
+    ("damping", "2 N*m*s", 'damping = "2 N*m*s": ', 'write "2 N*m*s/rad"'),
+    ("starting_torque", 0, "starting_torque = 0: ", "must be above 0"),
+    ("starting_torque", "62 N*m/rad", 'starting_torque = "62 N*m/rad": ', "a stiffness, not a torque"),
+    ("starting_torque", "62 J", 'starting_torque = "62 J": ', "an energy, not a torque"),
+    ("starting_torque", 7.16, "starting_torque = 7.16 N*m: ", "cannot move the load against load_torque"),
+    ("starting_torque", [62, 5], "starting_torque[1] = 5 N*m: ", "cannot move the load"),
+    ("maximum_torque", 61, "maximum_torque = 61 N*m: ", "must not be below starting_torque = 62 N*m"),
+    ("minimum_torque", 1, "minimum_torque = 1: ", "must be 0 or less"),
+    ("rated_power", "2.2 kJ", 'rated_power = "2.2 kJ": ', "an energy, not a power"),
+    ("rated_power", 0, "rated_power = 0: ", "must be above 0"),
+    ("rated_speed", "50 Hz", 'rated_speed = "50 Hz": ', 'write "50 turn/s" or "50 rad/s"'),
+    ("target_speed", "50 Hz", 'target_speed = "50 Hz": ', "may count turns or radians"),
+    ("target_speed", "880 1/min", 'target_speed = "880 1/min": ', 'write "880 rpm"'),
+    ("target_speed", "880 RPM", 'target_speed = "880 RPM": ', 'did you mean "rpm"?'),
+    ("target_speed", -92, "target_speed = -92: ", "must be above 0"),
+    ("torque_lag", -0.001, "torque_lag = -0.001: ", "must be 0 or more"),
+    ("torque_lag", "1 m", 'torque_lag = "1 m": ', "m is a length, not a time"),
+    ("torque_rate", 0, "torque_rate = 0: ", "must be above 0"),
+    ("torque_rate", -math.inf, "torque_rate = -inf: ", "must be above 0"),
+    ("torque_rate", math.nan, "torque_rate = nan: ", "not a number"),
+    ("torque_rate", "5 kW", 'torque_rate = "5 kW": ', "a power, not a rate of torque"),
+    ("encoder_lines", 2.5, "encoder_lines = 2.5: ", "must be a whole number, 0 or more"),
+    ("encoder_lines", -1, "encoder_lines = -1: ", "must be a whole number, 0 or more"),
+    ("encoder_lines", "4096 rad", 'encoder_lines = "4096 rad": ', "not a plain number"),
+    ("start_position", "1 kg", 'start_position = "1 kg": ', "a mass, not an angle"),
+    ("initial_load_speed", 92, "initial_load_speed = 92 rad/s: ", "must start below target_speed = 92 rad/s"),
+    ("initial_motor_speed", math.inf, "initial_motor_speed = inf: ", "must be finite"),
+    ("load_torque", -400.0, "load_torque = -400.0: ", "drives so hard"),
+    ("load_torque", 100, "starting_torque = 62 N*m: ", "cannot move the load against load_torque = 100 N*m"),
+    ("load_kind", "reactiv", 'load_kind = "reactiv": ', 'did you mean "reactive"?'),
+    ("load_kind", "friction", 'load_kind = "friction": ', 'is "active" or "reactive"'),
+    ("load_kind", ["active"], "load_kind = ['active']: ", 'is "active" or "reactive"'),
+    ("contact_law", "no_pull", 'contact_law = "no_pull": ', 'did you mean "no-pull"?'),
+    ("contact_law", None, "contact_law = None: ", '"no-pull", "dead-zone" or "modelica"'),
+    ("name", "", 'name = "": ', "one line of text"),
+    ("name", "two\nlines", 'name = "two\\nlines": ', "one line of text"),
+    ("name", 5, "name = 5: ", "must be text"),
+    ("source", ["a", "b"], "source = ['a', 'b']: ", "must be text"),
+    ("source", "\ud800", "source = ", "half a character"),
+    ("gapp", 1, "gapp = 1: ", "did you mean gap?"),
+    ("J1", 1, "J1 = 1: ", "did you mean motor_inertia?"),
+    ("inertia", 1, "inertia = 1: ", "did you mean motor_inertia or load_inertia?"),
+    ("Load_Kind", "active", 'Load_Kind = "active": ', "did you mean load_kind?"),
+    ("colour", "red", 'colour = "red": ', "the names are name, source, motor_inertia"),
+    ("motor_inertia", 1e-320, "motor_inertia, load_inertia, stiffness: ", "elastic frequency"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value", "subject", "reason"), PYTHON, ids=lambda v: str(v)[:24])
+def test_one_sentence_from_python(name, value, subject, reason, sentences):
+    (sentence,) = sentences(lambda: Drive(**GOOD | {name: value}))
+    assert sentence.startswith(subject)
+    assert reason in sentence
+
+
+def test_everything_missing(sentences):
+    found = sentences(Drive)
+    required = [name for name, parameter in PARAMETERS.items() if parameter.required]
+    assert [s.split(" is missing: ")[0] for s in found] == [*required, "target_speed"]
+    assert found[0] == (
+        "motor_inertia is missing: the inertia of the motor J1 is needed; "
+        'write for example motor_inertia="0.035 kg*m^2".'
+    )
+
+
+def test_a_misspelt_key_is_not_also_missing(sentences):
+    given = {name: value for name, value in GOOD.items() if name not in ("gap", "target_speed")}
+    found = sentences(lambda: Drive(**given, gapp=0.5, rated_sped=92))
+    assert [s.split(" ")[0] for s in found] == ["gapp", "rated_sped"]
+
+
+def test_several_cross_checks_at_once(sentences):
+    found = sentences(
+        lambda: Drive(
+            **GOOD
+            | {"maximum_torque": 3, "load_torque": -1, "load_kind": "reactive", "initial_load_speed": 500}
+        )
+    )
+    assert [s.split(" ")[0] for s in found] == ["maximum_torque", "load_torque", "initial_load_speed"]
+
+
+def test_arrays_that_do_not_fit(sentences):
+    (sentence,) = sentences(lambda: Drive(**GOOD | {"gap": [1, 2, 3], "load_inertia": [1, 2]}))
+    assert sentence.startswith("gap has shape (3,), load_inertia has shape (2,): ")
+
+
+def test_a_cross_check_names_the_elements(sentences):
+    (sentence,) = sentences(
+        lambda: Drive(**GOOD | {"starting_torque": [62, 5, 70], "load_torque": [[7.0], [8.0]]})
+    )
+    assert sentence.startswith("starting_torque[1] = 5 N*m: ")
+    assert "load_torque[0, 0] = 7 N*m" in sentence
+
+
+SETTINGS = [
+    ("load.inertia", '"load.inertia": ', "a key, an equals sign and a value"),
+    ("=0.07", '"=0.07": ', "a key, an equals sign and a value"),
+    ("load.inertia=", 'load.inertia = "": ', "no number with a unit"),
+    ("load.inertia=-1", 'load.inertia = "-1": ', "must be above 0"),
+    ("load_inertia=-1", 'load_inertia = "-1": ', "must be above 0"),
+    ("load.inertai=1", "load.inertai=1: ", "did you mean load.inertia?"),
+    ("inertia=1", "inertia=1: ", "did you mean motor.inertia or load.inertia?"),
+    ("J2=1", "J2=1: ", "did you mean load.inertia?"),
+    ("load=1", "load=1: ", "load is a table, name one of its keys, such as load.inertia"),
+    ("zzz.yyy=1", "zzz.yyy=1: ", "there are name, source, motor.inertia"),
+    ("load.kind=reactve", 'load.kind = "reactve": ', 'did you mean "reactive"?'),
+    ("shaft.gap=2 m", 'shaft.gap = "2 m": ', "m is a length"),
+    ("shaft.gap=0.5,2", 'shaft.gap = "0.5,2": ', "decimal point"),
+    ("motor.starting_torque=1", "motor.starting_torque = 1 N*m: ", "load.torque = 7.16 N*m"),
+    (5, "5: ", "a setting is text"),
+]
+
+
+@pytest.mark.parametrize(("setting", "subject", "reason"), SETTINGS, ids=lambda v: str(v)[:24])
+def test_one_sentence_from_a_setting(setting, subject, reason, sentences):
+    (sentence,) = sentences(lambda: Drive(**GOOD).with_settings([setting]))
+    assert sentence.startswith(subject)
+    assert reason in sentence
+
+
+def test_a_setting_twice(sentences):
+    (sentence,) = sentences(lambda: Drive(**GOOD).with_settings(["shaft.gap=1", "gap=2"]))
+    assert sentence == "gap=2: it was set before (shaft.gap=1); keep one of the two."

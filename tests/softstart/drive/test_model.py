@@ -1,0 +1,230 @@
+"""The drive as a value: defaults, changes, batches, equality, and what follows from the parameters."""
+
+import copy
+import math
+import pickle
+import subprocess
+import sys
+import typing
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from softstart.drive import PARAMETERS, TABLES, Drive
+from softstart.drive.keywords import DriveChanges, DriveKeywords
+from softstart.errors import InputError
+
+CRANE = {
+    "motor_inertia": 0.035,
+    "starting_torque": 62.0,
+    "stiffness": 368.465,
+    "gap": 0.5,
+    "load_inertia": 0.175,
+    "load_torque": 7.16,
+    "rated_speed": 92.0,
+}
+
+
+@pytest.fixture
+def crane():
+    return Drive(**CRANE)
+
+
+def test_defaults(crane):
+    assert crane.maximum_torque == 62.0
+    assert crane.target_speed == 92.0
+    assert crane.minimum_torque == crane.torque_lag == crane.damping == crane.start_position == 0.0
+    assert crane.torque_rate == math.inf
+    assert crane.encoder_lines == 4096.0
+    assert crane.rated_power is None
+    assert (crane.load_kind, crane.contact_law, crane.name, crane.source) == (
+        "active",
+        "no-pull",
+        "unnamed drive",
+        "",
+    )
+
+
+def test_symbols(crane):
+    assert (crane.J1, crane.J2, crane.c, crane.d, crane.gap, crane.Mc, crane.Ms) == (
+        0.035,
+        0.175,
+        368.465,
+        0.0,
+        0.5,
+        7.16,
+        62.0,
+    )
+    expected = math.sqrt(368.465 * 0.21 / (0.035 * 0.175))  # [G](8)
+    assert crane.Omega == pytest.approx(expected, rel=1e-15)
+    assert crane.elastic_period == pytest.approx(2 * math.pi / expected, rel=1e-15)
+    assert type(crane.Omega) is float
+    assert type(crane.elastic_period) is float
+
+
+def test_everything_numeric_is_a_float():
+    drive = Drive(**CRANE | {"gap": 1, "load_inertia": np.float32(0.5), "damping": np.array(2)})
+    numbers = [value for name, value in drive if PARAMETERS[name].unit and value is not None]
+    assert all(type(value) is float for value in numbers)
+
+
+def test_the_same_drive_in_other_units(crane):
+    other = Drive(
+        motor_inertia="350 kg*cm^2",
+        starting_torque="0.062 kN*m",
+        stiffness="0.368465 kN*m/rad",
+        gap="500 mrad",
+        load_inertia="1750 kg*cm^2",
+        load_torque="7.16 Nm",
+        rated_speed=92,
+    )
+    assert other == crane
+    assert hash(other) == hash(crane)
+
+
+@settings(deadline=None)  # the first example imports pint
+@given(
+    scale=st.sampled_from([("deg", math.pi / 180), ("arcmin", math.pi / 10800), ("turn", 2 * math.pi)]),
+    gap=st.floats(1e-4, 1e2),
+)
+def test_a_change_of_unit_changes_nothing(scale, gap):
+    unit, size = scale
+    drive = Drive(**CRANE | {"gap": f"{gap!r} {unit}", "stiffness": f"{gap!r} N*m/{unit}"})
+    assert drive.gap == pytest.approx(gap * size, rel=1e-15)
+    assert drive.stiffness == pytest.approx(gap / size, rel=1e-15)
+
+
+def test_replace_follows_and_checks(crane):
+    assert crane.replace(starting_torque=100).maximum_torque == 100
+    assert crane.replace(rated_speed=50).target_speed == 50
+    assert crane.replace(target_speed=10).replace(target_speed=None).target_speed == 92
+    assert crane.replace() == crane
+    assert crane.gap == 0.5
+    with pytest.raises(InputError, match=r"^gap = -1: the total angular gap must be 0 or more"):
+        crane.replace(gap=-1)
+    with pytest.raises(InputError, match="did you mean gap"):
+        crane.replace(gapp=-1)
+    with pytest.raises(InputError, match=r"cannot move the load against load_torque = 7\.16"):
+        crane.replace(starting_torque=5)
+
+
+def test_settings(crane):
+    changed = crane.with_settings(
+        [
+            "load.inertia=0.07",
+            "shaft.gap=2 rad",
+            "load_kind = reactive",
+            'name="a = b"',
+            "start.target_speed=500 rpm",
+        ]
+    )
+    assert changed == crane.replace(
+        load_inertia=0.07, gap=2, load_kind="reactive", name="a = b", target_speed="500 rpm"
+    )
+    assert crane.with_settings([]) == crane
+
+
+def test_frozen(crane):
+    with pytest.raises(AttributeError, match=r"replace\(gap=...\)"):
+        crane.gap = 2.0
+    with pytest.raises(AttributeError):
+        del crane.gap
+    batch = crane.replace(gap=[1, 2])
+    with pytest.raises(ValueError, match="read-only"):
+        batch.gap[0] = 3.0
+    with pytest.raises(ValueError, match="read-only"):
+        pickle.loads(pickle.dumps(batch)).gap[0] = 3.0
+    assert copy.deepcopy(batch) is batch
+    assert copy.copy(batch) is batch
+
+
+def test_an_array_given_stays_the_callers_own(crane):
+    gaps = np.array([1.0, 2.0])
+    batch = crane.replace(gap=gaps)
+    gaps[0] = 7.0
+    assert batch.gap[0] == 1.0
+
+
+def test_equality_and_hash(crane):
+    batch = crane.replace(gap=[0.5, 2])
+    assert batch == crane.replace(gap=np.array([0.5, 2.0]))
+    assert hash(batch) == hash(crane.replace(gap=(0.5, 2.0)))
+    assert batch != crane
+    assert batch != crane.replace(gap=[[0.5, 2]])
+    assert crane != crane.replace(name="other")
+    assert crane != 5
+    assert crane.replace(maximum_torque=62) == crane  # given or following: the same drive
+    assert crane.replace(start_position=[-0.0]) == crane.replace(start_position=[0.0])
+    assert len({crane, Drive(**CRANE), batch}) == 2
+    assert pickle.loads(pickle.dumps(batch)) == batch
+
+
+def test_repr_can_be_evaluated(crane):
+    assert eval(repr(crane), {"Drive": Drive}) == crane
+
+
+def test_batches(crane):
+    batch = crane.replace(gap=[0.5, 1, 2], load_inertia=[[0.07], [0.175]], target_speed=[90, 80, 70])
+    assert batch.shape == (2, 3)
+    assert np.shape(batch.Omega) == (2, 1)
+    singles = list(batch.elements())
+    assert len(singles) == 6
+    assert [d.gap for d in singles] == [0.5, 1, 2, 0.5, 1, 2]
+    assert singles[5] == crane.replace(gap=2, load_inertia=0.175, target_speed=70)
+    assert all(d.shape == () for d in singles)
+    assert list(crane.elements()) == [crane]
+    assert singles[4].replace(starting_torque=100).maximum_torque == 100
+
+
+def test_the_table_the_fields_and_the_keywords_agree():
+    fields = Drive.model_fields
+    assert list(fields) == list(PARAMETERS)
+    assert set(DriveKeywords.__annotations__) == set(DriveChanges.__annotations__) == set(PARAMETERS)
+    required = {name for name, parameter in PARAMETERS.items() if parameter.required}
+    assert required == set(DriveKeywords.__required_keys__)
+    assert required == {name for name, field in fields.items() if field.is_required()}
+    assert not DriveChanges.__required_keys__
+    assert TABLES == ("motor", "shaft", "load", "start")
+    assert len({p.path for p in PARAMETERS.values()}) == len(PARAMETERS)
+    for parameter in PARAMETERS.values():
+        choices = typing.get_args(fields[parameter.name].annotation)
+        assert not parameter.choices or parameter.choices == choices
+
+
+@pytest.mark.parametrize(
+    "parameter", [p for p in PARAMETERS.values() if p.unit or p.choices], ids=lambda p: p.name
+)
+def test_the_example_of_each_parameter_is_valid(crane, parameter):
+    crane.with_settings([f"{parameter.path}={parameter.example}"])
+
+
+def test_no_way_in_past_the_checks(crane):
+    assert Drive.model_validate(CRANE) == crane
+    assert Drive.model_validate(crane) is crane
+    assert crane.model_copy(update={"gap": "1 rad"}).gap == 1
+    for attempt in (
+        lambda: Drive.model_validate(CRANE | {"gap": -1}),
+        lambda: Drive.model_validate({1: 2}),
+        lambda: Drive.model_validate(3),
+        lambda: crane.model_copy(update={"gap": -1}),
+    ):
+        with pytest.raises(InputError) as error:
+            attempt()
+        assert not isinstance(error.value.__cause__, ValidationError)
+        assert error.value.__suppress_context__ or error.value.__context__ is None
+
+
+def test_json_of_a_batch_is_plain(crane):
+    assert '"gap":[0.5,2.0]' in crane.replace(gap=[0.5, 2]).model_dump_json()
+
+
+def test_the_import_stays_light():
+    code = (
+        "import sys; from softstart.drive import Drive;"
+        "heavy = {'numba', 'control', 'matplotlib', 'scipy', 'pint', 'casadi'} & set(sys.modules);"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,94 @@
+"""The certified search never passes a crossing, also where two lie close together."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart.plant import layout as at
+from softstart.plant.crossing import NO_CROSSING, RISING, WATCH, bounds, first_crossing
+from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
+
+NO_LOAD = (0.0,) * 7
+
+
+def swing(
+    z0: float, v0: float, w0: float, zeta: float, forcing: tuple[float, float, float], rate: float
+) -> np.ndarray:
+    m = np.zeros(at.N_M)
+    prepare(m, z0, v0, w0 * w0, 1.0, w0 * w0, w0, 1.0 / w0**2, zeta, *forcing, rate)
+    return m
+
+
+SWINGS = st.builds(
+    swing,
+    st.floats(-1.0, 1.0),
+    st.floats(-5.0, 5.0),
+    st.floats(0.5, 10.0),
+    st.floats(0.0, 12.0),
+    st.tuples(*[st.floats(-5.0, 5.0)] * 3),
+    st.floats(0.1, 50.0),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(SWINGS, st.floats(0.0, 1.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(-0.2, 0.2))
+def test_against_a_fine_grid(m: np.ndarray, above: float, alpha: float, beta: float, gamma: float) -> None:
+    end = 4.0
+
+    def f(s: float) -> float:
+        z, v = motion(m, s)
+        a = derivatives(m, s, z, v, forcing_tail(m, s))[0]
+        return float(c0 + alpha * z + beta * v + gamma * a)
+
+    c0 = 0.0
+    c0 = above - f(0.0) + 1e-9  # begins above zero
+    found = first_crossing(m, c0, alpha, beta, gamma, 0.0, NO_LOAD, WATCH, 0.0, end)
+    grid = np.linspace(0.0, end, 2001)
+    values = np.array([f(s) for s in grid])
+    size = 1.0 + float(np.abs(values).max())
+    negative = np.flatnonzero(values < -1e-9 * size)
+    if found == NO_CROSSING:
+        assert negative.size == 0
+    else:
+        assert 0.0 <= found <= end
+        assert abs(f(found)) < 1e-11 * size
+        assert negative.size == 0 or found <= grid[negative[0]]
+        before = values[grid < found]
+        assert before.size == 0 or before.min() > -1e-11 * size
+
+
+@settings(max_examples=300, deadline=None)
+@given(SWINGS, st.floats(0.0, 3.0))
+def test_bounds_hold_to_the_end_of_the_span(m: np.ndarray, s: float) -> None:
+    end = 4.0
+    z, v = motion(m, s)
+    limits = bounds(m, s, end, z, v, forcing_tail(m, s))
+    for later in np.linspace(s, end, 60):
+        z, v = motion(m, later)
+        found = (v, *derivatives(m, later, z, v, forcing_tail(m, later)))
+        for value, limit in zip(found, limits, strict=False):
+            assert abs(value) <= limit * (1 + 1e-9) + 1e-9
+
+
+def test_a_pair_of_crossings_a_millionth_apart_is_seen() -> None:
+    """z = cos(s) dips below its threshold for a moment only: a grid or a sign test would miss it."""
+    m = swing(1.0, 0.0, 1.0, 0.0, (0.0, 0.0, 0.0), 1.0)
+    for dip in (1e-3, 1e-6, 1e-10):
+        s = first_crossing(m, 1.0 - dip, 1.0, 0.0, 0.0, 0.0, NO_LOAD, WATCH, 0.0, 6.0)
+        assert s == pytest.approx(math.acos(-1.0 + dip), rel=1e-7)
+        assert s < math.pi
+    assert first_crossing(m, 1.0 + 1e-6, 1.0, 0.0, 0.0, 0.0, NO_LOAD, WATCH, 0.0, 6.0) == NO_CROSSING
+
+
+def test_an_event_just_handled_does_not_fire_again() -> None:
+    m = swing(0.0, 1.0, 1.0, 0.0, (0.0, 0.0, 0.0), 1.0)  # z = sin(s) leaves zero upwards
+    assert first_crossing(m, 0.0, 1.0, 0.0, 0.0, 0.0, NO_LOAD, RISING, 0.0, 6.0) == pytest.approx(
+        math.pi, rel=1e-14
+    )
+    touching = swing(0.0, 0.0, 1.0, 0.0, (1.0, 0.0, 0.0), 1.0)  # z = 1 - cos(s) touches zero
+    assert first_crossing(touching, 0.0, 1.0, 0.0, 0.0, 0.0, NO_LOAD, RISING, 0.0, 6.0) == NO_CROSSING

@@ -1,0 +1,259 @@
+"""Quantities: what is read, how exactly, and what is refused with which remedy."""
+
+import contextlib
+import math
+import subprocess
+import sys
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pint
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart.errors import InputError
+from softstart.unit_table import OTHER_NOUNS, QUANTITIES, read_unit
+from softstart.units import nearest, show, to_si
+
+READ = [
+    ("0.5", "rad", 0.5),
+    ("0.5 rad", "rad", 0.5),
+    ("500mrad", "rad", 0.5),
+    ("90 deg", "rad", math.pi / 2),
+    ("90°", "rad", math.pi / 2),
+    ("60 arcmin", "rad", math.pi / 180),
+    ("3600 arcsec", "rad", math.pi / 180),
+    ("0.25 turn", "rad", math.pi / 2),
+    ("880 rpm", "rad/s", 880 * 2 * math.pi / 60),
+    ("880 r/min", "rad/s", 880 * 2 * math.pi / 60),
+    ("0.88 krpm", "rad/s", 880 * 2 * math.pi / 60),
+    ("180 deg/s", "rad/s", math.pi),
+    ("2 turn/s", "rad/s", 4 * math.pi),
+    ("5 rad s-1", "rad/s", 5.0),
+    ("5 rad·s⁻¹", "rad/s", 5.0),
+    ("350 kg*cm^2", "kg*m^2", 0.035),
+    ("0.035 kg m2", "kg*m^2", 0.035),
+    ("0.035 kg·m²", "kg*m^2", 0.035),
+    ("0.1 kgf*m*s^2", "kg*m^2", 0.980665),
+    ("2 N*m*s^2/rad", "kg*m^2", 2.0),
+    ("62 N*m", "N*m", 62.0),
+    ("62 Nm", "N*m", 62.0),
+    ("62 N.m", "N*m", 62.0),
+    ("0.062 kN m", "N*m", 62.0),
+    ("1 kgf*m", "N*m", 9.80665),
+    ("1 lbf*ft", "N*m", 1.3558179483314004),
+    ("3 J/rad", "N*m", 3.0),
+    ("5 kgf*m/rad", "N*m/rad", 49.03325),
+    ("1 N*m/deg", "N*m/rad", 180 / math.pi),
+    ("2.5 N*m/arcmin", "N*m/rad", 2.5 * 180 * 60 / math.pi),
+    ("1.5 N*m*s/rad", "N*m*s/rad", 1.5),
+    ("1 N*m/(rad/s)", "N*m*s/rad", 1.0),
+    ("1 N*m/rpm", "N*m*s/rad", 60 / (2 * math.pi)),
+    ("9 ms", "s", 0.009),
+    ("2 min", "s", 120.0),
+    ("2.2 kW", "W", 2200.0),
+    ("1 hp", "W", 745.6998715822702),
+    ("1 PS", "W", 735.49875),
+    ("3 N*m/s", "W", 3.0),
+    ("5e2 N*m/s", "N*m/s", 500.0),
+    ("\N{MINUS SIGN}5 N*m", "N*m", -5.0),
+    ("+.5 rad", "rad", 0.5),
+    ("4096", "1", 4096.0),
+    ("1 kHz", "Hz", 1000.0),
+    ("2 ft", "m", 0.6096),
+    (3, "rad", 3.0),
+    (np.float32(0.5), "rad", 0.5),
+    (np.int64(2), "rad", 2.0),
+    (Fraction(1, 2), "rad", 0.5),
+    (Decimal("0.5"), "rad", 0.5),
+    (np.array(0.5), "rad", 0.5),
+]
+
+
+@pytest.mark.parametrize(("value", "unit", "expected"), READ, ids=str)
+def test_is_read(value, unit, expected):
+    found = to_si(value, unit)
+    assert type(found) is float
+    assert found == pytest.approx(expected, rel=1e-15)
+
+
+REFUSED = [
+    (
+        "50 Hz",
+        "rad/s",
+        'Hz is a frequency, which may count turns or radians; write "50 turn/s" or "50 rad/s"',
+    ),
+    ("1.5 kHz", "rad/s", 'write "1500 turn/s"'),
+    (
+        "50 1/s",
+        "rad/s",
+        '1/s is a frequency, which may count turns or radians; write "50 turn/s" or "50 rad/s"',
+    ),
+    ("5 s⁻¹", "rad/s", 'or "5 rad/s"'),
+    ("1500 1/min", "rad/s", 'write "1500 rpm" or "1500 rad/min"'),
+    ("5 m/s", "rad/s", "m/s is a speed along a line, not a speed"),
+    ("50 rad/s", "Hz", "rad/s is a speed, not a frequency"),
+    ("5 N*m", "N*m/rad", 'N*m is a torque, but a stiffness is per angle; write "5 N*m/rad" or "5 N*m/deg"'),
+    ("5 kgf*m", "N*m/rad", 'write "5 kgf*m/rad"'),
+    ("5 N/m", "N*m/rad", "N/m is a stiffness along a line, not a stiffness"),
+    ("5 N*m*s", "N*m*s/rad", 'a damping is per angle; write "5 N*m*s/rad"'),
+    ("5 N*m/rad", "N*m", 'N*m/rad is a stiffness, not a torque; write "5 N*m"'),
+    ("5 J", "N*m", 'J is an energy, not a torque; write "5 N*m"'),
+    ("5 N", "N*m", "N is a force, not a torque"),
+    ("5 W", "N*m/s", "W is a power, not a rate of torque"),
+    ("5 J", "W", "J is an energy, not a power"),
+    ("5 kg", "kg*m^2", "kg is a mass, not an inertia"),
+    ("5 kgf*m^2", "kg*m^2", "kgf*m^2 is a flywheel moment (GD^2); divide it by 4 g"),
+    ("0.5 m", "rad", 'm is a length, not an angle; write an angle as "0.5 rad"'),
+    ("0.5 s", "rad", "s is a time, not an angle"),
+    ("5 deg m", "rad", "deg m is not a unit of an angle"),
+    ("5 rad", "1", "rad is an angle, not a plain number"),
+    ("5 radd", "rad", 'unknown unit "radd" (did you mean "rad"?)'),
+    ("880 RPM", "rad/s", 'unknown unit "RPM" (did you mean "rpm"?)'),
+    ("5 xyzzy", "rad", 'unknown unit "xyzzy"; write an angle'),
+    ("5 %", "rad", '"%" is no unit'),
+    ("5 rad^99", "rad", '"rad^99" is no unit'),
+    ("5 (rad", "rad", '"(rad" is no unit'),
+    ("5 rad/", "rad", '"rad/" is no unit'),
+    ("5 rad**rad", "rad", '"rad**rad" is no unit'),
+    ("2*3 rad", "rad", '"*3 rad" is no unit'),
+    ("0,5 rad", "rad", "a comma may divide decimals or thousands"),
+    ("1,500.0 rad", "rad", "a comma may divide decimals or thousands"),
+    ("half a turn", "rad", "this is no number with a unit"),
+    ("rad", "rad", "this is no number with a unit"),
+    ("", "rad", "this is no number with a unit"),
+    ("nan rad", "rad", "this is not a number"),
+    (math.nan, "rad", "this is not a number"),
+    ("inf rad", "rad", "it must be finite"),
+    ("1e999 rad", "rad", "it must be finite"),
+    ("1e308 krpm", "rad/s", "it must be finite"),
+    ("1e-323 mrad", "rad", "the number is too small"),
+    (10**400, "rad", "the number is too large"),
+    (True, "rad", "true and false are no quantities"),
+    (np.bool_(True), "rad", "true and false are no quantities"),
+    (None, "rad", "there is no value"),
+    (1j, "rad", "a complex number is no quantity"),
+    ({}, "rad", "a table is no quantity"),
+    (b"1", "rad", "a bytes is no quantity"),
+    ([], "rad", "an empty list holds no value"),
+    ([[1, 2], [3]], "rad", "the rows of a list must all have the same length"),
+]
+
+
+@pytest.mark.parametrize(("value", "unit", "reason"), REFUSED, ids=lambda v: str(v)[:30])
+def test_is_refused(value, unit, reason):
+    with pytest.raises(InputError) as error:
+        to_si(value, unit, name="key")
+    (sentence,) = error.value.sentences
+    assert sentence.startswith("key")
+    assert reason in sentence
+    assert sentence.endswith(".")
+
+
+def test_every_noun_belongs_to_one_kind_of_unit():
+    kinds = [read_unit(unit) for unit in [*QUANTITIES, *OTHER_NOUNS]]
+    assert not any(isinstance(kind, str) for kind in kinds)
+    dimensions = [kind.dimensions for kind in kinds]
+    assert len(set(dimensions)) == len(dimensions)
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=str)
+def test_the_example_of_each_quantity_is_one(quantity):
+    assert to_si(quantity.example, quantity.unit) > 0
+
+
+def test_arrays_keep_their_shape_and_name_the_bad_element():
+    found = to_si([["1 deg", 2], [0.5, "1 rad"]], "rad")
+    np.testing.assert_allclose(found, [[math.pi / 180, 2], [0.5, 1]], rtol=1e-15)
+    with pytest.raises(InputError, match=r'^gap\[1, 0\] = "1 m": m is a length'):
+        to_si([["1 deg", 2], ["1 m", 1]], "rad", name="gap")
+    with pytest.raises(InputError, match=r"^gap\[2\] = nan: this is not a number"):
+        to_si(np.array([0.0, 1.0, math.nan]), "rad", name="gap")
+    with pytest.raises(InputError, match=r"^gap\[0\] = True"):
+        to_si(np.array([True]), "rad", name="gap")
+
+
+def test_an_array_is_copied():
+    given_array = np.array([1.0, -0.0])
+    found = to_si(given_array, "rad")
+    given_array[0] = 5.0
+    assert found[0] == 1.0
+    assert not np.signbit(found[1])
+
+
+def test_infinity_only_where_it_is_let_through():
+    assert to_si("inf N*m/s", "N*m/s", infinite=True) == math.inf
+    assert to_si(math.inf, "N*m/s", infinite=True) == math.inf
+    with pytest.raises(InputError, match="not a number"):
+        to_si(math.nan, "N*m/s", infinite=True)
+
+
+def test_quantities_of_a_users_own_pint_registry():
+    registry = pint.UnitRegistry()
+    assert to_si(registry.Quantity(880, "rpm"), "rad/s") == pytest.approx(880 * math.pi / 30)
+    np.testing.assert_allclose(
+        to_si(registry.Quantity([1, 2], "N*m/deg"), "N*m/rad"), [57.29577951, 114.591559]
+    )
+    with pytest.raises(InputError, match="is a length"):
+        to_si(registry.Quantity(1, "m"), "rad")
+
+
+@pytest.mark.parametrize(
+    ("unit", "forms"),
+    [
+        ("rad", ["rad", "mrad", "deg", "arcmin", "turn"]),
+        ("rad/s", ["rad/s", "rpm", "deg/s", "turn/s", "rad/min"]),
+        ("N*m/rad", ["N*m/rad", "kN*m/rad", "N*m/deg", "kgf*m/rad", "lbf*in/deg"]),
+        ("kg*m^2", ["kg*m^2", "kg*cm^2", "g*cm^2", "lb*ft^2", "kgf*m*s^2"]),
+        ("W", ["W", "kW", "hp", "PS"]),
+    ],
+)
+@settings(deadline=None)  # the first example imports pint
+@given(data=st.data())
+def test_there_and_back(unit, forms, data):
+    x = data.draw(st.floats(1e-6, 1e6))
+    form = data.draw(st.sampled_from(forms))
+    one = to_si(f"1 {form}", unit)
+    assert to_si(f"{x / one!r} {form}", unit) == pytest.approx(x, rel=4e-16)
+    assert to_si(f"{x!r} {unit}", unit) == x
+
+
+@settings(deadline=None)  # the first example imports pint
+@given(st.integers(-(10**6), 10**6), st.sampled_from(["m", "µ", "n", "k"]))
+def test_decimal_prefixes_are_correctly_rounded(number, prefix):
+    exponent = {"m": "e-3", "µ": "e-6", "n": "e-9", "k": "e3"}[prefix]
+    assert to_si(f"{number} {prefix}s", "s") == float(f"{number}{exponent}")
+
+
+@settings(deadline=None)  # the first example imports pint
+@given(
+    st.text("0123456789.eE+-*/^() Nmradskgf1°µ²⁻·_%,inf", max_size=14), st.sampled_from(sorted(QUANTITIES))
+)
+def test_any_text_is_read_or_refused(text, unit):
+    for value in (text, f"5 {text}"):
+        with contextlib.suppress(InputError):
+            assert math.isfinite(to_si(value, unit))
+
+
+def test_a_wrong_unit_in_the_code_is_a_sentence_too():
+    with pytest.raises(InputError, match='unit = "furlong": unknown unit "furlong"'):
+        to_si("1 m", "furlong")
+
+
+def test_bare_numbers_do_not_import_pint():
+    code = (
+        "import sys; from softstart.units import to_si; to_si(1.0, 'rad'); to_si('2', 'rad');"
+        "assert 'pint' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_helpers():
+    assert nearest("Gap", ["gap", "gip"]) == "gap"
+    assert nearest("load", []) is None
+    assert show(np.array([1.0, 2.0])) == "[1.0, 2.0]"
+    assert show(np.zeros(100)) == "an array of shape (100,)"
+    assert show(["x"], toml=True) == '["x"]'
+    assert len(show("x" * 1000)) < 80
