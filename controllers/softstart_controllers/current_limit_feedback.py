@@ -35,6 +35,7 @@ from softstart_controllers.sampled import (
 from softstart_controllers.shaft_observer import Observer, observer, predict
 
 DAMPING_RATIO = 0.7
+SLEWED_SHARE = 0.25  # of Ms
 PHASE_LEFT = math.pi / 6  # phase margin that the delays must leave
 UNCERTAINTY = 0.05
 RIPPLE = 0.2  # standard deviation of kd T', of Ms, that a coarse encoder may cause
@@ -160,11 +161,14 @@ class CurrentLimitFeedback(CompiledController):
         u = clip(limit - kd T', 0, full_torque),     kd = 2 damping_ratio J1 Omega/c
 
     With [G](7): T'' + (kd c/J1) T' + Omega^2 T = c (limit/J1 + Mc/J2), so kd gives the shaft the damping ratio
-    asked for on top of its own. A delay tau in the loop (torque lag, half a period, and the observer's lag as far
-    as its model may miss the load, J1/(J1 + J2)) turns damping into its opposite: the loop gain is one at
+    asked for on top of its own. The rise goes on only while the gap counts as closed. A delay tau in the loop (torque lag, the
+    time in which a limited rate slews a quarter of Ms, half a period, and the observer's lag as far as its model may
+    miss the load, J1/(J1 + J2)) turns damping into its opposite: the loop gain is one at
     Omega (zeta + sqrt(zeta^2 + 1)), and a phase margin of 30 degrees is kept there by
-    zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). A drive whose torque lags too far behind its elastic
-    frequency (m <= 1) gets no feedback, but the soft approach and the rise all the same.
+    zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). An observer that lags by more than 1/Omega cannot follow the
+    shaft: from there to 2/Omega the damping ratio is taken back to zero. A drive whose torque or
+    observer is too slow for its elastic frequency so gets no feedback, but the soft approach and the rise all the
+    same; its gap, once closed, then counts as closed for good.
 
     If the load is not at its target speed within `patience`, the feedback is dropped and the limit raised,
     so that an estimate gone wrong does not hold up the start for ever.
@@ -192,7 +196,7 @@ class CurrentLimitFeedback(CompiledController):
     full_torque: float | None = parameter("N*m", "torque limit after the rise", "starting torque Ms")
     rise: float | None = parameter("s", "time in which the limit rises after contact", "one elastic period")
     damping_ratio: float | None = parameter(
-        "1", "damping ratio added by the feedback", "0.7 less that of the shaft, or what the delays allow"
+        "1", "damping ratio added by the feedback", "0.7 less that of the shaft, or what the delays allow, down to 0"
     )
     threshold: float | None = parameter(
         "N*m",
@@ -239,10 +243,11 @@ class CurrentLimitFeedback(CompiledController):
         """The numbers in the order of the indices P_PERIOD to P_K_RATE."""
         eyes = observer(drive, self.period, self.uncertainty)
         period, ratio = np.asarray(self.period), np.asarray(self.damping_ratio)
+        opening = np.where(ratio > 0.0, OPEN_AGAIN * np.asarray(self.threshold), -math.inf)
         rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
         return stack(
             drive, period, drive.J1, self.low_torque, self.full_torque, 2.0 * ratio * drive.J1 * drive.Omega / drive.c,
-            self.threshold, OPEN_AGAIN * np.asarray(self.threshold), period / np.maximum(self.rise, period),
+            self.threshold, opening, period / np.maximum(self.rise, period),
             self.approach_speed, 2.0 * (period + drive.torque_lag), drive.initial_load_speed, rolling * drive.Mc / drive.J2,
             self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
             drive.d * drive.Omega**2 / drive.c, drive.Mc, eyes.angle_gain, eyes.speed_gain, eyes.torque_gain,
@@ -251,12 +256,14 @@ class CurrentLimitFeedback(CompiledController):
 
 
 def _damping_ratio(drive: Drive, eyes: Observer, period: Any) -> Any:
-    """0.7 less that of the shaft, and at most what leaves the phase margin at the delay of the loop."""
+    """0.7 less that of the shaft, and at most what the lag of torque and observer allow."""
     unforeseen = drive.J1 / (drive.J1 + drive.J2)
-    delay = drive.torque_lag + 0.5 * np.asarray(period) + unforeseen * eyes.rate_lag
+    slewing = SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
+    delay = drive.torque_lag + slewing + 0.5 * np.asarray(period) + unforeseen * eyes.rate_lag
     m = (0.5 * math.pi - PHASE_LEFT) / (drive.Omega * delay)
     own = 0.5 * drive.d * drive.Omega / drive.c
-    return np.clip(DAMPING_RATIO - own, 0.0, np.maximum(0.5 * (m - 1.0 / m), 0.0))
+    following = np.clip(2.0 - drive.Omega * eyes.rate_lag, 0.0, 1.0)
+    return following * np.clip(DAMPING_RATIO - own, 0.0, np.maximum(0.5 * (m - 1.0 / m), 0.0))
 
 
 def _shaft_torque_under(drive: Drive, low: Any) -> Any:

@@ -17,7 +17,8 @@ from softstart_controllers.sampled import encoder_count, number
 TRANSITION = ((1.0, 1.0, -1 / 2, -1 / 6), (0.0, 1.0, -1.0, -1 / 2), (0.0, 0.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0))
 DISTURBANCE = ((-1 / 24,), (-1 / 6,), (1 / 2,), (1.0,))  # a constant T'' over the sample, in h^4 T''/J1
 OUTPUT = ((1.0, 0.0, 0.0, 0.0),)
-SMALLEST_INDEX, LARGEST_INDEX = -18.0, 4.0  # decades; 4 is nearly dead beat, for an ideal encoder
+SMALLEST_INDEX = -18.0  # decades
+FASTEST = 6.0  # bandwidth of the observer in elastic frequencies; faster it would only learn the torque's ripple
 DECADES = 0.05  # designs are shared between drives whose index differs by less
 
 
@@ -70,31 +71,33 @@ def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
 
     The model is J1 w1' = u - T with T'' = model + noise: `uncertainty` Omega^2 Ms is the part of T'' that
     the model misses, changing at random within 1/Omega, so of spectral density
-    S = (uncertainty Omega^2 Ms)^2/Omega. The encoder's rounding is taken as noise of variance q^2/12 in each sample.
-    Nothing about the gap enters.
+    S = (uncertainty Omega^2 Ms)^2/Omega. The encoder's rounding is taken as noise of variance q^2/12 in each
+    sample, R = h q^2/12. The bandwidth is near (S/(J1^2 R))^(1/8); with a fine encoder R is taken as large as keeps
+    it at 6 Omega. Nothing about the gap enters.
 
     >>> crane = observer(Drive.load("crane-4amtkf"), 0.001, 0.05)
     >>> round(crane.angle_gain, 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
     (0.66, 0.0058, True)
     """
     h = np.asarray(period, dtype=np.float64)
-    q = np.maximum(encoder_count(drive), np.finfo(np.float64).tiny ** 0.25)
-    noise = np.asarray(uncertainty) * drive.Omega**2 * drive.Ms / np.sqrt(drive.Omega * h)
-    index = 2.0 * np.log10(noise * h**4 / drive.J1 * math.sqrt(12.0) / q)
-    steps = np.rint(np.clip(index, SMALLEST_INDEX, LARGEST_INDEX) / DECADES).astype(np.int64)
+    deviation = np.asarray(encoder_count(drive)) / math.sqrt(12.0)
+    noise = np.asarray(uncertainty) * drive.Omega**2 * drive.Ms / np.sqrt(drive.Omega * h) * h**4 / drive.J1
+    slowest = 10.0 ** (0.5 * SMALLEST_INDEX)
+    fastest = np.maximum((FASTEST * drive.Omega * h) ** 4, slowest)
+    index = 2.0 * np.log10(noise / np.clip(deviation, noise / fastest, noise / slowest))
+    steps = np.rint(index / DECADES).astype(np.int64)
     steps = np.broadcast_to(steps, drive.shape)
     kinds, where = np.unique(steps, return_inverse=True)
     table = np.array([design(int(kind)) for kind in kinds])
     values = Design(*(table[where.reshape(steps.shape), i] for i in range(table.shape[1])))
     unit = drive.J1 / h**2
-    rounding = np.asarray(encoder_count(drive)) / math.sqrt(12.0)
     return Observer(
         number(values.angle),
         number(values.speed / h),
         number(values.torque * unit),
         number(values.rate * unit / h),
-        number(values.torque_deviation * unit * rounding),
-        number(values.rate_deviation * unit / h * rounding),
+        number(values.torque_deviation * unit * deviation),
+        number(values.rate_deviation * unit / h * deviation),
         number(values.rate_lag * h),
     )
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import IO, Any
 
 from softstart.errors import InputError
-from softstart.export import write_whole
 
 
 @contextmanager
@@ -37,6 +36,7 @@ def output_folder(asked: str | None) -> Iterator[Path | None]:
 
 def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """A table as CSV; numbers with all their digits, None as an empty cell."""
+    from softstart.export import write_whole
 
     def write(stream: IO[Any]) -> None:
         writer = csv.writer(stream, lineterminator="\n")
@@ -48,6 +48,8 @@ def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[obje
 
 def write_text(path: Path, text: str) -> None:
     """A text file."""
+    from softstart.export import write_whole
+
     write_whole(path, lambda stream: stream.write(text))
 
 

@@ -149,4 +149,5 @@ def _show_one(name: str, cls: type[Controller]) -> None:
     rows = [[one[key] or "-" for key in keys] for one in about["parameters"]]
     print_table(to, [Column(heading, False) for heading in ("parameter", "unit", "meaning", "default")], rows)
     to.print()
-    sentence(to, f"Set with: softstart simulate crane-4amtkf --controller {name} --param {rows[0][0]}=VALUE")
+    sentence(to, "Set one:")
+    sentence(to, f"  softstart simulate crane-4amtkf --controller {name} --param {rows[0][0]}=VALUE")

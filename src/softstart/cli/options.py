@@ -83,13 +83,10 @@ def controller_names() -> tuple[str, ...]:
 
 def drive_argument(default: str | None = None) -> Decorator:
     """DRIVE: a TOML file or the name of a shipped drive."""
-    return click.argument(
-        "drive",
-        metavar="[DRIVE]" if default else "DRIVE",
-        required=default is None,
-        default=default,
-        shell_complete=_starting(drive_names),
-    )
+    complete = _starting(drive_names)
+    if default is None:
+        return click.argument("drive", metavar="DRIVE", shell_complete=complete)
+    return click.argument("drive", metavar="[DRIVE]", default=default, shell_complete=complete)
 
 
 def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:

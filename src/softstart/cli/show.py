@@ -33,7 +33,13 @@ def console() -> Console:
     """Standard output. Square brackets are text here, not markup: sources are called [G]."""
     from rich.console import Console
 
-    made = Console(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=False)
+    class Pipe(Console):
+        """Leaves it to `main` to end quietly when the reader goes away."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    made = Pipe(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=False)
     if made.is_terminal or "COLUMNS" in made._environ:
         made.width = max(NARROWEST, made.width)
     else:

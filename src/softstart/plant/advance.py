@@ -128,6 +128,10 @@ from softstart.plant.motion import derivatives, forcing_tail, motion
 from softstart.plant.span import begin_span, next_event, torque_course
 
 
+# A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
+LONGEST_SPAN = 16.0
+
+
 @inlined
 def keep_peak(x: Vector, torque: float, time: float) -> None:
     """Note a candidate for the largest |T| of the stage."""
@@ -402,9 +406,12 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
         load = begin_span(p, x, m)
         until = min(x[ASK_AT], stop)
         horizon = until - t
-        slewing = m[SLEW_END] < horizon
-        if slewing:
+        cut = m[SLEW_END] < horizon
+        if cut:
             horizon = m[SLEW_END]
+        if x[SIDE] != 0.0 and horizon > LONGEST_SPAN * p[PERIOD]:
+            cut = True
+            horizon = LONGEST_SPAN * p[PERIOD]
         event, s = next_event(p, x, m, load, horizon)
         if event == UNSOLVED:
             return NOT_LOCATED
@@ -416,7 +423,7 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
         if not math.isfinite(x[THETA] + x[V] + x[W2] + x[U]):
             return NOT_FINITE
         if event == NO_EVENT:
-            if not slewing:
+            if not cut:
                 x[TIME] = until
             if s > 0.0:
                 x[MASK] = NOTHING

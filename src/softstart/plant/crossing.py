@@ -114,10 +114,14 @@ def first_crossing(
             third += abs(kappa * load[5]) * (m[K] * b2 + m[DD] * b3)
             scale += abs(kappa) * (abs(w2) + abs(load[4] * v))
         if flat:
-            flat = False
-            if f < 0.0 and start == WATCH:
+            if f < -ROUNDING * scale and start == WATCH:
                 return origin
-            f = abs(f)
+            if f <= ROUNDING * scale:
+                s = origin + 2.0 * (s - origin)
+                if s >= end:
+                    return NO_CROSSING
+                continue
+            flat = False
         if not begun or f <= ROUNDING * scale:
             if most == 0.0 and slope <= 0.0 and curve == 0.0:
                 return s if (begun and slope < 0.0) else NO_CROSSING
@@ -154,6 +158,13 @@ def first_crossing(
                     return s
             elif most > 0.0:
                 step = (root + slope) / most
+                near = s - origin
+                if step < 0.1 * near and gamma == 0.0 and kappa == 0.0:
+                    # M2 is far too large here, its terms cancel: bound f'' over the next stretch alone
+                    local = abs(curve) + near * abs(alpha * jerk + beta * snap)
+                    local += 0.5 * near * near * (abs(alpha) * b4 + abs(beta) * b5)
+                    if local < most:
+                        step = min(near, (slope + math.sqrt(slope * slope + 2.0 * local * f)) / local)
             else:
                 return NO_CROSSING
             s += step

@@ -6,8 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from softstart import Drive, Run, simulate, stages
+from softstart.controller import Controller
 from softstart.metrics import base_torque
 
 Vector = NDArray[np.float64]
@@ -19,6 +21,7 @@ LIGHT, HEAVY = 2, 5  # J2'/J1, J2''/J1
 SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the table of REFERENCE
 RATIOS: Vector = np.linspace(0.0, 1.0, 101)[1:]  # the axis of figs. 2-4
 POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
+METHODS: tuple[Method, Method] = (1, 2)
 CONTROLLERS = {1: "reduced-first-stage", 2: "reduced-two-stage"}
 
 
@@ -47,8 +50,8 @@ def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None)
     1.2677
     """
     compute = stages.method_1 if method == 1 else stages.method_2
-    symbols = {"J1": drive.J1, "J2": drive.J2, "c": drive.c, "gap": drive.gap, "Ms": drive.Ms, "Mc": drive.Mc}
-    return compute(r, base=base, **symbols)
+    J1, J2, c, gap, Ms, Mc = drive.J1, drive.J2, drive.c, drive.gap, drive.Ms, drive.Mc
+    return compute(r, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, base=base)
 
 
 def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None) -> Run:
@@ -58,6 +61,25 @@ def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None)
     1.2677
     """
     return simulate(drive, CONTROLLERS[method], parameters={"torque": r * float(drive.Ms)}, base=base)
+
+
+def many(drives: Drive, controller: str | Controller, **parameters: float) -> tuple[Vector, Vector]:
+    """K_dyn of first contact and of the whole start of a batch; controller and base of the new drive.
+
+    >>> [k.round(4).tolist() for k in many(CRANE.replace(gap=[0.5, 2.0]), "direct")]
+    [[3.1179, 4.8654], [3.1179, 4.8654]]
+    """
+    results: Any = simulate(drives, controller, parameters=parameters or None, fitted_to=CRANE, base=CRANE)
+    return np.asarray(results["k_dyn_first_contact"]), np.asarray(results["k_dyn"])
+
+
+def ratio_where(k_dyn: float, drive: Drive, method: Method, base: float | None = None) -> float:
+    """The ratio M1/Ms at which the closed form of this method gives this K_dyn.
+
+    >>> round(ratio_where(2.0, crane(), 2), 3)
+    0.524
+    """
+    return float(brentq(lambda r: closed_form(drive, r, method, base).k_dyn - k_dyn, 0.0, 1.0, xtol=1e-14))
 
 
 def percent(ratio: float) -> str:

@@ -14,6 +14,7 @@ from softstart_studies.paper_g.crane import (
     GAP_2,
     HEAVY,
     LIGHT,
+    METHODS,
     POINTS,
     RATIOS,
     Method,
@@ -33,7 +34,6 @@ PRINTED = (
     (2, 0.5, 1.0, "2.7157", "2.7157", "0.0163", "0.0485"),
 )
 QUANTITIES = ("K method 1", "K method 2", "t1, s", "t1 + t2 method 1, s")
-METHODS: tuple[Method, Method] = (1, 2)
 
 
 @dataclass(frozen=True)
@@ -107,18 +107,23 @@ def figure_3() -> list[Curve]:
 
 def figure_4() -> list[Curve]:
     """Length of stages 1 + 2 for both methods and of stage 1, both gaps, at J2''."""
+    spans: tuple[tuple[Method | None, str], ...] = (
+        (1, "$t_1 + t_2$, method 1"),
+        (2, "$t_1 + t_2$, method 2"),
+        (None, "$t_1$"),
+    )
     return [
         duration_curve(gap, method, f"$\\delta_{index} = {gap:g}$ rad, {what}")
         for index, gap in ((2, GAP_2), (1, GAP_1))
-        for method, what in ((1, "$t_1 + t_2$, method 1"), (2, "$t_1 + t_2$, method 2"), (None, "$t_1$"))
+        for method, what in spans
     ]
 
 
 def worked_table() -> Table:
     """The table of REFERENCE: as printed, by closed form, and by the plant.
 
-    REFERENCE adds durations already rounded: 0.0321 + 0.0422 is printed as 0.0743, where t1 + t2 is 0.074396 s,
-    and 0.0163 + 0.0322 as 0.0485, where it is 0.048550 s. The last column says so.
+    REFERENCE adds durations already rounded: 0.0321 + 0.0422 is printed as 0.0743, where t1 + t2 is
+    0.074396 s, and 0.0163 + 0.0322 as 0.0485, where it is 0.048550 s. The last column says so.
     """
     rows: list[tuple[object, ...]] = []
     for ratio, gap, r, *printed in PRINTED:

@@ -12,7 +12,7 @@ import pytest
 
 from softstart.cli import main
 
-CONTROLLERS = '''
+CONTROLLERS = """
 from softstart import Command, PlainController, Sensor
 from softstart.controller import parameter
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Hollow(PlainController):
 
 class NoController:
     pass
-'''
+"""
 
 DRIVE = """
 name = "a drive of my own"
@@ -98,7 +98,9 @@ def place(tmp_path, monkeypatch):
     (tmp_path / "list.toml").write_text(DRIVE.replace("gap = 0.5", "gap = [0.5, 1.0]"))
     (tmp_path / "weak.toml").write_text(DRIVE.replace('"62 N*m"', "5"))
     (tmp_path / "misspelt.toml").write_text(DRIVE.replace("stiffness", "stifness"))
-    (tmp_path / "wrong.toml").write_text(DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan"))
+    (tmp_path / "wrong.toml").write_text(
+        DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan")
+    )
     (tmp_path / "missing.toml").write_text(DRIVE.replace("gap = 0.5", ""))
     (tmp_path / "folder").mkdir()
     return tmp_path
@@ -126,6 +128,12 @@ def spawn(place):
         )
 
     return go
+
+
+@pytest.fixture
+def command():
+    """What starts softstart in a process of its own."""
+    return COMMAND
 
 
 COMMAND = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")

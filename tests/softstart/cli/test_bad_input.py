@@ -1,5 +1,8 @@
 """Every kind of bad input: clear sentences on standard error, exit 2, nothing on standard output, no file."""
 
+import subprocess
+import sys
+
 import pytest
 
 START = ("simulate", "crane-4amtkf", "--controller")
@@ -154,14 +157,12 @@ def test_a_failing_controller_fails_the_comparison(run, nothing_left):
     nothing_left()
 
 
-def test_a_mistake_of_softstart_itself_shows_no_traceback(spawn, monkeypatch):
-    broken = "import sys, softstart.cli.commands as c; c.GREETING = property(); c.print = None\n"
-    run_it = "from softstart.cli.main import main; sys.exit(main())"
-    from subprocess import run as start
-    from sys import executable
-
-    ended = start([executable, "-c", broken + run_it], capture_output=True, text=True, check=False)
-    assert ended.returncode == 1
-    assert ended.stdout == ""
+def test_a_mistake_of_softstart_itself_shows_no_traceback(place):
+    program = (
+        "import sys; import softstart.cli.commands as commands; commands.print = None; "
+        "from softstart.cli import main; sys.exit(main())"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (1, "")
     assert "this is a mistake in softstart" in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -1,0 +1,63 @@
+"""Starts that the tests of the controllers share."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from softstart import Drive, Run, simulate
+from softstart.controller import Command, CompiledController, Measured
+from softstart.controller.base import PlainTwin
+from softstart.plant import layout as at
+
+CRANE = Drive.load("crane-4amtkf")
+
+
+def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
+    """A drive that somebody might build: 4 decades of inertia, 2 to 200 Hz, gaps up to ten times the windup."""
+    J1 = 10 ** rng.uniform(-4, 0.5)
+    J2 = J1 * 10 ** rng.uniform(-0.5, 1.3)
+    Ms = J1 * 10 ** rng.uniform(2.5, 3.7)
+    Mc = Ms * rng.uniform(0, 0.5)
+    frequency = 10 ** rng.uniform(0.3, 2.3)
+    Omega = 2 * math.pi * frequency
+    c = Omega**2 * J1 * J2 / (J1 + J2)
+    given: dict[str, Any] = {
+        "motor_inertia": J1,
+        "load_inertia": J2,
+        "starting_torque": Ms,
+        "load_torque": Mc,
+        "load_kind": rng.choice(["active", "reactive"]).item(),
+        "stiffness": c,
+        "damping": 2 * rng.choice([0, 0, 0.02, 0.3]) * c / Omega,
+        "gap": Ms / c * rng.choice([0, 10 ** rng.uniform(-2, 1)]),
+        "torque_lag": rng.choice([0, 0, 0.02, 0.2]) / frequency,
+        "encoder_lines": rng.choice([0, 1024, 4096, 32768]).item(),
+        "target_speed": (Ms - Mc) / (J1 + J2) * 10 ** rng.uniform(0.3, 1.7) / frequency,
+    }
+    given["start_position"] = given["gap"] * rng.choice([0, -0.5, rng.uniform(-0.5, 0.5)])
+    return Drive(**(given | fixed))
+
+
+def raised_at(run: Run) -> float:
+    """First instant at which the demand is the starting torque (seen in the torque without lag), s."""
+    full = run.segments[:, at.S_UA] >= 0.999 * float(run.drive.Ms)
+    return float(run.segments[full, at.S_START][0]) if full.any() else math.nan
+
+
+def traced(drive: Drive, controller: CompiledController) -> tuple[Run, np.ndarray[Any, Any]]:
+    """A run in plain Python, with rows (time, state) after each asking."""
+    rows: list[tuple[float, ...]] = []
+
+    class Listening(PlainTwin):
+        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+            answer = super().step(measured, state)
+            rows.append((measured.time, *answer.state))
+            return answer
+
+    twin = controller.as_plain(drive)
+    assert isinstance(twin, PlainTwin)
+    run = simulate(drive, Listening(twin.twin, twin.numbers))
+    trace = np.array(rows)
+    return run, trace[trace[:, 0] <= run.end_time]

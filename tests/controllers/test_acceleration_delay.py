@@ -1,0 +1,136 @@
+"""acceleration-delay: does it see the contact, when, and nothing else."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from softstart import Drive, simulate, stages
+from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
+from softstart_controllers.sampled import encoder_count
+from tests.controllers.starts import CRANE, raised_at, random_drive
+
+AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
+
+
+def seen_after(drive: Drive, controller: AccelerationDelay = AT_ONCE) -> float:
+    """Time from the true first contact until the torque is raised, s."""
+    run = simulate(drive, controller)
+    return raised_at(run) - run.first_contact
+
+
+def test_delay_is_stage_2_of_the_reduced_torque() -> None:
+    fitted = AccelerationDelay(torque=0.25 * 62).fitted(CRANE)
+    nominal = stages.method_2(0.25, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
+    assert fitted.delay == pytest.approx(nominal.contact_duration, rel=1e-12)
+
+
+@pytest.mark.parametrize("lines", [0, 1024, 4096])
+@pytest.mark.parametrize("lag", [0.0, 0.002])
+def test_contact_is_seen_as_late_as_documented(lines: int, lag: float) -> None:
+    """Over encoder phases, gaps and inertias of the crane; worst case measured: 1.6 ms off (a lag is not in it)."""
+    q = 2 * math.pi / (4 * max(lines, 1))
+    worst = 0.0
+    for gap, J2, phase in itertools.product((0.1, 0.5, 2.0), (0.07, 0.175), np.arange(8) / 8):
+        drive = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, encoder_lines=lines)
+        latency = AccelerationDelay().fitted(drive).latency
+        assert latency is not None
+        after = seen_after(drive.replace(start_position=phase * min(q, 0.05)))
+        assert after > 0.0
+        worst = max(worst, abs(after - latency))
+    assert worst < 0.002
+
+
+def test_detection_over_random_drives() -> None:
+    """Never before contact; undamped active drives whose window is short: within 5 % of stage 2 (measured 3 %)."""
+    rng = np.random.default_rng(3)
+    errors, clean = [], []
+    for _ in range(250):
+        drive = random_drive(rng)
+        fitted = AccelerationDelay().fitted(drive)
+        assert fitted.latency is not None
+        assert fitted.delay is not None
+        after = seen_after(drive)
+        assert after >= 0.0, drive
+        half, stride, _ = window(drive, fitted.torque, fitted.drop, fitted.period)
+        if half * stride * fitted.period > 0.25 * drive.elastic_period:
+            continue
+        error = (after - fitted.latency) / fitted.delay
+        errors.append(error)
+        if drive.load_kind == "active" and drive.damping == 0.0 and drive.torque_lag == 0.0:
+            clean.append(error)
+    assert len(errors) > 100
+    assert max(map(abs, errors)) < 0.35
+    assert len(clean) > 20
+    assert max(map(abs, clean)) < 0.05
+
+
+def test_rounding_alone_is_never_a_contact() -> None:
+    """A gap so wide that the motor turns freely for seconds: nothing is seen before the contact."""
+    rng = np.random.default_rng(4)
+    for lines in (16, 64, 256, 1024, 4096):
+        for _ in range(4):
+            wide = CRANE.replace(
+                gap=rng.uniform(5, 60), encoder_lines=lines, start_position=rng.uniform(0, 1e-3),
+                torque_lag=rng.choice([0.0, 0.003]), load_kind="reactive",
+            )  # fmt: skip
+            patient = AccelerationDelay(delay=0.0, latency=0.0, patience=100.0)
+            assert seen_after(wide, patient) > 0.0
+
+
+@pytest.mark.parametrize("motor_speed", [-3.0, 2.0, 10.0])
+def test_a_motor_already_turning_changes_nothing(motor_speed: float) -> None:
+    drive = CRANE.replace(initial_motor_speed=motor_speed, initial_load_speed=motor_speed, torque_lag=0.002)
+    latency = AccelerationDelay().fitted(drive).latency
+    assert seen_after(drive) == pytest.approx(latency, abs=0.002)
+
+
+def test_drives_without_gap_and_with_tiny_gaps() -> None:
+    for gap in (0.0, 1e-6, 1e-3, 0.01):
+        drive = CRANE.replace(gap=gap)
+        fitted = AccelerationDelay().fitted(drive)
+        assert seen_after(drive) == pytest.approx(fitted.latency, abs=0.002)
+
+
+def test_contact_not_seen_ends_with_patience() -> None:
+    blind = AccelerationDelay(drop=50.0, patience=0.2)
+    assert raised_at(simulate(CRANE, blind)) == pytest.approx(0.2, abs=0.001)
+
+
+def test_follows_wear_where_a_fixed_time_fails() -> None:
+    """[G]: the contact of a gap four times as wide is seen as well, set up for the new drive."""
+    worn = CRANE.replace(gap=2.0)
+    run = simulate(worn, AccelerationDelay(), fitted_to=CRANE)
+    fitted = AccelerationDelay().fitted(CRANE)
+    assert raised_at(run) - run.first_contact == pytest.approx(fitted.delay, abs=0.003)
+
+
+def test_first_contact_is_that_of_method_2_and_the_second_is_not() -> None:
+    """[G](18) for the first contact; the torque raised as the gap opens again makes the second one hard."""
+    controller = AccelerationDelay(torque=0.25 * 62)
+    run = simulate(CRANE, controller)
+    assert run.k_dyn_first_contact == pytest.approx(1.2677, abs=5e-5)
+    assert run.k_dyn == pytest.approx(2.3894, abs=0.02)
+    # raised at the peak of stage 2, where the shaft carries the most: no second landing at full torque
+    sooner = AccelerationDelay(torque=0.25 * 62, delay=0.5 * controller.fitted(CRANE).parameters["delay"])
+    assert simulate(CRANE, sooner).k_dyn < 1.7
+
+
+def test_window_keeps_the_rounding_error_below_a_third_of_the_drop() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        drive = random_drive(rng)
+        fitted = AccelerationDelay().fitted(drive)
+        half, stride, threshold = window(drive, fitted.torque, fitted.drop, fitted.period)
+        assert 2 <= half <= 30
+        assert stride >= 1
+        assert 2.0 * encoder_count(drive) <= threshold / 3 * (1 + 1e-9)
+
+
+def test_latency_of_a_batch_equals_that_of_its_drives() -> None:
+    batch = CRANE.replace(gap=[0.1, 0.5, 2.0], encoder_lines=[0, 1024, 4096])
+    together = detection_latency(batch, 15.0, 0.3, 0.001)
+    alone = [detection_latency(one, 15.0, 0.3, 0.001) for one in batch.elements()]
+    assert together.tolist() == alone

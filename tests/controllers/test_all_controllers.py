@@ -1,0 +1,148 @@
+"""What every shipped controller must keep to."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from softstart import Drive, InputError, simulate
+from softstart.controller import CompiledController, controller_class, make_controller
+from softstart.drive.library import names
+from softstart.units import to_si
+from tests.controllers.starts import CRANE, random_drive
+
+ALL = (
+    "acceleration-delay",
+    "current-limit-feedback",
+    "direct",
+    "ramp",
+    "reduced-first-stage",
+    "reduced-two-stage",
+    "s-curve",
+)
+SAMPLED = ("acceleration-delay", "current-limit-feedback", "ramp", "s-curve")
+DRIVES = [Drive.load(name) for name in names()]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_is_described(name: str) -> None:
+    cls = controller_class(name)
+    assert cls.name == name
+    assert cls.summary
+    assert cls.source
+    assert cls.__doc__ is not None
+    assert ">>>" in cls.__doc__
+    for field in dataclasses.fields(cls):
+        assert field.metadata["meaning"], field.name
+        assert field.metadata["default"], field.name
+        assert to_si(1.0, field.metadata["unit"]) == 1.0, field.name
+        assert field.default is None
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("drive", DRIVES, ids=lambda drive: drive.name)
+def test_defaults_are_complete_and_plain_numbers(name: str, drive: Drive) -> None:
+    values = make_controller(name).fitted(drive).parameters
+    assert all(type(value) is float for value in values.values()), values
+    assert all(math.isfinite(value) for value in values.values()), values
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("drive", DRIVES, ids=lambda drive: drive.name)
+def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> None:
+    controller = make_controller(name)
+    assert isinstance(controller, CompiledController)
+    compiled = simulate(drive, controller)
+    plain = simulate(drive, controller.as_plain(drive))
+    assert np.array_equal(compiled.final, plain.final, equal_nan=True)
+    assert np.array_equal(compiled.segments, plain.segments)
+    assert np.array_equal(compiled.event_rows, plain.event_rows)
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+@pytest.mark.parametrize("kind", ["active", "reactive"])
+def test_batch_equals_single_starts(name: str, kind: Any) -> None:
+    rng = np.random.default_rng(5)
+    fields = [dict(random_drive(rng, load_kind=kind)) for _ in range(40)]
+    varied = [key for key, value in fields[0].items() if isinstance(value, float)]
+    batch = Drive(load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
+    together = simulate(batch, name)
+    for i, one in enumerate(batch.elements()):
+        run = simulate(one, name)
+        assert together.k_dyn.values[i] == run.k_dyn
+        assert together.start_time.values[i] == run.start_time
+        assert together.contacts.values[i] == run.contacts
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_batch_of_two_dimensions(name: str) -> None:
+    batch = CRANE.replace(gap=np.array([[0.5], [2.0]]), load_inertia=np.array([0.07, 0.175, 0.3]))
+    result = simulate(batch, name)
+    assert result.k_dyn.shape == (2, 3)
+    assert result.k_dyn.values[1, 0] == simulate(CRANE.replace(gap=2.0, load_inertia=0.07), name).k_dyn
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_reaches_the_target_speed_of_any_sensible_drive(name: str) -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(150):
+        drive = random_drive(rng)
+        run = simulate(drive, name)
+        assert not math.isnan(run.start_time), drive
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_a_load_that_pushes_is_started_too(name: str) -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(30):
+        drive = random_drive(rng, load_kind="active")
+        pushing = drive.replace(load_torque=-0.1 * float(drive.Ms) * min(1.0, float(drive.J2 / drive.J1)))
+        assert not math.isnan(simulate(pushing, name).start_time), pushing
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_asks_at_whole_sample_periods_only(name: str) -> None:
+    run = simulate(CRANE, make_controller(name, {"period": 0.0007}))
+    instants = run.segments[1:, 0]
+    asked = np.setdiff1d(instants, run.event_rows[:, 0])
+    assert np.abs(asked / 0.0007 - np.rint(asked / 0.0007)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_sample_period_follows_fast_drives(name: str) -> None:
+    fast = CRANE.replace(stiffness=1e5)
+    assert make_controller(name).fitted(CRANE).parameters["period"] == 0.001
+    assert make_controller(name).fitted(fast).parameters["period"] == fast.elastic_period / 32
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("ramp", {"period": 0.0}),
+        ("ramp", {"time": -0.1}),
+        ("ramp", {"initial": math.nan}),
+        ("s-curve", {"rounding": 1.5}),
+        ("s-curve", {"rounding": -0.1}),
+        ("acceleration-delay", {"torque": 0.0}),
+        ("acceleration-delay", {"drop": -0.3}),
+        ("acceleration-delay", {"delay": math.inf}),
+        ("current-limit-feedback", {"approach_speed": 0.0}),
+        ("current-limit-feedback", {"damping_ratio": -1.0}),
+        ("current-limit-feedback", {"uncertainty": 0.0}),
+    ],
+)
+def test_refuses_impossible_parameters_in_one_sentence(name: str, wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError) as caught:
+        make_controller(name, wrong)
+    (key,) = wrong
+    assert len(caught.value.sentences) == 1
+    assert key in str(caught.value)
+
+
+def test_tells_all_wrong_parameters_at_once() -> None:
+    with pytest.raises(InputError) as caught:
+        make_controller("ramp", {"period": -1.0, "time": -1.0})
+    assert len(caught.value.sentences) == 2

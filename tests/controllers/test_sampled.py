@@ -1,0 +1,42 @@
+"""The shared pieces of the sampled controllers."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from softstart_controllers.sampled import encoder_count, mean_torque, patience
+from tests.controllers.starts import CRANE
+
+torques = some.floats(-1000, 1000)
+
+
+@given(torques, torques, some.floats(0.01, 30))
+def test_mean_torque_is_exact_for_any_lag(before: float, demand: float, samples: float) -> None:
+    """`samples` sample periods per lag: the closed-form mean of an exponential."""
+    tail = math.exp(-samples)
+    after = demand + (before - demand) * tail
+    exact = demand + (before - demand) * (1 - tail) / samples
+    assert mean_torque(before, after, demand) == pytest.approx(exact, rel=1e-9, abs=2e-6 * abs(before - demand) + 1e-9)
+
+
+@given(torques, torques)
+def test_mean_torque_without_lag_is_the_demand(before: float, demand: float) -> None:
+    assert mean_torque(before, demand, demand) == demand
+
+
+@given(torques, torques, torques)
+def test_mean_torque_lies_between_its_ends_and_the_demand(before: float, after: float, demand: float) -> None:
+    low, high = min(before, after, demand), max(before, after, demand)
+    assert low - 1e-9 <= mean_torque(before, after, demand) <= high + 1e-9
+
+
+def test_ideal_encoder_has_no_count() -> None:
+    assert encoder_count(CRANE.replace(encoder_lines=0)) == 0.0
+    assert encoder_count(CRANE.replace(encoder_lines=[0, 1])).tolist() == [0.0, math.pi / 2]
+
+
+def test_patience_outlasts_every_start_of_the_crane() -> None:
+    assert patience(CRANE) > 10 * 0.3735

@@ -1,0 +1,187 @@
+"""`softstart compare`: the table, the JSON, the files."""
+
+import csv
+import json
+import math
+import os
+import tomllib
+
+import pytest
+
+from softstart import Drive, compare, simulate
+from softstart.cli.compare import conclusion, share_lost
+from softstart.cli.show import column_of, number, printable, short
+
+THREE = ("--controllers", "direct,reduced-first-stage,reduced-two-stage")
+
+
+def test_json_is_the_summary_of_the_comparison(run):
+    code, out, err = run("compare", *THREE, "--json")
+    assert (code, err) == (0, "")
+    assert out.startswith("{")
+    told = json.loads(out, parse_constant=pytest.fail)  # no NaN, no Infinity
+    expected = compare("crane-4amtkf", THREE[1].split(",")).summary()
+    assert told.keys() == expected.keys()
+    for row, wanted in zip(told["strategies"], expected["strategies"], strict=True):
+        assert row.keys() == wanted.keys()
+        for key, value in wanted.items():
+            if isinstance(value, float) and math.isnan(value):
+                assert row[key] is None
+            elif key != "parameters":
+                assert row[key] == value
+
+
+def test_settings_parameters_and_end_reach_the_start(run):
+    arguments = ("--set", "shaft.gap=2 rad", "--set", "load.inertia=0.07", "--until", "500 ms")
+    parameters = ("--param", "reduced-first-stage.torque=15.5 N*m")
+    code, out, _ = run("compare", "good.toml", *THREE, *arguments, *parameters, "--json")
+    assert code == 0
+    row = json.loads(out)["strategies"][1]
+    drive = Drive.load("good.toml").replace(gap=2.0, load_inertia=0.07)
+    wanted = simulate(drive, "reduced-first-stage", 0.5, parameters={"torque": 15.5})
+    assert row["k_dyn"] == wanted.k_dyn
+    assert row["end_time"] == 0.5
+
+
+def test_loose_controller_takes_parameters(run):
+    code, out, err = run(
+        "compare", "good.toml", "--controllers", "direct,own.py:Needy",
+        "--param", "own.py:Needy.share=0.25", "--json",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert json.loads(out)["strategies"][1]["parameters"] == {"share": 0.25}
+
+
+@pytest.mark.parametrize("width", ["80", "100", "140"])
+def test_table_says_all_and_fits(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    code, out, err = run("compare", *THREE)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= int(width)
+    assert not any(line != line.rstrip() for line in lines)
+    assert "\x1b" not in out
+    assert not set("─│┃━") & set(out)
+    for words in (
+        "Crane travel drive", "J1 = 0.035 kg m2", "gap = 0.5 rad", "no-pull", "active", "strategy", "K_dyn",
+        "gap x4", "J2 x0.4", "stage 1", "stage 2", "contacts", "time", "lost %", "Gentlest: ", "52.86 N m",
+    ):  # fmt: skip
+        assert words in out
+    for row in compare("crane-4amtkf", THREE[1].split(",")).rows:
+        shown = " ".join(line for line in lines if line.startswith(row.run.controller.name))
+        for value in (row.run.k_dyn, row.run.k_dyn_first_contact, row.k_dyn_worn_gap, row.k_dyn_light_load):
+            assert f"{value:.3f}" in shown
+        assert f"{row.run.peak_torque:.1f}" in shown
+        assert f"{row.run.start_time:.4f}" in shown
+        assert f"{row.run.first_contact:.4f}" in shown
+
+
+def test_the_closing_sentence_names_the_gentlest_and_its_cost():
+    comparison = compare("crane-4amtkf", THREE[1].split(","))
+    said = conclusion(comparison)
+    best = comparison.gentlest
+    assert said.startswith(f"Gentlest: {best.run.controller.name}, K_dyn {best.run.k_dyn:.3f}")
+    assert "of direct" in said
+    direct = comparison.rows[0].run.start_time
+    assert math.isclose(share_lost(best), 100 * (best.run.start_time / direct - 1), rel_tol=1e-9)
+    assert f"{abs(share_lost(best)):.1f} %" in said
+
+
+def test_direct_alone_costs_nothing():
+    assert "no more time than direct" in conclusion(compare("crane-4amtkf", ["direct"]))
+
+
+def test_starts_cut_short_are_told(run):
+    code, out, _ = run("compare", "--controllers", "direct", "--until", "0.05")
+    assert code == 0
+    assert "None reaches the target speed" in out
+    assert "direct: The run ended at the time asked for" in out
+
+
+def test_a_controller_may_print(run):
+    code, out, err = run("compare", "good.toml", "--controllers", "own.py:Chatty", "--json")
+    assert code == 0
+    json.loads(out)
+    assert "this belongs to standard error" in err
+
+
+FILES = {
+    "report.md", "comparison.csv", "drive.toml", "comparison.svg", "comparison.png", "trade-off.svg",
+    "trade-off.png", "run-direct.svg", "run-direct.png", "trace-direct.csv", "run-own.svg", "run-own.png",
+    "trace-own.csv",
+}  # fmt: skip
+
+
+def test_the_files(run, place):
+    code, out, err = run(
+        "compare",
+        "good.toml",
+        "--controllers",
+        "direct,own.py:Good",
+        "--set",
+        "gap=0.6",
+        "--out",
+        "deep/results",
+    )
+    assert (code, err) == (0, "")
+    assert out.endswith("Written to deep/results: report.md, figures, traces and the table.\n")
+    folder = place / "deep" / "results"
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert [path.name for path in (place / "deep").iterdir()] == ["results"]
+    for path in folder.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    for path in folder.glob("*.svg"):
+        assert "</svg>" in path.read_text("utf-8")
+
+    drive = Drive.load(folder / "drive.toml")
+    assert drive.gap == 0.6
+    assert tomllib.loads((folder / "drive.toml").read_text("utf-8"))["name"] == "a drive of my own"
+    with (folder / "comparison.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["controller"] for row in rows] == ["direct", "own"]
+    assert float(rows[0]["k_dyn"]) == simulate(drive, "direct").k_dyn
+    trace = (folder / "trace-direct.csv").read_text("utf-8").splitlines()
+    assert trace[0] == "t [s],phi1 [rad],phi2 [rad],w1 [rad/s],w2 [rad/s],u [N*m],T [N*m]"
+
+    report = (folder / "report.md").read_text("utf-8")
+    for words in (
+        "# a drive of my own", "Gentlest: ", "| direct | 3.", "![comparison](comparison.svg)",
+        "| shaft.gap | gap | 0.6 |",
+        "softstart compare good.toml --controllers direct,own.py:Good --set gap=0.6 --out deep/results",
+    ):  # fmt: skip
+        assert words in report
+    linked = {part.split(")")[0] for part in report.split("](")[1:]}
+    assert linked <= FILES
+
+
+def test_files_replace_older_ones_and_leave_others(run, place):
+    folder = place / "results"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "report.md").write_text("old")
+    for _ in range(2):
+        assert run("compare", "--controllers", "direct", "--out", "results", "--json").code == 0
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert (folder / "report.md").read_text("utf-8").startswith("# Crane")
+    assert not [name for name in os.listdir(folder) if name.startswith(".")]
+    mode = (folder / "report.md").stat().st_mode & 0o777
+    (place / "usual").touch()
+    assert mode == (place / "usual").stat().st_mode & 0o777
+
+
+def test_the_same_command_writes_the_same_report(run, place):
+    for _ in range(2):
+        assert run("compare", "--controllers", "direct", "--out", "results").code == 0
+        first = {p.name: p.read_bytes() for p in (place / "results").iterdir()}
+    assert run("compare", "--controllers", "direct", "--out", "results").code == 0
+    assert {p.name: p.read_bytes() for p in (place / "results").iterdir()} == first
+
+
+def test_numbers_of_a_column_read_alike():
+    assert column_of([0.0, 0.0]) == ["0", "0"]
+    assert column_of([12345.6, 1.0]) == ["12346", "1"]
+    assert column_of([1e-9, float("inf"), None]) == ["1.000e-09", "inf", "-"]
+    assert number(None, 3) == "-"
+    assert number(float("-inf"), 3) == "-inf"
+    assert short(1e-7) == "1e-07"
+    assert printable("a\x1b[31mb") == "a [31mb"

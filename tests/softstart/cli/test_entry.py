@@ -1,0 +1,216 @@
+"""The command as a process: what it imports, how it ends, what reaches which stream."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from softstart import __version__
+from softstart.cli.running import COMPILING, working
+
+HEAVY = ("casadi", "control", "matplotlib", "numba", "scipy.linalg", "xarray")
+SLOW = """
+import time
+from softstart import Command, PlainController
+
+class Slow(PlainController):
+    def step(self, measured, state):
+        open("began", "w").close()
+        time.sleep(0.02)
+        return Command(62.0, measured.time + 0.001)
+"""
+
+DIRECT = ("--controllers", "direct")
+
+LIGHT = {
+    "greeting": ([], 0),
+    "help": (["--help"], 0),
+    "help of a command": (["compare", "--help"], 0),
+    "version": (["--version"], 0),
+    "drives": (["drives"], 0),
+    "one drive": (["drives", "crane-4amtkf"], 0),
+    "bad usage": (["compare", "--nothing"], 2),
+    "no drive file": (["compare", "nowhere.toml"], 2),
+    "bad drive file": (["compare", "wrong.toml"], 2),
+    "bad setting": (["compare", "--set", "gap=-1"], 2),
+    "unknown controller": (["simulate", "good.toml", "--controller", "dirct"], 2),
+    "bad output": (["compare", "--out", "good.toml"], 2),
+}
+
+
+@pytest.mark.parametrize("what", LIGHT)
+def test_quick_answers_import_nothing_heavy(what, place):
+    arguments, code = LIGHT[what]
+    program = (
+        "import sys; from softstart.cli import main; code = main(sys.argv[1:]); "
+        f"print([name for name in {HEAVY} if name in sys.modules], code, file=sys.stderr)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False
+    )
+    assert ended.stderr.splitlines()[-1] == f"[] {code}"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["simulate", "good.toml", "--controller", "direct"], ["compare", *DIRECT]]
+)
+def test_a_start_needs_neither_pictures_nor_design_tools(arguments, place):
+    program = (
+        "import sys; from softstart.cli import main; main(sys.argv[1:]); "
+        "print([n for n in ('casadi', 'matplotlib', 'xarray') if n in sys.modules], file=sys.stderr)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False
+    )
+    assert ended.stderr.splitlines()[-1] == "[]"
+
+
+def test_greeting_names_three_things(spawn):
+    ended = spawn()
+    assert (ended.returncode, ended.stderr) == (0, "")
+    for words in ("softstart compare", "softstart drives crane-4amtkf > mine.toml", "softstart study"):
+        assert words in ended.stdout
+
+
+def test_help_and_version(run):
+    assert run("--version").out == f"softstart {__version__}\n"
+    told = run("--help").out
+    for words in ("compare", "simulate", "drives", "controllers", "study", "_SOFTSTART_COMPLETE", "130"):
+        assert words in told
+    for command in ("compare", "simulate", "drives", "controllers", "study"):
+        assert run(command, "-h").out.startswith(f"Usage: softstart {command}")
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("softstart comp", "compare"),
+        ("softstart compare cra", "crane-4amtkf"),
+        ("softstart compare --controllers direct,ra", "direct,ramp"),
+        ("softstart simulate crane-4amtkf --con", "--controller"),
+    ],
+)
+def test_completion_in_the_shell(spawn, words, offered):
+    count = str(len(words.split()) - 1)
+    environment = os.environ | {
+        "_SOFTSTART_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": count,
+    }  # fmt: skip
+    ended = spawn(env=environment)
+    assert offered in ended.stdout.replace("plain,", "").splitlines()
+
+
+def test_streams_and_exit_codes_of_the_process(spawn):
+    good = spawn("simulate", "good.toml", "--controller", "direct", "--json")
+    assert good.returncode == 0
+    assert json.loads(good.stdout)["controller"] == "direct"
+    bad = spawn("compare", "wrong.toml", "--json")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    lost = spawn("simulate", "good.toml", "--controller", "own.py:Nan", "--json")
+    assert (lost.returncode, lost.stdout) == (3, "")
+
+
+def test_a_reader_that_goes_away_is_no_failure_to_talk_about(command, place):
+    process = subprocess.Popen(
+        [*command, "simulate", "good.toml", "--controller", "direct"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait() == 141
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a disk that is always full")
+def test_full_disk(command, place):
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(
+            [*command, "drives"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert ended.returncode == 2
+    assert ended.stderr == "softstart: the output could not be written: No space left on device.\n"
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("there_before", [False, True])
+def test_interrupted_write_leaves_nothing(command, place, stop, there_before):
+    (place / "slow.py").write_text(SLOW)
+    if there_before:
+        (place / "results").mkdir()
+        (place / "results" / "report.md").write_text("old")
+    process = subprocess.Popen(
+        [*command, "simulate", "good.toml", "--controller", "slow.py:Slow", "--out", "results"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while not (place / "began").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert list(place.rglob("*.part"))
+    process.send_signal(stop)
+    out, err = process.communicate()
+    assert (process.returncode, out) == (130, "")
+    assert err == "softstart: interrupted; nothing half-written was left behind.\n"
+    assert not list(place.rglob("*.part"))
+    if there_before:
+        assert [path.name for path in (place / "results").iterdir()] == ["report.md"]
+        assert (place / "results" / "report.md").read_text() == "old"
+    else:
+        assert not (place / "results").exists()
+
+
+def test_interrupted_between_files_leaves_whole_files_only(run, place, monkeypatch):
+    written = []
+
+    def stop(folder):
+        written.extend(folder.iterdir())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("softstart.cli.report.write_start", lambda run_, folder, command: stop(folder))
+    code, out, err = run("simulate", "good.toml", "--controller", "direct", "--out", "results")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err
+    assert not (place / "results").exists()
+    assert not list(place.rglob("*.part"))
+
+
+def test_compiling_is_announced_once(capfd):
+    from numba import njit
+
+    with working("compiling"):
+        print("this is no output")
+        for _ in range(2):
+            assert njit(lambda x: x + 1.0)(1.0) == 2.0
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.count(COMPILING) == 1
+    with working("nothing"):
+        pass
+    assert capfd.readouterr().err == ""
+
+
+def test_on_a_terminal_progress_goes_to_standard_error(command, place):
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        [*command, "compare", "--controllers", "direct", "--json"], stdout=subprocess.PIPE, stderr=follower,
+        env=os.environ | {"TERM": "xterm", "COLUMNS": "100"},
+    )  # fmt: skip
+    os.close(follower)
+    shown = b""
+    while True:
+        try:
+            part = os.read(leader, 4096)
+        except OSError:  # the other end is closed
+            break
+        if not part:
+            break
+        shown += part
+    os.close(leader)
+    out = process.stdout.read()
+    process.stdout.close()
+    assert process.wait() == 0
+    assert json.loads(out)["strategies"][0]["controller"] == "direct"
+    assert b"starting the drive" in shown

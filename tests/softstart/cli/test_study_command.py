@@ -1,0 +1,132 @@
+"""`softstart study`, and what a study is."""
+
+import json
+
+import pytest
+
+from softstart import InputError, SimulationError
+from softstart import study as studies
+from softstart.figures import new_figure
+from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study
+
+ROWS = [(0.5, 3.1179, "[G]"), (2.0, None, "")]
+
+
+class Example(Study):
+    name = "example"
+    title = "Does a wider gap raise K_dyn?"
+    pictures = ("gap",)
+
+    def run(self, out, progress):
+        progress("asking")
+        figure, axes = new_figure()
+        axes.plot([0.5, 2.0], [3.1179, 4.8654])
+        return StudyResult(
+            tables=[
+                Table("Peak over gap", ("gap, rad", "K_dyn", "note"), [(0.5, 3.1179, "[G]"), (2.0, None, "")])
+            ],
+            claims=[
+                Claim("A wider gap raises K_dyn.", "confirmed", "3.12 at 0.5 rad, 4.87 at 2 rad."),
+                Claim("Nothing else does.", Verdict.REFUTED, "A larger J2 does too. " * 12),
+                Claim("It always does.", "partly", "Not where the start begins in contact."),
+            ],
+            figures={"gap": figure},
+        )
+
+
+class Fails(Example):
+    name = "fails"
+
+    def run(self, out, progress):
+        (out / "begun.txt").write_text("half")
+        raise SimulationError("The start was given up: its controller is a test.")
+
+
+class Point:
+    """An entry point."""
+
+    def __init__(self, target):
+        self.target, self.value = target, "somewhere:Something"
+
+    def load(self):
+        if isinstance(self.target, Exception):
+            raise self.target
+        return self.target
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch):
+    points = {
+        "example": Point(Example),
+        "fails": Point(Fails),
+        "broken": Point(ImportError("No module named 'nothing'")),
+        "strange": Point(int),
+    }
+    monkeypatch.setattr(studies, "_registered", lambda: points)
+
+
+def test_list(run):
+    for arguments in (["study"], ["study", "--list"]):
+        code, out, err = run(*arguments)
+        assert (code, err) == (0, "")
+        assert "Does a wider gap raise K_dyn?" in out
+        assert "No module named 'nothing'" in " ".join(out.split())
+    told = json.loads(run("study", "--list", "--json").out)
+    assert {"name": "example", "title": Example.title, "pictures": ["gap"]} in told["studies"]
+
+
+def test_result_is_shown(run):
+    code, out, err = run("study", "example")
+    assert (code, err) == (0, "")
+    for words in (
+        "Peak over gap",
+        "gap, rad",
+        "3.1179",
+        " 1. confirmed  A wider gap",
+        " 2. refuted    Nothing",
+        "[G]",
+    ):
+        assert words in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_json(run):
+    code, out, err = run("study", "example", "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["study"] == "example"
+    assert [claim["verdict"] for claim in told["claims"]] == ["confirmed", "refuted", "partly"]
+    assert told["tables"][0]["rows"] == [[0.5, 3.1179, "[G]"], [2.0, None, ""]]
+
+
+def test_files(run, place):
+    code, out, _ = run("study", "example", "--out", "results")
+    assert code == 0
+    names = {path.name for path in (place / "results").iterdir()}
+    assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv"}
+    table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")
+    assert table == '"gap, rad",K_dyn,note\n0.5,3.1179,[G]\n2.0,,\n'
+    assert "Written to results" in out
+
+
+def test_a_study_that_fails_leaves_nothing(run, nothing_left):
+    code, out, err = run("study", "fails", "--out", "results")
+    assert (code, out) == (3, "")
+    assert err == "softstart: The start was given up: its controller is a test.\n"
+    nothing_left()
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("exampel", 'did you mean "example"?'), ("broken", "cannot be loaded"), ("strange", "is no study")],
+)
+def test_studies_that_are_not_there(name, says):
+    with pytest.raises(InputError, match=says.replace("?", r"\?")):
+        find_study(name)
+
+
+def test_mistakes_in_a_result_are_found_at_once():
+    with pytest.raises(ValueError, match="2 cells for 1 columns"):
+        Table("t", ("a",), [(1, 2)])
+    with pytest.raises(ValueError, match="perhaps"):
+        Claim("s", "perhaps", "e")
