@@ -109,19 +109,19 @@ class AccelerationDelay(CompiledController):
     W^2 >= 6 q J1/(drop torque); so rounding alone never looks like a contact. Up to 30 periods each sample is
     used, with longer windows every second, third, ... one, so that 61 angles are always enough to keep.
 
-    *Delay.* From contact the torque stays reduced for `delay`, by default the length of stage 2, [G](15), from
-    the nominal drive. What passes between contact and its being seen is known: `latency` is the time after
-    which the shaft torque of [G](11) alone brings the window to the threshold, and half a period for
-    the sampling (half of each second, third, ... with a long window). Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
+    *Delay.* From contact the torque stays reduced for `delay`, by default the length of stage 2, [G](15),
+    from the nominal drive. What passes between contact and its being seen is known: `latency` is the time
+    after which the shaft torque of [G](11) brings the window to the threshold, and half the time between two
+    looks at it. Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
     at the nearest sample. Damping is left out of both, as in [G].
 
-    Contact that is not seen within `patience` (a load that shares next to nothing of the torque, an encoder too
-    coarse) is waited for no longer: the torque is raised then.
+    Contact that is not seen within `patience` (a load that shares next to nothing of the torque, an encoder
+    too coarse) is waited for no longer: the torque is raised then.
 
     At the end of stage 2 the gap opens again, with the masses parting at the speed they met with. The torque
-    raised there, as [G] proposes, drives them into the second contact about as hard as method 1 does
-    into the first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`), the whole start is
-    not (`run.k_dyn`). Another `delay` may serve better.
+    raised there, as [G] proposes, drives them into the second contact about as hard as method 1 does into the
+    first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`), the whole start is not
+    (`run.k_dyn`). Another `delay` may serve better.
 
     Source: [G], conclusions; stages by [G](10), (11), (15).
 
@@ -170,9 +170,9 @@ class AccelerationDelay(CompiledController):
         return {
             "torque": number(torque),
             "full_torque": drive.Ms,
-            "delay": number(stage_2_duration(drive, torque)),
+            "delay": stage_2_duration(drive, torque),
             "drop": number(drop),
-            "latency": number(detection_latency(drive, torque, drop, period)),
+            "latency": detection_latency(drive, torque, drop, period),
             "patience": patience(drive),
             "period": period,
         }
@@ -188,7 +188,7 @@ class AccelerationDelay(CompiledController):
 
 
 def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[Any, Any, Any]:
-    """Kept samples in half a window, stride between them in periods, threshold of the second difference in rad.
+    """Kept samples in half a window, stride between them in periods, threshold of the difference in rad.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> half, stride, threshold = window(crane, 15.386, 0.3, 0.001)
@@ -222,7 +222,7 @@ def stage_2_duration(drive: Drive, torque: Any) -> Any:
     Where friction keeps the gap of a reactive load closed for good, [G](15) is taken all the same.
 
     >>> round(stage_2_duration(Drive.load("crane-4amtkf"), 15.5), 4)
-    0.0327
+    0.0328
     """
     dw12 = closing_speed(drive, torque)
     mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
@@ -233,15 +233,18 @@ def stage_2_duration(drive: Drive, torque: Any) -> Any:
         )
         resting = np.asarray(drive.initial_load_speed) == 0.0
         duration = np.where(resting & np.isfinite(stuck), stuck, duration)
-    return duration
+    return number(duration)
 
 
 def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
     """Time in s from contact until the window is at its threshold, at most the length of stage 2.
 
-    The angle lost to the shaft is l(s) = int int T/J1 with T of [G](11), so
-    l(s) = (mean (s^2/2 - (1 - cos Omega s)/Omega^2) + (c dw12/Omega^2)(s - sin(Omega s)/Omega))/J1; solved for
-    l(s) - 2 l(s - W) + l(s - 2 W) = threshold by bisection, plus half the time between two looks.
+    The angle lost to the shaft is l(s) = int int T/J1 with T of [G](11), so with x = Omega s
+
+        l(s) = (mean (x^2/2 - 1 + cos x) + (c dw12/Omega)(x - sin x))/(J1 Omega^2)
+
+    l(s) - 2 l(s - W) + l(s - 2 W) = threshold is solved by bisection; half the time between two looks is
+    added.
 
     >>> round(detection_latency(Drive.load("crane-4amtkf"), 15.386, 0.3, 0.001), 4)
     0.0054

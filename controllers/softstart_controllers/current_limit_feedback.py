@@ -143,32 +143,33 @@ class CurrentLimitFeedback(CompiledController):
         T'' = (c/J1)(u - T) - (c/J2)(T - Mc) - (d Omega^2/c) T'
 
     and are corrected by the encoder with Kalman gains from `control.dlqe` (`shaft_observer`), designed for an
-    unknown part `uncertainty` Omega^2 Ms of T'' and for the rounding of the encoder. The gap counts
-    as closed from T > `threshold` on, and as open again from T < 0.3 `threshold`. The threshold is 0.1
-    M12avg_base, or half of what the shaft carries under the low limit where that is less. A coarse encoder makes
-    the observer slower: the uncertainty is lowered until 5 standard deviations of T are below the threshold
-    and those of kd T' below 0.2 Ms.
+    unknown part `uncertainty` Omega^2 Ms of T'' and for the rounding of the encoder. The gap counts as closed
+    from T > `threshold` on, and as open again from T < 0.3 `threshold`. The threshold is 0.1 M12avg_base, or
+    half of what the shaft carries under the low limit where that is less. A coarse encoder makes the observer
+    slower: the uncertainty is lowered until 5 standard deviations of T are below the threshold and one of kd
+    T' is below 0.2 Ms.
 
-    *Gap open.* The limit is low. It accelerates the motor until it is `approach_speed` faster than the load, whose
-    speed is known (at the start w2(0) - Mc t/J2 under an active load, counted to half of the approach speed at
-    most; after a contact the estimate w1 - T'/c at its end), and keeps that speed:
-    u = clip(J1 (allowed - w1)/(2 (period + lag)), 0, low_torque). With
-    approach_speed = Omega M12avg_base/c, the impact alone swings the shaft to M12avg_base, [G](12), so to K_dyn = 1,
-    which the full torque will need anyway, from however wide a gap.
+    *Gap open.* The low limit accelerates the motor until it is `approach_speed` faster than the load, and
+    keeps that speed: u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag)), 0, low_torque). The speed of
+    the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the approach speed,
+    no further), and after a contact the estimate w1 - T'/c of the instant at which it ended. With
+    approach_speed = Omega M12avg_base/c the impact alone swings the shaft to M12avg_base, [G](12), that is to
+    K_dyn = 1, which the full torque needs anyway; from however wide a gap.
 
     *Gap closed.* The limit rises from `low_torque` to `full_torque` in the time `rise`, and
 
         u = clip(limit - kd T', 0, full_torque),     kd = 2 damping_ratio J1 Omega/c
 
-    With [G](7): T'' + (kd c/J1) T' + Omega^2 T = c (limit/J1 + Mc/J2), so kd gives the shaft the damping ratio
-    asked for on top of its own. The rise goes on only while the gap counts as closed. A delay tau in the loop (torque lag, the
-    time in which a limited rate slews a quarter of Ms, half a period, and the observer's lag as far as its model may
-    miss the load, J1/(J1 + J2)) turns damping into its opposite: the loop gain is one at
-    Omega (zeta + sqrt(zeta^2 + 1)), and a phase margin of 30 degrees is kept there by
-    zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). An observer that lags by more than 1/Omega cannot follow the
-    shaft: from there to 2/Omega the damping ratio is taken back to zero. A drive whose torque or
-    observer is too slow for its elastic frequency so gets no feedback, but the soft approach and the rise all the
-    same; its gap, once closed, then counts as closed for good.
+    With [G](7): T'' + (kd c/J1) T' + Omega^2 T = c (limit/J1 + Mc/J2), so kd gives the shaft the damping
+    ratio asked for on top of its own. The rise goes on only while the gap counts as closed.
+
+    *Limits of the feedback.* A delay tau in the loop (torque lag, the time in which a limited rate slews a
+    quarter of Ms, half a period, and the observer's lag as far as its model may miss the load, J1/(J1 + J2))
+    turns damping into its opposite: the loop gain is one at Omega (zeta + sqrt(zeta^2 + 1)), and a phase
+    margin of 30 degrees is kept there by zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). An observer that
+    lags by more than 1/Omega cannot follow the shaft: from there to 2/Omega the damping ratio is taken back
+    to zero. A drive whose torque or observer is too slow for its elastic frequency so gets no feedback, but
+    the soft approach and the rise all the same; its gap, once closed, then counts as closed for good.
 
     If the load is not at its target speed within `patience`, the feedback is dropped and the limit raised,
     so that an estimate gone wrong does not hold up the start for ever.
@@ -182,7 +183,9 @@ class CurrentLimitFeedback(CompiledController):
     """
 
     name: ClassVar[str] = "current-limit-feedback"
-    summary: ClassVar[str] = "low limit while the gap is open, then a limit with feedback of the estimated dT/dt"
+    summary: ClassVar[str] = (
+        "low limit while the gap is open, then a limit with feedback of the estimated dT/dt"
+    )
     source: ClassVar[str] = "[G]"
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = N_STATE
@@ -196,7 +199,9 @@ class CurrentLimitFeedback(CompiledController):
     full_torque: float | None = parameter("N*m", "torque limit after the rise", "starting torque Ms")
     rise: float | None = parameter("s", "time in which the limit rises after contact", "one elastic period")
     damping_ratio: float | None = parameter(
-        "1", "damping ratio added by the feedback", "0.7 less that of the shaft, or what the delays allow, down to 0"
+        "1",
+        "damping ratio added by the feedback",
+        "0.7 less that of the shaft, or what the delays allow, down to 0",
     )
     threshold: float | None = parameter(
         "N*m",
@@ -204,7 +209,9 @@ class CurrentLimitFeedback(CompiledController):
         "0.1 M12avg_base, at most half the shaft torque under the low limit, at least 5 standard deviations",
     )
     uncertainty: float | None = parameter(
-        "1", "unknown part of the second derivative of T, as a share of Omega^2 Ms", "0.05, less for a coarse encoder"
+        "1",
+        "unknown part of the second derivative of T, as a share of Omega^2 Ms",
+        "0.05, less for a coarse encoder",
     )
     patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
@@ -242,14 +249,16 @@ class CurrentLimitFeedback(CompiledController):
     def vector(self, drive: Drive) -> Vector:
         """The numbers in the order of the indices P_PERIOD to P_K_RATE."""
         eyes = observer(drive, self.period, self.uncertainty)
-        period, ratio = np.asarray(self.period), np.asarray(self.damping_ratio)
-        opening = np.where(ratio > 0.0, OPEN_AGAIN * np.asarray(self.threshold), -math.inf)
+        period, ratio, rise = (np.asarray(v, float) for v in (self.period, self.damping_ratio, self.rise))
+        threshold = np.asarray(self.threshold, float)
+        opening = np.where(ratio > 0.0, OPEN_AGAIN * threshold, -math.inf)
         rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
         return stack(
-            drive, period, drive.J1, self.low_torque, self.full_torque, 2.0 * ratio * drive.J1 * drive.Omega / drive.c,
-            self.threshold, opening, period / np.maximum(self.rise, period),
-            self.approach_speed, 2.0 * (period + drive.torque_lag), drive.initial_load_speed, rolling * drive.Mc / drive.J2,
-            self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
+            drive, period, drive.J1, self.low_torque, self.full_torque,
+            2.0 * ratio * drive.J1 * drive.Omega / drive.c, threshold, opening,
+            period / np.maximum(rise, period),
+            self.approach_speed, 2.0 * (period + drive.torque_lag), drive.initial_load_speed,
+            rolling * drive.Mc / drive.J2, self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
             drive.d * drive.Omega**2 / drive.c, drive.Mc, eyes.angle_gain, eyes.speed_gain, eyes.torque_gain,
             eyes.rate_gain,
         )  # fmt: skip

@@ -34,7 +34,8 @@ class ReducedTwoStage(CompiledController):
     into the second contact as hard as method 1 does into the first. The K_dyn of the whole start is
     therefore that of method 1; the one of [G](18) is `run.k_dyn_first_contact`.
 
-    Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `patience` after contact.
+    Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `patience` after
+    contact.
 
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), ReducedTwoStage(torque=0.25 * 62))

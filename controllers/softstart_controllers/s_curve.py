@@ -17,7 +17,7 @@ from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """parameters = (initial, full torque, time, rounding, period), state = (number of samples taken)."""
+    """Parameters: (initial, full torque, time, rounding, period); state: (number of samples taken)."""
     initial = parameters[0]
     full = parameters[1]
     time = parameters[2]

@@ -77,7 +77,7 @@ def patience(drive: Drive) -> Any:
     return number(without_gap + PERIODS_OF_PATIENCE * drive.elastic_period)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def mean_torque(before: float, after: float, demand: float) -> float:
     """Mean motor torque of an interval, from the torque measured at its ends and the constant demand in it.
 
@@ -86,7 +86,7 @@ def mean_torque(before: float, after: float, demand: float) -> float:
     none (after = demand, mean = demand), and close under a slew limit.
 
     >>> mean_torque(0.0, 62.0, 62.0), round(mean_torque(0.0, 62.0 * (1.0 - math.exp(-1.0)), 62.0), 3)
-    (62.0, 22.808)
+    (62.0, 22.809)
     """
     b = demand - before
     a = demand - after
@@ -115,6 +115,8 @@ def check(controller: Controller, above_zero: Iterable[str] = (), not_negative: 
             good, rule = good & (values >= 0.0), "0 or more"
         if not good.all():
             shown = float(values[~good].flat[0]) if values.ndim else float(values)
-            wrong.append(f"{name} = {shown:g}: the parameter of the controller {controller.name} must be {rule}.")
+            wrong.append(
+                f"{name} = {shown:g}: the parameter of the controller {controller.name} must be {rule}."
+            )
     if wrong:
         raise InputError(wrong)

@@ -14,11 +14,18 @@ from softstart_controllers.sampled import encoder_count, number
 
 # One sample of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), without the known torque; h is the sample period.
 # In these scales the matrices are the same for every drive.
-TRANSITION = ((1.0, 1.0, -1 / 2, -1 / 6), (0.0, 1.0, -1.0, -1 / 2), (0.0, 0.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+TRANSITION = (
+    (1.0, 1.0, -1 / 2, -1 / 6),
+    (0.0, 1.0, -1.0, -1 / 2),
+    (0.0, 0.0, 1.0, 1.0),
+    (0.0, 0.0, 0.0, 1.0),
+)
 DISTURBANCE = ((-1 / 24,), (-1 / 6,), (1 / 2,), (1.0,))  # a constant T'' over the sample, in h^4 T''/J1
 OUTPUT = ((1.0, 0.0, 0.0, 0.0),)
 SMALLEST_INDEX = -18.0  # decades
-FASTEST = 6.0  # bandwidth of the observer in elastic frequencies; faster it would only learn the torque's ripple
+FASTEST = (
+    6.0  # bandwidth of the observer in elastic frequencies; faster it would only learn the torque's ripple
+)
 DECADES = 0.05  # designs are shared between drives whose index differs by less
 
 
@@ -62,8 +69,8 @@ def design(steps: int) -> Design:
     after = keep @ np.asarray(P)
     # the error settles to this under a T'' of 1 that never ends: how far behind T' stays
     behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)
-    gains = (float(k) for k in K[:, 0])
-    return Design(*gains, math.sqrt(after[2, 2]), math.sqrt(after[3, 3]), float(behind[3, 0]))
+    numbers = [*K[:, 0], math.sqrt(after[2, 2]), math.sqrt(after[3, 3]), behind[3, 0]]
+    return Design._make(float(value) for value in numbers)
 
 
 def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
@@ -72,12 +79,12 @@ def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
     The model is J1 w1' = u - T with T'' = model + noise: `uncertainty` Omega^2 Ms is the part of T'' that
     the model misses, changing at random within 1/Omega, so of spectral density
     S = (uncertainty Omega^2 Ms)^2/Omega. The encoder's rounding is taken as noise of variance q^2/12 in each
-    sample, R = h q^2/12. The bandwidth is near (S/(J1^2 R))^(1/8); with a fine encoder R is taken as large as keeps
-    it at 6 Omega. Nothing about the gap enters.
+    sample, R = h q^2/12. The bandwidth is near (S/(J1^2 R))^(1/8); with a fine encoder R is taken as large as
+    keeps it at 6 Omega. Nothing about the gap enters.
 
     >>> crane = observer(Drive.load("crane-4amtkf"), 0.001, 0.05)
     >>> round(crane.angle_gain, 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
-    (0.66, 0.0058, True)
+    (0.66, 0.0059, True)
     """
     h = np.asarray(period, dtype=np.float64)
     deviation = np.asarray(encoder_count(drive)) / math.sqrt(12.0)
@@ -102,7 +109,7 @@ def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict(
     angle: float,
     speed: float,

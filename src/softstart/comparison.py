@@ -62,7 +62,8 @@ class Comparison:
     def gentlest(self) -> Row:
         """The strategy with the smallest K_dyn among those that reach the target speed."""
         reaching = [row for row in self.rows if not math.isnan(row.run.start_time)]
-        return min(reaching or self.rows, key=lambda row: row.run.k_dyn)
+        # equal to nine digits is equal: then the quicker one
+        return min(reaching or self.rows, key=lambda row: (float(f"{row.run.k_dyn:.9g}"), row.time_lost))
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""

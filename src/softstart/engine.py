@@ -8,7 +8,7 @@ import numpy as np
 
 from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.advance import advance
@@ -86,7 +86,13 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
             book.grow()
         elif reason == at.ASK:
             kernel.measure(p, book.x, book.sees, book.measured)
-            answer = controller.step(Measured(*book.measured.tolist()), state)
+            try:
+                answer = controller.step(Measured(*book.measured.tolist()), state)
+            except Exception as error:  # the user's own code may fail in any way
+                raise SimulationError(
+                    f"The controller {type(controller).__name__} failed at t = {book.x[at.TIME]:.6g} s: "
+                    f"{type(error).__name__}: {error}."
+                ) from error
             try:
                 torque, ask_again, state = float(answer[0]), float(answer[1]), tuple(answer[2])
             except (TypeError, IndexError, ValueError):

@@ -79,49 +79,46 @@ def run_figure(run: Run) -> Any:
     """Torques, speeds and the place in the gap over time; grey where the gap is open."""
     with drawing():
         figure, (torque, speed, twist) = new_figure(3, 1, (8.0, 7.5), sharex=True)
-        base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else float("nan")
         for axes in (torque, speed, twist):
             shade_open_gap(axes, run)
-        torque.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
-        torque.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
-        torque.axhline(base, color="#666666", lw=0.8, ls=":", label="mean torque (K_dyn = 1)")
-        torque.plot([run.peak_time], [_signed_peak(run)], "o", ms=4, color=COLOURS[0])
-        torque.annotate(
-            f"K_dyn = {run.k_dyn:.3f}",
-            (run.peak_time, _signed_peak(run)),
-            xytext=(6, 2),
-            textcoords="offset points",
-            fontsize=9,
-        )
-        torque.set_ylabel("torque, N m")
-        torque.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
-        speed.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
-        speed.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
-        speed.axhline(float(run.drive.target_speed), color="#666666", lw=0.8, ls=":")
-        if run.start_time == run.start_time:
-            speed.axvline(run.start_time, color="#666666", lw=0.8, ls=":")
-            speed.annotate(
-                f"start time {run.start_time:.4f} s",
-                (run.start_time, float(run.w1.min())),
-                xytext=(-6, 2),
-                textcoords="offset points",
-                ha="right",
-                backgroundcolor="white",
-                fontsize=9,
-            )
-        speed.set_ylabel("speed, rad/s")
-        speed.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
+        _torques(torque, run)
+        _speeds(speed, run)
         half = 0.5 * float(run.drive.gap)
-        twist.plot(run.t, run.theta, color=COLOURS[2], label="twist phi1 - phi2")
+        twist.plot(run.t, run.theta, color=COLOURS[2])
         for flank in (half, -half):
             twist.axhline(flank, color="#444444", lw=0.8, ls="--")
-        twist.set_ylabel("twist, rad")
-        twist.set_xlabel("time, s     (grey: gap open; dashed: flanks)")
+        twist.set_title("twist phi1 - phi2, flanks dashed", loc="left", fontsize=9.5)
+        twist.set_ylabel("rad")
+        twist.set_xlabel("time, s     (grey: gap open)")
         twist.set_xlim(0.0, run.end_time)
-        torque.set_title(
-            f"{run.drive.name}: {run.controller.name or type(run.controller).__name__}", loc="left"
-        )
+        name = run.controller.name or type(run.controller).__name__
+        figure.suptitle(f"{run.drive.name}: {name}", x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def _torques(axes: Axes, run: Run) -> None:
+    axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
+    axes.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
+    if run.k_dyn > 0.0:
+        axes.axhline(run.peak_torque / run.k_dyn, color="#666666", lw=0.8, ls=":", label="K_dyn = 1")
+        axes.plot([run.peak_time], [_signed_peak(run)], "o", ms=4, color=COLOURS[0])
+    axes.set_title(f"K_dyn = {run.k_dyn:.3f}", loc="left", fontsize=9.5)
+    axes.set_ylabel("torque, N m")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
+
+
+def _speeds(axes: Axes, run: Run) -> None:
+    axes.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
+    axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
+    axes.axhline(float(run.drive.target_speed), color="#666666", lw=0.8, ls=":", label="target")
+    reached = run.start_time == run.start_time
+    if reached:
+        axes.axvline(run.start_time, color="#666666", lw=0.8, ls=":")
+    axes.set_title(
+        f"start time {run.start_time:.4f} s" if reached else run.status.value, loc="left", fontsize=9.5
+    )
+    axes.set_ylabel("speed, rad/s")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
 
 
 def _signed_peak(run: Run) -> float:
@@ -163,7 +160,15 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
         figure, axes = new_figure(1, 1, (8.0, 4.6))
         for index, (name, time, k) in enumerate(points):
             axes.plot(
-                [time], [k], markers[index % 8], ms=8, color=COLOURS[index % 8], label=name, clip_on=False
+                [time],
+                [k],
+                markers[index % 8],
+                ms=9,
+                mfc="none",
+                mew=2.0,
+                color=COLOURS[index % 8],
+                label=name,
+                clip_on=False,
             )
         axes.axhline(1.0, color="#666666", lw=0.8, ls=":")
         axes.set_xlabel("start time, s")

@@ -20,6 +20,7 @@ POINTS_PER_PERIOD = 64
 def settling_time(run: Run, band: float) -> float:
     """First instant from which |T - M12avg(u)| <= band * M12avg_base holds with the gap closed, s.
 
+    It must hold for one elastic period at least, to the end of the run; NaN otherwise.
     Scanned at 64 points an elastic period, the crossing itself located by root finding.
     """
     if not 0.0 < band < math.inf:
@@ -34,13 +35,16 @@ def settling_time(run: Run, band: float) -> float:
         return np.abs(state["T"] - stages.mean_shaft_torque(state["u"], drive.J1, drive.J2, drive.Mc)) - limit
 
     begin = run.stages[-1].start
-    count = max(2, math.ceil((run.end_time - begin) / float(drive.elastic_period) * POINTS_PER_PERIOD))
+    period = float(drive.elastic_period)
+    if run.end_time - begin < period:
+        return math.nan  # too short a look to call it settled
+    count = max(2, math.ceil((run.end_time - begin) / period * POINTS_PER_PERIOD))
     grid = np.linspace(begin, run.end_time, count)
     outside = np.flatnonzero(excess(grid) > 0.0)
     if outside.size == 0:
         return float(begin)
     last = int(outside[-1])
-    if last == count - 1:
+    if last == count - 1 or run.end_time - grid[last + 1] < period:
         return math.nan
     if excess(grid[last + 1]) == 0.0:
         return float(grid[last + 1])

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+
 from softstart import Drive, Run, simulate
 from softstart.controller import Command, CompiledController, Measured
 from softstart.controller.base import PlainTwin
@@ -15,7 +16,7 @@ CRANE = Drive.load("crane-4amtkf")
 
 
 def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
-    """A drive that somebody might build: 4 decades of inertia, 2 to 200 Hz, gaps up to ten times the windup."""
+    """A drive that somebody might build: 4 decades of inertia, 2 to 200 Hz, gaps up to 10 windups."""
     J1 = 10 ** rng.uniform(-4, 0.5)
     J2 = J1 * 10 ** rng.uniform(-0.5, 1.3)
     Ms = J1 * 10 ** rng.uniform(2.5, 3.7)

@@ -7,10 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from tests.controllers.starts import CRANE, raised_at, random_drive
+
 from softstart import Drive, simulate, stages
 from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
 from softstart_controllers.sampled import encoder_count
-from tests.controllers.starts import CRANE, raised_at, random_drive
 
 AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
 
@@ -30,24 +31,27 @@ def test_delay_is_stage_2_of_the_reduced_torque() -> None:
 @pytest.mark.parametrize("lines", [0, 1024, 4096])
 @pytest.mark.parametrize("lag", [0.0, 0.002])
 def test_contact_is_seen_as_late_as_documented(lines: int, lag: float) -> None:
-    """Over encoder phases, gaps and inertias of the crane; worst case measured: 1.6 ms off (a lag is not in it)."""
-    q = 2 * math.pi / (4 * max(lines, 1))
+    """Over encoder phases, gaps and inertias of the crane; worst measured: 0.9 ms off, lag or not."""
+    q = 2 * math.pi / (4 * lines) if lines else 0.0
     worst = 0.0
     for gap, J2, phase in itertools.product((0.1, 0.5, 2.0), (0.07, 0.175), np.arange(8) / 8):
         drive = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, encoder_lines=lines)
         latency = AccelerationDelay().fitted(drive).latency
         assert latency is not None
-        after = seen_after(drive.replace(start_position=phase * min(q, 0.05)))
+        after = seen_after(drive.replace(start_position=phase * q))
         assert after > 0.0
         worst = max(worst, abs(after - latency))
-    assert worst < 0.002
+    assert worst < 0.0012
 
 
 def test_detection_over_random_drives() -> None:
-    """Never before contact; undamped active drives whose window is short: within 5 % of stage 2 (measured 3 %)."""
+    """Never before contact; with a window below a quarter period, as late as documented (by stage 2).
+
+    Measured: -0.09 to 0.23 (lag, damping and friction are not in the latency), 0.02 where there are none.
+    """
     rng = np.random.default_rng(3)
     errors, clean = [], []
-    for _ in range(250):
+    for _ in range(400):
         drive = random_drive(rng)
         fitted = AccelerationDelay().fitted(drive)
         assert fitted.latency is not None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.controllers.starts import CRANE
+
 from softstart import simulate
 from softstart.controller import CompiledController
 from softstart_controllers.ramp import Ramp
 from softstart_controllers.s_curve import SCurve
-from tests.controllers.starts import CRANE
 
 PERIOD = 0.001
 MIDDLES = (np.arange(250) + 0.5) * PERIOD

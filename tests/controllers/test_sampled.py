@@ -7,8 +7,9 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
-from softstart_controllers.sampled import encoder_count, mean_torque, patience
 from tests.controllers.starts import CRANE
+
+from softstart_controllers.sampled import encoder_count, mean_torque, patience
 
 torques = some.floats(-1000, 1000)
 
@@ -19,7 +20,8 @@ def test_mean_torque_is_exact_for_any_lag(before: float, demand: float, samples:
     tail = math.exp(-samples)
     after = demand + (before - demand) * tail
     exact = demand + (before - demand) * (1 - tail) / samples
-    assert mean_torque(before, after, demand) == pytest.approx(exact, rel=1e-9, abs=2e-6 * abs(before - demand) + 1e-9)
+    tolerance = 2e-6 * abs(before - demand) + 1e-9
+    assert mean_torque(before, after, demand) == pytest.approx(exact, rel=1e-9, abs=tolerance)
 
 
 @given(torques, torques)

@@ -152,8 +152,9 @@ def conclusion(comparison: Comparison) -> str:
     if math.isnan(lost):
         return said + "; direct does not reach the target speed within the run."
     share = abs(share_lost(best))
-    seconds = column_of([best.run.start_time, abs(lost)])[1]
-    if not seconds.strip("0."):
+    all_lost = [row.time_lost for row in comparison.rows]
+    seconds = column_of(all_lost, digits=3)[comparison.rows.index(best)].lstrip("-")
+    if abs(lost) < 1e-6 * best.run.start_time:
         return said + "; it takes no more time than direct."
     if lost < 0.0:
         return said + f"; it is even {seconds} s ({share:.1f} %) quicker than direct."

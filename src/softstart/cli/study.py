@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,27 +124,22 @@ def _cell(value: Any) -> str:
     return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
-def _show_claims(to: Console, claims: Any) -> None:
-    from rich.text import Text
+def _show_claims(to: Console, claims: Sequence[Claim]) -> None:
+    """Each claim with its verdict, wrapped to the right of it, and the evidence below."""
+    from textwrap import wrap
 
-    to.print(Text("Claims", style="bold"))
-    claim: Claim
-    for number, claim in enumerate(claims, start=1):
-        verdict = Verdict(claim.verdict)
-        head = Text(f"{number:2}. ").append(f"{verdict.value:9}  ", style=f"bold {MARKS[verdict]}")
-        to.print(_hanging(head, claim.statement, ""))
-        to.print(_hanging(Text(" " * len(head)), claim.evidence, "dim"))
-
-
-def _hanging(head: Any, text: str, style: str) -> Any:
-    """A paragraph that hangs to the right of its head."""
-    from rich.table import Table as Grid
     from rich.text import Text
 
     from softstart.cli.show import printable
 
-    grid = Grid.grid()
-    grid.add_column(no_wrap=True, width=len(head))
-    grid.add_column(overflow="fold")
-    grid.add_row(head, Text(printable(text), style=style))
-    return grid
+    to.print(Text("Claims", style="bold"))
+    for number, claim in enumerate(claims, start=1):
+        verdict = Verdict(claim.verdict)
+        head = f"{number:2}. {verdict.value:9}  "
+        width, margin = to.width - len(head), " " * len(head)
+        statement = f"\n{margin}".join(wrap(printable(claim.statement), width))
+        to.print(
+            Text(head, style=f"bold {MARKS[verdict]}").append(statement, style="default"), soft_wrap=True
+        )
+        for line in wrap(printable(claim.evidence), width):
+            to.print(Text(margin + line, style="dim"), soft_wrap=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib.util
+import inspect
 import sys
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
@@ -48,7 +49,12 @@ def controller_class(name: str) -> type[Controller]:
         near = difflib.get_close_matches(name, controller_names(), n=1, cutoff=0.4)
         hint = f'did you mean "{near[0]}"?' if near else "`softstart controllers` lists them."
         raise InputError(f'controller = "{name}": there is no controller of this name; {hint}')
-    found = point.load()
+    try:
+        found = point.load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f'controller = "{name}": it is registered as {point.value}, which does not load: {error}.'
+        ) from error
     return _checked(found, name)
 
 
@@ -81,9 +87,9 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
             continue
         try:
-            values[key] = to_si(value, known[key].metadata.get("unit", ""))
+            values[key] = to_si(value, known[key].metadata.get("unit", ""), name=key)
         except InputError as error:
-            wrong.extend(f"{key} = {value}: {sentence}" for sentence in error.sentences)
+            wrong.extend(error.sentences)
     missing = [
         f.name
         for f in fields(cls)
@@ -95,6 +101,9 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
     ]
     if wrong:
         raise InputError(wrong)
+    if inspect.isabstract(cls):
+        lacking = ", ".join(sorted(cls.__abstractmethods__))
+        raise InputError(f'controller = "{name}": the class {cls.__name__} still lacks {lacking}.')
     return cls(**values)
 
 

@@ -62,7 +62,7 @@ class PaperG(Study):
         progress("elastic frequency")
         sweeps = [frequency.detuned("load inertia"), frequency.detuned("stiffness")]
         progress("gap, inertia and stiffness")
-        spreads = [invariance.spread(strategy) for strategy in invariance.STRATEGIES]
+        spreads = [invariance.spread(*strategy) for strategy in invariance.STRATEGIES]
         progress("drawing")
         traces = [
             ("method 2: raised at the end of stage 2, (15)", simulated(crane(), SHARE, 2)),
@@ -73,7 +73,7 @@ class PaperG(Study):
                 figures["2"], 2, "Fig. 2 of [G]: $\\delta_1 = 0.5$ rad, base of $J_2''$", pictures.K_DYN, 3.5
             ),
             pictures.curves_figure(figures["3"], 2, "Fig. 3 of [G]: $J_2'' = 5\\,J_1$", pictures.K_DYN, 5.2),
-            pictures.curves_figure(figures["4"], 3, "Fig. 4 of [G]: $J_2'' = 5\\,J_1$", "ms", 250.0),
+            pictures.curves_figure(figures["4"], 3, "Fig. 4 of [G]: $J_2'' = 5\\,J_1$", "time, ms", 250.0),
             pictures.whole_start_figure(starts),
             pictures.traces_figure(traces, 0.26),
             pictures.wear_figure(worn),
@@ -91,8 +91,9 @@ class PaperG(Study):
                 invariance.table(spreads),
             ),
             claims=(
-                *damping.claims(),
+                *damping.of_methods(),
                 *whole_start.claims(starts),
+                *damping.of_gap_and_inertia(),
                 *durations.claims(),
                 *wear.claims(worn),
                 *frequency.claims(sweeps),

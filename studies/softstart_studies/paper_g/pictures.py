@@ -16,6 +16,7 @@ from softstart_studies.paper_g.whole_start import WholeStart
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MARKED = 5  # a marker at every so many points
 K_DYN = "$K_{dyn}$"
 RATIO = "$M_1/M_s$"
 MARKERS = "os^"
@@ -32,7 +33,7 @@ LOOK: tuple[dict[str, Any], ...] = (
 
 def curves_figure(curves: Sequence[Curve], kinds: int, title: str, unit: str, top: float) -> Figure:
     """Curves over M1/Ms, `kinds` of them a colour, with the plant's points on them."""
-    scale = 1000.0 if unit == "ms" else 1.0
+    scale = 1000.0 if unit == "time, ms" else 1.0
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 5.0))
         for index, curve in enumerate(curves):
@@ -45,7 +46,7 @@ def curves_figure(curves: Sequence[Curve], kinds: int, title: str, unit: str, to
             axes.plot(
                 [], [], **look, marker=MARKERS[kind], ms=4.5, mec=colour, mfc="white", label=curve.label
             )
-        if unit != "ms":
+        if unit != "time, ms":
             two_line(axes)
         worst = max(curve.disagreement for curve in curves)
         axes.set_xlabel(f"{RATIO}     (lines: closed form; points: exact plant, at most {worst:.0e} off)")
@@ -53,7 +54,7 @@ def curves_figure(curves: Sequence[Curve], kinds: int, title: str, unit: str, to
         axes.set_xlim(0.0, 1.02)
         axes.set_ylim(0.0, top)
         axes.set_title(title, loc="left")
-        axes.legend(loc="upper left" if unit != "ms" else "upper right", handlelength=3.2)
+        axes.legend(loc="upper left" if unit != "time, ms" else "upper right", handlelength=3.2)
     return figure  # type: ignore[no-any-return]
 
 
@@ -68,11 +69,11 @@ def whole_start_figure(starts: Sequence[WholeStart]) -> Figure:
         figure, panels = new_figure(1, len(starts), (9.0, 4.9), sharey=True)
         for axes, start in zip(panels, starts, strict=True):
             two_line(axes)
-            axes.plot(start.r, start.first_contact, **LOOK[FIRST], label="method 2, first contact, (18)")
+            axes.plot(start.r, start.first_contact, **LOOK[PROMISED], label="method 2, first contact, (18)")
             axes.plot(start.r, start.method_1, **LOOK[WHOLE], label="method 1")
             axes.plot(
-                start.r,
-                start.whole,
+                start.r[::MARKED],
+                start.whole[::MARKED],
                 "s",
                 ms=5,
                 mec=COLOURS[1],
@@ -130,13 +131,17 @@ def wear_figure(found: Wear) -> Figure:
     )
     with drawing():
         figure, panels = new_figure(1, 2, (9.0, 4.6), sharey=True)
-        for axes, title in zip(panels, ("first contact", "whole start"), strict=True):
+        for axes, title in zip(
+            panels, ("first contact", "whole start (steps: sampled at 1 kHz)"), strict=True
+        ):
             two_line(axes)
             axes.plot(found.gaps, found.promised, **LOOK[PROMISED], label="promised by (18)")
             for label, kept, colour, dash in ways:
                 k = kept.first_contact if title == "first contact" else kept.whole
                 axes.plot(found.gaps, k, color=colour, ls=dash, label=label)
             axes.set_title(title, loc="left")
+            axes.set_xlim(0.45, 2.05)
+            axes.set_xticks([0.5, 1.0, 1.5, 2.0])
             axes.set_xlabel("gap $\\delta$, rad     (set up for 0.5 rad)")
         panels[0].set_ylabel(K_DYN)
         panels[0].set_ylim(0.0, 4.0)

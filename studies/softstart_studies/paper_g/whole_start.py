@@ -14,7 +14,7 @@ from softstart_studies.paper_g.crane import (
     GAP_2,
     HEAVY,
     METHODS,
-    POINTS,
+    RATIOS,
     SHARE,
     Vector,
     closed_form,
@@ -24,6 +24,8 @@ from softstart_studies.paper_g.crane import (
 )
 from softstart_studies.paper_g.switching import SwitchAfterContact
 
+R: Vector = RATIOS[4:]  # 0.05 to 1, as the points of figs. 2-4
+TABLED = (5, 10, 15, 20, 25, 30, 40, 50, 75, 100)  # hundredths of M1/Ms
 DAMPING_RATIO = 0.05  # d Omega/(2 c), what a real shaft may have; [G] has none
 
 
@@ -61,14 +63,14 @@ def whole_start(gap: float) -> WholeStart:
     True
     """
     drive = crane(HEAVY, gap)
-    second = [simulated(drive, float(r), 2) for r in POINTS]
+    second = [simulated(drive, float(r), 2) for r in R]
     return WholeStart(
         gap,
-        POINTS,
-        np.array([simulated(drive, float(r), 1).k_dyn for r in POINTS]),
+        R,
+        np.array([simulated(drive, float(r), 1).k_dyn for r in R]),
         np.array([run.k_dyn_first_contact for run in second]),
         np.array([run.k_dyn for run in second]),
-        np.array([at_peak(gap, float(r)).k_dyn for r in POINTS]),
+        np.array([at_peak(gap, float(r)).k_dyn for r in R]),
     )
 
 
@@ -82,6 +84,7 @@ def table(starts: list[WholeStart]) -> Table:
         for values in zip(
             start.r, start.method_1, start.first_contact, start.whole, start.at_peak, strict=True
         )
+        if round(100 * float(values[0])) in TABLED
     ]
     return Table(
         "K_dyn over the whole start, J2 = 5 J1",
@@ -89,9 +92,9 @@ def table(starts: list[WholeStart]) -> Table:
             "gap, rad",
             "M1/Ms",
             "method 1",
-            "method 2, first contact",
-            "method 2, whole start",
-            "raised at peak of stage 2, whole start",
+            "method 2: first contact",
+            "whole start",
+            "at peak: whole start",
         ),
         rows,
     )

@@ -1,0 +1,81 @@
+"""softstart itself, three ways: the bare kernel, a batch with labelled results, and a Run for each start."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from softstart import simulate
+from softstart.controller import CompiledController, Sensor
+from softstart.drive import Drive
+from softstart.plant import layout as at
+from softstart.plant import start as kernel
+from softstart.plant.vector import plant_vector
+from softstart_studies.benchmarks.problem import Problem, Vector, controller_of, crane
+
+
+class Kernel:
+    """The compiled kernel over a batch: arrays of parameters in, one row of located figures a start out."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def ready(self, gaps: Vector) -> tuple[Any, ...]:
+        """All arguments of the kernel; those after the results are its scratch."""
+        drive = crane(gaps)
+        controller = cast(CompiledController, controller_of(self.problem.strategy, drive))
+        own = np.ascontiguousarray(controller.vector(drive), dtype=np.float64)
+        size = controller.state_size
+        return (
+            type(controller).kernel, plant_vector(drive), own, int(controller.sensors),
+            bool(controller.sensors & Sensor.STAGE), np.array([np.inf]), np.empty((len(gaps), at.N_X)),
+            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
+            np.zeros(2 + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
+        )  # fmt: skip
+
+    def solve(self, work: tuple[Any, ...]) -> Vector:
+        """Peak torques, N m."""
+        kernel.run_many(*work)
+        results = work[6]
+        peaks: Vector = np.abs(results[:, at.PEAK])
+        return peaks
+
+
+class Batch:
+    """`simulate` of a Drive with arrays: the same kernel, and its figures as an xarray.Dataset."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def ready(self, gaps: Vector) -> tuple[Drive, Any]:
+        """The batch and its controller."""
+        drive = crane(gaps)
+        return drive, controller_of(self.problem.strategy, drive)
+
+    def solve(self, work: tuple[Drive, Any]) -> Vector:
+        """Peak torques, N m."""
+        labelled = cast(Any, simulate(*work))  # an xarray.Dataset, since the drive holds arrays
+        peaks: Vector = labelled.peak_torque.values
+        return peaks
+
+
+class FullRun:
+    """One `simulate` call a start; of each Run the events, stages and traces are asked for, too."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def ready(self, gaps: Vector) -> list[tuple[Drive, Any]]:
+        """Drives and controllers."""
+        drives = [crane(float(gap)) for gap in gaps]
+        return [(drive, controller_of(self.problem.strategy, drive)) for drive in drives]
+
+    def solve(self, work: list[tuple[Drive, Any]]) -> Vector:
+        """Peak torques, N m."""
+        peaks = []
+        for drive, controller in work:
+            run = simulate(drive, controller)
+            assert run.events and run.stages and run.T.size == run.t.size
+            peaks.append(run.peak_torque)
+        return np.array(peaks)

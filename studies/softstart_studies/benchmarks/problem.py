@@ -1,0 +1,95 @@
+"""The starts that everyone solves: plain numbers, so that a peer needs nothing of softstart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from softstart.controller import Controller
+    from softstart.drive import Drive
+
+Vector = NDArray[np.float64]
+
+DRIVE = "crane-4amtkf"
+GAPS = (0.5, 2.0)  # rad, the two gaps of [G]; the batches lie between them
+RAMP_TIME = 0.5  # s, longer than most of the start, so that it is sampled nearly throughout
+STRATEGIES = ("direct", "reduced-first-stage", "reduced-two-stage", "ramp")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An undamped crane drive with active load, from rest at mid-gap, until one elastic period after `target`.
+
+    `stage_torques`: motor torque of stage 1, of stage 2 and of all later ones. For a ramp they are None and
+    the torque is initial + (full - initial) min(1, t_k/time), held from t_k = k period to the next sample.
+    SI units.
+    """
+
+    strategy: str
+    J1: float
+    J2: float
+    c: float
+    Mc: float
+    target: float
+    elastic_period: float
+    stage_torques: tuple[float, float, float] | None
+    initial: float = 0.0
+    full: float = 0.0
+    time: float = 0.0
+    period: float = 0.0
+
+
+def gaps(count: int) -> Vector:
+    """`count` gaps in rad, the middles of equal parts of `GAPS`: few or many, their mean is the same.
+
+    >>> gaps(3)
+    array([0.75, 1.25, 1.75])
+    """
+    low, high = GAPS
+    middles: Vector = low + (high - low) * (np.arange(count) + 0.5) / count
+    return middles
+
+
+def crane(gap: Any) -> Drive:
+    """The drive with this gap (rad), or with an array of gaps: a batch."""
+    from softstart.drive import Drive
+
+    return Drive.load(DRIVE).replace(gap=gap)
+
+
+def controller_of(strategy: str, drive: Drive) -> Controller:
+    """The strategy as softstart's controller, fitted to the drive: its defaults, and a ramp over `RAMP_TIME`."""
+    from softstart.controller.finding import make_controller
+
+    given = {"time": RAMP_TIME} if strategy == "ramp" else None
+    return make_controller(strategy, given).fitted(drive)
+
+
+def crane_problem(strategy: str) -> Problem:
+    """The problem as numbers, taken from softstart's drive and controller.
+
+    >>> crane_problem("direct").stage_torques
+    (62.0, 62.0, 62.0)
+    >>> crane_problem("ramp").period
+    0.001
+    """
+    drive = crane(GAPS[0])
+    given = controller_of(strategy, drive).parameters
+    stages = None
+    if strategy == "direct":
+        stages = (given["torque"],) * 3
+    elif strategy == "reduced-first-stage":
+        stages = (given["torque"], given["full_torque"], given["full_torque"])
+    elif strategy == "reduced-two-stage":
+        stages = (given["torque"], given["torque"], given["full_torque"])
+    numbers = [float(x) for x in (drive.J1, drive.J2, drive.c, drive.Mc, drive.target_speed)]
+    period = float(drive.elastic_period)
+    if stages is not None:
+        first, second, later = (float(torque) for torque in stages)
+        return Problem(strategy, *numbers, period, (first, second, later))
+    ramp = [float(given[name]) for name in ("initial", "full_torque", "time", "period")]
+    return Problem(strategy, *numbers, period, None, *ramp)

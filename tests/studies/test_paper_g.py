@@ -1,0 +1,229 @@
+"""`softstart study paper-g`: the data behind the pictures, the table, and the numbers of the verdicts."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+from softstart import simulate
+from softstart.study import Verdict, find_study
+from softstart_studies.paper_g import PaperG, curves, damping, frequency, invariance, wear, whole_start
+from softstart_studies.paper_g.crane import CRANE, RATIOS, closed_form, crane, simulated
+from softstart_studies.paper_g.switching import SwitchAfterContact, SwitchAtInstant
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("paper-g")
+    told: list[str] = []
+    return PaperG().run(folder, told.append), folder, told
+
+
+@pytest.fixture(scope="module")
+def worn():
+    return wear.wear()
+
+
+# figures 2, 3, 4 ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("figure", "count"), [("figure_2", 4), ("figure_3", 4), ("figure_4", 6)])
+def test_curves_go_through_the_simulated_points(figure, count):
+    drawn = getattr(curves, figure)()
+    assert len(drawn) == count
+    for curve in drawn:
+        assert curve.disagreement < 1e-9
+        # exact holds the curve's own values: the points lie on the axis of the curve
+        on_axis = [int(np.argmin(np.abs(curve.r - r))) for r in curve.at]
+        assert curve.values[on_axis] == pytest.approx(curve.exact, rel=1e-12)
+
+
+def test_all_curves_of_figure_2_have_the_base_of_the_heavy_load():
+    full = [curve.values[-1] for curve in curves.figure_2()]
+    assert full == pytest.approx([3.11785, 3.11785, 2.71567, 2.71567], abs=5e-6)
+
+
+def test_figure_4_is_in_the_order_of_its_curves():
+    worn_1, worn_2, worn_open, new_1, new_2, new_open = (curve.values for curve in curves.figure_4())
+    assert np.all(worn_1 >= worn_2)
+    assert np.all(worn_2 > worn_open)
+    assert np.all(new_1 >= new_2)
+    assert np.all(new_2 > new_open)
+
+
+def test_table_of_reference_to_all_printed_digits():
+    rows = curves.worked_table().rows
+    assert len(rows) == 20
+    for *_, printed, form, plant, note in rows:
+        assert form == plant
+        if note == "all digits":
+            assert f"{form:.4f}" == printed
+        else:
+            # REFERENCE adds rounded durations: one digit off, and the note shows the sum
+            assert re.fullmatch(r"print adds rounded terms: 0\.\d{4} \+ 0\.\d{4}", note)
+            assert abs(form - float(printed)) < 1.0e-4
+    assert [row[:4] for row in rows if row[-1] != "all digits"] == [
+        (5, 0.5, 0.25, "t1 + t2 method 1, s"),
+        (2, 0.5, 1.0, "t1 + t2 method 1, s"),
+    ]
+
+
+# verdicts ----------------------------------------------------------------------------------------------
+
+VERDICTS = {
+    "Method 1 damps": "confirmed",
+    "Method 2 can bring": "confirmed",
+    "Method 2 is to be preferred": "refuted",
+    "(Not in [G]) Raised at the peak": "confirmed",
+    "A wider gap": "confirmed",
+    "A smaller J2": "partly",
+    "The least K_dyn": "refuted",
+    "Stage 2 lasts almost": "partly",
+    "The total time": "confirmed",
+    "Stage 1 lasts the same": "partly",
+    "Switching by time": "partly",
+    "Torque held reduced": "partly",
+    "The delay fits": "partly",
+    "Regulators acting": "partly",
+}
+
+
+def test_each_conclusion_has_its_verdict_and_a_number(study):
+    claims = study[0].claims
+    assert len(claims) == len(VERDICTS)
+    for claim, (beginning, verdict) in zip(claims, VERDICTS.items(), strict=True):
+        assert claim.statement.startswith(beginning)
+        assert claim.verdict is Verdict(verdict), claim.statement
+        assert re.search(r"\d", claim.evidence)
+        assert "nan" not in claim.evidence.lower()
+
+
+def test_least_k_dyn_of_method_1_is_that_of_a_vanishing_torque():
+    # (17) with M1 = 0: the load torque alone closes the gap
+    for gap, least in ((0.5, 2.0386), (2.0, 2.1466)):
+        assert damping.k_dyn(5, gap, 0.0, 1) == pytest.approx(least, abs=5e-5)
+        k = np.asarray(closed_form(crane(5, gap), RATIOS, 1).k_dyn)
+        assert np.all(np.diff(k) > 0)
+    assert damping.k_dyn(2, 0.5, 0.0, 1) == pytest.approx(1.7444, abs=5e-5)
+    assert damping.k_dyn(2, 0.5, 0.0, 1, own_base=True) > 2.0
+
+
+@pytest.mark.parametrize("gap", [0.5, 2.0])
+def test_method_2_is_as_hard_as_method_1_over_the_whole_start(gap):
+    found = whole_start.whole_start(gap)
+    assert found.whole == pytest.approx(found.method_1, rel=1e-12)
+    assert np.all(found.first_contact[:-1] < found.whole[:-1])
+    # (18) survives the whole start if the torque is raised at the turning point of the shaft torque
+    assert found.at_peak == pytest.approx(np.maximum(found.first_contact, 2 - found.first_contact), rel=1e-12)
+
+
+def test_second_contact_of_method_2_is_the_hard_one():
+    run = simulated(crane(), 0.25, 2)
+    peaks = [stage.peak_torque / (run.peak_torque / run.k_dyn) for stage in run.stages if stage.side != 0]
+    assert peaks[:2] == pytest.approx([1.267724, 2.389365], abs=5e-7)
+    # the flanks part at the speed they met with
+    parting = run.at(np.array([run.stages[1].end]))["v"][0]
+    assert parting == pytest.approx(-run.impact_speed, rel=1e-9)
+
+
+def test_time_switched_torque_fails_at_first_contact_of_the_worn_gap(worn):
+    assert worn.by_time.first_contact[0] == pytest.approx(worn.promised[0], rel=1e-12)
+    assert 1.35 < worn.by_time.first_contact[-1] / worn.promised[-1] < 1.45
+    assert 1.70 < worn.by_time.whole.min() < 1.80
+
+
+def test_acceleration_delay_keeps_its_first_contact_while_the_gap_wears(worn):
+    assert worn.by_delay.first_contact == pytest.approx(worn.promised, rel=0.05)
+    assert np.all(worn.by_delay.whole > 2.3)
+    assert worn.by_half_delay.whole == pytest.approx(worn.promised, rel=0.03)
+
+
+def test_frequency_sweeps_have_the_frequencies_they_say():
+    for cause in ("load inertia", "stiffness"):
+        found = frequency.detuned(cause)
+        drives = CRANE.replace(load_inertia=found.J2, stiffness=found.c)
+        assert np.asarray(drives.Omega) / CRANE.Omega - 1 == pytest.approx(found.deviations, abs=1e-12)
+        assert not np.any(np.isnan(found.whole))
+
+
+def test_delay_fits_within_10_percent_and_breaks_before_20():
+    by_load, by_shaft = frequency.detuned("load inertia"), frequency.detuned("stiffness")
+    assert by_load.first_contact == pytest.approx(by_load.promised, rel=0.02)
+    near = by_shaft.within(0.10)
+    assert by_shaft.first_contact[near] == pytest.approx(by_shaft.promised[near], rel=0.02)
+    assert np.max((by_shaft.first_contact / by_shaft.promised)[by_shaft.within(0.20)]) > 1.5
+
+
+def test_feedback_depends_less_on_the_drive_than_the_direct_start():
+    direct, *_, feedback = (invariance.spread(*strategy) for strategy in invariance.STRATEGIES)
+    assert direct.strategy == "direct"
+    assert invariance.relative_spread(direct.together) == pytest.approx(1.0383, abs=5e-4)
+    assert feedback.together.shape == direct.together.shape == (80,)
+    assert invariance.relative_spread(feedback.together) < 0.6 * invariance.relative_spread(direct.together)
+    assert invariance.relative_spread(feedback.by_gap) < 0.15
+    assert feedback.together.max() < 1.6
+
+
+# the two ways of switching -----------------------------------------------------------------------------
+
+
+def test_delay_of_stage_2_is_method_2_on_the_drive_it_was_set_up_for():
+    delayed, reference = simulate(CRANE, SwitchAfterContact(torque=15.5)), simulated(CRANE, 0.25, 2)
+    assert delayed.k_dyn_first_contact == pytest.approx(reference.k_dyn_first_contact, rel=1e-12)
+    assert delayed.k_dyn == pytest.approx(reference.k_dyn, rel=1e-9)
+
+
+def test_switching_at_an_instant_raises_the_torque_then():
+    run = simulate(CRANE, SwitchAtInstant(torque=15.5, instant=0.02))
+    assert run.at(np.array([0.0199, 0.0201]))["u"].tolist() == [15.5, 62.0]
+
+
+@pytest.mark.parametrize("controller", [SwitchAtInstant(), SwitchAfterContact()])
+def test_compiled_ways_of_switching_equal_their_plain_twins(controller):
+    worn = crane(5, 1.2)
+    compiled, plain = (
+        simulate(worn, one, fitted_to=CRANE) for one in (controller, controller.as_plain(CRANE))
+    )
+    assert compiled.k_dyn == plain.k_dyn
+    assert compiled.start_time == plain.start_time
+
+
+# the study ---------------------------------------------------------------------------------------------
+
+
+def test_the_study_is_registered_and_says_what_it_draws(study):
+    result, _, told = study
+    assert isinstance(find_study("paper-g"), PaperG)
+    assert tuple(result.figures) == PaperG.pictures
+    assert len(told) >= 5
+    json.dumps(result.summary(), allow_nan=False)
+
+
+def test_every_figure_has_labelled_axes(study):
+    for stem, figure in study[0].figures.items():
+        assert any(axes.get_ylabel() for axes in figure.axes), stem
+        assert figure.axes[-1].get_xlabel(), stem
+        for axes in figure.axes:
+            for line in axes.lines:
+                assert np.all(np.isfinite(np.asarray(line.get_ydata(), dtype=float))), stem
+
+
+def test_curves_are_written_with_closed_form_and_plant(study):
+    with (study[1] / "paper-g-curves.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 14 * 120
+    compared = [row for row in rows if row["plant"]]
+    assert len(compared) == 14 * 20
+    for row in compared:
+        assert math.isclose(float(row["plant"]), float(row["closed form"]), rel_tol=1e-9)
+
+
+def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    PaperG().run(None, lambda doing: None)
+    assert list(tmp_path.iterdir()) == []
