@@ -17,4 +17,6 @@ def reduced_torque(drive: Drive) -> Any:
     >>> round(reduced_torque(Drive.load("crane-4amtkf")), 3)
     15.386
     """
-    return np.maximum(drive.Mc, 0.0) + SHARE * (drive.Ms - np.maximum(drive.Mc, 0.0))
+    held = np.maximum(drive.Mc, 0.0)
+    torque = held + SHARE * (drive.Ms - held)
+    return torque if np.ndim(torque) else float(torque)

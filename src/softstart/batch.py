@@ -53,7 +53,7 @@ def simulate_many(
     if isinstance(drives, Drive):
         results = _array_starts(drives, controller, until, fitted_to, time_limit, max_events)
         return _label(drives, results, until, base or drives)
-    listed = list(drives)
+    listed = list(drives) if isinstance(drives, Sequence) else []
     if not listed or not all(isinstance(drive, Drive) and drive.shape == () for drive in listed):
         raise InputError("drive: give one Drive, a Drive with array fields, or a list of Drives, not empty.")
     rows = []

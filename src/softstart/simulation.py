@@ -25,7 +25,7 @@ MAX_EVENTS = 1_000_000
 
 @overload
 def simulate(
-    drive: Drive,
+    drive: Drive | str,
     controller: str | Controller,
     until: float | None = ...,
     *,
@@ -48,7 +48,7 @@ def simulate(
     max_events: int = ...,
 ) -> xarray.Dataset: ...
 def simulate(
-    drive: Drive | Sequence[Drive],
+    drive: Drive | str | Sequence[Drive],
     controller: str | Controller,
     until: float | None = None,
     *,
@@ -62,7 +62,7 @@ def simulate(
 
     Parameters
     ----------
-    drive : a Drive, a Drive whose fields hold arrays, or a list of Drives.
+    drive : a Drive, a Drive whose fields hold arrays, a list of Drives, or the name or file of a drive.
     controller : a name, `path/to/file.py:ClassName`, or a Controller object.
     until : end of the run in s. Without it the run ends one elastic period 2 pi/Omega after the start time,
         the instant at which the load first has its target speed.
@@ -84,6 +84,8 @@ def simulate(
     >>> round(run.k_dyn, 4), round(run.start_time, 4)
     (3.1179, 0.3735)
     """
+    if isinstance(drive, str):
+        drive = Drive.load(drive)
     made = make_controller(controller, parameters)
     if until is not None and not (isinstance(until, int | float) and 0.0 < until < math.inf):
         raise InputError(

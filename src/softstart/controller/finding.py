@@ -102,7 +102,7 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
     if wrong:
         raise InputError(wrong)
     if inspect.isabstract(cls):
-        lacking = ", ".join(sorted(cls.__abstractmethods__))
+        lacking = ", ".join(sorted(getattr(cls, "__abstractmethods__", ())))
         raise InputError(f'controller = "{name}": the class {cls.__name__} still lacks {lacking}.')
     return cls(**values)
 

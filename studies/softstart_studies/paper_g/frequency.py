@@ -79,7 +79,7 @@ def table(sweeps: list[Detuned]) -> Table:
         if round(100 * float(sweep.deviations[i])) % 10 == 0
     ]
     return Table(
-        "K_dyn of acceleration-delay with the delay of the nominal drive, M1/Ms = 0.25",
+        "K_dyn over elastic frequency",
         (
             "changed",
             "Omega",

@@ -91,8 +91,8 @@ def table(spreads: list[Spread]) -> Table:
                 )
             )
     return Table(
-        "K_dyn on drives other than the one set up for; spread: largest over least, less 1",
-        ("strategy", "changed", "starts", "least K_dyn", "largest K_dyn", "spread"),
+        "K_dyn of strategies set up once",
+        ("strategy", "changed", "starts", "least K_dyn", "largest K_dyn", "largest/least - 1"),
         rows,
     )
 

@@ -62,7 +62,7 @@ def table(found: Wear) -> Table:
         *(values for way in ways for values in (way.first_contact, way.whole)),
     )
     return Table(
-        "K_dyn at first contact and over the whole start while the gap wears, M1/Ms = 0.25",
+        "K_dyn while the gap wears",
         (
             "gap, rad",
             "(18)",

@@ -1,0 +1,73 @@
+"""Many starts in one call: labels, broadcasting, the controller of one drive on another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softstart import Drive, compare, simulate
+
+CRANE = Drive.load("crane-4amtkf")
+
+
+def test_one_dimension_is_called_start_and_carries_the_field() -> None:
+    data = simulate(CRANE.replace(gap=[0.5, 1.0, 2.0]), "direct")
+    assert data.k_dyn.dims == ("start",)
+    np.testing.assert_array_equal(data.gap, [0.5, 1.0, 2.0])
+    assert list(data.coords) == ["gap"]
+    assert np.all(np.diff(data.k_dyn) > 0.0)
+    for name in ("k_dyn", "start_time", "impact_speed"):
+        assert data[name].attrs["units"]
+        assert data[name].attrs["long_name"]
+
+
+def test_fields_broadcast_to_a_grid() -> None:
+    gaps, inertias = np.array([0.5, 2.0]), np.array([0.07, 0.1, 0.175])
+    data = simulate(CRANE.replace(gap=gaps[:, None], load_inertia=inertias[None, :]), "reduced-two-stage")
+    assert data.k_dyn.dims == ("axis_0", "axis_1")
+    assert data.k_dyn.shape == (2, 3)
+    one = simulate(CRANE.replace(gap=2.0, load_inertia=0.1), "reduced-two-stage")
+    assert float(data.k_dyn[1, 1]) == one.k_dyn
+    assert float(data.gap[1, 1]) == 2.0
+    assert float(data.load_inertia[1, 1]) == 0.1
+
+
+def test_a_list_may_mix_kinds() -> None:
+    drives = [CRANE, CRANE.replace(load_kind="reactive"), CRANE.replace(contact_law="dead-zone", damping=0.5)]
+    data = simulate(drives, "direct")
+    assert [float(k) for k in data.k_dyn] == [simulate(drive, "direct").k_dyn for drive in drives]
+    assert list(data.load_kind.values) == ["active", "reactive", "active"]
+
+
+def test_a_controller_set_up_for_another_drive() -> None:
+    worn = CRANE.replace(gap=[0.5, 2.0])
+    own = simulate(worn, "ramp")
+    fixed = simulate(worn.replace(load_inertia=0.35), "ramp", fitted_to=CRANE, base=CRANE)
+    assert float(own.k_dyn[0]) == simulate(CRANE, "ramp").k_dyn
+    heavy = CRANE.replace(gap=2.0, load_inertia=0.35)
+    assert float(fixed.k_dyn[1]) == simulate(heavy, "ramp", fitted_to=CRANE, base=CRANE).k_dyn
+    assert float(fixed.k_dyn[1]) != simulate(heavy, "ramp").k_dyn
+
+
+def test_the_kernel_does_a_hundred_thousand() -> None:
+    gaps = np.linspace(0.01, 4.0, 100_000)
+    data = simulate(CRANE.replace(gap=gaps), "direct")
+    # [G](17), the closed form on every one
+    impact = CRANE.c / CRANE.Omega * np.sqrt(gaps * (62 * 0.175 + 7.16 * 0.035) / (0.035 * 0.175))
+    mean = (62 * 0.175 + 7.16 * 0.035) / 0.21
+    np.testing.assert_allclose(data.k_dyn, 1.0 + np.sqrt(1.0 + (impact / mean) ** 2), rtol=1e-12)
+    assert not np.isnan(data.start_time).any()
+
+
+def test_comparison_rows_are_the_single_starts() -> None:
+    table = compare(
+        CRANE, ["direct", "reduced-two-stage"], parameters={"reduced-two-stage": {"torque": 15.5}}
+    )
+    direct, reduced = table.rows
+    assert direct.time_lost == 0.0
+    assert reduced.time_lost == reduced.run.start_time - direct.run.start_time
+    worn = simulate(CRANE.replace(gap=2.0), "reduced-two-stage", parameters={"torque": 15.5})
+    assert reduced.k_dyn_worn_gap == pytest.approx(worn.k_dyn, rel=1e-12)
+    light = Drive.load("crane-4amtkf-light")
+    assert direct.k_dyn_light_load == simulate(light, "direct", base=CRANE, fitted_to=CRANE).k_dyn
+    assert table.gentlest is reduced

@@ -1,0 +1,161 @@
+"""Finding controllers, plain controllers, and what happens when one misbehaves."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from softstart import Command, Drive, InputError, Measured, PlainController, Sensor, SimulationError, simulate
+from softstart.controller import controller_class, controller_names, make_controller
+
+CRANE = Drive.load("crane-4amtkf")
+ALL = {
+    "direct",
+    "reduced-first-stage",
+    "reduced-two-stage",
+    "acceleration-delay",
+    "current-limit-feedback",
+    "ramp",
+    "s-curve",
+}
+
+
+def test_the_seven_strategies_are_found() -> None:
+    assert set(controller_names()) >= ALL
+    for name in ALL:
+        assert controller_class(name).name == name
+
+
+LOOSE = """
+from softstart import Command, PlainController
+class Mine(PlainController):
+    name = "mine"
+    def step(self, measured, state):
+        return Command(62.0)
+class Lazy(PlainController):
+    name = "lazy"
+class Other: pass
+"""
+
+
+@pytest.fixture
+def loose(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.py"
+    path.write_text(LOOSE, encoding="utf-8")
+    return path
+
+
+def test_a_loose_file_works_without_numba(loose: Path) -> None:
+    run = simulate(CRANE, f"{loose}:Mine")
+    assert run.k_dyn == simulate(CRANE, "direct").k_dyn
+    assert run.controller.name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("{}:Min", 'did you mean "Mine"'),
+        ("{}:Other", "derive the class"),
+        ("{}:Lazy", "still lacks step"),
+        ("{}", "say which class"),
+        ("nowhere.py:Mine", "there is no file nowhere.py"),
+        ("dirct", 'did you mean "direct"'),
+        ("xyz", "softstart controllers"),
+        ("", "no controller of this name"),
+    ],
+)
+def test_wrong_names(loose: Path, name: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        make_controller(name.format(loose))
+    assert len(caught.value.sentences) == 1
+    assert words in caught.value.sentences[0]
+
+
+def test_a_file_that_does_not_run(tmp_path: Path) -> None:
+    path = tmp_path / "broken.py"
+    path.write_text("1/0", encoding="utf-8")
+    with pytest.raises(InputError, match="does not run: ZeroDivisionError"):
+        make_controller(f"{path}:Mine")
+
+
+@pytest.mark.parametrize(
+    ("answer", "error", "words"),
+    [
+        (Command(float("nan")), SimulationError, "NaN or with a past instant"),
+        (Command(1.0, 0.0), SimulationError, "NaN or with a past instant"),
+        (Command(1.0, float("nan")), SimulationError, "NaN or with a past instant"),
+        (None, InputError, "answer with Command"),
+        (("a", 1.0, ()), InputError, "answer with Command"),
+    ],
+)
+def test_a_controller_that_answers_nonsense(answer: object, error: type[Exception], words: str) -> None:
+    class Nonsense(PlainController):
+        name = "nonsense"
+
+        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+            return answer  # type: ignore[return-value]
+
+    with pytest.raises(error, match=words):
+        simulate(CRANE, Nonsense())
+
+
+def test_a_controller_that_fails() -> None:
+    class Fails(PlainController):
+        name = "fails"
+
+        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+            raise RuntimeError("out of ideas")
+
+    with pytest.raises(SimulationError, match="Fails failed at t = 0 s: RuntimeError: out of ideas"):
+        simulate(CRANE, Fails())
+
+
+def test_what_is_not_declared_is_not_seen() -> None:
+    seen: list[Measured] = []
+
+    class Blind(PlainController):
+        name = "blind"
+
+        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+            seen.append(measured)
+            return Command(62.0, measured.time + 0.01)
+
+    class Sighted(Blind):
+        sensors = Sensor.SHAFT_TORQUE | Sensor.LOAD_SPEED | Sensor.STAGE
+
+    simulate(CRANE, Blind(), until=0.05)
+    assert all(m.shaft_torque != m.shaft_torque and m.load_speed != m.load_speed for m in seen)
+    assert all(m.stage != m.stage for m in seen)
+    seen.clear()
+    run = simulate(CRANE, Sighted(), until=0.05)
+    states = run.at([m.time for m in seen])
+    assert [m.shaft_torque for m in seen] == pytest.approx(states["T"], abs=1e-9)
+    assert [m.load_speed for m in seen] == pytest.approx(states["w2"], abs=1e-12)
+    contact = run.first_contact
+    assert contact in [m.time for m in seen]  # asked at the very instant of contact
+
+
+def test_the_encoder_counts_and_the_torque_is_the_realised_one() -> None:
+    seen: list[Measured] = []
+
+    class Watch(PlainController):
+        name = "watch"
+
+        def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+            seen.append(measured)
+            return Command(100.0, measured.time + 0.001)  # above the largest torque, 64 N m
+
+    drive = CRANE.replace(torque_lag=0.002, encoder_lines=1024)
+    run = simulate(drive, Watch(), until=0.05)
+    count = 2 * 3.141592653589793 / 4096
+    states = run.at([m.time for m in seen])
+    for i, m in enumerate(seen):
+        assert abs(m.motor_angle - states["phi1"][i]) <= 0.5001 * count
+        assert m.motor_angle / count == pytest.approx(round(m.motor_angle / count), abs=1e-6)
+        assert m.motor_torque == pytest.approx(64.0 * -math.expm1(-m.time / 0.002), abs=1e-9)
+        if i:
+            before = seen[i - 1]
+            rate = (m.motor_angle - before.motor_angle) / (m.time - before.time)
+            assert m.motor_speed == pytest.approx(rate, abs=1e-9)

@@ -1,0 +1,183 @@
+"""A finished start: traces, figures, settling, energy, export."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softstart import Drive, InputError, Run, Status, simulate, stages
+
+CRANE = Drive.load("crane-4amtkf")
+DAMPED = CRANE.replace(damping=1.0, load_kind="reactive")
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return simulate(CRANE, "reduced-first-stage")
+
+
+def test_traces_hang_together(run: Run) -> None:
+    np.testing.assert_allclose(run.theta, run.phi1 - run.phi2, atol=1e-12)
+    states = run.at(run.t)
+    for name in ("phi1", "phi2", "w1", "w2", "u", "T"):
+        np.testing.assert_array_equal(states[name], getattr(run, name))
+    # angles are the integrals of the speeds, by a quadrature of the traces' own (trapezium, 1e-3 here)
+    turned = np.concatenate([[0.0], np.cumsum(np.diff(run.t) * 0.5 * (run.w2[1:] + run.w2[:-1]))])
+    np.testing.assert_allclose(run.phi2, turned, atol=1e-4 * run.phi2.max())
+
+
+def test_equation_of_motion_holds_along_the_traces(run: Run) -> None:
+    """J1 w1' = u - T and J2 w2' = T - Mc, by central differences inside the stages."""
+    h = 1e-6
+    inside = [stage.start + 0.37 * stage.duration for stage in run.stages]
+    before, now, after = (run.at(np.array(inside) + shift) for shift in (-h, 0.0, h))
+    np.testing.assert_allclose(0.035 * (after["w1"] - before["w1"]) / (2 * h), now["u"] - now["T"], atol=1e-3)
+    np.testing.assert_allclose(0.175 * (after["w2"] - before["w2"]) / (2 * h), now["T"] - 7.16, atol=1e-3)
+
+
+def test_shape_of_the_answer_is_that_of_the_question(run: Run) -> None:
+    assert run.at(0.1)["T"].shape == ()
+    assert run.at([[0.1, 0.2], [0.3, 0.35]])["w2"].shape == (2, 2)
+    with pytest.raises(ValueError, match="within the run"):
+        run.at(run.end_time + 1.0)
+    with pytest.raises(ValueError, match="within the run"):
+        run.at([0.1, -0.1])
+    with pytest.raises(ValueError, match="within the run"):
+        run.at(math.nan)
+
+
+def test_start_time_is_the_first_instant_at_the_target(run: Run) -> None:
+    assert float(run.at(run.start_time)["w2"]) == pytest.approx(CRANE.target_speed, rel=1e-12)
+    earlier = run.at(np.linspace(0.0, run.start_time * (1 - 1e-9), 5000))
+    assert earlier["w2"].max() < CRANE.target_speed
+    assert run.end_time == pytest.approx(run.start_time + CRANE.elastic_period, rel=1e-12)
+
+
+def test_stages_tile_the_run_and_hold_the_peaks(run: Run) -> None:
+    assert [stage.number for stage in run.stages] == list(range(1, len(run.stages) + 1))
+    assert run.stages[0].start == 0.0
+    assert run.stages[-1].end == run.end_time
+    for one, following in zip(run.stages, run.stages[1:], strict=False):
+        assert one.end == following.start
+    assert max(abs(stage.peak_torque) for stage in run.stages) == run.peak_torque
+    for stage in run.stages:
+        assert (stage.side == 0) == (stage.number % 2 == 1)
+        seen = np.abs(run.at(np.linspace(stage.start, stage.end, 400)[1:-1])["T"]).max()
+        assert seen <= abs(stage.peak_torque) * (1 + 1e-12) + 1e-9
+        assert seen >= 0.999 * abs(stage.peak_torque) - 1e-9 or stage is run.stages[-1]
+
+
+def test_settling_of_a_damped_drive() -> None:
+    run = simulate(DAMPED, "direct", until=2.0)
+    settled = run.settling_time(0.1)
+    assert 0.0 < settled < 1.0
+    mean = stages.mean_shaft_torque(62.0, 0.035, 0.175, 7.16)
+    after = run.at(np.linspace(settled, 2.0, 20_000))["T"]
+    assert np.abs(after - mean).max() <= 0.1 * mean * (1 + 1e-6)
+    assert abs(float(run.at(settled - 1e-6)["T"]) - mean) > 0.1 * mean * (1 - 1e-3)
+    # a wider band is entered earlier, and an undamped drive never settles
+    assert run.settling_time(0.5) < settled < run.settling_time(0.01)
+    assert math.isnan(simulate(CRANE, "direct", until=1.0).settling_time())
+    with pytest.raises(InputError, match="band = 0"):
+        run.settling_time(0.0)
+
+
+def test_damping_takes_what_the_balance_says() -> None:
+    energy = simulate(DAMPED, "direct", until=2.0).energy
+    assert energy.dissipated > 0.0
+    assert abs(energy.residual) < 1e-10 * energy.motor
+    lossless = simulate(CRANE, "direct", until=2.0).energy
+    assert abs(lossless.dissipated) < 1e-10 * lossless.motor
+    total = energy.kinetic + energy.elastic + energy.load + energy.dissipated + energy.residual
+    assert total == pytest.approx(energy.motor, rel=1e-14)
+
+
+def test_csv_reads_back(run: Run, tmp_path: Path) -> None:
+    run.to_csv(tmp_path / "start.csv")
+    with (tmp_path / "start.csv").open(encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["t [s]", "phi1 [rad]", "phi2 [rad]", "w1 [rad/s]", "w2 [rad/s]", "u [N*m]", "T [N*m]"]
+    table = np.array(rows, dtype=float)
+    np.testing.assert_array_equal(table[:, 0], run.t)
+    np.testing.assert_array_equal(table[:, 6], run.T)
+    run.to_csv(tmp_path / "few.csv", times=[0.0, 0.1])
+    assert len((tmp_path / "few.csv").read_text(encoding="utf-8").splitlines()) == 3
+
+
+def test_csv_is_whole_or_not_there(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = tmp_path / "start.csv"
+    target.write_text("what was there", encoding="utf-8")
+
+    def interrupted(*_args: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savetxt", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run.to_csv(target)
+    assert target.read_text(encoding="utf-8") == "what was there"
+    assert [path.name for path in tmp_path.iterdir()] == ["start.csv"]
+    with pytest.raises(InputError, match="cannot be written there"):
+        run.to_csv(tmp_path / "nowhere" / "start.csv")
+
+
+def test_a_start_that_never_arrives_says_so() -> None:
+    run = simulate(CRANE.replace(load_kind="reactive"), "direct", parameters={"torque": 7.0}, time_limit=3.0)
+    assert run.status is Status.NOT_REACHED
+    assert math.isnan(run.start_time)
+    assert run.end_time == 3.0
+    assert 0.0 < run.k_dyn < 1.0  # the motor alone swings against the resting load
+    early = simulate(CRANE, "direct", until=0.1)
+    assert early.status is Status.STOPPED_EARLY
+    assert early.k_dyn == pytest.approx(3.11785, rel=1e-5)
+
+
+def test_the_base_of_k_dyn_can_be_another_drive() -> None:
+    """[G], fig. 2: the light load's torque over the mean torque of the heavy one; REFERENCE table, 2.7157."""
+    light = Drive.load("crane-4amtkf-light")
+    assert simulate(light, "direct", base=CRANE).k_dyn == pytest.approx(2.7157, abs=5e-5)
+
+
+def test_the_figure_shows_the_run(run: Run) -> None:
+    figure = run.plot()
+    torque, speed, twist = figure.axes
+    assert {line.get_label() for line in torque.lines} >= {"motor torque u", "shaft torque T"}
+    drawn = next(line for line in torque.lines if line.get_label() == "shaft torque T")
+    np.testing.assert_array_equal(drawn.get_ydata(), run.T)
+    assert max(drawn.get_ydata()) == pytest.approx(run.peak_torque, rel=1e-12)  # the peak is on the grid
+    open_stages = [stage for stage in run.stages if stage.side == 0]
+    assert len(twist.patches) == len(open_stages)
+    assert f"{run.start_time:.4f}" in speed.get_title(loc="left")
+
+
+@pytest.mark.parametrize(
+    ("options", "key"),
+    [
+        ({"until": 0.0}, "until = 0.0"),
+        ({"until": -1.0}, "until = -1.0"),
+        ({"until": math.nan}, "until = nan"),
+        ({"until": math.inf}, "until = inf"),
+        ({"until": "1 s"}, "until = 1 s"),
+        ({"max_events": 0}, "max_events = 0"),
+        ({"max_events": 1.5}, "max_events = 1.5"),
+        ({"parameters": {"torqe": 1.0}}, "torqe"),
+        ({"parameters": {"torque": "1 kg"}}, "torque"),
+        ({"parameters": {"torque": "lots"}}, "torque"),
+    ],
+)
+def test_bad_arguments(options: dict[str, object], key: str) -> None:
+    with pytest.raises(InputError) as caught:
+        simulate(CRANE, "direct", **options)  # type: ignore[call-overload]
+    assert len(caught.value.sentences) == 1
+    assert key in caught.value.sentences[0]
+
+
+@pytest.mark.parametrize(
+    "drives", [[], [CRANE, 1], [CRANE.replace(gap=[0.5, 1.0])], None, 3.0, "crane-4amtfk"]
+)
+def test_bad_drives(drives: object) -> None:
+    with pytest.raises(InputError, match="drive"):
+        simulate(drives, "direct")  # type: ignore[call-overload]
