@@ -121,7 +121,7 @@ def integrate(
 class _Run:
     """The state of one start on its way, and what has been noted of it."""
 
-    def __init__(  # noqa: PLR0917
+    def __init__(
         self,
         drive: Drive,
         path: TorquePath,

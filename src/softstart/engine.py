@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import traceback
 
 import numpy as np
 
@@ -88,10 +89,12 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
             kernel.measure(p, book.x, book.sees, book.measured)
             try:
                 answer = controller.step(Measured(*book.measured.tolist()), state)
-            except Exception as error:  # the user's own code may fail in any way
+            except (Exception, SystemExit) as error:  # the user's own code may fail in any way
+                place = traceback.extract_tb(error.__traceback__)[-1]
                 raise SimulationError(
-                    f"The controller {type(controller).__name__} failed at t = {book.x[at.TIME]:.6g} s: "
-                    f"{type(error).__name__}: {error}."
+                    f"The start was given up: the controller {type(controller).__name__} failed at "
+                    f"t = {book.x[at.TIME]:.6g} s in {place.filename}, line {place.lineno} "
+                    f"({type(error).__name__}: {error})."
                 ) from error
             try:
                 torque, ask_again, state = float(answer[0]), float(answer[1]), tuple(answer[2])

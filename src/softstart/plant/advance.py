@@ -127,7 +127,6 @@ from softstart.plant.layout import (
 from softstart.plant.motion import derivatives, forcing_tail, motion
 from softstart.plant.span import begin_span, next_event, torque_course
 
-
 # A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
 LONGEST_SPAN = 16.0
 

@@ -37,7 +37,13 @@ HOME = "softstart_studies.benchmarks"
 ENTRIES = {
     "kernel": Entry("softstart", "exact", "Kernel", "compiled kernel over a batch"),
     "batch": Entry("softstart", "exact", "Batch", "simulate of a batch, labelled results"),
-    "run": Entry("softstart", "exact", "FullRun", "one simulate call a start; Run with events, stages, traces"),
+    "run": Entry("softstart", "exact", "EachRun", "one simulate call a start; Run with events and stages"),
+    "run-traces": Entry(
+        "softstart",
+        "exact",
+        "EachRunWithTraces",
+        "one simulate call a start; Run with stages and traces",
+    ),
     "lsoda": Entry(
         "scipy", "lsoda", "Lsoda", "solve_ivp LSODA, rtol 1e-8, located events, restarted at each stage"
     ),

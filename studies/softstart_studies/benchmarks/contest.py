@@ -14,7 +14,7 @@ from softstart_studies.benchmarks.problem import Problem, crane, gaps
 
 @dataclass(frozen=True)
 class Duel:
-    """What is measured: a peer against softstart, each with as many starts a pass as it needs for a good time.
+    """A peer against softstart, each with as many starts a pass as a good measurement of time needs.
 
     `wanted` is the ratio that softstart shall reach, None where none was set.
     """
@@ -29,7 +29,7 @@ class Duel:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Medians over the passes: starts a second of processor time, the ratios, and the largest |difference of K_dyn|.
+    """Medians over the passes: starts a second of processor time and ratios; largest difference in K_dyn.
 
     `ratio` is by processor time, `wall_ratio` by the clock. `peer_prepared` is the peer's first pass in s.
     """
@@ -44,7 +44,7 @@ class Outcome:
 
 
 def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> Outcome:
-    """The two in turns, so that a machine that slows down slows both; the ratio is the median over the turns."""
+    """The two in turns, so that a machine that slows down slows both; the ratio is the median of the turns'."""
     prepared = peer.prepare(duel.peer, problem, duel.peer_starts)
     ours.prepare(duel.ours, problem, duel.our_starts)
     theirs, own = [], []

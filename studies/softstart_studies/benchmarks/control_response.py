@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import control
 import numpy as np
@@ -18,7 +18,7 @@ class ControlDefault:
     """As it comes: RK45 at its default tolerances, outputs every millisecond, the peak read off them."""
 
     step = 1e-3  # s, of the grid of times
-    options: dict[str, Any] = {}
+    options: ClassVar[dict[str, Any]] = {}
 
     def __init__(self, problem: Problem) -> None:
         if problem.strategy != "direct":
@@ -51,7 +51,7 @@ class ControlTight(ControlDefault):
     """With care: LSODA at 1e-8, no step over 1 ms, outputs every 0.1 ms."""
 
     step = 1e-4
-    options: dict[str, Any] = {
+    options: ClassVar[dict[str, Any]] = {
         "solve_ivp_method": "LSODA",
         "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-8, "max_step": 1e-3},
     }

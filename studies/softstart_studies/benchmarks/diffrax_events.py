@@ -57,7 +57,9 @@ def one_start(problem: Problem) -> Any:
         turn = jnp.where(contact, side, -origin) * y[1]
         after = jnp.where(contact, side * y[0] - half, half - origin * y[0])
         far = jnp.where(contact | ~inward, 1.0, half + origin * y[0])
-        return jnp.stack([jnp.where(inward, turn, after), far, jnp.where(reached, 1.0, problem.target - y[2])])
+        return jnp.stack(
+            [jnp.where(inward, turn, after), far, jnp.where(reached, 1.0, problem.target - y[2])]
+        )
 
     event = dfx.Event(
         lambda t, y, args, **_: jnp.min(guards(y, args)), optx.Newton(1e-12, 1e-12), direction=False

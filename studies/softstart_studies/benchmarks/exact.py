@@ -1,4 +1,4 @@
-"""softstart itself, three ways: the bare kernel, a batch with labelled results, and a Run for each start."""
+"""softstart itself, in each way it is used: the bare kernel, a batch with labelled results, a Run for each start."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from softstart.drive import Drive
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
+from softstart.run import Run
 from softstart_studies.benchmarks.problem import Problem, Vector, controller_of, crane
 
 
@@ -60,8 +61,8 @@ class Batch:
         return peaks
 
 
-class FullRun:
-    """One `simulate` call a start; of each Run the events, stages and traces are asked for, too."""
+class EachRun:
+    """One `simulate` call a start, with figures, events and stages of its Run."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -73,9 +74,20 @@ class FullRun:
 
     def solve(self, work: list[tuple[Drive, Any]]) -> Vector:
         """Peak torques, N m."""
-        peaks = []
-        for drive, controller in work:
-            run = simulate(drive, controller)
-            assert run.events and run.stages and run.T.size == run.t.size
-            peaks.append(run.peak_torque)
-        return np.array(peaks)
+        return np.array([self.asked(simulate(drive, controller)) for drive, controller in work])
+
+    def asked(self, run: Run) -> float:
+        """Peak torque, N m, after the lazy parts of the Run have been made."""
+        if not (run.events and run.stages and run.start_time > 0.0):
+            raise ValueError("a start without events is no start.")
+        return run.peak_torque
+
+
+class EachRunWithTraces(EachRun):
+    """The same, and the 1500 and more instants of every trace."""
+
+    def asked(self, run: Run) -> float:
+        """Peak torque, N m, after all traces have been made: they are evaluated together."""
+        if run.T.shape != run.t.shape:
+            raise ValueError("a trace without its instants is no trace.")
+        return super().asked(run)

@@ -33,7 +33,7 @@ def case(seed: int) -> dict[str, Any]:
 def run_of(drawn: dict[str, Any]) -> Run:
     """The same start by the plant under test."""
     torques = [u for _, u in drawn["torque_pieces"]]
-    Ms = max(max(torques), 1.1 * drawn["Mc"], 1e-9)
+    Ms = max(*torques, 1.1 * drawn["Mc"], 1e-09)
     drive = Drive(
         motor_inertia=drawn["J1"],
         load_inertia=drawn["J2"],

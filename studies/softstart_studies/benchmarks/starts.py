@@ -1,0 +1,172 @@
+"""`softstart study benchmark-starts`: starts a second of softstart and of its peers, as ratios of one run."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import ClassVar
+
+from softstart.study import Progress, Study, StudyResult, Table
+from softstart_studies.benchmarks import contenders
+from softstart_studies.benchmarks.contenders import ENTRIES
+from softstart_studies.benchmarks.contest import Duel, Outcome, fight
+from softstart_studies.benchmarks.host import Child, Host
+from softstart_studies.benchmarks.picture import ratio_figure
+from softstart_studies.benchmarks.problem import crane_problem
+from softstart_studies.benchmarks.verdicts import MANY, claims
+
+__all__ = ["BenchmarkStarts"]
+
+PASSES = 7
+# a pass of a peer takes 0.1 to 0.4 s; the batches of the kernel are as large as a study of tolerances needs
+DUELS = (
+    Duel("direct", "lsoda", 20, "kernel", 100_000, MANY),
+    Duel("reduced-first-stage", "lsoda", 20, "kernel", 100_000, MANY),
+    Duel("reduced-two-stage", "lsoda", 20, "kernel", 100_000, MANY),
+    Duel("direct", "lsoda", 20, "batch", 100_000),
+    Duel("ramp", "lsoda-sampled", 2, "kernel", 5_000, 100.0),
+    Duel("direct", "lsoda", 20, "run", 200, 20.0),
+    Duel("direct", "lsoda", 20, "run-traces", 200, 20.0),
+    Duel("direct", "control", 4, "run-traces", 200),
+    Duel("direct", "control-tight", 4, "run-traces", 200),
+    Duel("direct", "diffrax", 1_000, "kernel", 100_000),
+)
+MISSING = "not installed: pip install 'softstart[benchmark]'"
+COLUMNS = (
+    "strategy",
+    "peer",
+    "how the peer is used",
+    "how softstart is used",
+    "peer, starts/s",
+    "softstart, starts/s",
+    "ratio",
+    "ratio by the clock",
+    "wanted ratio",
+    "largest difference in K_dyn",
+)
+
+
+class BenchmarkStarts(Study):
+    """Constant, staged and sampled torque on the crane drive of [G], against scipy, python-control and diffrax.
+
+    Every contender works in a process of its own, bound to one processor and one thread. Rates are by the
+    process's own processor time, since the machine may have other work; the two of a row take turns.
+
+    >>> BenchmarkStarts.name, BenchmarkStarts.pictures
+    ('benchmark-starts', ('benchmark-starts-ratios',))
+    """
+
+    name: ClassVar[str] = "benchmark-starts"
+    title: ClassVar[str] = "Speed and memory beside scipy, python-control and diffrax, as ratios of one run"
+    pictures: ClassVar[tuple[str, ...]] = ("benchmark-starts-ratios",)
+
+    def __init__(
+        self, duels: Sequence[Duel] = DUELS, passes: int = PASSES, host: Callable[[], Host] = Child
+    ) -> None:
+        self.duels, self.passes, self.host = tuple(duels), passes, host
+
+    def run(self, out: Path | None, progress: Progress) -> StudyResult:
+        """All duels, about a minute; nothing is written to `out`."""
+        results: list[Outcome | None] = []
+        memories: dict[str, float | None] = {}
+        with ExitStack() as stack:
+            hosts: dict[str, Host] = {}
+
+            def host_of(name: str) -> Host:
+                package = ENTRIES[name].package
+                if package not in hosts:
+                    hosts[package] = self.host()
+                    stack.callback(hosts[package].close)
+                return hosts[package]
+
+            for number, duel in enumerate(self.duels, start=1):
+                peer = ENTRIES[duel.peer]
+                if contenders.installed(duel.peer) is None:
+                    progress(f"{number}/{len(self.duels)} {duel.strategy}: {peer.package} {MISSING}")
+                    results.append(None)
+                    continue
+                progress(f"{number}/{len(self.duels)} {duel.strategy}: {peer.package}, {peer.how}")
+                problem = crane_problem(duel.strategy)
+                results.append(fight(duel, problem, host_of(duel.peer), host_of(duel.ours), self.passes))
+            for package, host in hosts.items():
+                memories[package] = host.memory()
+        rows = list(zip(self.duels, results, strict=True))
+        measured = [result for result in results if result is not None]
+        return StudyResult(
+            tables=(
+                Table(
+                    "Starts a second, by processor time of one core", COLUMNS, [_row(*row) for row in rows]
+                ),
+                _process_table(self.duels, measured, memories),
+                _condition_table(self.passes),
+            ),
+            claims=claims(measured),
+            figures={self.pictures[0]: ratio_figure(measured)},
+        )
+
+
+def _row(duel: Duel, outcome: Outcome | None) -> tuple[object, ...]:
+    peer, ours = ENTRIES[duel.peer], ENTRIES[duel.ours]
+    version = contenders.installed(duel.peer)
+    if outcome is None:
+        return (duel.strategy, peer.package, MISSING, ours.how, None, None, None, None, duel.wanted, None)
+    return (
+        duel.strategy,
+        f"{peer.package} {version}",
+        peer.how,
+        ours.how,
+        _rounded(outcome.peer_rate),
+        _rounded(outcome.our_rate),
+        _rounded(outcome.ratio),
+        _rounded(outcome.wall_ratio),
+        duel.wanted,
+        float(f"{outcome.k_dyn_difference:.1e}"),
+    )
+
+
+def _rounded(value: float) -> float:
+    """Three digits: more would be noise."""
+    return float(f"{value:.3g}")
+
+
+def _process_table(
+    duels: Sequence[Duel], outcomes: Sequence[Outcome], memories: dict[str, float | None]
+) -> Table:
+    """One row a process: what it took to make ready, and its largest memory."""
+    rows = []
+    for package, memory in memories.items():
+        first = [one.peer_prepared for one in outcomes if ENTRIES[one.duel.peer].package == package]
+        sizes = [(d.peer_starts, d.peer) for d in duels] + [(d.our_starts, d.ours) for d in duels]
+        largest = max(count for count, name in sizes if ENTRIES[name].package == package)
+        rows.append(
+            (
+                f"{package} {contenders.version_of(package)}",
+                None if memory is None else round(memory),
+                largest,
+                _rounded(max(first)) if first else None,
+            )
+        )
+    columns = (
+        "process",
+        "largest memory with interpreter and libraries, MiB",
+        "largest batch, starts",
+        "longest first pass with imports and compiling (not in the rates), s",
+    )
+    return Table("Processes", columns, rows)
+
+
+def _condition_table(passes: int) -> Table:
+    libraries = ("numpy", "scipy", "numba", "control", "jax", "diffrax")
+    versions = {name: contenders.version_of(name) or "not installed" for name in libraries}
+    rows = [
+        ("processors of the machine", os.cpu_count()),
+        ("machine", f"{platform.machine()}, {platform.system()}"),
+        ("processors and threads used", "one, one"),
+        ("passes, in turns (medians are shown)", passes),
+        ("python", platform.python_version()),
+        *versions.items(),
+    ]
+    return Table("Conditions", ("what", "value"), rows)
