@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import ExitStack
 from typing import IO, Any
 
 from softstart.errors import SimulationError
@@ -33,8 +32,7 @@ class Child:
     """A host whose work is done by a process of its own."""
 
     def __init__(self) -> None:
-        self.stack = ExitStack()
-        self.errors = self.stack.enter_context(tempfile.TemporaryFile())
+        self.errors = tempfile.TemporaryFile()  # noqa: SIM115  closed with the child
         self.process = subprocess.Popen(
             [sys.executable, "-c", COMMAND],
             stdin=subprocess.PIPE,
@@ -59,7 +57,7 @@ class Child:
 
     def close(self) -> None:
         """Let the child go; one that does not go is ended."""
-        with self.stack:
+        with self.errors:
             try:
                 self.process.communicate(timeout=PATIENCE)
             except subprocess.TimeoutExpired:

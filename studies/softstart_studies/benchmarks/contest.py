@@ -44,7 +44,7 @@ class Outcome:
 
 
 def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> Outcome:
-    """The two in turns, so that a machine that slows down slows both; the ratio is the median of the turns'."""
+    """The two in turns, so that a machine that slows down slows both; the ratio is a median, too."""
     prepared = peer.prepare(duel.peer, problem, duel.peer_starts)
     ours.prepare(duel.ours, problem, duel.our_starts)
     theirs, own = [], []

@@ -1,4 +1,4 @@
-"""softstart itself, in each way it is used: the bare kernel, a batch with labelled results, a Run for each start."""
+"""softstart itself, as it is used: the bare kernel, a batch with labelled results, a Run for each start."""
 
 from __future__ import annotations
 

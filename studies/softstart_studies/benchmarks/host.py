@@ -49,6 +49,8 @@ class Here:
         """Make ready for so many starts; seconds of the first pass, imports and compiling included."""
         begin = time.perf_counter()
         if (name, problem) not in self.made:
+            self.made.clear()  # the memory of one duel is not to be counted in the next
+            self.work.clear()
             self.made[name, problem] = make(name, problem)
         contender = self.made[name, problem]
         self.work[name, problem, starts] = contender.ready(gaps(starts))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from softstart.figures import COLOURS, drawing, new_figure
 from softstart_studies.benchmarks.contenders import ENTRIES
-from softstart_studies.benchmarks.contest import Outcome
+from softstart_studies.benchmarks.contest import Outcome, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,18 +33,15 @@ def ratio_figure(outcomes: Sequence[Outcome]) -> Figure:
         for place, one in enumerate(outcomes):
             package = ENTRIES[one.duel.peer].package
             axes.barh(place, one.ratio, height=0.66, left=0.0, color=COLOURS[packages.index(package)])
+            # at the right edge, where no bar and no tick can cross it
             axes.annotate(
-                f"{one.ratio:,.0f}",
-                (one.ratio, place),
-                xytext=(5, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=9,
+                shown(one.ratio), (1.0, place), xycoords=("axes fraction", "data"), ha="right", va="center"
             )
             if one.duel.wanted is not None:
                 axes.plot([one.duel.wanted] * 2, [place - 0.42, place + 0.42], color="black", lw=1.8)
         axes.set_xscale("log")
-        axes.set_xlim(1.0, 10.0 * max((one.ratio for one in outcomes), default=1.0))
+        wanted = [one.duel.wanted or 1.0 for one in outcomes]
+        axes.set_xlim(1.0, 10.0 * max(1.0, *wanted, *(one.ratio for one in outcomes)))
         axes.set_yticks(range(len(outcomes)))
         axes.set_yticklabels(
             [f"{one.duel.strategy}:  {SHORT[one.duel.ours]} : {SHORT[one.duel.peer]}" for one in outcomes]
@@ -53,4 +50,4 @@ def ratio_figure(outcomes: Sequence[Outcome]) -> Figure:
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("starts/s of softstart : starts/s of the peer     (black tick: wanted)")
         axes.set_title("Same starts, same end, one core, in one run", loc="left")
-    return figure
+    return cast("Figure", figure)

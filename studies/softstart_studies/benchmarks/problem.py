@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,7 @@ STRATEGIES = ("direct", "reduced-first-stage", "reduced-two-stage", "ramp")
 
 @dataclass(frozen=True)
 class Problem:
-    """An undamped crane drive with active load, from rest at mid-gap, until one elastic period after `target`.
+    """An undamped crane drive with active load, at rest at mid-gap, until an elastic period after `target`.
 
     `stage_torques`: motor torque of stage 1, of stage 2 and of all later ones. For a ramp they are None and
     the torque is initial + (full - initial) min(1, t_k/time), held from t_k = k period to the next sample.
@@ -62,7 +62,7 @@ def crane(gap: Any) -> Drive:
 
 
 def controller_of(strategy: str, drive: Drive) -> Controller:
-    """The strategy as softstart's controller, fitted to the drive: its defaults, and a ramp over `RAMP_TIME`."""
+    """The strategy as softstart's controller, with its defaults for the drive; a ramp takes `RAMP_TIME`."""
     from softstart.controller.finding import make_controller
 
     given = {"time": RAMP_TIME} if strategy == "ramp" else None
@@ -86,10 +86,22 @@ def crane_problem(strategy: str) -> Problem:
         stages = (given["torque"], given["full_torque"], given["full_torque"])
     elif strategy == "reduced-two-stage":
         stages = (given["torque"], given["torque"], given["full_torque"])
-    numbers = [float(x) for x in (drive.J1, drive.J2, drive.c, drive.Mc, drive.target_speed)]
-    period = float(drive.elastic_period)
+    problem = Problem(
+        strategy=strategy,
+        J1=float(drive.J1),
+        J2=float(drive.J2),
+        c=float(drive.c),
+        Mc=float(drive.Mc),
+        target=float(drive.target_speed),
+        elastic_period=float(drive.elastic_period),
+        stage_torques=stages,
+    )
     if stages is not None:
-        first, second, later = (float(torque) for torque in stages)
-        return Problem(strategy, *numbers, period, (first, second, later))
-    ramp = [float(given[name]) for name in ("initial", "full_torque", "time", "period")]
-    return Problem(strategy, *numbers, period, None, *ramp)
+        return problem
+    return replace(
+        problem,
+        initial=float(given["initial"]),
+        full=float(given["full_torque"]),
+        time=float(given["time"]),
+        period=float(given["period"]),
+    )

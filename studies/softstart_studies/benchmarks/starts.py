@@ -11,9 +11,10 @@ from typing import ClassVar
 
 from softstart.study import Progress, Study, StudyResult, Table
 from softstart_studies.benchmarks import contenders
+from softstart_studies.benchmarks.child import Child
 from softstart_studies.benchmarks.contenders import ENTRIES
 from softstart_studies.benchmarks.contest import Duel, Outcome, fight
-from softstart_studies.benchmarks.host import Child, Host
+from softstart_studies.benchmarks.host import Host
 from softstart_studies.benchmarks.picture import ratio_figure
 from softstart_studies.benchmarks.problem import crane_problem
 from softstart_studies.benchmarks.verdicts import MANY, claims
@@ -35,6 +36,7 @@ DUELS = (
     Duel("direct", "diffrax", 1_000, "kernel", 100_000),
 )
 MISSING = "not installed: pip install 'softstart[benchmark]'"
+TITLE = "Starts a second, by processor time of one core"
 COLUMNS = (
     "strategy",
     "peer",
@@ -50,7 +52,7 @@ COLUMNS = (
 
 
 class BenchmarkStarts(Study):
-    """Constant, staged and sampled torque on the crane drive of [G], against scipy, python-control and diffrax.
+    """Constant, staged and sampled torque on the crane drive of [G]: scipy, python-control, diffrax and we.
 
     Every contender works in a process of its own, bound to one processor and one thread. Rates are by the
     process's own processor time, since the machine may have other work; the two of a row take turns.
@@ -97,9 +99,7 @@ class BenchmarkStarts(Study):
         measured = [result for result in results if result is not None]
         return StudyResult(
             tables=(
-                Table(
-                    "Starts a second, by processor time of one core", COLUMNS, [_row(*row) for row in rows]
-                ),
+                Table(TITLE, COLUMNS, [_row(*row) for row in rows]),
                 _process_table(self.duels, measured, memories),
                 _condition_table(self.passes),
             ),
