@@ -50,6 +50,10 @@ class Child:
         answer: Timed = self._ask("timed", name, problem, starts)
         return answer
 
+    def forget(self) -> None:
+        """Let go of all that was made ready."""
+        self._ask("forget")
+
     def memory(self) -> float | None:
         """Largest resident memory of the child so far, MiB."""
         answer: float | None = self._ask("memory")
@@ -73,6 +77,7 @@ class Child:
             to_child.flush()
             return pickle.load(from_child)
         except (EOFError, BrokenPipeError):
+            self.process.wait(PATIENCE)  # its last words are complete only then
             self.errors.seek(0)
             said = self.errors.read().decode(errors="replace").strip().splitlines()[-1:]
             last = f"its last words: {said[0]}" if said else "without a word."
@@ -85,6 +90,7 @@ def serve(questions: IO[bytes], answers: IO[bytes]) -> None:
     verbs: dict[str, Callable[..., object]] = {
         "prepare": here.prepare,
         "timed": here.timed,
+        "forget": here.forget,
         "memory": here.memory,
     }
     while True:

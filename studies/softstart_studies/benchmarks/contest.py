@@ -54,6 +54,8 @@ def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> 
     share = duel.our_starts / duel.peer_starts
     ours.prepare(duel.ours, problem, duel.peer_starts)
     same = ours.timed(duel.ours, problem, duel.peer_starts)
+    for host in (peer, ours):
+        host.forget()
     drive = crane(gaps(duel.peer_starts))
     apart = np.abs(metrics.k_dyn(theirs[0].peaks, drive) - metrics.k_dyn(same.peaks, drive))
     return Outcome(
@@ -65,3 +67,21 @@ def fight(duel: Duel, problem: Problem, peer: Host, ours: Host, passes: int) -> 
         float(apart.max()),
         prepared,
     )
+
+
+def rounded(value: float) -> float:
+    """Three digits: more would be noise.
+
+    >>> rounded(6487.3)
+    6490.0
+    """
+    return float(f"{value:.3g}")
+
+
+def shown(value: float) -> str:
+    """Three digits, for a reader.
+
+    >>> shown(6487.3), shown(21.13)
+    ('6,490', '21')
+    """
+    return f"{rounded(value):,.0f}"

@@ -31,6 +31,9 @@ class Host(Protocol):
     def timed(self, name: str, problem: Problem, starts: int) -> Timed:
         """One pass over `gaps(starts)`."""
 
+    def forget(self) -> None:
+        """Let go of all that was made ready, so that one duel's memory is not counted in the next."""
+
     def memory(self) -> float | None:
         """Largest memory of the process so far, MiB; None where that cannot be had."""
 
@@ -49,8 +52,6 @@ class Here:
         """Make ready for so many starts; seconds of the first pass, imports and compiling included."""
         begin = time.perf_counter()
         if (name, problem) not in self.made:
-            self.made.clear()  # the memory of one duel is not to be counted in the next
-            self.work.clear()
             self.made[name, problem] = make(name, problem)
         contender = self.made[name, problem]
         self.work[name, problem, starts] = contender.ready(gaps(starts))
@@ -63,6 +64,11 @@ class Here:
         cpu, wall = time.process_time(), time.perf_counter()
         peaks = contender.solve(work)
         return Timed(time.process_time() - cpu, time.perf_counter() - wall, peaks.copy())
+
+    def forget(self) -> None:
+        """Let go of all that was made ready."""
+        self.made.clear()
+        self.work.clear()
 
     def memory(self) -> float | None:
         """Largest resident memory of this process, MiB, where Linux tells it.

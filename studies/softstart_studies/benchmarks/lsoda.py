@@ -29,6 +29,8 @@ def stage_plan(problem: Problem) -> Plan:
 
 def sampled_plan(problem: Problem) -> Plan:
     """A ramp, held between samples; after it the torque is constant and nothing is sampled any more."""
+    if problem.stage_torques is not None:
+        raise ValueError(f"{problem.strategy} is not sampled.")
     initial, full, time, period = problem.initial, problem.full, problem.time, problem.period
 
     def plan(t: float, stage: int) -> tuple[float, float]:

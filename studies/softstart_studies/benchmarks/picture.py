@@ -41,7 +41,7 @@ def ratio_figure(outcomes: Sequence[Outcome]) -> Figure:
                 axes.plot([one.duel.wanted] * 2, [place - 0.42, place + 0.42], color="black", lw=1.8)
         axes.set_xscale("log")
         wanted = [one.duel.wanted or 1.0 for one in outcomes]
-        axes.set_xlim(1.0, 10.0 * max(1.0, *wanted, *(one.ratio for one in outcomes)))
+        axes.set_xlim(1.0, 10.0 * max([1.0, *wanted, *(one.ratio for one in outcomes)]))
         axes.set_yticks(range(len(outcomes)))
         axes.set_yticklabels(
             [f"{one.duel.strategy}:  {SHORT[one.duel.ours]} : {SHORT[one.duel.peer]}" for one in outcomes]

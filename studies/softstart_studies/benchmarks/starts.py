@@ -13,7 +13,7 @@ from softstart.study import Progress, Study, StudyResult, Table
 from softstart_studies.benchmarks import contenders
 from softstart_studies.benchmarks.child import Child
 from softstart_studies.benchmarks.contenders import ENTRIES
-from softstart_studies.benchmarks.contest import Duel, Outcome, fight
+from softstart_studies.benchmarks.contest import Duel, Outcome, fight, rounded
 from softstart_studies.benchmarks.host import Host
 from softstart_studies.benchmarks.picture import ratio_figure
 from softstart_studies.benchmarks.problem import crane_problem
@@ -118,18 +118,13 @@ def _row(duel: Duel, outcome: Outcome | None) -> tuple[object, ...]:
         f"{peer.package} {version}",
         peer.how,
         ours.how,
-        _rounded(outcome.peer_rate),
-        _rounded(outcome.our_rate),
-        _rounded(outcome.ratio),
-        _rounded(outcome.wall_ratio),
+        rounded(outcome.peer_rate),
+        rounded(outcome.our_rate),
+        rounded(outcome.ratio),
+        rounded(outcome.wall_ratio),
         duel.wanted,
         float(f"{outcome.k_dyn_difference:.1e}"),
     )
-
-
-def _rounded(value: float) -> float:
-    """Three digits: more would be noise."""
-    return float(f"{value:.3g}")
 
 
 def _process_table(
@@ -146,7 +141,7 @@ def _process_table(
                 f"{package} {contenders.version_of(package)}",
                 None if memory is None else round(memory),
                 largest,
-                _rounded(max(first)) if first else None,
+                rounded(max(first)) if first else None,
             )
         )
     columns = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softstart.study import Claim, Verdict
-from softstart_studies.benchmarks.contest import Outcome
+from softstart_studies.benchmarks.contest import Outcome, shown
 
 MANY = 20_000.0  # times LSODA, for a batch without sampling
 MILLION = 1e6  # starts/s on one core
@@ -22,12 +22,12 @@ def claims(outcomes: Sequence[Outcome]) -> list[Claim]:
     if kernel:
         found.append(_ratio_claim("In a batch, constant and staged torque", kernel))
         rates = [one.our_rate for one in kernel]
-        shown = ", ".join(f"{one.duel.strategy} {one.our_rate / 1e6:.2f}" for one in kernel)
+        millions = ", ".join(f"{one.duel.strategy} {one.our_rate / 1e6:.2f}" for one in kernel)
         found.append(
             Claim(
                 "One core makes at least 1 million starts a second with constant and staged torque.",
                 _verdict([rate >= MILLION for rate in rates]),
-                f"Million starts/s: {shown}.",
+                f"Million starts/s: {millions}.",
             )
         )
     if sampled:
@@ -48,13 +48,11 @@ def claims(outcomes: Sequence[Outcome]) -> list[Claim]:
 
 def _ratio_claim(what: str, outcomes: Sequence[Outcome]) -> Claim:
     wanted = max(one.duel.wanted or 0.0 for one in outcomes)
-    shown = ", ".join(
-        f"{one.duel.strategy} ({one.duel.ours}) {float(f'{one.ratio:.3g}'):,.0f}" for one in outcomes
-    )
+    ratios = ", ".join(f"{one.duel.strategy} ({one.duel.ours}) {shown(one.ratio)}" for one in outcomes)
     return Claim(
         f"{what}: at least {wanted:,.0f} times as many starts a second as LSODA with located events.",
         _verdict([one.ratio >= (one.duel.wanted or 0.0) for one in outcomes]),
-        f"Ratio: {shown}.",
+        f"Ratio: {ratios}.",
     )
 
 

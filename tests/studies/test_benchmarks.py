@@ -1,0 +1,200 @@
+"""The benchmark study: peers and softstart solve the same starts. Nothing here is about speed."""
+
+import pytest
+
+from softstart import SimulationError, simulate
+from softstart.study import Verdict, find_study
+from softstart_studies.benchmarks import contenders
+from softstart_studies.benchmarks.child import Child
+from softstart_studies.benchmarks.contest import Duel, Outcome, fight
+from softstart_studies.benchmarks.host import Here
+from softstart_studies.benchmarks.lsoda import sampled_plan
+from softstart_studies.benchmarks.picture import ratio_figure
+from softstart_studies.benchmarks.problem import RAMP_TIME, STRATEGIES, crane, crane_problem, gaps
+from softstart_studies.benchmarks.starts import DUELS, MISSING, BenchmarkStarts
+from softstart_studies.benchmarks.verdicts import claims
+
+needs_diffrax = pytest.mark.skipif(
+    contenders.version_of("diffrax") is None, reason="diffrax: extra `benchmark`"
+)
+
+
+def difference(strategy: str, peer: str, ours: str = "kernel", starts: int = 4) -> float:
+    here = Here()
+    return fight(
+        Duel(strategy, peer, starts, ours, starts), crane_problem(strategy), here, here, 1
+    ).k_dyn_difference
+
+
+@pytest.mark.parametrize("strategy", ["direct", "reduced-first-stage", "reduced-two-stage"])
+def test_lsoda_and_softstart_agree(strategy):
+    assert difference(strategy, "lsoda", starts=6) < 1e-6
+
+
+def test_sampled_lsoda_and_softstart_agree():
+    # 500 restarts at rtol 1e-8; the difference falls in step with LSODA's tolerance, so it is LSODA's
+    assert difference("ramp", "lsoda-sampled", starts=2) < 2e-5
+
+
+def test_python_control_agrees_when_told_to_be_exact():
+    assert difference("direct", "control-tight", "run-traces", starts=2) < 1e-5
+
+
+def test_python_control_as_it_comes_is_the_same_start_but_coarse():
+    assert 1e-3 < difference("direct", "control", "run", starts=2) < 1.0
+
+
+@needs_diffrax
+def test_diffrax_and_softstart_agree():
+    # in a process of its own: it switches jax to 64 bits for good
+    here, child = Here(), Child()
+    try:
+        for strategy in ("direct", "reduced-two-stage"):
+            outcome = fight(
+                Duel(strategy, "diffrax", 5, "kernel", 5), crane_problem(strategy), child, here, 1
+            )
+            assert outcome.k_dyn_difference < 1e-6
+    finally:
+        child.close()
+
+
+@pytest.mark.parametrize("ours", ["kernel", "batch", "run", "run-traces"])
+def test_every_way_of_using_softstart_gives_the_same(ours):
+    here, problem = Here(), crane_problem("direct")
+    here.prepare(ours, problem, 3)
+    peaks = here.timed(ours, problem, 3).peaks
+    assert peaks.tolist() == [simulate(crane(float(gap)), "direct").peak_torque for gap in gaps(3)]
+
+
+def test_the_problem_is_that_of_the_drive():
+    problem = crane_problem("reduced-two-stage")
+    drive = crane(0.5)
+    assert (problem.J1, problem.J2, problem.c, problem.Mc) == (drive.J1, drive.J2, drive.c, drive.Mc)
+    first, second, later = problem.stage_torques
+    assert first == second < later == drive.Ms
+    assert crane_problem("reduced-first-stage").stage_torques == (first, later, later)
+    assert drive.d == 0.0
+    assert drive.load_kind == "active"
+
+
+def test_few_and_many_gaps_have_the_same_mean():
+    assert gaps(7).mean() == pytest.approx(gaps(1000).mean(), rel=1e-12)
+
+
+def test_the_ramp_of_the_peer_is_that_of_the_controller():
+    problem = crane_problem("ramp")
+    plan = sampled_plan(problem)
+    run = simulate(crane(0.5), "ramp", parameters={"time": RAMP_TIME})
+    for t in (0.0, 0.0005, 0.2504, 0.4999, 0.5):
+        assert plan(t, 1)[0] == pytest.approx(float(run.at([t])["u"][0]), rel=1e-12)
+
+
+def test_peers_refuse_what_they_cannot_do():
+    with pytest.raises(ValueError, match="ramp"):
+        contenders.make("control", crane_problem("ramp"))
+    with pytest.raises(ValueError, match="direct"):
+        sampled_plan(crane_problem("direct"))
+
+
+def test_a_process_of_its_own_gives_the_same_and_weighs_itself():
+    problem = crane_problem("direct")
+    here, child = Here(), Child()
+    try:
+        for host in (here, child):
+            host.prepare("lsoda", problem, 2)
+        assert (
+            child.timed("lsoda", problem, 2).peaks.tolist() == here.timed("lsoda", problem, 2).peaks.tolist()
+        )
+        memory = child.memory()
+        assert memory is None or 20 < memory < 2000
+    finally:
+        child.close()
+    assert child.process.returncode == 0
+
+
+def test_a_process_that_fails_is_one_sentence():
+    child = Child()
+    try:
+        with pytest.raises(SimulationError, match=r"ended; its last words: ValueError: ramp") as caught:
+            child.prepare("control", crane_problem("ramp"), 1)
+        assert "\n" not in str(caught.value)
+    finally:
+        child.close()
+
+
+@pytest.fixture(scope="module")
+def result():
+    duels = (
+        Duel("direct", "lsoda", 2, "kernel", 3, 20_000.0),
+        Duel("ramp", "lsoda-sampled", 1, "kernel", 2, 100.0),
+        Duel("direct", "lsoda", 2, "run", 2, 1e-9),
+        Duel("direct", "control", 1, "run-traces", 2),
+        Duel("direct", "diffrax", 2, "kernel", 2),
+    )
+    said = []
+    with pytest.MonkeyPatch.context() as patch:
+        known = contenders.version_of
+        patch.setattr(contenders, "version_of", lambda name: None if name == "diffrax" else known(name))
+        found = BenchmarkStarts(duels, passes=1, host=Here).run(None, said.append)
+    return found, said
+
+
+def test_rows_columns_and_progress(result):
+    found, said = result
+    rates, processes, conditions = found.tables
+    assert len(rates.rows) == len(said) == 5
+    row = dict(zip(rates.columns, rates.rows[0], strict=True))
+    assert row["peer"].startswith("scipy ")
+    assert row["peer, starts/s"] > 0.0
+    assert row["ratio"] == pytest.approx(row["softstart, starts/s"] / row["peer, starts/s"], rel=0.02)
+    assert row["largest difference in K_dyn"] < 1e-6
+    assert [row[0].split()[0] for row in processes.rows] == ["scipy", "softstart", "control"]
+    versions = dict(conditions.rows)
+    assert versions["processors and threads used"] == "one, one"
+    assert versions["scipy"] == contenders.version_of("scipy")
+    assert versions["diffrax"] == "not installed"
+
+
+def test_a_missing_peer_is_a_row_that_says_so(result):
+    found, said = result
+    row = dict(zip(found.tables[0].columns, found.tables[0].rows[-1], strict=True))
+    assert (row["peer"], row["how the peer is used"], row["ratio"]) == ("diffrax", MISSING, None)
+    assert "softstart[benchmark]" in said[-1]
+
+
+def test_claims_are_judged_by_the_ratios():
+    def outcome(ratio, rate=2e6, strategy="direct", peer="lsoda", ours="kernel", wanted=20_000.0, apart=1e-8):
+        return Outcome(Duel(strategy, peer, 1, ours, 1, wanted), rate / ratio, rate, ratio, ratio, apart, 0.1)
+
+    fast, slow = outcome(30_000.0), outcome(6_000.0, 0.9e6, "reduced-first-stage")
+    assert [claim.verdict for claim in claims([fast])] == [Verdict.CONFIRMED] * 3
+    assert [claim.verdict for claim in claims([slow])] == [
+        Verdict.REFUTED,
+        Verdict.REFUTED,
+        Verdict.CONFIRMED,
+    ]
+    mixed = claims([fast, slow])
+    assert [claim.verdict for claim in mixed[:2]] == [Verdict.PARTLY] * 2
+    assert "direct (kernel) 30,000, reduced-first-stage (kernel) 6,000" in mixed[0].evidence
+    apart = claims([outcome(30_000.0, apart=2e-6)])[-1]
+    assert apart.verdict is Verdict.REFUTED
+    assert claims([]) == []
+
+
+def test_the_picture_shows_the_ratios(result):
+    found, _ = result
+    figure = found.figures["benchmark-starts-ratios"]
+    bars = figure.axes[0].patches
+    assert len(bars) == 4
+    assert figure.axes[0].get_xscale() == "log"
+    ratios = [row[6] for row in found.tables[0].rows[:4]]
+    assert [bar.get_width() for bar in bars] == pytest.approx(ratios, rel=0.01)
+    assert not ratio_figure([]).axes[0].patches
+
+
+def test_the_study_is_registered_with_all_its_duels():
+    study = find_study("benchmark-starts")
+    assert isinstance(study, BenchmarkStarts)
+    assert study.duels == DUELS
+    assert {duel.strategy for duel in DUELS} == set(STRATEGIES)
+    assert {duel.peer for duel in DUELS} | {duel.ours for duel in DUELS} == set(contenders.ENTRIES)
