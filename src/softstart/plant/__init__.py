@@ -2,7 +2,8 @@
 
 The kernel's files, in the order in which they build on each other: `layout` (where each number stands),
 `motion` (the closed forms of one span), `crossing` (the certified first crossing), `span` (the next event),
-`advance` (span after span to the next control instant), `start` (one start, many starts), `record` (any
+`notes` (what is noted), `modes` (what changes at an event), `advance` (span after span to the next control
+instant), `start` (one start, many starts), `record` (any
 instant of a recorded start), `vector` (a Drive as numbers).
 """
 

@@ -18,21 +18,7 @@ import math
 
 from softstart.plant.jit import compiled
 from softstart.plant.layout import (
-    DD,
-    FA,
-    FB,
-    FREE,
-    LAMBDA,
-    P0,
-    P1,
-    V0,
-    W0SQ,
-    Z0,
-    ZETA,
-    K,
-    Quintuple,
-    Septuple,
-    Vector,
+    DD, FA, FB, FREE, K, LAMBDA, P0, P1, V0, W0SQ, Z0, ZETA, Quintuple, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion
 

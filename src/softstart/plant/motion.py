@@ -16,30 +16,9 @@ import math
 
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import (
-    BRANCH,
-    DD,
-    FA,
-    FB,
-    FE,
-    FREE,
-    LAMBDA,
-    P0,
-    P1,
-    P2,
-    ROOT_Q,
-    V0,
-    W0,
-    W0SQ,
-    Y0,
-    YV0,
-    Z0,
-    ZETA,
-    K,
-    Pair,
-    Q,
-    Triple,
-    Vector,
-)
+    BRANCH, DD, FA, FB, FE, FREE, K, LAMBDA, P0, P1, P2, Q, ROOT_Q, V0, W0, W0SQ, Y0, YV0, Z0, ZETA,
+    Pair, Triple, Vector,
+)  # fmt: skip
 
 # how the response to the exponential is computed
 NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0

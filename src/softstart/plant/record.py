@@ -5,40 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.plant.advance import move, shaft_torque
+from softstart.plant.advance import move
 from softstart.plant.jit import compiled
 from softstart.plant.layout import (
-    DEMAND,
-    DOUBLED,
-    LOAD,
-    PHI2,
-    S_DD,
-    S_END,
-    S_K,
-    S_LOAD,
-    S_PHI2,
-    S_SIDE,
-    S_START,
-    S_THETA,
-    S_UA,
-    S_UB,
-    S_UE,
-    S_V,
-    S_W2,
-    SIDE,
-    SLEW_END,
-    THETA,
-    UA,
-    UB,
-    UE,
-    W2,
-    C,
-    D,
-    Matrix,
-    U,
-    V,
-    Vector,
+    C, D, DEMAND, DOUBLED, LOAD, PHI2, SIDE, SLEW_END, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE,
+    S_START, S_THETA, S_UA, S_UB, S_UE, S_V, S_W2, THETA, U, UA, UB, UE, V, W2, Matrix, Vector,
 )  # fmt: skip
+from softstart.plant.modes import shaft_torque
 from softstart.plant.span import begin_span
 
 # columns of the evaluated states

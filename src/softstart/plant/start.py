@@ -7,51 +7,15 @@ import math
 import numpy as np
 from numba import types
 
-from softstart.plant.advance import advance, engage, shaft_torque
+from softstart.plant.advance import advance
 from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
-    ASK,
-    ASK_AT,
-    ASK_ON_GAP,
-    ASKED,
-    BAD_COMMAND,
-    BEYOND,
-    CONTACT_TORQUE,
-    CONTACTS,
-    DEAD_ZONE,
-    DEMAND,
-    ENCODER,
-    FIRST_CONTACT,
-    GAP,
-    IMPACT_SPEED,
-    LAW,
-    LOAD,
-    N_P,
-    N_X,
-    PHI2,
-    REACTIVE,
-    SAMPLE_ANGLE,
-    SAMPLE_TIME,
-    SIDE,
-    STAGE,
-    STAGE_2_END,
-    START_TIME,
-    STATUS,
-    T_END,
-    THETA,
-    THETA_0,
-    TIME,
-    U_MAX,
-    U_MIN,
-    W1_0,
-    W2,
-    W2_0,
-    C,
-    D,
-    U,
-    V,
-    Vector,
+    ASK, ASKED, ASK_AT, ASK_ON_GAP, BAD_COMMAND, BEYOND, C, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE,
+    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAW, LOAD, N_P, N_X, PHI2, REACTIVE,
+    SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0, TIME,
+    T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
 )  # fmt: skip
+from softstart.plant.modes import engage, shaft_torque
 
 # what a controller is given: the indices of `measured`
 N_MEASURED = 7

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from typing import IO, Any
 
 from softstart.errors import SimulationError
@@ -77,7 +78,8 @@ class Child:
             to_child.flush()
             return pickle.load(from_child)
         except (EOFError, BrokenPipeError):
-            self.process.wait(PATIENCE)  # its last words are complete only then
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(PATIENCE)  # its last words are complete only then
             self.errors.seek(0)
             said = self.errors.read().decode(errors="replace").strip().splitlines()[-1:]
             last = f"its last words: {said[0]}" if said else "without a word."

@@ -37,18 +37,8 @@ DUELS = (
 )
 MISSING = "not installed: pip install 'softstart[benchmark]'"
 TITLE = "Starts a second, by processor time of one core"
-COLUMNS = (
-    "strategy",
-    "peer",
-    "how the peer is used",
-    "how softstart is used",
-    "peer, starts/s",
-    "softstart, starts/s",
-    "ratio",
-    "ratio by the clock",
-    "wanted ratio",
-    "largest difference in K_dyn",
-)
+# short, so that a terminal of 80 columns holds them; the table of contenders says what the names mean
+COLUMNS = ("strategy", "peer", "softstart", "peer 1/s", "ours 1/s", "ratio", "wanted", "K_dyn diff.")
 
 
 class BenchmarkStarts(Study):
@@ -100,8 +90,9 @@ class BenchmarkStarts(Study):
         return StudyResult(
             tables=(
                 Table(TITLE, COLUMNS, [_row(*row) for row in rows]),
+                _contender_table(self.duels),
                 _process_table(self.duels, measured, memories),
-                _condition_table(self.passes),
+                _condition_table(self.passes, measured),
             ),
             claims=claims(measured),
             figures={self.pictures[0]: ratio_figure(measured)},
@@ -109,28 +100,26 @@ class BenchmarkStarts(Study):
 
 
 def _row(duel: Duel, outcome: Outcome | None) -> tuple[object, ...]:
-    peer, ours = ENTRIES[duel.peer], ENTRIES[duel.ours]
-    version = contenders.installed(duel.peer)
+    names = (duel.strategy, duel.peer, duel.ours)
     if outcome is None:
-        return (duel.strategy, peer.package, MISSING, ours.how, None, None, None, None, duel.wanted, None)
-    return (
-        duel.strategy,
-        f"{peer.package} {version}",
-        peer.how,
-        ours.how,
-        rounded(outcome.peer_rate),
-        rounded(outcome.our_rate),
-        rounded(outcome.ratio),
-        rounded(outcome.wall_ratio),
-        duel.wanted,
-        float(f"{outcome.k_dyn_difference:.1e}"),
-    )
+        return (*names, None, None, None, duel.wanted, None)
+    rates = (rounded(outcome.peer_rate), rounded(outcome.our_rate), rounded(outcome.ratio))
+    return (*names, *rates, duel.wanted, float(f"{outcome.k_dyn_difference:.1e}"))
+
+
+def _contender_table(duels: Sequence[Duel]) -> Table:
+    """What the names in the first table stand for; a missing peer's row says how to get it."""
+    rows = []
+    for name in dict.fromkeys(name for duel in duels for name in (duel.ours, duel.peer)):
+        entry, version = ENTRIES[name], contenders.installed(name)
+        rows.append((name, f"{entry.package} {version or ''}".strip(), entry.how if version else MISSING))
+    return Table("Contenders", ("name", "package", "how it is used"), rows)
 
 
 def _process_table(
     duels: Sequence[Duel], outcomes: Sequence[Outcome], memories: dict[str, float | None]
 ) -> Table:
-    """One row a process: what it took to make ready, and its largest memory."""
+    """One row a process: its largest memory and batch, and the longest first pass."""
     rows = []
     for package, memory in memories.items():
         first = [one.peer_prepared for one in outcomes if ENTRIES[one.duel.peer].package == package]
@@ -144,23 +133,22 @@ def _process_table(
                 rounded(max(first)) if first else None,
             )
         )
-    columns = (
-        "process",
-        "largest memory with interpreter and libraries, MiB",
-        "largest batch, starts",
-        "longest first pass with imports and compiling (not in the rates), s",
-    )
-    return Table("Processes", columns, rows)
+    return Table("Processes", ("process", "memory, MiB", "largest batch", "first pass, s"), rows)
 
 
-def _condition_table(passes: int) -> Table:
+def _condition_table(passes: int, outcomes: Sequence[Outcome]) -> Table:
     libraries = ("numpy", "scipy", "numba", "control", "jax", "diffrax")
     versions = {name: contenders.version_of(name) or "not installed" for name in libraries}
+    clock = max((abs(one.wall_ratio / one.ratio - 1.0) for one in outcomes), default=0.0)
     rows = [
+        ("rates", "starts a second of processor time, medians of the passes"),
+        ("ratios by the clock instead", f"differ by {clock:.1%} at most"),
+        ("memory", "largest of the whole process, interpreter and libraries included"),
+        ("first pass", "imports and compiling included; not in the rates"),
         ("processors of the machine", os.cpu_count()),
         ("machine", f"{platform.machine()}, {platform.system()}"),
         ("processors and threads used", "one, one"),
-        ("passes, in turns (medians are shown)", passes),
+        ("passes, in turns", passes),
         ("python", platform.python_version()),
         *versions.items(),
     ]
