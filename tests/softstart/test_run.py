@@ -136,7 +136,7 @@ def test_a_start_that_never_arrives_says_so() -> None:
 
 
 def test_the_base_of_k_dyn_can_be_another_drive() -> None:
-    """[G], fig. 2: the light load's torque over the mean torque of the heavy one; REFERENCE table, 2.7157."""
+    """[G], fig. 2: the light load's torque over the mean torque of the heavy one, 2.7157."""
     light = Drive.load("crane-4amtkf-light")
     assert simulate(light, "direct", base=CRANE).k_dyn == pytest.approx(2.7157, abs=5e-5)
 

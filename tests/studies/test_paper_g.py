@@ -64,7 +64,7 @@ def test_table_of_reference_to_all_printed_digits():
         if note == "all digits":
             assert f"{form:.4f}" == printed
         else:
-            # REFERENCE adds rounded durations: one digit off, and the note shows the sum
+            # the check table adds rounded durations: one digit off, and the note shows the sum
             assert re.fullmatch(r"print adds rounded terms: 0\.\d{4} \+ 0\.\d{4}", note)
             assert abs(form - float(printed)) < 1.0e-4
     assert [row[:4] for row in rows if row[-1] != "all digits"] == [

@@ -1,7 +1,7 @@
 """[G] Gerasymiak & Subbotin, Dual-mass mechanical part electromechanical system behavior analysis, p. 18-20.
 
 The data are those of page 20: crane motor 4AMTKF(H)112L6. The paper prints curves without numbers; the table
-recomputed from its equations (REFERENCE, [G]) has four decimals, and is compared to all of them.
+recomputed from its equations (the check table) has four decimals, and is compared to all of them.
 """
 
 from __future__ import annotations

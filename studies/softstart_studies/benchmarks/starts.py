@@ -22,7 +22,7 @@ from softstart_studies.benchmarks.verdicts import MANY, claims
 __all__ = ["BenchmarkStarts"]
 
 PASSES = 7
-# a pass of a peer takes 0.1 to 0.4 s; the batches of the kernel are as large as a study of tolerances needs
+# as many starts as make a pass last about a tenth of a second or two
 DUELS = (
     Duel("direct", "lsoda", 20, "kernel", 100_000, MANY),
     Duel("reduced-first-stage", "lsoda", 20, "kernel", 100_000, MANY),
@@ -37,7 +37,7 @@ DUELS = (
 )
 MISSING = "not installed: pip install 'softstart[benchmark]'"
 TITLE = "Starts a second, by processor time of one core"
-# short, so that a terminal of 80 columns holds them; the table of contenders says what the names mean
+# short, so that a terminal holds them; the table of contenders says what the names mean
 COLUMNS = ("strategy", "peer", "softstart", "peer 1/s", "ours 1/s", "ratio", "wanted", "K_dyn diff.")
 
 
@@ -61,7 +61,7 @@ class BenchmarkStarts(Study):
         self.duels, self.passes, self.host = tuple(duels), passes, host
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
-        """All duels, about a minute; nothing is written to `out`."""
+        """All duels, about half a minute; nothing is written to `out`."""
         results: list[Outcome | None] = []
         memories: dict[str, float | None] = {}
         with ExitStack() as stack:

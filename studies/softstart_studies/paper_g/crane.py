@@ -18,7 +18,7 @@ Method = Literal[1, 2]
 CRANE = Drive.load("crane-4amtkf")  # J2'' = 5 J1, delta1 = 0.5 rad
 GAP_1, GAP_2 = 0.5, 2.0  # rad, new and worn
 LIGHT, HEAVY = 2, 5  # J2'/J1, J2''/J1
-SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the table of REFERENCE
+SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the check table
 RATIOS: Vector = np.linspace(0.0, 1.0, 101)[1:]  # the axis of figs. 2-4
 POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
 METHODS: tuple[Method, Method] = (1, 2)

@@ -1,4 +1,4 @@
-"""Figures 2, 3 and 4 of [G] and the table of REFERENCE: closed forms, and the plant at points on them."""
+"""Figures 2, 3 and 4 of [G] and the check table: closed forms, and the plant at points on them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from softstart_studies.paper_g.crane import (
     simulated,
 )
 
-# J2/J1, gap in rad, r, and what REFERENCE prints: K method 1, K method 2, t1, t1 + t2 of method 1
+# J2/J1, gap in rad, r, and what the check table gives: K method 1, K method 2, t1, t1 + t2 of method 1
 PRINTED = (
     (5, 0.5, 1.0, "3.1179", "3.1179", "0.0166", "0.0533"),
     (5, 0.5, 0.25, "2.3894", "1.2677", "0.0321", "0.0743"),
@@ -120,9 +120,9 @@ def figure_4() -> list[Curve]:
 
 
 def worked_table() -> Table:
-    """The table of REFERENCE: as printed, by closed form, and by the plant.
+    """The check table: as printed, by closed form, and by the plant.
 
-    REFERENCE adds durations already rounded: 0.0321 + 0.0422 is printed as 0.0743, where t1 + t2 is
+    The check table adds durations already rounded: 0.0321 + 0.0422 is given as 0.0743, where t1 + t2 is
     0.074396 s, and 0.0163 + 0.0322 as 0.0485, where it is 0.048550 s. The last column says so.
     """
     rows: list[tuple[object, ...]] = []
@@ -152,7 +152,7 @@ def worked_table() -> Table:
                 )
             )
     return Table(
-        "Worked example: the table of REFERENCE recomputed",
+        "Worked example: the check table recomputed",
         ("J2/J1", "gap, rad", "M1/Ms", "quantity", "printed", "closed form", "plant", "note"),
         rows,
     )

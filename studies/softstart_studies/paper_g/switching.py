@@ -10,7 +10,7 @@ from softstart import Drive, stages
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
 from softstart.controller.compiled import ASK_AGAIN, STAGE, STATE, TIME, TORQUE, Vector
 
-SHARE = 0.25  # reduced torque over Ms, as in the table of REFERENCE
+SHARE = 0.25  # reduced torque over Ms, as in the check table
 
 
 @compiled_step

@@ -82,7 +82,7 @@ def test_the_first_two_stages_of_g(crane):
     speed = (Ms / J1 + Mc / J2) * closing  # [G](10)
     mean = (Ms * J2 + J1 * Mc) / (J1 + J2)
     peak = mean * (1 + np.sqrt(1 + (c * speed / (crane.Omega * mean)) ** 2))  # [G](13)
-    assert peak / mean == pytest.approx(3.1179, abs=5e-5)  # the table of REFERENCE
+    assert peak / mean == pytest.approx(3.1179, abs=5e-5)  # the check table
     assert np.all(out["T"][t < closing - 1e-5] == 0.0)
     assert out["T"].max() == pytest.approx(peak, rel=1e-5)  # read off a grid of 10 us
     within = (t > closing) & (t < 0.053)
