@@ -14,12 +14,13 @@ from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DOUBLED, EXIT, FA, GAP,
     GRAZE_LOWER, GRAZE_UPPER, INV_J, INV_J1, INV_J2, INV_W0SQ, J1, K, LAG, LAST_V, LAW, LEFT_BEYOND,
-    LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MEMO_P, MEMO_S, MEMO_V, MEMO_W, MODELICA, NO_EVENT,
-    P0, RATE, REACHED, REACTIVE, REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH,
-    SWITCHED, TARGET, THETA, U, UA, UB, UE, UNSOLVED, UPPER, V, V0, W0, W0SQ, W0SQ_SLIP, W0_SLIP, W2,
+    LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MODELICA, NO_EVENT,
+    RATE, REACHED, REACTIVE, REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH,
+    SWITCHED, TARGET, THETA, U, UA, UB, UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2,
     Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
+from softstart.plant.steady import steady_exit, steady_target
 
 # A flank touched with an overlap below this share of the gap is grazed, not hit: from theta = -gap/2 the
 # drive comes back to that flank with zero speed after each rebound, and rounding alone would decide.
@@ -164,34 +165,6 @@ def flank_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float)
 
 
 @inlined
-def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
-    """[G](15): y = rho cos(w0 s - alpha) falls back to -p0 at w0 s = alpha + acos(-p0/rho)."""
-    w0 = m[W0]
-    v0 = m[V0]
-    if m[Z0] == 0.0:
-        if v0 <= 0.0:
-            return (NO_EVENT, horizon) if (v0 == 0.0 and m[P0] > 0.0) else (EXIT, 0.0)
-        speed = v0
-        if v0 != m[MEMO_V] or m[P0] != m[MEMO_P] or w0 != m[MEMO_W]:
-            m[MEMO_V] = v0
-            m[MEMO_P] = m[P0]
-            m[MEMO_W] = w0
-            m[MEMO_S] = 2.0 * math.atan2(v0, -w0 * m[P0]) / w0
-        s = m[MEMO_S]
-    else:
-        reach = v0 * v0 + m[W0SQ] * m[Z0] * (m[Z0] - 2.0 * m[P0])  # w0^2 (rho^2 - p0^2)
-        if reach <= 0.0:
-            return NO_EVENT, horizon
-        speed = math.sqrt(reach)
-        s = (math.atan2(v0, w0 * m[Y0]) + math.atan2(speed, -w0 * m[P0])) / w0
-        s = max(s, 0.0)  # rounding, on the very flank
-    if s >= horizon:
-        return NO_EVENT, horizon
-    m[LAST_V] = -speed
-    return EXIT, s
-
-
-@inlined
 def exit_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
     """The instant at which the flanks part (or the damping regime of `modelica` changes)."""
     modelica = p[LAW] == MODELICA and p[D] > 0.0
@@ -264,7 +237,11 @@ def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon:
             event = STOP
             end = s
     if s >= -1.0 and high >= p[TARGET] and math.isnan(x[START_TIME]):
-        s = first_crossing(m, p[TARGET], 0.0, 0.0, 0.0, -1.0, load, WATCH, 0.0, end)
+        flank_to_flank = event == NO_EVENT and m[Z0] == 0.0 and not math.isnan(m[LAST_V])
+        if flank_to_flank and x[SIDE] > 0.0 and x[LOAD] > 0.0:
+            s = steady_target(m, load, p[TARGET], end)
+        else:
+            s = first_crossing(m, p[TARGET], 0.0, 0.0, 0.0, -1.0, load, WATCH, 0.0, end)
         if s >= 0.0:
             event = REACHED
             end = s
