@@ -27,8 +27,9 @@ def difference(strategy: str, peer: str, ours: str = "kernel", starts: int = 4) 
 
 
 @pytest.mark.parametrize("strategy", ["direct", "reduced-first-stage", "reduced-two-stage"])
-def test_lsoda_and_softstart_agree(strategy):
-    assert difference(strategy, "lsoda", starts=6) < 1e-6
+@pytest.mark.parametrize("peer", ["lsoda", "lsoda-restarted"])
+def test_lsoda_and_softstart_agree(peer, strategy):
+    assert difference(strategy, peer, starts=6) < 1e-6
 
 
 def test_sampled_lsoda_and_softstart_agree():

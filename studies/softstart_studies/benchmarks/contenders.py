@@ -45,6 +45,9 @@ ENTRIES = {
         "one simulate call a start; Run with stages and traces",
     ),
     "lsoda": Entry(
+        "scipy", "lsoda_plain", "LsodaPlain", "solve_ivp LSODA, rtol 1e-8, one call with located events"
+    ),
+    "lsoda-restarted": Entry(
         "scipy", "lsoda", "Lsoda", "solve_ivp LSODA, rtol 1e-8, located events, restarted at each stage"
     ),
     "lsoda-sampled": Entry(

@@ -18,6 +18,7 @@ SHORT = {
     "run": "simulate, Run",
     "run-traces": "simulate, Run with traces",
     "lsoda": "LSODA",
+    "lsoda-restarted": "LSODA, each stage",
     "lsoda-sampled": "LSODA, each sample",
     "control": "control, defaults",
     "control-tight": "control, 1e-8",
