@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, STAGE, TORQUE, Vector
+from softstart.controller.compiled import ASK_AGAIN, NEVER, STAGE, TORQUE, Vector
 from softstart.drive import Drive
 from softstart_controllers.reduced import reduced_torque
 
@@ -15,8 +15,9 @@ from softstart_controllers.reduced import reduced_torque
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced in stage 1; the stage number changes at the instant of contact."""
-    command[TORQUE] = parameters[0] if measured[STAGE] < 2.0 else parameters[1]
-    command[ASK_AGAIN] = math.inf
+    waiting = measured[STAGE] < 2.0
+    command[TORQUE] = parameters[0] if waiting else parameters[1]
+    command[ASK_AGAIN] = math.inf if waiting else NEVER
 
 
 @dataclass(frozen=True)

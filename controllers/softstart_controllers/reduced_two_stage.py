@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, STAGE, STATE, TIME, TORQUE, Vector
+from softstart.controller.compiled import ASK_AGAIN, NEVER, STAGE, STATE, TIME, TORQUE, Vector
 from softstart.drive import Drive
 from softstart_controllers.reduced import reduced_torque
 
@@ -21,7 +21,10 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
         deadline = t + parameters[2]
     waiting = measured[STAGE] < 2.0 or (measured[STAGE] < 3.0 and t < deadline)
     command[TORQUE] = parameters[0] if waiting else parameters[1]
-    command[ASK_AGAIN] = deadline if waiting and deadline > t else math.inf
+    if waiting:
+        command[ASK_AGAIN] = deadline if deadline > t else math.inf
+    else:
+        command[ASK_AGAIN] = NEVER
     command[STATE] = deadline
 
 

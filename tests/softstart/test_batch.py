@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from softstart import Drive, compare, simulate
+from softstart.plant.layout import GAP_EVENTS
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -71,3 +72,28 @@ def test_comparison_rows_are_the_single_starts() -> None:
     light = Drive.load("crane-4amtkf-light")
     assert direct.k_dyn_light_load == simulate(light, "direct", base=CRANE, fitted_to=CRANE).k_dyn
     assert table.gentlest is reduced
+
+
+@pytest.mark.parametrize("strategy", ["direct", "reduced-first-stage", "reduced-two-stage"])
+@pytest.mark.parametrize("kind", ["active", "reactive"])
+@pytest.mark.parametrize("until", [None, 0.9])
+def test_strides_over_repeated_contacts_keep_every_bit(strategy: str, kind: str, until: float | None) -> None:
+    """A batch takes repeated contacts in one stride, a recorded start goes through each: the same bits."""
+    rng = np.random.default_rng(11)
+    count = 400
+    drives = CRANE.replace(
+        load_kind=kind,
+        gap=rng.uniform(0.01, 4.0, count),
+        load_inertia=10 ** rng.uniform(-2, 1, count),
+        stiffness=10 ** rng.uniform(1.5, 4, count),
+        target_speed=rng.uniform(10.0, 200.0, count),
+        start_position=rng.choice([0.0, 0.0, -0.004, 0.003], count),
+    )
+    data = simulate(drives, strategy, until)
+    names = ("k_dyn", "start_time", "contacts", "gap_events", "end_time", "k_dyn_first_contact", "peak_time")
+    for i, drive in enumerate(drives.elements()):
+        run = simulate(drive, strategy, until)
+        single = dict(run.summary(), gap_events=run.final[GAP_EVENTS])
+        for name in names:
+            np.testing.assert_equal(float(data[name][i]), float(single[name]), err_msg=f"{name}, start {i}")
+    assert float(data.contacts.max()) > 10

@@ -1,6 +1,7 @@
 """The controller interface, and how controllers are found."""
 
 from softstart.controller.base import (
+    NEVER,
     Command,
     CompiledController,
     Controller,
@@ -14,6 +15,7 @@ from softstart.controller.compiled import compiled_step
 from softstart.controller.finding import controller_class, controller_names, make_controller
 
 __all__ = [
+    "NEVER",
     "Command",
     "CompiledController",
     "Controller",

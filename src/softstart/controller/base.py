@@ -48,8 +48,14 @@ class Measured(NamedTuple):
     load_speed: float  # rad/s
 
 
+NEVER = -math.inf  # as `ask_again`: not at gap events either, the torque stays as it is
+
+
 class Command(NamedTuple):
     """A controller's answer: torque demand (N m), when to be asked again (s), new state.
+
+    `ask_again` is an instant later than now. Infinity is none: then a controller that sees the stage is
+    still asked at each gap event, unless it says NEVER.
 
     >>> Command(62.0)
     Command(torque=62.0, ask_again=inf, state=())

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.controller.base import NEVER
 from softstart.plant.jit import compiled_as, inlined
 from softstart.plant.start import STEP_SIGNATURE
 
@@ -34,6 +35,7 @@ __all__ = [
     "MOTOR_ANGLE",
     "MOTOR_SPEED",
     "MOTOR_TORQUE",
+    "NEVER",
     "SHAFT_TORQUE",
     "STAGE",
     "STATE",

@@ -7,7 +7,7 @@ import math
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, EVENTS, EVENT_CAP, EVENT_LIMIT, GAP, INV_J, J1,
+    EXIT, MEMO_DONE, STEADY, Z0, ASK, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, EVENTS, EVENT_CAP, EVENT_LIMIT, GAP, INV_J, J1,
     LAMBDA, LAST_V, LOAD, MASK, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS,
     N_STAGES, PERIOD, PHI2, REF, SIDE, SLEW_END, START_TIME, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB,
     UE, UNSOLVED, V, W2, Septuple, Vector,
@@ -16,6 +16,7 @@ from softstart.plant.modes import handle
 from softstart.plant.motion import motion
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import begin_span, next_event, torque_course
+from softstart.plant.steady import bounce, repeats
 
 # A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
 LONGEST_SPAN = 16.0
@@ -80,6 +81,10 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
         torque_course(p, x, m)
         load = begin_span(p, x, m)
         until = min(x[ASK_AT], stop)
+        if not recording and repeats(p, x, m) and bounce(p, x, m, load, until) > 0:
+            if x[EVENTS] > p[EVENT_CAP]:
+                return EVENT_LIMIT
+            continue
         horizon = until - t
         cut = m[SLEW_END] < horizon
         if cut:
@@ -88,6 +93,8 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
             cut = True
             horizon = LONGEST_SPAN * p[PERIOD]
         event, s = next_event(p, x, m, load, horizon)
+        if event == EXIT and m[STEADY] != 0.0 and m[Z0] == 0.0:
+            m[MEMO_DONE] = 1.0
         if event == UNSOLVED:
             return NOT_LOCATED
         if x[SIDE] != 0.0 and note_peak(x, m, load, s) == NOT_LOCATED:

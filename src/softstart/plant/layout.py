@@ -53,8 +53,9 @@ N_X: Final = 38
     LAST_V,  # the speed at its end where that is known without evaluating the motion
     W0, STEADY,  # w0; 1 for an undamped spring under constant torque, whose events are closed formulas
     MEMO_V, MEMO_P, MEMO_W, MEMO_S,  # the last contact's entry and duration: under constant torque it repeats
-) = range(30)  # fmt: skip
-N_M: Final = 30
+    MEMO_DONE,  # 1 once that contact has run from flank to flank, its peak noted
+) = range(31)  # fmt: skip
+N_M: Final = 31
 
 # a recorded span: enough to evaluate every state within it exactly
 (

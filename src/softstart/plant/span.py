@@ -20,11 +20,7 @@ from softstart.plant.layout import (
     Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
-from softstart.plant.steady import steady_exit, steady_target
-
-# A flank touched with an overlap below this share of the gap is grazed, not hit: from theta = -gap/2 the
-# drive comes back to that flank with zero speed after each rebound, and rounding alone would decide.
-GRAZE = 1e-12
+from softstart.plant.steady import GRAZE, steady_exit, steady_target
 
 
 @inlined

@@ -11,7 +11,7 @@ from softstart.plant.advance import advance
 from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
     ASK, ASKED, ASK_AT, ASK_ON_GAP, BAD_COMMAND, BEYOND, C, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE,
-    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAW, LOAD, N_P, N_X, PHI2, REACTIVE,
+    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAW, LOAD, MEMO_V, N_P, N_X, PHI2, REACTIVE,
     SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0, TIME,
     T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
 )  # fmt: skip
@@ -88,7 +88,13 @@ def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
 
 @compiled
 def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
-    """Take the controller's answer; False if it is none: not a number, or a past instant."""
+    """Take the controller's answer; False if it is none: not a number, or a past instant.
+
+    ask_again = -inf (NEVER) also ends the asking at gap events.
+    """
+    if ask_again == -math.inf:
+        x[ASK_ON_GAP] = 0.0
+        ask_again = math.inf
     if math.isnan(torque) or not ask_again > x[TIME]:
         return False
     x[DEMAND] = min(max(torque, p[U_MIN]), p[U_MAX])
@@ -138,6 +144,7 @@ def run_many(  # type: ignore[no-untyped-def]
                 own[j] = parameters[i, j]
         for j in range(state.shape[0]):
             state[j] = 0.0
+        m[MEMO_V] = math.nan
         begin(drive, x, until[i if until.shape[0] > 1 else 0], nothing)
         x[ASK_ON_GAP] = 1.0 if on_gap else 0.0
         _run(step, drive, own, sees, x, m, measured, state, command, nothing, nothing, nothing)

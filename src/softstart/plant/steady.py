@@ -1,4 +1,4 @@
-"""An undamped contact under constant torque: events by closed formula, and by a Newton that cannot stray."""
+"""Undamped contacts under constant torque: closed formulas, and what repeats is not computed again."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ import math
 from softstart.plant.crossing import LOST, NO_CROSSING
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import (
-    EXIT, K, LAST_V, MEMO_P, MEMO_S, MEMO_V, MEMO_W, NO_EVENT, P0, V0, W0, W0SQ, Y0, Z0, Septuple, Vector,
+    ASK_ON_GAP, CONTACTS, EVENTS, EXIT, FA, GAP, GAP_EVENTS, INV_J, J1, K, LAST_V, LOAD, MC, MEMO_P,
+    MEMO_DONE, MEMO_S, MEMO_V, MEMO_W, NO_EVENT, P0, PHI2, REACTIVE, SIDE, STAGE, STAGE_PEAK_TIME, STAGE_START,
+    START_TIME, STEADY, TARGET, TIME, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
+
+# A flank touched with an overlap below this share of the gap is grazed, not hit: from theta = -gap/2 the
+# drive comes back to that flank with zero speed after each rebound, and rounding alone would decide.
+GRAZE = 1e-12
 
 
 @inlined
@@ -24,6 +30,7 @@ def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
             m[MEMO_V] = v0
             m[MEMO_P] = m[P0]
             m[MEMO_W] = w0
+            m[MEMO_DONE] = 0.0
             m[MEMO_S] = 2.0 * math.atan2(v0, -w0 * m[P0]) / w0
         s = m[MEMO_S]
     else:
@@ -37,6 +44,71 @@ def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
         return NO_EVENT, horizon
     m[LAST_V] = -speed
     return EXIT, s
+
+
+@compiled
+def bounce(p: Vector, x: Vector, m: Vector, load: Septuple, until: float) -> int:
+    """Contact and flight repeat while nothing else happens: take them in one stride; returns how many.
+
+    Called at the start of a contact whose twin has been gone through before (MEMO). Each line is the
+    arithmetic that the spans would do one by one, in the same order: a recorded start has the same bits.
+    """
+    v0 = m[V0]
+    a = m[FA]
+    if a <= 0.0 or v0 * v0 - 2.0 * a * p[GAP] > -2.0 * a * GRAZE * p[GAP]:
+        return 0  # the flight reaches the other flank
+    contact = m[MEMO_S]
+    flight = -2.0 * -v0 / a
+    slope = load[6]
+    share = p[J1] * p[INV_J]
+    swing = abs(load[4]) * (math.sqrt(v0 * v0 + m[W0SQ] * m[Y0] * m[Y0]) + v0)
+    rise = max(0.0, load[1] * contact) + swing
+    fall = min(0.0, load[1] * contact) - swing
+    push = contact * contact * (0.5 * load[1] + contact * load[2] / 6.0)
+    done = 0
+    while True:
+        t = x[TIME]
+        w2 = x[W2]
+        if not contact < until - t or (math.isnan(x[START_TIME]) and w2 + rise >= p[TARGET]):
+            return done
+        if p[REACTIVE] != 0.0 and w2 + fall <= 0.0:
+            return done
+        parted = t + contact
+        if not flight < until - parted:
+            return done
+        after = w2 + contact * (load[1] + 0.5 * contact * load[2]) - load[4] * (-v0 - v0)
+        met = after + flight * slope
+        if p[REACTIVE] != 0.0 and met <= 0.0:
+            return done
+        x[PHI2] += contact * (w2 + share * v0) + push
+        x[PHI2] += flight * (after + 0.5 * flight * slope)
+        x[W2] = met
+        x[TIME] = parted + flight
+        x[STAGE] += 2.0
+        x[STAGE_START] = x[TIME]
+        x[STAGE_PEAK_TIME] = x[TIME]
+        x[EVENTS] += 2.0
+        x[GAP_EVENTS] += 2.0
+        x[CONTACTS] += 1.0
+        done += 1
+
+
+@inlined
+def repeats(p: Vector, x: Vector, m: Vector) -> bool:
+    """The span that begins is a contact like the last one, and no controller waits for gap events."""
+    return (
+        m[MEMO_DONE] != 0.0
+        and m[STEADY] != 0.0
+        and m[Z0] == 0.0
+        and m[V0] > 0.0
+        and m[V0] == m[MEMO_V]
+        and m[P0] == m[MEMO_P]
+        and m[W0] == m[MEMO_W]
+        and x[SIDE] > 0.0
+        and x[LOAD] > 0.0
+        and x[ASK_ON_GAP] == 0.0
+        and p[MC] >= 0.0
+    )
 
 
 @compiled
