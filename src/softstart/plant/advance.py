@@ -7,12 +7,13 @@ import math
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    EXIT, MEMO_DONE, STEADY, Z0, ASK, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, EVENTS, EVENT_CAP, EVENT_LIMIT, GAP, INV_J, J1,
-    LAMBDA, LAST_V, LOAD, MASK, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS,
-    N_STAGES, PERIOD, PHI2, REF, SIDE, SLEW_END, START_TIME, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB,
-    UE, UNSOLVED, V, W2, Septuple, Vector,
+    ASK, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, END_KNOWN, END_V, END_Z, EVENTS, EVENT_CAP,
+    EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING, NOT_FINITE,
+    NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, PASSING, PERIOD, PHI2, REF, SIDE, SLEW_END,
+    START_TIME, STEADY, TARGET, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V, W2, Z0,
+    Septuple, Vector,
 )  # fmt: skip
-from softstart.plant.modes import handle
+from softstart.plant.modes import handle, reach_target
 from softstart.plant.motion import motion
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import begin_span, next_event, torque_course
@@ -27,7 +28,9 @@ def move(p: Vector, x: Vector, m: Vector, load: Septuple, s: float) -> None:
     """Bring the state to the end of the span."""
     tail = 1.0 - math.exp(-m[LAMBDA] * s) if m[UE] != 0.0 else 0.0
     side = x[SIDE]
-    if math.isnan(m[LAST_V]):
+    if m[END_KNOWN] != 0.0:
+        z, v = m[END_Z], m[END_V]
+    elif math.isnan(m[LAST_V]):
         z, v = motion(m, s)
     else:
         z = 0.0  # on a flank, to which `handle` sets the angle
@@ -95,6 +98,8 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
         event, s = next_event(p, x, m, load, horizon)
         if event == EXIT and m[STEADY] != 0.0 and m[Z0] == 0.0:
             m[MEMO_DONE] = 1.0
+            if not math.isnan(m[PASSING]):
+                reach_target(p, x, t + m[PASSING], p[TARGET], events)
         if event == UNSOLVED:
             return NOT_LOCATED
         if x[SIDE] != 0.0 and note_peak(x, m, load, s) == NOT_LOCATED:

@@ -54,8 +54,10 @@ N_X: Final = 38
     W0, STEADY,  # w0; 1 for an undamped spring under constant torque, whose events are closed formulas
     MEMO_V, MEMO_P, MEMO_W, MEMO_S,  # the last contact's entry and duration: under constant torque it repeats
     MEMO_DONE,  # 1 once that contact has run from flank to flank, its peak noted
-) = range(31)  # fmt: skip
-N_M: Final = 31
+    END_KNOWN, END_Z, END_V,  # the motion at the end of the span, once it has been evaluated
+    PASSING,  # when, within this contact, the load passes its target speed; NaN if it does not
+) = range(35)  # fmt: skip
+N_M: Final = 35
 
 # a recorded span: enough to evaluate every state within it exactly
 (

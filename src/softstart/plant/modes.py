@@ -12,7 +12,7 @@ from softstart.plant.layout import (
     PERIOD, REACHED, REJOIN, SIDE, START_TIME, STOP, SWITCH, SWITCHED, TARGET_REACHED, THETA, TIME,
     T_END, U, UPPER, V, W2, Vector,
 )  # fmt: skip
-from softstart.plant.notes import end_stage, note_event
+from softstart.plant.notes import end_stage, note_event, note_event_at
 
 
 @inlined
@@ -54,6 +54,15 @@ def close_gap(p: Vector, x: Vector, side: float, events: Vector, stages: Vector)
     x[SIDE] = side
     note_event(x, events, CLOSED, side)
     engage(p, x, events)
+
+
+@inlined
+def reach_target(p: Vector, x: Vector, time: float, speed: float, events: Vector) -> None:
+    """The load has its target speed; without `until` the run ends one elastic period later."""
+    x[START_TIME] = time
+    note_event_at(time, x, events, TARGET_REACHED, speed)
+    if x[T_END] == math.inf:
+        x[T_END] = time + p[PERIOD]
 
 
 @inlined
@@ -110,8 +119,5 @@ def handle(p: Vector, x: Vector, m: Vector, event: int, events: Vector, stages: 
             x[LOAD] = math.copysign(1.0, torque)
             note_event(x, events, LOAD_STARTS, x[LOAD])
     elif event == REACHED:
-        x[START_TIME] = x[TIME]
-        note_event(x, events, TARGET_REACHED, x[W2])
-        if x[T_END] == math.inf:
-            x[T_END] = x[TIME] + p[PERIOD]
+        reach_target(p, x, x[TIME], x[W2], events)
     return False

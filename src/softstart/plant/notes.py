@@ -10,11 +10,11 @@ import math
 from softstart.plant.crossing import RISING, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, DD, EVENTS, E_KIND, E_TIME, E_VALUE, FIRST_PEAK, G_END, G_NUMBER, G_PEAK, G_PEAK_TIME, G_SIDE,
-    G_START, K, LAST_V, LOAD, NOT_LOCATED, N_EVENTS, N_SEGMENTS, N_STAGES, P0, PEAK, PEAK_TIME, PHI2,
-    SIDE, STAGE, STAGE_2_END, STAGE_PEAK, STAGE_PEAK_TIME, STAGE_START, STEADY, S_DD, S_END, S_K,
-    S_LOAD, S_PHI2, S_SIDE, S_STAGE, S_START, S_THETA, S_UA, S_UB, S_UE, S_V, S_W2, THETA, TIME, UA,
-    UB, UE, V, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
+    ASK, DD, END_KNOWN, END_V, END_Z, EVENTS, E_KIND, E_TIME, E_VALUE, FIRST_PEAK, G_END, G_NUMBER,
+    G_PEAK, G_PEAK_TIME, G_SIDE, G_START, K, LAST_V, LOAD, NOT_LOCATED, N_EVENTS, N_SEGMENTS, N_STAGES,
+    P0, PEAK, PEAK_TIME, PHI2, SIDE, STAGE, STAGE_2_END, STAGE_PEAK, STAGE_PEAK_TIME, STAGE_START,
+    STEADY, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE, S_STAGE, S_START, S_THETA, S_UA, S_UB, S_UE, S_V,
+    S_W2, THETA, TIME, UA, UB, UE, V, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion
 
@@ -49,7 +49,8 @@ def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
                 radius = math.sqrt(m[Y0] * m[Y0] + m[V0] * m[V0] / m[W0SQ])
                 keep_peak(x, side * k * (m[P0] + radius), t + at)
         if not to_flank:
-            z, _ = motion(m, s)
+            z, v = motion(m, s)
+            m[END_KNOWN], m[END_Z], m[END_V] = 1.0, z, v
             keep_peak(x, side * k * z, t + s)
         return ASK
     begin = 0.0
@@ -70,20 +71,27 @@ def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
         keep_peak(x, side * (k * z + dd * v), t + at)
         begin = at
     z, v = motion(m, s)
+    m[END_KNOWN], m[END_Z], m[END_V] = 1.0, z, v
     keep_peak(x, side * (k * z + dd * v), t + s)
     return ASK
 
 
 @inlined
-def note_event(x: Vector, events: Vector, kind: float, value: float) -> None:
+def note_event_at(time: float, x: Vector, events: Vector, kind: float, value: float) -> None:
     """One event of the start; `events` may have no rows, then it is only counted."""
     x[EVENTS] += 1.0
     if events.shape[0] > 0:
         row = events[int(x[N_EVENTS])]
-        row[E_TIME] = x[TIME]
+        row[E_TIME] = time
         row[E_KIND] = kind
         row[E_VALUE] = value
         x[N_EVENTS] += 1.0
+
+
+@inlined
+def note_event(x: Vector, events: Vector, kind: float, value: float) -> None:
+    """One event that happens now."""
+    note_event_at(x[TIME], x, events, kind, value)
 
 
 @inlined

@@ -12,12 +12,11 @@ import math
 from softstart.plant.crossing import RISING, WATCH, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DOUBLED, EXIT, FA, GAP,
+    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DOUBLED, END_KNOWN, EXIT, FA, GAP,
     GRAZE_LOWER, GRAZE_UPPER, INV_J, INV_J1, INV_J2, INV_W0SQ, J1, K, LAG, LAST_V, LAW, LEFT_BEYOND,
-    LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MODELICA, NO_EVENT,
-    RATE, REACHED, REACTIVE, REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH,
-    SWITCHED, TARGET, THETA, U, UA, UB, UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2,
-    Y0, Z0, Septuple, Vector,
+    LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MODELICA, NO_EVENT, PASSING, RATE, REACHED, REACTIVE,
+    REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH, SWITCHED, TARGET, THETA, U, UA, UB,
+    UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 from softstart.plant.steady import GRAZE, steady_exit, steady_target
@@ -56,6 +55,8 @@ def begin_span(p: Vector, x: Vector, m: Vector) -> Septuple:
     ue = m[UE]
     rate = 1.0 / p[LAG] if p[LAG] > 0.0 else 0.0
     m[LAST_V] = math.nan
+    m[END_KNOWN] = 0.0
+    m[PASSING] = math.nan
     side = x[SIDE]
     stuck = x[LOAD] == 0.0
     a = ua * p[INV_J1]
@@ -236,6 +237,9 @@ def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon:
         flank_to_flank = event == NO_EVENT and m[Z0] == 0.0 and not math.isnan(m[LAST_V])
         if flank_to_flank and x[SIDE] > 0.0 and x[LOAD] > 0.0:
             s = steady_target(m, load, p[TARGET], end)
+            if s >= 0.0:  # no change of motion: noted on the way to the other end of the contact
+                m[PASSING] = s
+                s = -1.0
         else:
             s = first_crossing(m, p[TARGET], 0.0, 0.0, 0.0, -1.0, load, WATCH, 0.0, end)
         if s >= 0.0:

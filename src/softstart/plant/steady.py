@@ -7,9 +7,9 @@ import math
 from softstart.plant.crossing import LOST, NO_CROSSING
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import (
-    ASK_ON_GAP, CONTACTS, EVENTS, EXIT, FA, GAP, GAP_EVENTS, INV_J, J1, K, LAST_V, LOAD, MC, MEMO_P,
-    MEMO_DONE, MEMO_S, MEMO_V, MEMO_W, NO_EVENT, P0, PHI2, REACTIVE, SIDE, STAGE, STAGE_PEAK_TIME, STAGE_START,
-    START_TIME, STEADY, TARGET, TIME, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
+    ASK_ON_GAP, CONTACTS, EVENTS, EXIT, FA, GAP, GAP_EVENTS, INV_J, J1, K, LAST_V, LOAD, MC, MEMO_DONE,
+    MEMO_P, MEMO_S, MEMO_V, MEMO_W, NO_EVENT, P0, PHI2, REACTIVE, SIDE, STAGE, STAGE_PEAK_TIME,
+    STAGE_START, START_TIME, STEADY, TARGET, TIME, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 
 # A flank touched with an overlap below this share of the gap is grazed, not hit: from theta = -gap/2 the
