@@ -21,12 +21,12 @@ from softstart.controller.compiled import (
     Vector,
 )
 from softstart.drive import Drive
+from softstart.plant.vector import encoder_count
 from softstart_controllers.reduced import reduced_torque
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
     check,
-    encoder_count,
     mean_torque,
     number,
     patience,

@@ -15,7 +15,6 @@ from softstart.errors import InputError
 
 LONGEST_PERIOD = 1e-3  # s
 SAMPLES_PER_ELASTIC_PERIOD = 32
-COUNTS_PER_LINE = 4  # quadrature
 PERIOD_DEFAULT = "1 ms, or 1/32 of the elastic period where that is shorter"
 SHARE_OF_PATIENCE = 0.15
 PERIODS_OF_PATIENCE = 50.0
@@ -41,17 +40,6 @@ def sample_period(drive: Drive) -> Any:
     0.001
     """
     return number(np.minimum(LONGEST_PERIOD, drive.elastic_period / SAMPLES_PER_ELASTIC_PERIOD))
-
-
-def encoder_count(drive: Drive) -> Any:
-    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
-
-    >>> round(encoder_count(Drive.load("crane-4amtkf")) * 1e6, 2)
-    383.5
-    """
-    lines = np.asarray(drive.encoder_lines, dtype=np.float64)
-    some = np.maximum(lines, 1.0)
-    return number(np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * some), 0.0))
 
 
 def pulling_load(drive: Drive) -> Any:

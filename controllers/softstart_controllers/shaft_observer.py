@@ -10,7 +10,9 @@ import numpy as np
 from numba import njit
 
 from softstart.drive import Drive
-from softstart_controllers.sampled import encoder_count, number
+from softstart.errors import InputError
+from softstart.plant.vector import encoder_count
+from softstart_controllers.sampled import number
 
 # One sample of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), without the known torque; h is the sample period.
 # In these scales the matrices are the same for every drive.
@@ -63,7 +65,13 @@ def design(steps: int) -> Design:
     import control
 
     A, G, C = (np.array(matrix) for matrix in (TRANSITION, DISTURBANCE, OUTPUT))
-    L, P, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * DECADES)]]), np.array([[1.0]]))
+    try:
+        L, P, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * DECADES)]]), np.array([[1.0]]))
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "period: no observer can be designed for so long a sample period against the elastic period of "
+            "the drive; give a shorter one."
+        ) from None
     K = np.linalg.solve(A, np.asarray(L))
     keep = np.eye(4) - K @ C
     after = keep @ np.asarray(P)

@@ -72,7 +72,7 @@ class Comparison:
 
 def compare(
     drive: Drive | str = DEFAULT_DRIVE,
-    controllers: Sequence[str | Controller] | None = None,
+    controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     until: float | None = None,
@@ -88,8 +88,14 @@ def compare(
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)
+    if not isinstance(drive, Drive):
+        raise InputError(
+            f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one."
+        )
     if drive.shape != ():
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
+    if isinstance(controllers, str | Controller):
+        controllers = [controllers]
     asked = list(controllers) if controllers is not None else list(controller_names())
     if not asked:
         raise InputError("controllers: name at least one; `softstart controllers` lists them.")

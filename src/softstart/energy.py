@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.plant import layout as at
 
@@ -40,11 +42,13 @@ def energy_balance(run: Run) -> Energy:
     residual is computed, not assumed: it shows how exact the run is.
     """
     drive, rows = run.drive, run.segments
-    # a lag is resolved on its own scale where it is shorter than the oscillation
     scale = float(drive.elastic_period) / PIECES_PER_PERIOD
+    fastest = 1.0 / scale
+    if drive.d > 0.0:
+        fastest = max(fastest, float(drive.d * (1.0 / drive.J1 + 1.0 / drive.J2)))
     if drive.torque_lag > 0.0:
-        scale = min(scale, 0.5 * float(drive.torque_lag)) if rows[:, at.S_UE].any() else scale
-    starts, ends, owner = _pieces(rows, scale)
+        fastest = max(fastest, 1.0 / float(drive.torque_lag))
+    starts, ends, owner = _pieces(rows, scale, 0.5 / fastest)
     half = 0.5 * (ends - starts)
     times = starts[:, None] + half[:, None] * (NODES + 1.0)
     states = run.states_in(owner[:, None] + np.zeros(NODES.size, dtype=np.int64), times)
@@ -65,14 +69,25 @@ def energy_balance(run: Run) -> Energy:
     return Energy(motor, against_load, kinetic, elastic, dissipated, residual)
 
 
-def _pieces(rows: at.Matrix, scale: float) -> tuple[at.Vector, at.Vector, np.ndarray]:
+def _pieces(rows: at.Matrix, scale: float, shortest: float) -> tuple[at.Vector, at.Vector, NDArray[np.int64]]:
+    """Pieces (start, end, span): short behind each event, while damping and lag decay; even then."""
+    growth = 1.5
+    count = max(1, math.ceil(math.log(scale / shortest) / math.log(growth))) if shortest < scale else 0
+    graded = shortest * (growth ** np.arange(count + 1) - 1.0) / (growth - 1.0)
     length = rows[:, at.S_END] - rows[:, at.S_START]
-    count = np.maximum(1, np.ceil(length / scale)).astype(np.int64)
-    owner = np.repeat(np.arange(rows.shape[0]), count)
-    within = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
-    step = (length / count)[owner]
-    starts = rows[owner, at.S_START] + within * step
-    return starts, starts + step, owner
+    edges = np.minimum(graded, length[:, None])
+    rest = length - edges[:, -1]
+    even = np.ceil(rest / scale).astype(np.int64)
+    owner = np.repeat(np.arange(rows.shape[0]), even)
+    within = np.arange(owner.size) - np.repeat(np.cumsum(even) - even, even)
+    step = rest[owner] / even[owner]
+    begin = rows[:, at.S_START]
+    starts = np.concatenate(
+        [(begin[:, None] + edges[:, :-1]).ravel(), (begin + edges[:, -1])[owner] + within * step]
+    )
+    lengths = np.concatenate([np.diff(edges, axis=1).ravel(), step])
+    owners = np.concatenate([np.repeat(np.arange(rows.shape[0]), count), owner])
+    return starts, starts + lengths, owners
 
 
 def _kinetic(run: Run, time: float) -> float:

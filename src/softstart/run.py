@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +20,6 @@ from softstart.figures import run_figure
 from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.status import Status
-
-if TYPE_CHECKING:
-    pass
 
 Vector = NDArray[np.float64]
 
@@ -119,7 +116,10 @@ class Run:
 
     @property
     def k_dyn_first_contact(self) -> float:
-        """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one."""
+        """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one.
+
+        Where the run ends within stage 2 it is the one so far. A start in contact begins with stage 2.
+        """
         if math.isnan(self.final[at.STAGE_2_END]):
             return math.nan
         return float(metrics.k_dyn(self.final[at.FIRST_PEAK], self.base))
@@ -151,7 +151,7 @@ class Run:
 
     @property
     def contacts(self) -> int:
-        """How often the gap closed."""
+        """How often the gap closed; a start in contact counts as one, though there is no event."""
         return int(self.final[at.CONTACTS])
 
     @property
@@ -296,5 +296,6 @@ class Run:
             "stage_1_duration": first,
             "stage_2_duration": second,
             "settling_time": self.settling_time(),
+            "energy": asdict(self.energy),
             "end_time": self.end_time,
         }

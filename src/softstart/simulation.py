@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, overload
 
 from softstart.batch import simulate_many
@@ -15,7 +16,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant.vector import plant_vector
 from softstart.run import Run
-from softstart.status import status_of
+from softstart.status import Status, status_of
 
 if TYPE_CHECKING:
     import xarray
@@ -71,7 +72,8 @@ def simulate(
         to a controller set up for one drive when the gap has worn or the load changed.
     base : the drive whose mean torque K_dyn refers to, if not `drive`.
     time_limit : s, after which a start that has not reached its target speed is given up as not reached.
-    max_events : cap on the events of one start; going over it is an error, not a result.
+    max_events : cap on the events and on the control instants of one start; going over it is an error,
+        not a result.
 
     Returns
     -------
@@ -87,12 +89,13 @@ def simulate(
     if isinstance(drive, str):
         drive = Drive.load(drive)
     made = make_controller(controller, parameters)
-    if until is not None and not (isinstance(until, int | float) and 0.0 < until < math.inf):
-        raise InputError(
-            f"until = {until}: the end of the run is a time above 0 s; leave it out to run to the start time."
-        )
-    if not isinstance(max_events, int) or max_events < 1:
+    until = _time("until", until, "leave it out to run to the start time")
+    time_limit = _time("time_limit", time_limit, "leave it out for a hundred times a stiff drive's start")
+    if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
         raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
+    max_events = int(max_events)
+    for name, other in (("fitted_to", fitted_to), ("base", base)):
+        _check_other(name, other, drive)
     if not isinstance(drive, Drive) or drive.shape != ():
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
     fitted = made.fitted(fitted_to or drive)
@@ -101,8 +104,34 @@ def simulate(
     reason = run_one(fitted, fitted_to or drive, p, book, until)
     status = status_of(reason, not math.isnan(book.x[at.START_TIME]), until is not None)
     if not status.finished:
+        remedy = ""
+        if status is Status.TOO_MANY_EVENTS:
+            remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
         raise SimulationError(
-            f"{status.value} Drive {drive.name}, controller {fitted.name or type(fitted).__name__}, "
+            f"{status.value}{remedy} Drive {drive.name}, controller {fitted.name or type(fitted).__name__}, "
             f"t = {book.x[at.TIME]:.6g} s, {int(book.x[at.EVENTS])} events."
         )
     return Run(drive, fitted, base or drive, status, p, book.x.copy(), *book.rows())
+
+
+def _time(name: str, value: object, remedy: str) -> float | None:
+    """A time above 0 s, or None."""
+    if value is None:
+        return None
+    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
+        return float(value)
+    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
+
+
+def _check_other(name: str, other: object, drive: object) -> None:
+    """A drive given beside the simulated one: a single one, or one for each start of a batch."""
+    if other is None:
+        return
+    if not isinstance(other, Drive):
+        raise InputError(f"{name} = {other!r}: give a Drive; Drive.load reads one from a file or by name.")
+    own = drive.shape if isinstance(drive, Drive) else ()
+    if other.shape not in {(), own}:
+        raise InputError(
+            f"{name}: a Drive with fields of shape {other.shape} does not go with starts of shape {own}; "
+            "give a single drive or one of the same shape."
+        )

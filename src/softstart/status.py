@@ -17,7 +17,7 @@ class Status(Enum):
     REACHED = "The load reached its target speed."
     STOPPED_EARLY = "The run ended at the time asked for, before the load reached its target speed."
     NOT_REACHED = "The load did not reach its target speed within the time limit."
-    TOO_MANY_EVENTS = "The start was given up: it has more events than max_events allows."
+    TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than max_events allows."
     NOT_LOCATED = "The start was given up: an event could not be located to machine precision."
     NOT_FINITE = "The start was given up: a state is no longer a finite number."
     BAD_COMMAND = "The start was given up: the controller answered with NaN or with a past instant."

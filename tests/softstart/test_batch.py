@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softstart import Drive, compare, simulate
+from softstart import Drive, InputError, SimulationError, compare, simulate
 from softstart.plant.layout import GAP_EVENTS
 
 CRANE = Drive.load("crane-4amtkf")
@@ -48,6 +48,21 @@ def test_a_controller_set_up_for_another_drive() -> None:
     heavy = CRANE.replace(gap=2.0, load_inertia=0.35)
     assert float(fixed.k_dyn[1]) == simulate(heavy, "ramp", fitted_to=CRANE, base=CRANE).k_dyn
     assert float(fixed.k_dyn[1]) != simulate(heavy, "ramp").k_dyn
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+@pytest.mark.parametrize("role", ["fitted_to", "base"])
+def test_a_drive_of_another_shape_is_refused(rows: int, role: str) -> None:
+    other = CRANE.replace(load_inertia=np.linspace(0.1, 0.2, rows))
+    with pytest.raises(InputError, match=role):
+        simulate(CRANE.replace(gap=[0.5, 2.0]), "ramp", **{role: other})
+    with pytest.raises(InputError, match=role):
+        simulate([CRANE, CRANE], "ramp", **{role: other})
+
+
+def test_a_controller_that_wants_to_be_asked_for_ever_is_stopped() -> None:
+    with pytest.raises(SimulationError, match="control instants"):
+        simulate(CRANE, "ramp", parameters={"period": 1e-9}, max_events=50_000)
 
 
 def test_the_kernel_does_a_hundred_thousand() -> None:

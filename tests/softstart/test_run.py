@@ -161,6 +161,15 @@ def test_the_figure_shows_the_run(run: Run) -> None:
         ({"until": math.nan}, "until = nan"),
         ({"until": math.inf}, "until = inf"),
         ({"until": "1 s"}, "until = 1 s"),
+        ({"until": True}, "until = True"),
+        ({"time_limit": math.nan}, "time_limit = nan"),
+        ({"time_limit": -1.0}, "time_limit = -1"),
+        ({"time_limit": "1 s"}, "time_limit = 1 s"),
+        ({"base": "crane-4amtkf"}, "base = 'crane-4amtkf'"),
+        ({"fitted_to": 3.0}, "fitted_to = 3.0"),
+        ({"fitted_to": CRANE.replace(gap=[0.5, 2.0])}, "fitted_to: a Drive with fields of shape (2,)"),
+        ({"base": CRANE.replace(gap=[0.5, 2.0])}, "base: a Drive with fields of shape (2,)"),
+        ({"max_events": True}, "max_events = True"),
         ({"max_events": 0}, "max_events = 0"),
         ({"max_events": 1.5}, "max_events = 1.5"),
         ({"parameters": {"torqe": 1.0}}, "torqe"),
@@ -181,3 +190,23 @@ def test_bad_arguments(options: dict[str, object], key: str) -> None:
 def test_bad_drives(drives: object) -> None:
     with pytest.raises(InputError, match="drive"):
         simulate(drives, "direct")  # type: ignore[call-overload]
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    run = simulate(CRANE, "direct", until=np.float32(0.5), max_events=np.int64(1000))
+    assert run.end_time == 0.5
+
+
+def test_torque_at_contact_of_a_start_in_contact() -> None:
+    assert simulate(CRANE.replace(start_position=0.3), "direct").torque_at_contact == 62.0
+    assert simulate(CRANE.replace(start_position=0.3, torque_lag=0.01), "direct").torque_at_contact == 0.0
+
+
+@pytest.mark.parametrize("damping", [33.0, 100.0, 1000.0])
+@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
+def test_an_overdamped_drive_can_be_started(damping: float, law: str) -> None:
+    for lag in (0.0, 0.002):
+        drive = CRANE.replace(damping=damping, contact_law=law, torque_lag=lag, load_kind="reactive")
+        run = simulate(drive, "direct")
+        assert run.status is Status.REACHED
+        assert abs(run.energy.residual) < 1e-9 * run.energy.motor

@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from softstart.controller.base import Controller
+from softstart.controller.base import Controller, Sensor
 from softstart.errors import InputError
 from softstart.units import to_si
 
@@ -42,7 +42,7 @@ def controller_class(name: str) -> type[Controller]:
     >>> controller_class("direct").__name__
     'Direct'
     """
-    if ".py" in name:
+    if ".py:" in name or name.endswith(".py"):
         return _from_file(name)
     point = _registered().get(name)
     if point is None:
@@ -84,6 +84,8 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
             hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(known) or 'no parameters'}."
+            if key in getattr(cls, "__annotations__", {}):
+                hint = "its class names it, but is not a @dataclass(frozen=True)."
             wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
             continue
         try:
@@ -104,7 +106,13 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
     if inspect.isabstract(cls):
         lacking = ", ".join(sorted(getattr(cls, "__abstractmethods__", ())))
         raise InputError(f'controller = "{name}": the class {cls.__name__} still lacks {lacking}.')
-    return cls(**values)
+    made = cls(**values)
+    if not isinstance(made.sensors, Sensor):
+        raise InputError(
+            f'controller = "{name}": its sensors are {made.sensors!r}; declare them as Sensor.STAGE, '
+            "Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |."
+        )
+    return made
 
 
 def _from_file(text: str) -> type[Controller]:

@@ -7,11 +7,11 @@ import math
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, END_KNOWN, END_V, END_Z, EVENTS, EVENT_CAP,
-    EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING, NOT_FINITE,
-    NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, PASSING, PERIOD, PHI2, REF, SIDE, SLEW_END,
-    START_TIME, STEADY, TARGET, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V, W2, Z0,
-    Septuple, Vector,
+    ASK, ASKED, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, END_KNOWN, END_V, END_Z, EVENTS,
+    EVENT_CAP, EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING,
+    NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, PASSING, PERIOD, PHI2, REF, SIDE,
+    SLEW_END, START_TIME, STEADY, TARGET, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V,
+    W2, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.modes import handle, reach_target
 from softstart.plant.motion import motion
@@ -80,7 +80,7 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
             end_stage(x, stages)
             return ENDED
         if t >= x[ASK_AT]:
-            return ASK
+            return ASK if x[ASKED] < p[EVENT_CAP] else EVENT_LIMIT
         torque_course(p, x, m)
         load = begin_span(p, x, m)
         until = min(x[ASK_AT], stop)

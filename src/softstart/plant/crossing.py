@@ -18,7 +18,7 @@ import math
 
 from softstart.plant.jit import compiled
 from softstart.plant.layout import (
-    DD, FA, FB, FREE, K, LAMBDA, P0, P1, V0, W0SQ, Z0, ZETA, Quintuple, Septuple, Vector,
+    DD, FA, FB, FREE, K, LAMBDA, P0, P1, Q, ROOT_Q, V0, W0, W0SQ, Z0, ZETA, Quintuple, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion
 
@@ -30,6 +30,34 @@ WATCH, RISING = 0, 1
 
 ROUNDING = 4.0 * 2.220446049250313e-16
 MAX_STEPS = 20_000
+
+
+@compiled
+def overdamped_bounds(m: Vector, s: float, end: float, y: float, yv: float, tail: float) -> Quintuple:
+    """The same for two real decay rates: the energy bound would hold the fast one against the slow motion."""
+    zeta = m[ZETA]
+    w0sq = m[W0SQ]
+    rate = m[LAMBDA]
+    fast = zeta + m[ROOT_Q]
+    slow = w0sq / fast
+    apart = fast - slow
+    a = abs(yv + fast * y) / apart
+    b = abs(yv + slow * y) / apart
+    y1 = a * slow + b * fast
+    y2 = a * slow**2 + b * fast**2
+    y3 = a * slow**3 + b * fast**3
+    y4 = a * slow**4 + b * fast**4
+    y5 = a * slow**5 + b * fast**5
+    if tail > 0.0:  # what the rest of the lag adds, from rest
+        length = min(1.0 / rate, end - s)
+        w0 = tail * length / apart
+        w1 = tail * min(length, 2.0 / apart)
+        w2 = tail + 2.0 * zeta * w1 + w0sq * w0
+        w3 = rate * tail + 2.0 * zeta * w2 + w0sq * w1
+        w4 = rate * rate * tail + 2.0 * zeta * w3 + w0sq * w2
+        w5 = rate * rate * rate * tail + 2.0 * zeta * w4 + w0sq * w3
+        y1, y2, y3, y4, y5 = y1 + w1, y2 + w2, y3 + w3, y4 + w4, y5 + w5
+    return y1 + abs(m[P1]), y2, y3, y4, y5
 
 
 @compiled
@@ -45,7 +73,9 @@ def bounds(m: Vector, s: float, end: float, z: float, v: float, tail: float) -> 
     y = z - m[P0] - m[P1] * s
     yv = v - m[P1]
     w0sq = m[W0SQ]
-    w0 = math.sqrt(w0sq)
+    w0 = m[W0]
+    if m[Q] < -0.01 * w0sq:
+        return overdamped_bounds(m, s, end, y, yv, tail)
     radius = math.sqrt(yv * yv + w0sq * y * y)
     if tail > 0.0:
         radius += tail * min(1.0 / rate, end - s)

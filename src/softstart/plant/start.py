@@ -11,9 +11,9 @@ from softstart.plant.advance import advance
 from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
     ASK, ASKED, ASK_AT, ASK_ON_GAP, BAD_COMMAND, BEYOND, C, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE,
-    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAW, LOAD, MEMO_V, N_P, N_X, PHI2, REACTIVE,
-    SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0, TIME,
-    T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
+    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAG, LAW, LOAD, MEMO_V, N_P, N_X, PHI2, RATE,
+    REACTIVE, SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0,
+    TIME, T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
 )  # fmt: skip
 from softstart.plant.modes import engage, shaft_torque
 
@@ -100,8 +100,9 @@ def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
     x[DEMAND] = min(max(torque, p[U_MIN]), p[U_MAX])
     x[ASK_AT] = ask_again
     x[ASKED] += 1.0
-    if x[CONTACTS] == 1.0 and math.isnan(x[CONTACT_TORQUE]):
-        x[CONTACT_TORQUE] = x[U]
+    if x[CONTACTS] == 1.0 and math.isnan(x[CONTACT_TORQUE]):  # the start is in contact
+        immediate = p[LAG] == 0.0 and p[RATE] == math.inf
+        x[CONTACT_TORQUE] = x[DEMAND] if immediate else x[U]
     return True
 
 

@@ -127,4 +127,5 @@ def test_the_target_search_of_steady_contacts_agrees(
     found = steady_target(m, speeds, target, end)
     expected = first_crossing(m, target, 0.0, 0.0, 0.0, -1.0, speeds, WATCH, 0.0, end)
     if abs(w2.max() - target) > 1e-4 * (abs(target) + 1.0):  # beside the very top, where either may be right
-        assert found == pytest.approx(expected, rel=1e-9)
+        # near the start the load has hardly gained: the difference of two speeds leaves fewer digits
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * end)
