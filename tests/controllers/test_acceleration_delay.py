@@ -10,8 +10,8 @@ import pytest
 from tests.controllers.starts import CRANE, raised_at, random_drive
 
 from softstart import Drive, simulate, stages
+from softstart.plant.vector import encoder_count
 from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
-from softstart_controllers.sampled import encoder_count
 
 AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
 

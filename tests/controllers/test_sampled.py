@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as some
 from tests.controllers.starts import CRANE
 
-from softstart_controllers.sampled import encoder_count, mean_torque, patience
+from softstart.plant.vector import encoder_count
+from softstart_controllers.sampled import mean_torque, patience
 
 torques = some.floats(-1000, 1000)
 
