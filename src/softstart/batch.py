@@ -108,11 +108,9 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
 def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tuple[Any, str, str]]:
     """The labelled figures as name -> (values, unit, meaning)."""
     reached = ~np.isnan(results[:, at.START_TIME])
-    status = [
-        status_of(int(reason), bool(yes), until is not None)
-        for reason, yes in zip(results[:, at.STATUS], reached, strict=True)
-    ]
-    good = np.array([state.finished for state in status])
+    ended, which = np.unique(2 * results[:, at.STATUS].astype(np.int64) + reached, return_inverse=True)
+    kinds = [status_of(code // 2, bool(code % 2), until is not None) for code in ended.tolist()]
+    good = np.array([kind.finished for kind in kinds])[which]
 
     def kept(values: Any) -> Any:
         return np.where(good, values, np.nan)
@@ -132,7 +130,7 @@ def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tu
     }
     for name, column, unit, meaning in _COLUMNS:
         figures[name] = (kept(results[:, column]), unit, meaning)
-    figures["status"] = (np.array([state.name for state in status]), "", "how the start ended")
+    figures["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return figures
 
 

@@ -102,7 +102,7 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
                 reach_target(p, x, t + m[PASSING], p[TARGET], events)
         if event == UNSOLVED:
             return NOT_LOCATED
-        if x[SIDE] != 0.0 and note_peak(x, m, load, s) == NOT_LOCATED:
+        if x[SIDE] != 0.0 and note_peak(p, x, m, load, s) == NOT_LOCATED:
             return NOT_LOCATED
         if recording:
             note_segment(x, m, s, segments)

@@ -10,9 +10,9 @@ import math
 from softstart.plant.crossing import RISING, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, DD, END_KNOWN, END_V, END_Z, EVENTS, E_KIND, E_TIME, E_VALUE, FIRST_PEAK, G_END, G_NUMBER,
-    G_PEAK, G_PEAK_TIME, G_SIDE, G_START, K, LAST_V, LOAD, NOT_LOCATED, N_EVENTS, N_SEGMENTS, N_STAGES,
-    P0, PEAK, PEAK_TIME, PHI2, SIDE, STAGE, STAGE_2_END, STAGE_PEAK, STAGE_PEAK_TIME, STAGE_START,
+    ASK, D, DD, END_KNOWN, END_V, END_Z, EVENTS, E_KIND, E_TIME, E_VALUE, FIRST_PEAK, G_END, G_NUMBER,
+    G_PEAK, G_PEAK_TIME, G_SIDE, K, LAST_V, LOAD, MEMO_S, NOT_LOCATED, N_EVENTS, N_SEGMENTS, N_STAGES,
+    G_START, P0, PEAK, PEAK_TIME, PHI2, SIDE, STAGE, STAGE_2_END, STAGE_PEAK, STAGE_PEAK_TIME, STAGE_START,
     STEADY, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE, S_STAGE, S_START, S_THETA, S_UA, S_UB, S_UE, S_V,
     S_W2, THETA, TIME, UA, UB, UE, V, V0, W0, W0SQ, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
@@ -28,7 +28,7 @@ def keep_peak(x: Vector, torque: float, time: float) -> None:
 
 
 @inlined
-def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
+def note_peak(p: Vector, x: Vector, m: Vector, load: Septuple, s: float) -> int:
     """Locate the extremes of T within the span that ends at s; nothing is read off a grid."""
     side = x[SIDE]
     t = x[TIME]
@@ -39,8 +39,8 @@ def note_peak(x: Vector, m: Vector, load: Septuple, s: float) -> int:
         w0 = m[W0]
         to_flank = not math.isnan(m[LAST_V])
         if m[V0] > 0.0 or w0 * s > math.pi:
-            if m[Z0] == 0.0 and to_flank:
-                at = 0.5 * s  # from flank to flank T is symmetric, [G](14)
+            if m[Z0] == 0.0 and m[V0] > 0.0 and p[D] == 0.0:
+                at = 0.5 * m[MEMO_S]  # from flank to flank, which takes MEMO_S, T is symmetric, [G](14)
             else:
                 at = math.atan2(m[V0], w0 * m[Y0]) / w0
                 if at < 0.0:

@@ -121,12 +121,15 @@ def steady_target(m: Vector, load: Septuple, target: float, end: float) -> float
     """
     w0 = m[W0]
     s = 0.5 * end
+    z = m[P0] + math.sqrt(m[P0] * m[P0] + m[V0] * m[V0] / m[W0SQ])
+    v = 0.0
     direction = 0.0
-    for _ in range(100):
-        sin = math.sin(w0 * s)
-        cos = math.cos(w0 * s)
-        z = m[P0] * (1.0 - cos) + m[V0] / w0 * sin
-        v = m[P0] * w0 * sin + m[V0] * cos
+    for step_number in range(100):
+        if step_number > 0:
+            sin = math.sin(w0 * s)
+            cos = math.cos(w0 * s)
+            z = m[P0] * (1.0 - cos) + m[V0] / w0 * sin
+            v = m[P0] * w0 * sin + m[V0] * cos
         short = target - (load[0] + load[1] * s + load[4] * (m[V0] - v))
         gain = load[5] * m[K] * z + load[6]
         if gain <= 0.0:
