@@ -19,7 +19,7 @@ from softstart.plant.layout import (
     UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2, Y0, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
-from softstart.plant.steady import GRAZE, steady_exit, steady_target
+from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 
 
 @inlined
@@ -236,7 +236,8 @@ def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon:
     if s >= -1.0 and high >= p[TARGET] and math.isnan(x[START_TIME]):
         flank_to_flank = event == NO_EVENT and m[Z0] == 0.0 and not math.isnan(m[LAST_V])
         if flank_to_flank and x[SIDE] > 0.0 and x[LOAD] > 0.0:
-            s = steady_target(m, load, p[TARGET], end)
+            if p[MC] < 0.0 or x[W2] + largest_gain(p, m, load, end) >= p[TARGET]:
+                s = steady_target(m, load, p[TARGET], end)
             if s >= 0.0:  # no change of motion: noted on the way to the other end of the contact
                 m[PASSING] = s
                 s = -1.0

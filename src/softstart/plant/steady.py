@@ -46,6 +46,20 @@ def steady_exit(m: Vector, horizon: float) -> tuple[int, float]:
     return EXIT, s
 
 
+@inlined
+def largest_gain(p: Vector, m: Vector, load: Septuple, contact: float) -> float:
+    """How much load speed a contact from flank to flank can gain at most on its way, Mc >= 0.
+
+    At its end it has gained `gain`; before, w2 was higher only by what Mc takes while T < Mc at the end. From
+    there back z grows at least as v0 s as long as z < P0, so this lasts Mc/(c v0) at most.
+    """
+    level = p[MC] / m[K]
+    if level > m[P0]:
+        return max(0.0, load[1] * contact) + load[4] * (math.sqrt(m[V0] ** 2 + m[W0SQ] * m[Y0] ** 2) + m[V0])
+    gain = load[1] * contact + 2.0 * load[4] * m[V0]
+    return max(0.0, gain) - load[6] * level / m[V0]
+
+
 @compiled
 def bounce(p: Vector, x: Vector, m: Vector, load: Septuple, until: float) -> int:
     """Contact and flight repeat while nothing else happens: take them in one stride; returns how many.
@@ -62,7 +76,7 @@ def bounce(p: Vector, x: Vector, m: Vector, load: Septuple, until: float) -> int
     slope = load[6]
     share = p[J1] * p[INV_J]
     swing = abs(load[4]) * (math.sqrt(v0 * v0 + m[W0SQ] * m[Y0] * m[Y0]) + v0)
-    rise = max(0.0, load[1] * contact) + swing
+    rise = largest_gain(p, m, load, contact)
     fall = min(0.0, load[1] * contact) - swing
     push = contact * contact * (0.5 * load[1] + contact * load[2] / 6.0)
     done = 0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from softstart.plant import layout as at
 from softstart.plant.crossing import NO_CROSSING, RISING, WATCH, bounds, first_crossing, load_speed
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
-from softstart.plant.steady import steady_target
+from softstart.plant.steady import largest_gain, steady_target
 
 NO_LOAD = (0.0,) * 7
 
@@ -123,6 +123,9 @@ def test_the_target_search_of_steady_contacts_agrees(
     speeds = (0.3, (u - load) / total, 0.0, 0.0, J1 / total, 1.0 / J2, -load / J2)
     times = np.linspace(0.0, end, 400)
     w2 = np.array([load_speed(m, speeds, s, motion(m, s)[1]) for s in times])
+    p = np.zeros(at.N_P)
+    p[at.MC] = load
+    assert w2.max() <= 0.3 + largest_gain(p, m, speeds, end) * (1 + 1e-12) + 1e-12
     target = 0.3 + share * (w2.max() - 0.3) + 1e-6
     found = steady_target(m, speeds, target, end)
     expected = first_crossing(m, target, 0.0, 0.0, 0.0, -1.0, speeds, WATCH, 0.0, end)
