@@ -6,17 +6,15 @@ figures. It is registered in the entry-point group `softstart.studies` and run b
 
 from __future__ import annotations
 
-import difflib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from softstart.errors import InputError
+from softstart.plugins import load, registered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -141,18 +139,13 @@ class Study(ABC):
         """
 
 
-@cache
-def _registered() -> dict[str, EntryPoint]:
-    return {point.name: point for point in sorted(entry_points(group=GROUP), key=lambda point: point.name)}
-
-
 def study_names() -> tuple[str, ...]:
     """Names of all installed studies, those of other packages too.
 
     >>> "paper-g" in study_names()
     True
     """
-    return tuple(_registered())
+    return tuple(registered(GROUP))
 
 
 def find_study(name: str) -> Study:
@@ -164,17 +157,7 @@ def find_study(name: str) -> Study:
     Traceback (most recent call last):
     softstart.errors.InputError: study = "paper-q": there is no study of this name; did you mean "paper-g"?
     """
-    point = _registered().get(name)
-    if point is None:
-        near = difflib.get_close_matches(name, study_names(), n=1, cutoff=0.4)
-        hint = f'did you mean "{near[0]}"?' if near else "`softstart study --list` lists them."
-        raise InputError(f'study = "{name}": there is no study of this name; {hint}')
-    try:
-        found = point.load()
-    except (ImportError, AttributeError) as error:
-        raise InputError(f'study = "{name}": {point.value} cannot be loaded: {error}.') from None
+    found = load(GROUP, "study", name, "softstart study --list")
     if not (isinstance(found, type) and issubclass(found, Study)):
-        raise InputError(
-            f'study = "{name}": {point.value} is no study; derive it from softstart.study.Study.'
-        )
+        raise InputError(f'study = "{name}": {found!r} is no study; derive it from softstart.study.Study.')
     return found()

@@ -7,7 +7,6 @@ import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from click.shell_completion import CompletionItem
 
 from softstart.cli.usage import did_you_mean
 from softstart.errors import InputError
+from softstart.plugins import registered
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
@@ -78,7 +78,7 @@ def drive_names() -> tuple[str, ...]:
 @cache
 def controller_names() -> tuple[str, ...]:
     """Names of the installed controllers, found without importing any."""
-    return tuple(sorted(point.name for point in entry_points(group=CONTROLLER_GROUP)))
+    return tuple(registered(CONTROLLER_GROUP))
 
 
 def drive_argument(default: str | None = None) -> Decorator:

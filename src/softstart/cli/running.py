@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from importlib.metadata import entry_points
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from softstart.cli.options import CONTROLLER_GROUP, Mistakes
 from softstart.errors import InputError, SimulationError
+from softstart.plugins import registered
 
 if TYPE_CHECKING:
     from numba.core.event import Event
@@ -78,7 +78,7 @@ class Attributed:
 
     def __init__(self, loading: str = "") -> None:
         self.loading = loading
-        self.modules = {point.module for point in entry_points(group=CONTROLLER_GROUP)}
+        self.modules = {point.module for point in registered(CONTROLLER_GROUP).values()}
 
     def __enter__(self) -> None:
         pass

@@ -8,21 +8,15 @@ import inspect
 import sys
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 from softstart.controller.base import Controller, Sensor
 from softstart.errors import InputError
+from softstart.plugins import load, registered
 from softstart.units import to_si
 
 GROUP = "softstart.controllers"
-
-
-@cache
-def _registered() -> dict[str, EntryPoint]:
-    return {point.name: point for point in sorted(entry_points(group=GROUP), key=lambda point: point.name)}
 
 
 def controller_names() -> tuple[str, ...]:
@@ -31,7 +25,7 @@ def controller_names() -> tuple[str, ...]:
     >>> "direct" in controller_names()
     True
     """
-    return tuple(_registered())
+    return tuple(registered(GROUP))
 
 
 def controller_class(name: str) -> type[Controller]:
@@ -44,17 +38,7 @@ def controller_class(name: str) -> type[Controller]:
     """
     if ".py:" in name or name.endswith(".py"):
         return _from_file(name)
-    point = _registered().get(name)
-    if point is None:
-        near = difflib.get_close_matches(name, controller_names(), n=1, cutoff=0.4)
-        hint = f'did you mean "{near[0]}"?' if near else "`softstart controllers` lists them."
-        raise InputError(f'controller = "{name}": there is no controller of this name; {hint}')
-    try:
-        found = point.load()
-    except (ImportError, AttributeError) as error:
-        raise InputError(
-            f'controller = "{name}": it is registered as {point.value}, which does not load: {error}.'
-        ) from error
+    found = load(GROUP, "controller", name, "softstart controllers")
     return _checked(found, name)
 
 

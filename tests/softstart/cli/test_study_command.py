@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from softstart import InputError, SimulationError
+from softstart import InputError, SimulationError, plugins
 from softstart import study as studies
 from softstart.figures import new_figure
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study
@@ -62,7 +62,8 @@ def registered(monkeypatch):
         "broken": Point(ImportError("No module named 'nothing'")),
         "strange": Point(int),
     }
-    monkeypatch.setattr(studies, "_registered", lambda: points)
+    monkeypatch.setattr(studies, "registered", lambda group: points)
+    monkeypatch.setattr(plugins, "registered", lambda group: points)
 
 
 def test_list(run):
