@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from numba import njit
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.plant.vector import encoder_count
+from softstart_controllers.design_store import kept
 from softstart_controllers.sampled import number
 
 # One sample of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), without the known torque; h is the sample period.
@@ -62,6 +64,10 @@ def design(steps: int) -> Design:
     The index is the decimal logarithm of (variance of h^4 T''/J1) / (variance of the encoder's rounding).
     `control.dlqe` gives the gain L = A K of the predictor; `observe` corrects with K after the sample.
     """
+    return Design._make(kept(str(steps), Path(__file__), lambda: _designed(steps)))
+
+
+def _designed(steps: int) -> list[float]:
     import control
 
     A, G, C = (np.array(matrix) for matrix in (TRANSITION, DISTURBANCE, OUTPUT))
@@ -78,7 +84,7 @@ def design(steps: int) -> Design:
     # the error settles to this under a T'' of 1 that never ends: how far behind T' stays
     behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)
     numbers = [*K[:, 0], math.sqrt(after[2, 2]), math.sqrt(after[3, 3]), behind[3, 0]]
-    return Design._make(float(value) for value in numbers)
+    return [float(value) for value in numbers]
 
 
 def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
