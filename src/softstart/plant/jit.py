@@ -1,7 +1,7 @@
 """How the kernel's functions are compiled: once, cached on disk, without the interpreter lock.
 
 `_nrt=False` leaves out numba's reference counting. The kernel allocates nothing, so there is nothing to
-count, and without it a start runs six times as fast (measured on 100,000 constant-torque starts).
+count; take the option out and `softstart study benchmark-starts` shows what counting nothing costs.
 """
 
 from __future__ import annotations

@@ -198,7 +198,8 @@ def test_the_table_the_fields_and_the_keywords_agree():
     "parameter", [p for p in PARAMETERS.values() if p.unit or p.choices], ids=lambda p: p.name
 )
 def test_the_example_of_each_parameter_is_valid(crane, parameter):
-    crane.with_settings([f"{parameter.path}={parameter.example}"])
+    changed = crane.with_settings([f"{parameter.path}={parameter.example}"])
+    assert Drive.from_toml(changed.to_toml()) == changed
 
 
 def test_no_way_in_past_the_checks(crane):
