@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from softstart import Drive, simulate
-from softstart.controller import CompiledController, controller_names, make_controller
+from softstart import Drive, TorqueProfile, simulate
+from softstart.controller import CompiledController, make_controller, ready_controller_names
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -15,8 +15,8 @@ def compiled_kernels() -> None:
     The command line says on standard error that it compiles, which tests of its output would trip over.
     """
     crane = Drive.load("crane-4amtkf")
-    for name in controller_names():
-        controller = make_controller(name)
+    profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
+    for controller in (profile, *map(make_controller, ready_controller_names())):
         assert simulate(crane, controller).energy.residual < 1e-6
         simulate(crane.replace(gap=[0.5, 2.0]), controller)
     direct = make_controller("direct")

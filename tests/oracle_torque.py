@@ -1,4 +1,7 @@
-"""The motor torque of the oracle: what a demand in pieces becomes behind a slew limiter and a lag."""
+"""The motor torque of the oracle: what a demand in pieces becomes behind a slew limiter and a lag.
+
+A piece is (instant, demand) or (instant, demand, slope): it holds, or runs in a line, until the next one.
+"""
 
 from __future__ import annotations
 
@@ -11,26 +14,33 @@ import numpy as np
 class TorquePath:
     """Motor torque: demand, slew limiter, first-order lag; straight or exponential between borders."""
 
-    def __init__(self, pieces: list[tuple[float, float]], lag: float, rate: float, u0: float, t_end: float):
+    def __init__(self, pieces: list[Any], lag: float, rate: float, u0: float, t_end: float):
         self.lag, self.t_end = lag, t_end
         spans = []  # start, reference there, slope of the reference
-        pieces = sorted(pieces)
+        pieces = sorted(
+            (start, demand, *slope) if slope else (start, demand, 0.0) for start, demand, *slope in pieces
+        )
         if not pieces or pieces[0][0] > 0:
-            pieces = [(0.0, u0), *pieces]
+            pieces = [(0.0, u0, 0.0), *pieces]
         r = u0
-        for (start, demand), end in zip(pieces, [p[0] for p in pieces[1:]] + [math.inf], strict=True):
-            if math.isinf(rate) or r == demand:
+        for (start, demand, rise), end in zip(pieces, [p[0] for p in pieces[1:]] + [math.inf], strict=True):
+            if math.isinf(rate):
                 r = demand
-                spans.append((start, r, 0.0))
-                continue
-            slope = math.copysign(rate, demand - r)
-            arrival = start + (demand - r) / slope
-            spans.append((start, r, slope))
-            if arrival < end:
-                spans.append((arrival, demand, 0.0))
-                r = demand
+            if r != demand:
+                slope = math.copysign(rate, demand - r)
+                spans.append((start, r, slope))
+                # the limiter and the line approach each other, or never meet
+                closing = (slope - rise) / (demand - r)
+                arrival = start + 1 / closing if closing > 0 else math.inf
+                if arrival >= end:
+                    r += slope * (end - start)
+                    continue
+                r = demand + rise * (arrival - start)
             else:
-                r += slope * (end - start)
+                arrival = start
+            slope = min(max(rise, -rate), rate)
+            spans.append((arrival, r, slope))
+            r += slope * (end - arrival) if slope else 0.0
         spans = [span for span in spans if span[0] < t_end]
         ends = [span[0] for span in spans[1:]] + [t_end]
         self.spans: list[

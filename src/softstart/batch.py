@@ -88,14 +88,16 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
     end = math.inf if until is None else float(until)
     results = np.empty((p.shape[0], at.N_X))
     if isinstance(controller, CompiledController):
-        numbers = np.ascontiguousarray(controller.vector(own), dtype=np.float64)
-        numbers = np.ascontiguousarray(numbers.reshape(-1, numbers.shape[-1]))
+        numbers = np.asarray(controller.vector(own), dtype=np.float64)
+        if not any(numbers.strides[:-1]):  # one row, broadcast: it serves all starts
+            numbers = numbers[(0,) * (numbers.ndim - 1)]
+        numbers = np.array(numbers.reshape(-1, numbers.shape[-1]), order="C")
         size = controller.state_size
         kernel.run_many(
             type(controller).kernel, p, numbers, int(controller.sensors),
             bool(controller.sensors & Sensor.STAGE), np.array([end]), results,
             np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
-            np.zeros(2 + size), np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+            np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
         )  # fmt: skip
         return results
     for row, one in zip(results, p, strict=True):

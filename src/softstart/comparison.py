@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from softstart.controller.base import Controller
-from softstart.controller.finding import controller_names, make_controller
+from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.run import Run
@@ -77,8 +77,9 @@ def compare(
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     until: float | None = None,
 ) -> Comparison:
-    """Start the drive under each controller (all installed ones by default) and compare.
+    """Start the drive under each controller and compare.
 
+    By default these are all installed ones that run as they are, and those that are given parameters.
     `parameters` maps a controller's name to its parameters. Raises InputError for bad input.
 
     >>> from softstart import compare
@@ -96,7 +97,7 @@ def compare(
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
     if isinstance(controllers, str | Controller):
         controllers = [controllers]
-    asked = list(controllers) if controllers is not None else list(controller_names())
+    asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters or {}))
     if not asked:
         raise InputError("controllers: name at least one; `softstart controllers` lists them.")
     unused = set(parameters or {}) - {name for name in asked if isinstance(name, str)}

@@ -58,9 +58,11 @@ def run_compiled(controller: CompiledController, drive: Drive, p: at.Vector, boo
     """A compiled controller: the loop itself runs in the kernel."""
     kernel.begin(p, book.x, end, book.events)
     book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
-    numbers = np.ascontiguousarray(controller.vector(drive), dtype=np.float64).ravel()
+    numbers = np.array(
+        controller.vector(drive), dtype=np.float64
+    ).ravel()  # a copy: the kernel takes no read-only ones
     size = controller.state_size
-    state, command = np.zeros(size), np.zeros(2 + size)
+    state, command = np.zeros(size), np.zeros(kernel.NEW_STATE + size)
     step = type(controller).kernel
     while True:
         reason: int = kernel.run(
@@ -98,12 +100,13 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
                 ) from error
             try:
                 torque, ask_again, state = float(answer[0]), float(answer[1]), tuple(answer[2])
+                slope = float(answer[3]) if len(answer) > 3 else 0.0
             except (TypeError, IndexError, ValueError):
                 raise InputError(
                     f"controller {type(controller).__name__}: its step answered {answer!r}; "
-                    "answer with Command(torque, ask_again, state)."
+                    "answer with Command(torque, ask_again, state, slope)."
                 ) from None
-            if not kernel.obey(p, book.x, torque, ask_again):
+            if not kernel.obey(p, book.x, torque, ask_again, slope):
                 return at.BAD_COMMAND
         else:
             return reason

@@ -20,7 +20,10 @@ class Status(Enum):
     TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than max_events allows."
     NOT_LOCATED = "The start was given up: an event could not be located to machine precision."
     NOT_FINITE = "The start was given up: a state is no longer a finite number."
-    BAD_COMMAND = "The start was given up: the controller answered with NaN or with a past instant."
+    BAD_COMMAND = (
+        "The start was given up: the controller answered with NaN or with a past instant, "
+        "or with a slope without an end."
+    )
 
     @property
     def finished(self) -> bool:

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from softstart import Command, Drive, InputError, Measured, PlainController, Sensor, SimulationError, simulate
-from softstart.controller import controller_class, controller_names, make_controller
+from softstart.controller import (
+    compiled_step,
+    controller_class,
+    controller_names,
+    make_controller,
+    ready_controller_names,
+)
 
 CRANE = Drive.load("crane-4amtkf")
 ALL = {
@@ -20,11 +28,14 @@ ALL = {
     "ramp",
     "s-curve",
 }
+NEEDY = {"profile"}  # run only when they are given something
 
 
-def test_the_seven_strategies_are_found() -> None:
-    assert set(controller_names()) >= ALL
-    for name in ALL:
+def test_the_strategies_are_found() -> None:
+    assert set(controller_names()) >= ALL | NEEDY
+    assert set(ready_controller_names()) >= ALL
+    assert not NEEDY & set(ready_controller_names())
+    for name in ALL | NEEDY:
         assert controller_class(name).name == name
 
 
@@ -161,3 +172,22 @@ def test_the_encoder_counts_and_the_torque_is_the_realised_one() -> None:
             before = seen[i - 1]
             rate = (m.motor_angle - before.motor_angle) / (m.time - before.time)
             assert m.motor_speed == pytest.approx(rate, abs=1e-9)
+
+
+def test_a_step_compiled_before_the_interface_changed_is_compiled_again(tmp_path: Path) -> None:
+    """Its file has not changed, but the indices in it have: numba would go on with the old ones."""
+    source = tmp_path / "own.py"
+    kept = tmp_path / "__pycache__"
+    kept.mkdir()
+    source.write_text(
+        "def step(parameters, measured, state, command):\n    command[0] = 1.0\n", encoding="utf-8"
+    )
+    (kept / "own.step-1.py311.nbi").write_bytes(b"")
+    (kept / "other.step-1.py311.nbi").write_bytes(b"")
+    for path in kept.iterdir():
+        os.utime(path, (0.0, 0.0))
+    space: dict[str, Any] = {}
+    exec(compile(source.read_text(encoding="utf-8"), str(source), "exec"), space)
+    compiled_step(space["step"])
+    assert not any(path.stat().st_mtime == 0.0 for path in kept.glob("own.*"))
+    assert (kept / "other.step-1.py311.nbi").exists()

@@ -12,7 +12,12 @@ from softstart.controller.base import (
     stack,
 )
 from softstart.controller.compiled import compiled_step
-from softstart.controller.finding import controller_class, controller_names, make_controller
+from softstart.controller.finding import (
+    controller_class,
+    controller_names,
+    make_controller,
+    ready_controller_names,
+)
 
 __all__ = [
     "NEVER",
@@ -27,5 +32,6 @@ __all__ = [
     "controller_names",
     "make_controller",
     "parameter",
+    "ready_controller_names",
     "stack",
 ]

@@ -12,15 +12,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from enum import IntFlag
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.drive import Drive
-from softstart.plant.start import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+from softstart.plant.start import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
 Vector = NDArray[np.float64]
+Kind = Literal["quantity", "text", "object"]
 
 
 class Sensor(IntFlag):
@@ -52,27 +53,31 @@ NEVER = -math.inf  # as `ask_again`: not at gap events either, the torque stays 
 
 
 class Command(NamedTuple):
-    """A controller's answer: torque demand (N m), when to be asked again (s), new state.
+    """A controller's answer: torque demand (N m), when to be asked again (s), new state, slope (N m/s).
 
     `ask_again` is an instant later than now. Infinity is none: then a controller that sees the stage is
-    still asked at each gap event, unless it says NEVER.
+    still asked at each gap event, unless it says NEVER. The demand is `torque` now and changes at `slope`
+    until asked again; a slope needs an `ask_again`, where its line ends within the limits of the drive: both
+    ends of a line beyond them are clipped.
 
     >>> Command(62.0)
-    Command(torque=62.0, ask_again=inf, state=())
+    Command(torque=62.0, ask_again=inf, state=(), slope=0.0)
     """
 
     torque: float
     ask_again: float = math.inf
     state: tuple[float, ...] = ()
+    slope: float = 0.0
 
 
-def parameter(unit: str, meaning: str, default: str = "") -> Any:
+def parameter(unit: str, meaning: str, default: str = "", kind: Kind = "quantity") -> Any:
     """A parameter of a controller, for use as a dataclass field.
 
     `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
-    the drive when none is given.
+    the drive when none is given. A `kind` other than a quantity is handed over as it is: a text (the path of
+    a file, say), or an object, which only Python can give.
     """
-    return field(default=None, metadata={"unit": unit, "meaning": meaning, "default": default})
+    return field(default=None, metadata={"unit": unit, "meaning": meaning, "default": default, "kind": kind})
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,7 @@ class Controller:
     summary: ClassVar[str] = ""  # one line: what it does
     source: ClassVar[str] = ""  # where it comes from
     sensors: ClassVar[Sensor] = Sensor.NONE
+    needs: ClassVar[tuple[str, ...]] = ()  # parameters of which one must be given: no drive implies it
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Values of the parameters that were not given, derived from the drive (never from the answer)."""
@@ -125,8 +131,8 @@ class CompiledController(Controller, ABC):
     """A controller whose step is compiled: `kernel(parameters, measured, state, command)`.
 
     All four are float64 vectors: `parameters` is `vector(drive)`, `measured` holds the fields of
-    `Measured` in order, `state` the last state (zeros at first), and `command` receives torque, ask_again
-    and the new state. See `softstart.controller.compiled_step`.
+    `Measured` in order, `state` the last state (zeros at first), and `command` receives torque, ask_again,
+    slope and the new state. See `softstart.controller.compiled_step`.
     """
 
     kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]
@@ -157,12 +163,13 @@ class PlainTwin(PlainController):
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         """The compiled controller's own lines, not compiled."""
         size = self.twin.state_size
-        command = np.zeros(2 + size)
+        command = np.zeros(NEW_STATE + size)
         before = np.array(state) if state else np.zeros(size)
         kernel = type(self.twin).kernel
         lines = getattr(kernel, "py_func", kernel)
         lines(np.array(self.numbers), np.array(measured), before, command)
-        return Command(float(command[0]), float(command[1]), tuple(command[2:].tolist()))
+        torque, ask_again, slope, *after = command.tolist()
+        return Command(torque, ask_again, tuple(after), slope)
 
 
 def stack(drive: Drive, *values: Any) -> Vector:

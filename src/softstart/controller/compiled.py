@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.controller.base import NEVER
+from softstart.plant import start
 from softstart.plant.jit import compiled_as, inlined
 from softstart.plant.start import STEP_SIGNATURE
 
@@ -24,9 +26,8 @@ from softstart.plant.start import (  # isort: skip
 )
 
 # indices of `command`; the new state follows from STATE on
-from softstart.plant.start import ASK_AGAIN, TORQUE  # isort: skip
+from softstart.plant.start import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
 
-STATE = 2
 Vector = NDArray[np.float64]
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "MOTOR_TORQUE",
     "NEVER",
     "SHAFT_TORQUE",
+    "SLOPE",
     "STAGE",
     "STATE",
     "TIME",
@@ -47,22 +49,37 @@ __all__ = [
 ]
 
 
+def _drop_if_older_than_the_interface(source: Path) -> None:
+    """The indices above are compiled into every step; numba would not notice that one of them has changed."""
+    try:
+        changed = max(path.stat().st_mtime for path in (Path(__file__), Path(start.__file__)))
+        for path in (source.parent / "__pycache__").glob(f"{source.stem}.*.nbi"):
+            if path.stat().st_mtime < changed:
+                path.unlink(missing_ok=True)
+    except OSError:
+        return  # another process is cleaning, or the folder is read-only: numba decides
+
+
 def compiled_step(function: Callable[..., None]) -> Any:
     """Compile `step(parameters, measured, state, command)` with the kernel's one signature.
 
-    All arguments are float64 vectors. The step must fill all of `command` and must not allocate arrays
-    (that keeps it near 10 ns a call). It is cached on disk, and the kernel is not compiled again for it.
+    All arguments are float64 vectors. The step must fill all of `command` except SLOPE, which is 0 before,
+    and must not allocate arrays (that keeps it near 10 ns a call). It is cached on disk, and the kernel is
+    not compiled again for it.
 
     >>> @compiled_step
     ... def step(parameters, measured, state, command):
     ...     command[TORQUE] = parameters[0]
     ...     command[ASK_AGAIN] = measured[TIME] + 0.001
     >>> import numpy as np
-    >>> command = np.zeros(2)
+    >>> command = np.zeros(3)
     >>> step(np.array([62.0]), np.zeros(7), np.zeros(0), command)
     >>> command.tolist()
-    [62.0, 0.001]
+    [62.0, 0.001, 0.0]
     """
     source = getattr(function, "__code__", None)
-    in_a_file = source is not None and not source.co_filename.startswith("<")
+    file = "<unknown>" if source is None else str(source.co_filename)
+    in_a_file = not file.startswith("<")
+    if in_a_file:
+        _drop_if_older_than_the_interface(Path(file))
     return compiled_as(STEP_SIGNATURE, cache=in_a_file)(function)

@@ -6,7 +6,7 @@ import difflib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,22 @@ def controller_names() -> tuple[str, ...]:
     True
     """
     return tuple(registered(GROUP))
+
+
+def ready_controller_names(given: Collection[str] = ()) -> tuple[str, ...]:
+    """Names of the installed controllers that run as they are, and of those in `given`.
+
+    >>> "direct" in ready_controller_names(), "profile" in ready_controller_names()
+    (True, False)
+    """
+    return tuple(name for name in controller_names() if name in given or not _needs_something(name))
+
+
+def _needs_something(name: str) -> bool:
+    try:
+        return bool(controller_class(name).needs)
+    except InputError:
+        return False  # that it is broken is told where it is used
 
 
 def controller_class(name: str) -> type[Controller]:
@@ -72,8 +88,13 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
                 hint = "its class names it, but is not a @dataclass(frozen=True)."
             wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
             continue
+        kind = known[key].metadata.get("kind", "quantity")
+        if kind == "object":
+            values[key] = value
+            continue
         try:
-            values[key] = to_si(value, known[key].metadata.get("unit", ""), name=key)
+            unit = known[key].metadata.get("unit", "")
+            values[key] = to_si(value, unit, name=key) if kind == "quantity" else _text(key, value)
         except InputError as error:
             wrong.extend(error.sentences)
     missing = [
@@ -97,6 +118,15 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             "Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |."
         )
     return made
+
+
+def _text(key: str, value: object) -> str:
+    """A parameter that is a text."""
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, str) and value:
+        return value
+    raise InputError(f"{key} = {value!r}: this parameter is a text; give it in quotes.")
 
 
 def _from_file(text: str) -> type[Controller]:

@@ -7,7 +7,7 @@ import math
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, ASKED, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, ENDED, END_KNOWN, END_V, END_Z, EVENTS,
+    ASK, ASKED, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, DEMAND_SLOPE, ENDED, END_KNOWN, END_V, END_Z, EVENTS,
     EVENT_CAP, EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING,
     NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, PASSING, PERIOD, PHI2, REF, SIDE,
     SLEW_END, START_TIME, STEADY, TARGET, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V,
@@ -54,6 +54,8 @@ def move(p: Vector, x: Vector, m: Vector, load: Septuple, s: float) -> None:
     x[THETA] = theta
     x[V] = v
     x[U] = m[UA] + m[UB] * s + m[UE] * (1.0 - tail)
+    if x[DEMAND_SLOPE] != 0.0:
+        x[DEMAND] += x[DEMAND_SLOPE] * s
     x[REF] = x[DEMAND] if s >= m[SLEW_END] else x[REF] + m[UB] * s
     x[TIME] += s
 

@@ -32,7 +32,7 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 # x: the state. theta = phi1 - phi2 and v = w1 - w2 are kept, not their parts: the gap is then as
 # sharp after a minute as at the start.
 (
-    TIME, THETA, V, PHI2, W2, REF, U, DEMAND,  # REF: the demand after the slew limiter
+    TIME, THETA, V, PHI2, W2, REF, U, DEMAND, DEMAND_SLOPE,  # REF: the demand after the slew limiter
     SIDE,  # 0 gap open, +1 or -1 the flank in contact
     DOUBLED,  # 1 while the `modelica` law's damping is capped by its spring: T = 2 c z
     BEYOND,  # +1 or -1: no torque though the flanks overlap: a damped spring that must not pull springs back
@@ -43,8 +43,8 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
     STAGE, STAGE_START, STAGE_PEAK, STAGE_PEAK_TIME, PEAK, PEAK_TIME, GAP_EVENTS, CONTACTS,
     FIRST_CONTACT, STAGE_2_END, IMPACT_SPEED, CONTACT_TORQUE, FIRST_PEAK, START_TIME, EVENTS,
     N_SEGMENTS, N_EVENTS, N_STAGES, STATUS,
-) = range(38)  # fmt: skip
-N_X: Final = 38
+) = range(39)  # fmt: skip
+N_X: Final = 39
 
 # m: the motion of one span, see motion.py
 (

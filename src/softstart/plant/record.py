@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from softstart.plant.advance import move
 from softstart.plant.jit import compiled
 from softstart.plant.layout import (
-    C, D, DEMAND, DOUBLED, LOAD, PHI2, SIDE, SLEW_END, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE,
+    C, D, DEMAND, DEMAND_SLOPE, DOUBLED, LOAD, PHI2, SIDE, SLEW_END, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE,
     S_START, S_THETA, S_UA, S_UB, S_UE, S_V, S_W2, THETA, U, UA, UB, UE, V, W2, Matrix, Vector,
 )  # fmt: skip
 from softstart.plant.modes import shaft_torque
@@ -38,6 +38,7 @@ def states_at(
             1.0 if row[S_K] > p[C] or (p[D] > 0.0 and row[S_SIDE] != 0.0 and row[S_DD] == 0.0) else 0.0
         )
         x[DEMAND] = 0.0
+        x[DEMAND_SLOPE] = 0.0
         m[UA] = row[S_UA]
         m[UB] = row[S_UB]
         m[UE] = row[S_UE]

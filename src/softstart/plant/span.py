@@ -12,8 +12,8 @@ import math
 from softstart.plant.crossing import RISING, WATCH, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DOUBLED, END_KNOWN, EXIT, FA, GAP,
-    GRAZE_LOWER, GRAZE_UPPER, INV_J, INV_J1, INV_J2, INV_W0SQ, J1, K, LAG, LAST_V, LAW, LEFT_BEYOND,
+    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DEMAND_SLOPE, DOUBLED, END_KNOWN, EXIT,
+    FA, GAP, GRAZE_LOWER, GRAZE_UPPER, INV_J, INV_J1, INV_J2, INV_W0SQ, J1, K, LAG, LAST_V, LAW, LEFT_BEYOND,
     LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MODELICA, NO_EVENT, PASSING, RATE, REACHED, REACTIVE,
     REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH, SWITCHED, TARGET, THETA, U, UA, UB,
     UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2, Y0, Z0, Septuple, Vector,
@@ -24,16 +24,27 @@ from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_targ
 
 @inlined
 def torque_course(p: Vector, x: Vector, m: Vector) -> None:
-    """The motor torque of the span: u(s) = ua + ub s + ue exp(-s/lag), after slew limiter and lag."""
+    """The motor torque of the span: u(s) = ua + ub s + ue exp(-s/lag), after slew limiter and lag.
+
+    The demand is a line, DEMAND + DEMAND_SLOPE s. A slew limiter that is not on it runs towards it at its
+    rate and meets it at SLEW_END; one that is on it follows, unless the line is too steep.
+    """
     demand = x[DEMAND]
-    ub = 0.0
+    ub = x[DEMAND_SLOPE]
     m[SLEW_END] = math.inf
     if x[REF] != demand:
         if p[RATE] < math.inf:
-            ub = math.copysign(p[RATE], demand - x[REF])
-            m[SLEW_END] = (demand - x[REF]) / ub
+            away = demand - x[REF]
+            slope = ub
+            ub = math.copysign(p[RATE], away)
+            if slope == 0.0:
+                m[SLEW_END] = away / ub
+            elif (ub - slope) * away > 0.0:
+                m[SLEW_END] = away / (ub - slope)
         else:
             x[REF] = demand
+    elif abs(ub) > p[RATE]:
+        ub = math.copysign(p[RATE], ub)
     ua = x[REF] - ub * p[LAG]
     ue = 0.0
     if p[LAG] > 0.0:

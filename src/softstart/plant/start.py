@@ -11,9 +11,9 @@ from softstart.plant.advance import advance
 from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
     ASK, ASKED, ASK_AT, ASK_ON_GAP, BAD_COMMAND, BEYOND, C, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE,
-    DEMAND, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAG, LAW, LOAD, MEMO_V, N_P, N_X, PHI2, RATE,
-    REACTIVE, SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0,
-    TIME, T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
+    DEMAND, DEMAND_SLOPE, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAG, LAW, LOAD, MEMO_V, N_P, N_X, PHI2,
+    RATE, REACTIVE, REF, SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA,
+    THETA_0, TIME, T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
 )  # fmt: skip
 from softstart.plant.modes import engage, shaft_torque
 
@@ -22,8 +22,10 @@ N_MEASURED = 7
 M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M_LOAD_SPEED = range(7)
 # what it may declare to see beyond time, motor angle, speed and torque
 SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
-# what it returns: torque demand, when to be asked again; its new state follows
-TORQUE, ASK_AGAIN = 0, 1
+# what it returns: torque demand, when to be asked again, the demand's slope until then; its new state follows
+TORQUE, ASK_AGAIN, SLOPE, NEW_STATE = range(4)
+
+SLOPE_ROUNDING = 1e-13  # a demand that goes on where a ramp has ended, but for so much, is no step
 
 _A = types.Array(types.float64, 1, "C")
 STEP_SIGNATURE = types.void(_A, _A, _A, _A)
@@ -87,17 +89,32 @@ def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
 
 
 @compiled
-def obey(p: Vector, x: Vector, torque: float, ask_again: float) -> bool:
-    """Take the controller's answer; False if it is none: not a number, or a past instant.
+def obey(p: Vector, x: Vector, torque: float, ask_again: float, slope: float) -> bool:
+    """Take the controller's answer; False if it is none: not a number, a past instant, a slope without end.
 
-    ask_again = -inf (NEVER) also ends the asking at gap events.
+    The demand is the straight line from `torque` now to torque + slope (ask_again - now) then, both ends
+    clipped to the drive's limits. ask_again = -inf (NEVER) also ends the asking at gap events.
     """
     if ask_again == -math.inf:
         x[ASK_ON_GAP] = 0.0
         ask_again = math.inf
     if math.isnan(torque) or not ask_again > x[TIME]:
         return False
-    x[DEMAND] = min(max(torque, p[U_MIN]), p[U_MAX])
+    demand = min(max(torque, p[U_MIN]), p[U_MAX])
+    if slope != 0.0:
+        length = ask_again - x[TIME]
+        end = torque + slope * length
+        if not math.isfinite(end):
+            return False
+        within = min(max(end, p[U_MIN]), p[U_MAX])
+        if demand != torque or within != end:
+            slope = (within - demand) / length
+    if x[DEMAND_SLOPE] != 0.0 and x[REF] == x[DEMAND]:
+        rounding = SLOPE_ROUNDING * (abs(demand) + abs(x[DEMAND_SLOPE]) * x[TIME])
+        if abs(demand - x[REF]) <= rounding:
+            x[REF] = demand
+    x[DEMAND] = demand
+    x[DEMAND_SLOPE] = slope
     x[ASK_AT] = ask_again
     x[ASKED] += 1.0
     if x[CONTACTS] == 1.0 and math.isnan(x[CONTACT_TORQUE]):  # the start is in contact
@@ -114,12 +131,13 @@ def _run(step, p, parameters, sees, x, m, measured, state, command, segments, ev
             x[STATUS] = reason
             return reason
         measure(p, x, sees, measured)
+        command[SLOPE] = 0.0
         step(parameters, measured, state, command)
-        if not obey(p, x, command[TORQUE], command[ASK_AGAIN]):
+        if not obey(p, x, command[TORQUE], command[ASK_AGAIN], command[SLOPE]):
             x[STATUS] = BAD_COMMAND
             return BAD_COMMAND
         for i in range(state.shape[0]):
-            state[i] = command[2 + i]
+            state[i] = command[NEW_STATE + i]
 
 
 @compiled_as(types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M))

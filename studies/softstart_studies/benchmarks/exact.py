@@ -32,7 +32,7 @@ class Kernel:
             type(controller).kernel, plant_vector(drive), own, int(controller.sensors),
             bool(controller.sensors & Sensor.STAGE), np.array([np.inf]), np.empty((len(gaps), at.N_X)),
             np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
-            np.zeros(2 + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
+            np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
         )  # fmt: skip
 
     def solve(self, work: tuple[Any, ...]) -> Vector:

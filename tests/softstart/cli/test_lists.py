@@ -38,6 +38,12 @@ def test_controllers_are_listed(run):
     assert {one["name"] for one in told["controllers"]} <= set(controller_names())
 
 
+def test_the_player_of_profiles_tells_how_it_is_given_one(run):
+    out = run("controllers", "profile").out
+    assert "path of the profile, CSV or TOML" in out
+    assert "--controller profile --param file=VALUE" in out
+
+
 @pytest.mark.parametrize("name", ["direct", "ramp", "reduced-two-stage"])
 def test_one_controller_tells_its_parameters(run, name):
     code, out, err = run("controllers", name)

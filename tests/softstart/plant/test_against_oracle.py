@@ -32,7 +32,12 @@ def case(seed: int) -> dict[str, Any]:
 
 def run_of(drawn: dict[str, Any]) -> Run:
     """The same start by the plant under test."""
-    torques = [u for _, u in drawn["torque_pieces"]]
+    pieces, ends = (
+        drawn["torque_pieces"],
+        [*(piece[0] for piece in drawn["torque_pieces"][1:]), drawn["t_end"]],
+    )
+    torques = [u for _, u, *_ in pieces]
+    torques += [u + (end - t) * sum(slope) for (t, u, *slope), end in zip(pieces, ends, strict=True)]
     Ms = max(*torques, 1.1 * drawn["Mc"], 1e-09)
     drive = Drive(
         motor_inertia=drawn["J1"],
@@ -52,7 +57,7 @@ def run_of(drawn: dict[str, Any]) -> Run:
         minimum_torque=min(0.0, *torques),
         target_speed=drawn["target"],
     )
-    return simulate(drive, Pieces(pieces=tuple(drawn["torque_pieces"])), until=drawn["t_end"])
+    return simulate(drive, Pieces(pieces=tuple(pieces), end=drawn["t_end"]), until=drawn["t_end"])
 
 
 @pytest.mark.parametrize("block", range(BLOCKS))

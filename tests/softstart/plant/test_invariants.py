@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.softstart.plant.pieces import Pieces, TwoSteps
 from tests.softstart.plant.test_against_oracle import case, run_of
 
-from softstart import Drive, controller, simulate
+from softstart import Drive, TorqueProfile, controller, simulate
 from softstart.plant.layout import S_SIDE, S_THETA
 
 SEEDS = st.integers(1_000, 100_000)
@@ -111,7 +111,17 @@ def test_time_shift(wait: float, torque: float, damping: float, lag: float) -> N
     assert later.contacts == now.contacts
 
 
-CONTROLLERS = [TwoSteps(20.0, 0.03, 62.0), *controller.controller_names()]
+RAMPED = TorqueProfile([0.0, 0.02, 0.02, 0.15], [10.0, 50.0, 20.0, 60.0])
+SENSED = TorqueProfile(
+    [0.0, 0.4], [5.0, 40.0], after_contact=TorqueProfile([0.0, 0.1, 0.1], [0.0, 50.0, 60.0])
+)
+PROFILES = [
+    controller.make_controller("profile", {"profile": RAMPED}),
+    controller.make_controller("profile", {"profile": RAMPED, "period": 0.0013}),
+    controller.make_controller("profile", {"profile": SENSED}),
+    controller.make_controller("profile", {"profile": SENSED, "period": 0.0013}),
+]
+CONTROLLERS = [TwoSteps(20.0, 0.03, 62.0), *PROFILES, *controller.ready_controller_names()]
 
 
 @pytest.mark.parametrize("strategy", CONTROLLERS, ids=str)
@@ -132,8 +142,8 @@ def test_batch_equals_single_exactly(strategy: Any) -> None:
             assert str(data.status.values[i]) == run.status.name
 
 
-@pytest.mark.parametrize("strategy", controller.controller_names())
-def test_a_plain_controller_equals_its_compiled_twin(strategy: str) -> None:
+@pytest.mark.parametrize("strategy", [*PROFILES, *controller.ready_controller_names()], ids=str)
+def test_a_plain_controller_equals_its_compiled_twin(strategy: Any) -> None:
     gaps = np.linspace(0.1, 3.0, 6)
     drive = Drive.load("crane-4amtkf").replace(torque_lag=0.001)
     compiled = controller.make_controller(strategy)

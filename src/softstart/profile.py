@@ -1,0 +1,224 @@
+"""A torque over time: what an optimum is, and what the `profile` controller plays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softstart import profile_code, profile_files
+from softstart.errors import InputError
+
+Vector = NDArray[np.float64]
+
+MOST_SAMPLES = 1_000_000
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class TorqueProfile:
+    """A torque demand that is linear between its knots; two knots at the same instant are a step.
+
+    `time` in s from 0 on and not falling, `torque` in N m, both of shape (n,). After the last knot the last
+    torque is held. `after_contact` is a second profile, on a clock that starts when the gap first closes: it
+    takes over there (a drive that senses the contact); None plays the first one to its end.
+
+    Raises InputError where the knots are no profile.
+
+    >>> pulse = TorqueProfile([0.0, 0.25, 0.25, 1.0], [62.0, 62.0, 0.0, 48.0])
+    >>> pulse.at([0.0, 0.25, 0.5, 2.0]).tolist()
+    [62.0, 0.0, 16.0, 48.0]
+    """
+
+    time: Vector
+    torque: Vector
+    after_contact: TorqueProfile | None = None
+
+    def __init__(
+        self, time: ArrayLike, torque: ArrayLike, after_contact: TorqueProfile | None = None
+    ) -> None:
+        time, torque = _vector("time", time), _vector("torque", torque)
+        if time.size != torque.size:
+            raise InputError(f"profile: {time.size} times for {torque.size} torques; give one torque a time.")
+        if time[0] != 0.0:
+            raise InputError(f"profile: its first time is {time[0]:g} s; a profile begins at 0 s.")
+        falling = np.flatnonzero(np.diff(time) < 0.0)
+        if falling.size:
+            i = int(falling[0])
+            raise InputError(
+                f"profile: time falls from {time[i]:g} s to {time[i + 1]:g} s at knot {i + 2}; "
+                "give the knots in order of time."
+            )
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "torque", torque)
+        object.__setattr__(self, "after_contact", after_contact)
+
+    @property
+    def end(self) -> float:
+        """Instant of the last knot, s."""
+        return float(self.time[-1])
+
+    def at(self, times: ArrayLike) -> Vector:
+        """Torque demand in N m at any instants, shape of `times`; at a step the value after it."""
+        when = np.asarray(times, dtype=np.float64)
+        last = np.searchsorted(self.time, when, side="right") - 1
+        last = last.clip(0, self.time.size - 1)
+        after = np.minimum(last + 1, self.time.size - 1)
+        width = self.time[after] - self.time[last]
+        share = np.where(width > 0.0, (when - self.time[last]) / np.where(width > 0.0, width, 1.0), 0.0)
+        values: Vector = self.torque[last] + share * (self.torque[after] - self.torque[last])
+        return values
+
+    @classmethod
+    def steps(cls, edges: ArrayLike, levels: ArrayLike) -> TorqueProfile:
+        """Constant torque `levels[i]` from `edges[i]` to `edges[i + 1]`; the last level is then held.
+
+        >>> TorqueProfile.steps([0.0, 0.01, 0.02], [62.0, 0.0]).at([0.005, 0.01, 3.0]).tolist()
+        [62.0, 0.0, 0.0]
+        """
+        at, held = np.asarray(edges, dtype=np.float64), np.asarray(levels, dtype=np.float64)
+        if at.size != held.size + 1:
+            raise InputError(f"profile: {held.size} levels need {held.size + 1} edges, not {at.size}.")
+        return cls(np.repeat(at, 2)[1:-1], np.repeat(held, 2)).simplified()
+
+    def simplified(self, tolerance: float = 1e-12) -> TorqueProfile:
+        """The same torque with as few knots as it needs (within `tolerance` of its largest torque).
+
+        >>> TorqueProfile([0.0, 0.1, 0.2, 0.2], [1.0, 1.0, 1.0, 1.0]).simplified().time.tolist()
+        [0.0]
+        """
+        allowed = tolerance * float(np.max(np.abs(self.torque), initial=1e-300))
+        kept = [0]
+        for i in range(1, self.time.size):
+            if self.time[i] == self.time[kept[-1]] and abs(self.torque[i] - self.torque[kept[-1]]) <= allowed:
+                continue
+            if len(kept) >= 2 and self._straight(kept[-2], kept[-1], i, allowed):
+                kept.pop()
+            kept.append(i)
+        if len(kept) >= 2 and abs(self.torque[kept[-1]] - self.torque[kept[-2]]) <= allowed:
+            kept.pop()
+        return TorqueProfile(self.time[kept], self.torque[kept], self.after_contact)
+
+    def _straight(self, i: int, j: int, k: int, allowed: float) -> bool:
+        """Whether knot j lies on the line from i to k."""
+        span = self.time[k] - self.time[i]
+        if self.time[j] in (self.time[i], self.time[k]):
+            return bool(self.time[i] == self.time[k])  # the middle one of three at the same instant
+        line = self.torque[i] + (self.torque[k] - self.torque[i]) * (self.time[j] - self.time[i]) / span
+        return bool(abs(line - self.torque[j]) <= allowed)
+
+    def clipped(self, lowest: float, highest: float) -> TorqueProfile:
+        """The same torque cut off at the limits, with knots where its lines cross them.
+
+        >>> TorqueProfile([0.0, 1.0], [-10.0, 30.0]).clipped(0.0, 20.0).time.tolist()
+        [0.0, 0.25, 0.75, 1.0]
+        """
+        after = None if self.after_contact is None else self.after_contact.clipped(lowest, highest)
+        if self.torque.min() >= lowest and self.torque.max() <= highest:
+            return TorqueProfile(self.time, self.torque, after)
+        times, torques = [float(self.time[0])], [float(self.torque[0])]
+        for t, u in zip(self.time[1:].tolist(), self.torque[1:].tolist(), strict=True):
+            start, before = times[-1], torques[-1]
+            crossings = []
+            for limit in (lowest, highest):
+                if min(before, u) < limit < max(before, u) and t > start:
+                    crossings.append(((limit - before) / (u - before), limit))
+            for share, limit in sorted(crossings):
+                times.append(min(start + share * (t - start), t))
+                torques.append(limit)
+            times.append(t)
+            torques.append(u)
+        return TorqueProfile(times, np.clip(torques, lowest, highest), after)
+
+    def sampled(self, period: float) -> TorqueProfile:
+        """Held from sample to sample (`period` in s), at the mean of this profile until the next sample.
+
+        Its integral is that of this profile at every sample; `after_contact` is sampled on its own clock.
+        Raises InputError for more than a million samples.
+
+        >>> TorqueProfile([0.0, 1.0], [0.0, 10.0]).sampled(0.5).at([0.0, 0.5, 1.0]).tolist()
+        [2.5, 7.5, 10.0]
+        """
+        after = None if self.after_contact is None else self.after_contact.sampled(period)
+        share = self.end / period
+        if not share <= MOST_SAMPLES:
+            raise InputError(
+                f"period = {period:g} s: that is {share:.3g} samples until the profile ends at "
+                f"{self.end:g} s, and at most {MOST_SAMPLES:,} are played; give a longer one, or 0 for none."
+            )
+        count = math.ceil(share)
+        samples = np.arange(count + 1) * period
+        edges = np.unique(np.concatenate([samples, self.time[self.time < samples[-1]]]))
+        middle = self.at(0.5 * (edges[:-1] + edges[1:]))  # straight in between: the mean of each piece
+        first = np.searchsorted(edges, samples[:-1])
+        impulse = np.add.reduceat(middle * np.diff(edges), first) if count else np.zeros(0)
+        levels = np.append(impulse / np.diff(samples), self.torque[-1])
+        return TorqueProfile(np.repeat(samples, 2)[1:], np.repeat(levels, 2)[:-1], after)
+
+    def followed_by(self, end: float, tail: TorqueProfile) -> TorqueProfile:
+        """The profile up to `end`, then `tail` on a clock that starts there.
+
+        >>> TorqueProfile([0.0], [5.0]).followed_by(1.0, TorqueProfile([0.0], [2.0])).at([0.5, 1.0]).tolist()
+        [5.0, 2.0]
+        """
+        before = self.time < end
+        left = self._just_before(end)
+        return TorqueProfile(
+            np.concatenate([self.time[before], [end], end + tail.time]),
+            np.concatenate([self.torque[before], [left], tail.torque]),
+            self.after_contact,
+        )
+
+    def _just_before(self, t: float) -> float:
+        """The torque as t is approached from below."""
+        i = int(np.searchsorted(self.time, t, side="left")) - 1
+        if i < 0:
+            return float(self.torque[0])
+        if i + 1 >= self.time.size:
+            return float(self.torque[-1])
+        share = (t - self.time[i]) / (self.time[i + 1] - self.time[i])
+        return float(self.torque[i] + share * (self.torque[i + 1] - self.torque[i]))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write time and torque as CSV, to the last bit; refused for a profile with `after_contact`."""
+        profile_files.write_csv(self, Path(path))
+
+    def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
+        """Write TOML that the `profile` controller plays; `about` says where the profile comes from."""
+        profile_files.write_toml(self, Path(path), about or {})
+
+    def to_c(
+        self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
+    ) -> None:
+        """Write C code with the function `double torque_profile(double time)`; `about` as in `to_toml`."""
+        profile_code.write_c(self, Path(path), name, about)
+
+    @classmethod
+    def load(cls, path: str | Path) -> TorqueProfile:
+        """Read a profile from CSV or TOML. Raises InputError that names file, line and value."""
+        time, torque, after = profile_files.read_profile(Path(path))
+        return cls(time, torque, None if after is None else cls(after.time, after.torque))
+
+    def heat(self, until: float, reference: float) -> float:
+        """I2t heat in s: the integral of (torque/reference)^2 from 0 to `until`; torque as demanded."""
+        edges = np.unique(np.concatenate([self.time[self.time < until], [0.0, until]]))
+        a = self.at(edges[:-1])
+        b = np.array([self._just_before(float(t)) for t in edges[1:]])
+        return float(np.sum(np.diff(edges) * (a * a + a * b + b * b)) / (3.0 * reference**2))
+
+
+def _vector(name: str, values: Any) -> Vector:
+    try:
+        vector = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"profile: its {name} is {values!r}; give a list of numbers.") from None
+    if vector.ndim != 1 or vector.size == 0:
+        raise InputError(f"profile: its {name} has shape {vector.shape}; give a list of one or more numbers.")
+    if not np.isfinite(vector).all():
+        raise InputError(f"profile: its {name} holds a value that is not finite; give finite numbers.")
+    vector.setflags(write=False)
+    return vector

@@ -1,0 +1,204 @@
+"""The controller `profile`: torque profiles played exactly, sampled, and taken over at the contact."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+from softstart import Drive, InputError, TorqueProfile, compare, simulate
+from softstart.controller import CompiledController, Sensor, make_controller, ready_controller_names
+from softstart_controllers.direct import Direct
+from softstart_controllers.profile import Profile
+
+CRANE = Drive.load("crane-4amtkf")
+SENSED = TorqueProfile(
+    [0.0, 0.3], [6.0, 50.0], after_contact=TorqueProfile([0.0, 0.04, 0.04], [20.0, 30.0, 55.0])
+)
+
+
+@some.composite
+def profiles(draw: some.DrawFn, lowest: float = -20.0, highest: float = 90.0) -> TorqueProfile:
+    """Knots with steps among them, some of them at one instant, some torques repeated."""
+    lengths = draw(some.lists(some.sampled_from([0.0, 0.001, 0.0137, 0.05]), max_size=7))
+    torque = some.sampled_from([0.0, 62.0, 31.0]) | some.floats(lowest, highest)
+    torques = draw(some.lists(torque, min_size=len(lengths) + 1, max_size=len(lengths) + 1))
+    return TorqueProfile(np.cumsum([0.0, *lengths]), torques)
+
+
+@settings(max_examples=60, deadline=None)
+@given(profiles())
+def test_the_demand_is_the_profile_at_every_instant(profile: TorqueProfile) -> None:
+    """Without lag or limits the motor torque is the profile, steps included; beyond a limit it is cut."""
+    drive = CRANE.replace(minimum_torque=-10.0, maximum_torque=70.0)
+    run = simulate(drive, Profile(profile=profile), until=profile.end + 0.05)
+    t = np.unique([*np.linspace(0.0, run.end_time, 400), *profile.time])
+    np.testing.assert_allclose(run.at(t)["u"], profile.at(t).clip(-10.0, 70.0), rtol=0.0, atol=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(profiles(), some.sampled_from([0.0, 0.0013]))
+def test_steps_alone_or_with_lag_and_limiter_twin_and_batch_agree(
+    profile: TorqueProfile, period: float
+) -> None:
+    drive = CRANE.replace(torque_lag=0.003, torque_rate=2000.0, maximum_torque=70.0, damping=0.1)
+    controller = Profile(profile=profile, period=period)
+    run = simulate(drive, controller, until=0.3)
+    plain = simulate(drive, controller.as_plain(drive), until=0.3)
+    many = simulate(drive.replace(maximum_torque=[62.0, 70.0]), controller, until=0.3)
+    assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
+    assert plain.segments.tobytes() == run.segments.tobytes()
+
+
+def test_a_constant_profile_is_a_direct_start_to_the_bit() -> None:
+    run, direct = (
+        simulate(CRANE, Profile(profile=TorqueProfile([0.0], [40.0]))),
+        simulate(CRANE, Direct(40.0)),
+    )
+    assert run.segments.tobytes() == direct.segments.tobytes()
+
+
+def test_knots_are_put_where_a_line_crosses_the_limits() -> None:
+    steep = TorqueProfile([0.0, 0.1], [-30.0, 170.0])
+    drive = CRANE.replace(maximum_torque=70.0)
+    run = simulate(drive, Profile(profile=steep), until=0.2)
+    for instant in (0.015, 0.05):
+        assert np.abs(run.segments[:, 0] - instant).min() < 1e-16
+    assert run.at([0.0, 0.03, 0.06])["u"] == pytest.approx([0.0, 30.0, 70.0], rel=1e-13)
+
+
+@settings(max_examples=60, deadline=None)
+@given(profiles(), some.sampled_from([0.001, 0.0007, 0.02, 0.11]))
+def test_samples_keep_the_impulse(profile: TorqueProfile, period: float) -> None:
+    """Motor and load together gain integral(u) - Mc t: the same, sampled or not, at every sample."""
+    sampled = profile.sampled(period)
+    instants = np.arange(math.ceil(profile.end / period) + 1) * period
+    for until in instants[1:]:
+        assert _impulse(sampled, until) == pytest.approx(_impulse(profile, until), abs=1e-12 * 90.0)
+    held = instants[:-1]
+    assert np.array_equal(sampled.at(held), sampled.at(held + 0.99 * period))
+
+
+def _impulse(profile: TorqueProfile, until: float) -> float:
+    edges = np.unique([0.0, *profile.time[profile.time < until], until])
+    return float(np.sum(np.diff(edges) * profile.at(0.5 * (edges[1:] + edges[:-1]))))
+
+
+def test_sampled_at_its_own_period_it_is_asked_there() -> None:
+    ramp = TorqueProfile([0.0, 0.05], [0.0, 50.0])
+    run = simulate(CRANE, Profile(profile=ramp, period=0.01), until=0.1)
+    assert run.at([0.0, 0.009, 0.01, 0.045, 0.06])["u"] == pytest.approx(
+        [5.0, 5.0, 15.0, 45.0, 50.0], rel=1e-12
+    )
+
+
+def test_after_the_contact_the_second_profile_runs_on_its_own_clock() -> None:
+    run = simulate(CRANE, Profile(profile=SENSED), until=0.5)
+    contact = run.first_contact
+    second = SENSED.after_contact
+    assert second is not None
+    assert 0.01 < contact < 0.3
+    before, after = np.linspace(0.0, contact, 50)[:-1], np.linspace(0.0, 0.1, 333)
+    np.testing.assert_allclose(run.at(before)["u"], SENSED.at(before), atol=1e-12)
+    apart = np.abs(after - 0.04) > 1e-12
+    np.testing.assert_allclose(run.at(contact + after)["u"][apart], second.at(after)[apart], atol=1e-11)
+    assert run.contacts > 1  # later contacts do not begin it again
+    assert float(run.at(0.5)["u"]) == 55.0
+
+
+def test_a_start_in_contact_begins_with_the_second_profile() -> None:
+    drive = CRANE.replace(start_position=0.5 * CRANE.gap + 0.03)
+    run = simulate(drive, Profile(profile=SENSED), until=0.02)
+    assert run.at([0.0, 0.01])["u"] == pytest.approx([20.0, 22.5], rel=1e-12)
+
+
+def test_with_a_period_the_second_profile_begins_at_a_sample() -> None:
+    run = simulate(CRANE, Profile(profile=SENSED, period=0.004), until=0.5)
+    takes_over = math.ceil(run.first_contact / 0.004) * 0.004
+    assert takes_over > run.first_contact
+    first = SENSED.sampled(0.004)
+    held = np.linspace(run.first_contact, takes_over, 9)[:-1]
+    np.testing.assert_allclose(run.at(held)["u"], first.at(held), atol=1e-12)
+    # 20 to 30 N m in 40 ms: the first sample holds the mean, 20.5
+    assert float(run.at(takes_over + 0.003)["u"]) == pytest.approx(20.5, rel=1e-12)
+
+
+def test_it_sees_the_contact_only_where_it_needs_to() -> None:
+    assert Profile(profile=TorqueProfile([0.0], [1.0])).sensors == Sensor.NONE
+    assert Profile(profile=SENSED).sensors == Sensor.STAGE
+
+
+@pytest.mark.parametrize("limits", [70.0, [62.0, 66.0, 70.0]])
+def test_batches_share_one_table_unless_the_limits_differ(limits: float | list[float]) -> None:
+    drive = CRANE.replace(gap=[0.5, 1.0, 2.0], maximum_torque=limits)
+    controller = Profile(profile=TorqueProfile([0.0, 0.1], [0.0, 90.0], after_contact=SENSED.after_contact))
+    vector = controller.vector(drive)
+    assert vector.shape[:-1] == (3,)
+    assert (vector.strides[0] == 0) == isinstance(limits, float)
+    many = simulate(drive, controller)
+    for i, one in enumerate(drive.elements()):
+        assert float(many.k_dyn[i]) == simulate(one, controller).k_dyn
+
+
+def test_its_parameters_are_short_and_plain(tmp_path: Path) -> None:
+    pulse = TorqueProfile([0.0, 0.2], [62.0, 10.0])
+    told = simulate(CRANE, Profile(profile=pulse)).summary()["parameters"]
+    assert json.loads(json.dumps(told)) == {"profile": {"knots": 2, "end": 0.2}, "period": 0.0}
+    path = tmp_path / "pulse.csv"
+    pulse.to_csv(path)
+    told = simulate(CRANE, "profile", parameters={"file": path, "period": "1 ms"}).summary()["parameters"]
+    assert told == {"file": str(path), "period": 0.001}
+
+
+@pytest.mark.parametrize("suffix", ["csv", "toml"])
+def test_a_file_replays_with_the_same_bits(tmp_path: Path, suffix: str) -> None:
+    pulse = TorqueProfile([0.0, 0.1, 0.1, 1 / 3], [20.0, 62.0 / 7, 30.0, 61.9])
+    path = tmp_path / f"pulse.{suffix}"
+    (pulse.to_csv if suffix == "csv" else pulse.to_toml)(path)
+    replayed = simulate(CRANE, "profile", parameters={"file": str(path)})
+    assert replayed.k_dyn == simulate(CRANE, Profile(profile=pulse)).k_dyn
+
+
+def test_it_is_compared_only_when_it_is_given_a_profile(tmp_path: Path) -> None:
+    assert "profile" not in ready_controller_names()
+    path = tmp_path / "pulse.csv"
+    TorqueProfile([0.0], [62.0]).to_csv(path)
+    table = compare(CRANE, ["direct", "profile"], parameters={"profile": {"file": str(path)}})
+    assert table.rows[0].run.k_dyn == table.rows[1].run.k_dyn
+    assert "profile" in ready_controller_names(["profile"])
+
+
+@pytest.mark.parametrize(
+    ("given_", "words"),
+    [
+        ({}, "--param file=PATH"),
+        ({"file": "a.csv", "profile": SENSED}, "both were given"),
+        ({"profile": "62.0"}, "this is no TorqueProfile"),
+        ({"file": 3.0}, "this parameter is a text"),
+        ({"file": "nowhere.csv"}, "cannot be read"),
+        ({"file": "nowhere.xls"}, "ends in .csv or .toml"),
+        ({"profile": SENSED, "period": -0.001}, "0 or more"),
+        ({"profile": SENSED, "period": math.nan}, "not a number"),
+    ],
+)
+def test_what_it_cannot_play_is_refused_in_one_sentence(given_: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        make_controller("profile", given_)
+    assert len(caught.value.sentences) == 1
+
+
+def test_too_many_samples_are_refused() -> None:
+    with pytest.raises(InputError, match="at most 1,000,000"):
+        simulate(CRANE, Profile(profile=TorqueProfile([0.0, 10.0], [1.0, 2.0]), period=1e-9))
+
+
+def test_knots_a_rounding_apart_do_not_stop_it() -> None:
+    close = TorqueProfile([0.0, 5e-324, 1e-17, 0.1, np.nextafter(0.1, 1.0)], [5.0, 60.0, 20.0, 30.0, 50.0])
+    run = simulate(CRANE, Profile(profile=close), until=0.2)
+    assert run.at([0.05, 0.15])["u"] == pytest.approx([25.0, 50.0], rel=1e-12)
+    assert isinstance(Profile(profile=close), CompiledController)

@@ -1,0 +1,234 @@
+"""A demand that moves in a line: against the oracle, against steps, and the slew limiter that chases it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+from tests.softstart.plant.pieces import Pieces
+from tests.softstart.plant.test_against_oracle import case, compare_with_oracle
+
+from softstart import (
+    Command,
+    CompiledController,
+    Drive,
+    Measured,
+    PlainController,
+    SimulationError,
+    TorqueProfile,
+    simulate,
+)
+from softstart.controller import compiled_step, make_controller
+from softstart.controller.compiled import ASK_AGAIN, SLOPE, TIME, TORQUE, Vector
+
+CRANE = Drive.load("crane-4amtkf")
+BLOCKS = 10
+DRIVES_PER_BLOCK = 24
+
+
+def ramped(seed: int) -> dict[str, Any]:
+    """A random start whose pieces are lines: some go on where the last one ended, some hold."""
+    drawn = case(seed)
+    rng = np.random.default_rng(seed)
+    pieces = drawn["torque_pieces"]
+    most = max(abs(u) for _, u in pieces)
+    ends = [*(t for t, _ in pieces[1:]), drawn["t_end"]]
+    after = [*(u for _, u in pieces[1:]), pieces[0][1]]
+    lines = []
+    for (t, u), end, goes_on in zip(pieces, ends, after, strict=True):
+        aim = (goes_on, u, most * float(rng.uniform(-0.3, 1.0)))[rng.choice(3, p=[0.4, 0.2, 0.4])]
+        lines.append((t, u, (aim - u) / (end - t)))
+    return drawn | {"torque_pieces": lines}
+
+
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_ramps_against_the_oracle(block: int) -> None:
+    """All contact laws, both kinds of load, with and without lag, rate limit and damping."""
+    for seed in range(50_000 + block * DRIVES_PER_BLOCK, 50_000 + (block + 1) * DRIVES_PER_BLOCK):
+        compare_with_oracle(ramped(seed), seed)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.004])
+@pytest.mark.parametrize("damping", [0.0, 0.6])
+@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
+def test_steps_converge_to_the_ramp_with_order_two(lag: float, damping: float, law: Any) -> None:
+    """Held at the mean of the line over each step: the impulse is kept, the rest is of second order."""
+    drive = CRANE.replace(
+        torque_lag=lag,
+        damping=damping,
+        contact_law=law,
+        start_position=0.5 * CRANE.gap + 0.02,
+        target_speed=60.0,
+    )
+    end, slope = 0.2, 250.0
+    exact = simulate(drive, Pieces(pieces=((0.0, 8.0, slope),), end=end), until=end)
+
+    def error(count: int) -> Vector:
+        edges = np.linspace(0.0, end, count + 1)
+        steps = tuple((float(t), 8.0 + slope * (float(t) + 0.5 * end / count)) for t in edges[:-1])
+        run = simulate(drive, Pieces(pieces=steps), until=end)
+        mine, theirs = run.at(end), exact.at(end)
+        assert run.contacts == exact.contacts == 1
+        off = [float(mine[name] - theirs[name]) for name in ("theta", "v", "w2")]
+        return np.abs([*off, run.peak_torque - exact.peak_torque])
+
+    coarse, fine, finer = error(400), error(800), error(1600)
+    floor = 1e-11 * exact.peak_torque
+    for rougher, better in ((coarse, fine), (fine, finer)):
+        counts = rougher > floor
+        np.testing.assert_allclose((rougher / np.maximum(better, 1e-300))[counts], 4.0, rtol=0.05)
+    assert np.any(coarse > floor)
+
+
+def test_a_ramp_without_lag_or_limit_is_the_line_itself() -> None:
+    run = simulate(CRANE, Pieces(pieces=((0.0, 5.0, 400.0), (0.1, 45.0, -100.0)), end=0.3), until=0.3)
+    t = np.linspace(0.0, 0.3, 700)[:-1]
+    line = np.where(t < 0.1, 5.0 + 400.0 * t, 45.0 - 100.0 * (t - 0.1))
+    np.testing.assert_allclose(run.at(t)["u"], line, rtol=0.0, atol=1e-13 * 62.0)
+
+
+def test_a_ramp_through_a_lag_is_the_closed_form() -> None:
+    """lag u' = k t - u from u = 0: u = k (t - lag) + k lag exp(-t/lag)."""
+    lag, k = 0.01, 150.0
+    run = simulate(CRANE.replace(torque_lag=lag), Pieces(pieces=((0.0, 0.0, k),), end=0.3), until=0.3)
+    t = np.linspace(0.0, 0.3, 400)
+    np.testing.assert_allclose(run.at(t)["u"], k * (t - lag) + k * lag * np.exp(-t / lag), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("torque", "slope", "meets"),
+    [
+        (50.0, -200.0, 50.0 / 1200.0),  # the line comes down to the limiter
+        (20.0, 300.0, 20.0 / 700.0),  # it runs away, but slower
+        (0.0, 900.0, 0.0),  # on it from the first instant
+    ],
+)
+def test_the_limiter_meets_a_moving_line(torque: float, slope: float, meets: float) -> None:
+    """From 0 at the rate of 1000 N m/s, then along the line."""
+    drive = CRANE.replace(torque_rate=1000.0)
+    run = simulate(drive, Pieces(pieces=((0.0, torque, slope),), end=0.06), until=0.06)
+    t = np.linspace(0.0, 0.06, 301)
+    u = np.where(t < meets, 1000.0 * t, torque + slope * t)
+    np.testing.assert_allclose(run.at(t)["u"], u, atol=1e-11)
+    assert meets == 0.0 or np.abs(run.segments[:, 0] - meets).min() < 1e-15
+
+
+def test_a_line_too_steep_for_the_limiter_is_chased_and_met_after_its_end() -> None:
+    drive = CRANE.replace(torque_rate=500.0)
+    run = simulate(drive, Pieces(pieces=((0.0, 0.0, 1000.0), (0.05, 50.0)), end=1.0), until=0.2)
+    t = np.linspace(0.0, 0.2, 500)
+    np.testing.assert_allclose(run.at(t)["u"], np.minimum(500.0 * t, 50.0), atol=1e-11)
+
+
+lines = some.tuples(some.floats(0.005, 0.05), some.floats(0.0, 60.0), some.floats(0.0, 60.0))
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.lists(lines, min_size=1, max_size=4), some.floats(200.0, 5000.0))
+def test_the_limiter_is_a_limiter(drawn: list[tuple[float, float, float]], rate: float) -> None:
+    """Against the limiter as it stands in textbooks, one short step after the other."""
+    pieces, t = [], 0.0
+    for length, before, after in drawn:
+        pieces.append((t, before, (after - before) / length))
+        t += length
+    run = simulate(CRANE.replace(torque_rate=rate), Pieces(pieces=tuple(pieces), end=t), until=t)
+    count = 4000
+    grid = np.linspace(0.0, t, count + 1)
+    which = np.searchsorted([piece[0] for piece in pieces], grid[1:], side="left") - 1
+    start, before, slope = np.array(pieces)[which].T
+    demand = before + slope * (grid[1:] - start)
+    step = rate * t / count
+    followed, r = [], 0.0
+    for line in demand.tolist():
+        r += min(max(line - r, -step), step)
+        followed.append(r)
+    roughness = step + t / count * float(np.abs(slope).max())
+    np.testing.assert_allclose(run.at(grid[1:-1])["u"], followed[:-1], atol=2.0 * roughness)
+
+
+@dataclass(frozen=True)
+class Answer(PlainController):
+    """One answer, then a constant torque."""
+
+    name: ClassVar[str] = "answer"
+    answer: Command = field(default_factory=lambda: Command(0.0))
+
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+        return self.answer if measured.time == 0.0 else Command(30.0)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        Command(1.0, math.inf, (), 5.0),
+        Command(1.0, 0.1, (), math.nan),
+        Command(1.0, 0.1, (), math.inf),
+        Command(math.inf, 0.1, (), -1.0),
+        Command(1.0, -math.inf, (), 1.0),
+    ],
+)
+def test_a_slope_without_an_end_is_refused(answer: Command) -> None:
+    with pytest.raises(SimulationError, match="slope without an end"):
+        simulate(CRANE, Answer(answer))
+
+
+def test_both_ends_of_a_line_are_clipped() -> None:
+    drive = CRANE.replace(maximum_torque=70.0, minimum_torque=-10.0)
+    run = simulate(drive, Answer(Command(140.0, 0.1, (), -2000.0)), until=0.2)
+    np.testing.assert_allclose(run.at([0.0, 0.05, 0.0999999999])["u"], [70.0, 30.0, -10.0], atol=1e-6)
+    assert run.at(0.15)["u"] == 30.0
+
+
+@compiled_step
+def slope_once(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """A slope in the first answer only: later ones do not write it."""
+    command[TORQUE] = 20.0
+    command[ASK_AGAIN] = measured[TIME] + 0.05
+    if measured[TIME] == 0.0:
+        command[SLOPE] = 400.0
+
+
+@dataclass(frozen=True)
+class SlopeOnce(CompiledController):
+    """Ramps for 50 ms."""
+
+    name: ClassVar[str] = "slope-once"
+    kernel: ClassVar[Any] = slope_once
+
+    def vector(self, drive: Drive) -> Vector:
+        return np.zeros((*drive.shape, 1))
+
+
+def test_a_slope_that_is_not_written_again_is_none() -> None:
+    run = simulate(CRANE, SlopeOnce(), until=0.2)
+    assert run.at([0.0, 0.025, 0.05, 0.08, 0.12])["u"].tolist() == [20.0, 30.0, 20.0, 20.0, 20.0]
+    many = simulate(CRANE.replace(gap=[CRANE.gap, CRANE.gap]), SlopeOnce(), until=0.2)
+    assert many.peak_torque.values.tolist() == [run.peak_torque, run.peak_torque]
+
+
+def test_contacts_under_a_slope_are_never_taken_for_repeated_ones() -> None:
+    """Undamped contacts repeat under a constant torque only: the batch, which strides, has the same bits."""
+    for slope in (0.0, 1e-9, 1.0, -3.0):
+        drive = CRANE.replace(target_speed=800.0)
+        player = Pieces(pieces=((0.0, 40.0, slope), (1.5, 40.0 + 1.5 * slope)), end=math.inf)
+        run = simulate(drive, player, until=2.5)
+        batch = simulate([drive], player, until=2.5)
+        assert run.contacts > 5
+        assert float(batch.contacts[0]) == run.contacts
+        assert float(batch.peak_torque[0]) == run.peak_torque
+
+
+def test_ramps_that_join_leave_no_splinters_behind_the_limiter() -> None:
+    """Where a line goes on from the end of the last one, rounding is no step that the limiter would chase."""
+    knots = np.linspace(0.0, 0.3, 301)
+    torque = 30.0 + 25.0 * np.sin(40.0 * knots)
+    player = make_controller("profile", {"profile": TorqueProfile(knots, torque)})
+    run = simulate(CRANE.replace(torque_rate=5000.0, torque_lag=0.002), player, until=0.3)
+    lengths = np.diff(run.segments[1:, :2], axis=1)
+    assert len(lengths) < 301 + 40
+    assert lengths.min() > 1e-7  # splinters are a rounding of the torque over the rate, 1e-18 s

@@ -1,0 +1,236 @@
+"""Torque profiles in files: what is written is read back with the same bits, and bad files are told apart."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as some
+
+from softstart import InputError, TorqueProfile
+
+quick = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+finite = some.floats(allow_nan=False, allow_infinity=False)
+
+
+@some.composite
+def profiles(draw: some.DrawFn, sensed: bool = True) -> TorqueProfile:
+    times = sorted(draw(some.lists(some.floats(0.0, allow_nan=False, allow_infinity=False), max_size=8)))
+    torques = draw(some.lists(finite, min_size=len(times) + 1, max_size=len(times) + 1))
+    after = draw(profiles(sensed=False)) if sensed and draw(some.booleans()) else None
+    return TorqueProfile([0.0, *times], torques, after)
+
+
+def assert_same(one: TorqueProfile | None, other: TorqueProfile | None) -> None:
+    assert (one is None) == (other is None)
+    if one is not None and other is not None:
+        assert one.time.tobytes() == other.time.tobytes()
+        assert one.torque.tobytes() == other.torque.tobytes()
+        assert_same(one.after_contact, other.after_contact)
+
+
+@quick
+@given(profiles(sensed=False))
+def test_csv_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile) -> None:
+    profile.to_csv(tmp_path / "p.csv")
+    assert_same(TorqueProfile.load(tmp_path / "p.csv"), profile)
+
+
+@quick
+@given(profiles(), some.dictionaries(some.text(), some.text() | some.floats(), max_size=4))
+def test_toml_gives_back_the_bits(tmp_path: Path, profile: TorqueProfile, about: dict[str, object]) -> None:
+    path = tmp_path / "p.toml"
+    profile.to_toml(path, about)
+    assert_same(TorqueProfile.load(path), profile)
+    document = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert document["controller"] == {"name": "profile"}
+    assert document.get("about", {}) == {str(key): str(value) for key, value in about.items()}
+
+
+def test_nothing_else_is_left_beside_the_file(tmp_path: Path) -> None:
+    pulse = TorqueProfile([0.0, 0.1], [1.0, 2.0])
+    for write, name in ((pulse.to_csv, "p.csv"), (pulse.to_toml, "p.toml"), (pulse.to_c, "p.c")):
+        write(tmp_path / name)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.c", "p.csv", "p.toml"]
+
+
+def test_csv_has_a_header_with_units(tmp_path: Path) -> None:
+    TorqueProfile([0.0, 0.1], [1.0, 2.5]).to_csv(tmp_path / "p.csv")
+    assert (tmp_path / "p.csv").read_text().splitlines() == [
+        "time [s],torque [N*m]",
+        "0,1",
+        "0.10000000000000001,2.5",
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,1\n0.1,2.5\n",
+        "t,u\n0,1\n0.1,2.5",
+        "# measured\n\nZeit [ms];Moment [N*m]\n0;1\n100;2.5\n",
+        "torque [kN*m],time [s]\n0.001,0\n0.0025,0.1\n",
+        "t (s)\tu (N*m)\n0\t1\n0.1\t2.5\n",
+        "t [s],phi1 [rad],u [N*m],T [N*m]\n0,0,1,7\n0.1,3,2.5,8\n",
+        "\ufefftime , torque\r\n 0 , 1 \r\n 1e-1 , 2.5 \r\n",
+    ],
+)
+def test_csv_is_read_with_other_headers_units_and_separators(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text(text, encoding="utf-8")
+    read = TorqueProfile.load(path)
+    assert read.time.tolist() == pytest.approx([0.0, 0.1], rel=1e-15)
+    assert read.torque.tolist() == pytest.approx([1.0, 2.5], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "it is empty"),
+        ("time,torque\n", "no knot below its header"),
+        ("time,torque\n0,1\n0.1,a\n", 'line 3, "a": this is no number'),
+        ("time,torque\n0,1\n0.1,nan\n", 'line 3, "nan": this is not finite'),
+        ("time,torque\n0.5,1\n", "line 2: the first time is 0.5 s"),
+        ("0,1\n0.2,1\n0.1,2\n", "line 3: time falls from 0.2 s to 0.1 s"),
+        ("0,1\n0.2\n", 'line 2, "0.2", has 1 value instead of 2'),
+        ("time,torque\n0,1\n0,5,62\n", "write decimal points"),
+        ("time;torque\n0;1\n0,1;62\n", 'line 3, "0,1": this is a decimal comma'),
+        ("time;torque\n0;1\n0.1;62,5\n", 'line 3, "62,5": this is a decimal comma'),
+        ("when,what,u\n0,1,2\n", "names no column time and torque"),
+        ("time [furlong],torque\n0,1\n", "furlong"),
+        ("0\n1\n", "has 1 value instead of 2"),
+    ],
+)
+def test_bad_csv_in_one_sentence_with_line_and_value(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        TorqueProfile.load(path)
+    (sentence,) = caught.value.sentences
+    assert words in sentence
+    assert "bad.csv" in sentence
+
+
+GOOD = "[profile]\ntime = [0, 0.1]\ntorque = [1, 2.5]\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        '[controller]\nname = "profile"\n' + GOOD,
+        '[profile]\ntime = [0, 100]\ntime_unit = "ms"\ntorque = [0.001, 0.0025]\ntorque_unit = "kN*m"\n',
+    ],
+)
+def test_toml_is_read_with_units(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(text, encoding="utf-8")
+    read = TorqueProfile.load(path)
+    assert read.time.tolist() == pytest.approx([0.0, 0.1], rel=1e-15)
+    assert read.torque.tolist() == pytest.approx([1.0, 2.5], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[profile\n", "not valid TOML"),
+        ("", "no table [profile]"),
+        ("[motor]\ninertia = 1\n", 'no "motor"'),
+        ('[controller]\nname = "ramp"\n' + GOOD, 'for the controller "ramp"'),
+        ("profile = 3\n", "write a table [profile]"),
+        ("[profile]\ntime = [0]\n", "torque = None: write a list"),
+        ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
+        ('[profile]\ntime = [0, "1"]\ntorque = [1, 1]\n', 'number 2 of the list is "1"'),
+        ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "number 2 of the list is True"),
+        ("[profile]\ntime = [0, inf]\ntorque = [1, 1]\n", "number 2 of the list is inf"),
+        ("[profile]\ntime = [0, 1]\ntorque = [1]\n", "2 times for 1 torques"),
+        ("[profile]\ntime = [1, 2]\ntorque = [1, 1]\n", "the first is 1 s"),
+        ("[profile]\ntime = [0, 2, 1]\ntorque = [1, 1, 1]\n", "falls from 2 s to 1 s at number 3"),
+        (GOOD + 'unit = "s"\n', 'no key "unit"'),
+        (GOOD + 'time_unit = "N*m"\n', "time_unit"),
+        (GOOD + "[after_contact]\ntime = [0]\n", "[after_contact] torque"),
+    ],
+)
+def test_bad_toml_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        TorqueProfile.load(path)
+    (sentence,) = caught.value.sentences
+    assert words in sentence
+    assert "bad.toml" in sentence
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+    pulse = TorqueProfile([0.0], [1.0], after_contact=TorqueProfile([0.0], [2.0]))
+    (tmp_path / "latin.csv").write_bytes(b"\xe9\n0,1\n")
+    for name, words in (
+        ("latin.csv", "UTF-8"),
+        ("none.toml", "cannot be read"),
+        ("p.bin", "ends in .csv or .toml"),
+    ):
+        with pytest.raises(InputError, match=words):
+            TorqueProfile.load(tmp_path / name)
+    with pytest.raises(InputError, match="write this profile as TOML"):
+        pulse.to_csv(tmp_path / "p.csv")
+    with pytest.raises(InputError, match="cannot be written"):
+        pulse.to_toml(tmp_path / "nowhere" / "p.toml")
+    for name in ("a b", "a__b", "a_", "1a", ""):
+        with pytest.raises(InputError, match="a C function is named"):
+            pulse.to_c(tmp_path / "p.c", name)
+
+
+compiler = shutil.which("cc")
+
+
+@pytest.mark.skipif(compiler is None, reason="no C compiler `cc` on this machine")
+def test_the_c_code_is_the_profile(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    steps = np.sort(rng.uniform(0.0, 1.0, 40)).repeat(2)
+    many = TorqueProfile([0.0, *steps, 1.5], rng.uniform(-50.0, 90.0, 82))
+    steep = TorqueProfile([0.0, 1e-13, 0.3, np.nextafter(0.3, 1.0), 0.5], [0.0, 62.0, 1 / 3, -7.0, 62.0])
+    for i, profile in enumerate((many, steep, TorqueProfile([0.0], [5.0], after_contact=many))):
+        source, library = tmp_path / f"p{i}.c", tmp_path / f"p{i}.so"
+        profile.to_c(source)
+        command = [
+            str(compiler),
+            "-O2",
+            "-Wall",
+            "-Werror",
+            "-shared",
+            "-fPIC",
+            "-o",
+            str(library),
+            str(source),
+            "-lm",
+        ]
+        subprocess.run(command, check=True, capture_output=True)
+        code = ctypes.CDLL(str(library))
+        functions = {"torque_profile": profile}
+        if profile.after_contact is not None:
+            functions["torque_profile_after_contact"] = profile.after_contact
+        for name, played in functions.items():
+            torque = getattr(code, name)
+            torque.restype, torque.argtypes = ctypes.c_double, [ctypes.c_double]
+            knots = played.time
+            t = np.concatenate(
+                [knots, np.nextafter(knots, 2.0), np.nextafter(knots[1:], 0.0), rng.uniform(0.0, 2.0, 500)]
+            )
+            values = np.array([torque(float(one)) for one in t])
+            np.testing.assert_allclose(values, played.at(t), rtol=1e-12, atol=1e-12)
+            assert torque(1e6) == played.torque[-1]
+
+
+def test_the_c_code_says_what_it_is(tmp_path: Path) -> None:
+    TorqueProfile([0.0, 0.25], [62.0, 0.0]).to_c(tmp_path / "p.c", "start", {"drive": "a */ b\nc"})
+    text = (tmp_path / "p.c").read_text()
+    assert text.startswith("/* Torque demand in N m over time in s")
+    assert "   drive: a * / b c\n" in text
+    assert "double start(double time) {" in text
+    assert str(tmp_path) not in text
