@@ -26,6 +26,7 @@ layers: $(VENV)/.installed-dev
 
 benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-starts --out results/benchmark-starts
+	$(BIN)/softstart study benchmark-optima --out results/benchmark-optima
 
 clean:
 	rm -rf $(VENV) results

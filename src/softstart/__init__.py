@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     )
     from softstart.drive import Drive
     from softstart.errors import InputError, SimulationError
+    from softstart.optimal.front import Front, pareto
+    from softstart.optimal.problem import Problem
+    from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
+    from softstart.optimal.robust import RobustOptimum, optimize_robust, worth_of_contact_sensor
+    from softstart.optimal.solving import optimize
+    from softstart.profile import TorqueProfile
     from softstart.run import Run
     from softstart.simulation import simulate
     from softstart.status import Status
@@ -35,15 +41,26 @@ _HOME = {
     "CompiledController": "softstart.controller",
     "Controller": "softstart.controller",
     "Drive": "softstart.drive",
+    "Front": "softstart.optimal.front",
+    "InfeasibleError": "softstart.optimal.result",
     "InputError": "softstart.errors",
     "Measured": "softstart.controller",
+    "Optimum": "softstart.optimal.result",
+    "OptimumError": "softstart.optimal.result",
     "PlainController": "softstart.controller",
+    "Problem": "softstart.optimal.problem",
+    "RobustOptimum": "softstart.optimal.robust",
     "Run": "softstart.run",
     "Sensor": "softstart.controller",
     "SimulationError": "softstart.errors",
     "Status": "softstart.status",
+    "TorqueProfile": "softstart.profile",
     "compare": "softstart.comparison",
+    "optimize": "softstart.optimal.solving",
+    "optimize_robust": "softstart.optimal.robust",
+    "pareto": "softstart.optimal.front",
     "simulate": "softstart.simulation",
+    "worth_of_contact_sensor": "softstart.optimal.robust",
 }
 
 __all__ = [
@@ -52,15 +69,26 @@ __all__ = [
     "CompiledController",
     "Controller",
     "Drive",
+    "Front",
+    "InfeasibleError",
     "InputError",
     "Measured",
+    "Optimum",
+    "OptimumError",
     "PlainController",
+    "Problem",
+    "RobustOptimum",
     "Run",
     "Sensor",
     "SimulationError",
     "Status",
+    "TorqueProfile",
     "compare",
+    "optimize",
+    "optimize_robust",
+    "pareto",
     "simulate",
+    "worth_of_contact_sensor",
 ]
 
 

@@ -1,4 +1,4 @@
-"""The command line: `softstart compare`, `simulate`, `drives`, `controllers`, `study`."""
+"""The command line: `softstart compare`, `simulate`, `optimize`, `pareto`, `drives`, `study` and more."""
 
 from softstart.cli.main import main
 

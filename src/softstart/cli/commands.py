@@ -7,6 +7,8 @@ import click
 from softstart import __version__
 from softstart.cli.compare import compare
 from softstart.cli.lists import controllers, drives
+from softstart.cli.optimize import optimize
+from softstart.cli.pareto import pareto
 from softstart.cli.simulate import simulate
 from softstart.cli.study import study
 from softstart.cli.usage import HELP_NAMES, Commands
@@ -17,6 +19,7 @@ softstart {__version__}: start a drive with a gap in its transmission gently, an
   softstart compare                              strategies side by side on the crane drive of the literature
   softstart drives crane-4amtkf > mine.toml      a drive of your own: change the file, then
   softstart compare mine.toml --out results        compare on it, with figures, traces and a report
+  softstart optimize --start-time 1.2x           the gentlest start there can be, as a torque profile
   softstart study                                what the papers claim, confirmed or refuted with numbers
 
 softstart --help lists all commands."""
@@ -45,5 +48,5 @@ def cli(context: click.Context) -> None:
         print(GREETING)
 
 
-for command in (compare, simulate, drives, controllers, study):
+for command in (compare, simulate, optimize, pareto, drives, controllers, study):
     cli.add_command(command)

@@ -38,7 +38,9 @@ if TYPE_CHECKING:
 @click.command(cls=Command)
 @drive_argument(default=DEFAULT_DRIVE)
 @controller_option(
-    "--controllers", "A,B,...", "Controllers, with commas between. By default all installed ones."
+    "--controllers",
+    "A,B,...",
+    "Controllers, with commas between. By default all installed ones that need no parameter.",
 )
 @set_option
 @param_option(
@@ -78,6 +80,10 @@ def compare(
         from softstart.cli.running import Attributed, make_controllers, working
 
         with working("starting the drive ..."):
+            if controllers is None:
+                from softstart.controller import ready_controller_names
+
+                names = ready_controller_names(given)
             made = make_controllers(names, given, prefix=True)
             from softstart.comparison import compare as compare_controllers
 

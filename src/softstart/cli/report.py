@@ -45,16 +45,16 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
     columns, cells = columns_and_rows(rows)
     headings = [" ".join(column.heading.split()) for column in columns]
     parts = [
-        f"# {_text(name)}: soft-start strategies compared",
+        f"# {markdown(name)}: soft-start strategies compared",
         conclusion(comparison),
-        _table(headings, cells, numbers_from=1),
+        markdown_table(headings, cells, numbers_from=1),
         *footnotes(comparison),
         *(f"![{stem}]({stem}.svg)" for stem in pictures),
         "## The drive",
-        _drive_table(comparison.drive),
+        drive_table(comparison.drive),
         "## The strategies",
         *(_strategy(run, stem) for run, stem in zip(runs, stems, strict=True)),
-        _provenance(comparison.drive, command),
+        provenance(comparison.drive, command),
     ]
     write_text(folder / "report.md", "\n\n".join(parts) + "\n")
 
@@ -71,14 +71,14 @@ def write_start(run: Run, folder: Path, command: str) -> None:
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     write_table(folder / "figures.csv", list(summary), [list(summary.values())])
     parts = [
-        f"# {_text(run.drive.name)}: start under {_text(stem)}",
+        f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
         run.status.value,
-        _table(["figure", "value"], figure_rows(run), numbers_from=1),
+        markdown_table(["figure", "value"], figure_rows(run), numbers_from=1),
         _strategy(run, stem),
         "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
         "## The drive",
-        _drive_table(run.drive),
-        _provenance(run.drive, command),
+        drive_table(run.drive),
+        provenance(run.drive, command),
     ]
     write_text(folder / "report.md", "\n\n".join(parts) + "\n")
 
@@ -93,14 +93,15 @@ def _write_run(run: Run, folder: Path, stem: str) -> None:
 def _strategy(run: Run, stem: str) -> str:
     cls = type(run.controller)
     values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
-    summary = f": {_text(cls.summary)}" if cls.summary else ""
+    summary = f": {markdown(cls.summary)}" if cls.summary else ""
     return (
-        f"### {_text(stem)}\n\n{_text(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
+        f"### {markdown(stem)}\n\n{markdown(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
         f"![{stem}](run-{stem}.svg)\n\nTraces: [trace-{stem}.csv](trace-{stem}.csv)"
     )
 
 
-def _drive_table(drive: Drive) -> str:
+def drive_table(drive: Drive) -> str:
+    """All parameters of a drive that are set."""
     from softstart.drive import PARAMETERS
 
     rows = []
@@ -110,10 +111,10 @@ def _drive_table(drive: Drive) -> str:
             shown = f"{value:.10g}" if isinstance(value, float) else str(value)
             unit = "" if parameter.unit == "1" else parameter.unit
             rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
-    return _table(["key", "symbol", "value", "unit", "meaning"], rows)
+    return markdown_table(["key", "symbol", "value", "unit", "meaning"], rows)
 
 
-def _provenance(drive: Drive, command: str) -> str:
+def provenance(drive: Drive, command: str) -> str:
     """What was run, by what, on which input: enough to do it again."""
     return (
         "## Where this comes from\n\n"
@@ -124,13 +125,16 @@ def _provenance(drive: Drive, command: str) -> str:
     )
 
 
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None) -> str:
+def markdown_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None
+) -> str:
+    """A table in Markdown; columns from `numbers_from` on are set to the right."""
     first = len(headings) if numbers_from is None else numbers_from
     rule = ["---" if index < first else "---:" for index in range(len(headings))]
-    return "\n".join(f"| {' | '.join(map(_text, cells))} |" for cells in (headings, rule, *rows))
+    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
 
 
-def _text(text: str) -> str:
+def markdown(text: str) -> str:
     """Text that Markdown leaves as it is, within a table too."""
     flat = " ".join(text.split())
     return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")

@@ -11,7 +11,10 @@ START = ("simulate", "crane-4amtkf", "--controller")
 ONE_SENTENCE = {
     # the command line
     "unknown command": (["compre"], ['"compre"', "did you mean softstart compare?"]),
-    "command unlike any": (["zzzzzz"], ["there are compare, simulate, drives, controllers and study"]),
+    "command unlike any": (
+        ["zzzzzz"],
+        ["there are compare, simulate, optimize, pareto, drives, controllers and study"],
+    ),
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
     "unknown option before a command": (["--verion"], ["did you mean --version?"]),
     "unknown short option": (["compare", "-z"], ["no option -z"]),

@@ -40,6 +40,11 @@ LIGHT = {
     "bad setting": (["compare", "--set", "gap=-1"], 2),
     "unknown controller": (["simulate", "good.toml", "--controller", "dirct"], 2),
     "bad output": (["compare", "--out", "good.toml"], 2),
+    "help of optimize": (["optimize", "--help"], 0),
+    "help of pareto": (["pareto", "--help"], 0),
+    "bad bound of an optimum": (["optimize", "--start-time", "0"], 2),
+    "bad terminal of an optimum": (["optimize", "--start-time", "1", "--terminal", "x"], 2),
+    "bad range of start times": (["pareto", "--start-times", "1:2"], 2),
 }
 
 
@@ -80,9 +85,10 @@ def test_greeting_names_three_things(spawn):
 def test_help_and_version(run):
     assert run("--version").out == f"softstart {__version__}\n"
     told = run("--help").out
-    for words in ("compare", "simulate", "drives", "controllers", "study", "_SOFTSTART_COMPLETE", "130"):
+    commands = ("compare", "simulate", "optimize", "pareto", "drives", "controllers", "study")
+    for words in (*commands, "_SOFTSTART_COMPLETE", "130"):
         assert words in told
-    for command in ("compare", "simulate", "drives", "controllers", "study"):
+    for command in commands:
         assert run(command, "-h").out.startswith(f"Usage: softstart {command}")
 
 

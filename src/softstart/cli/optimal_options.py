@@ -1,0 +1,249 @@
+"""The options of `optimize` and `pareto`: bounds, terminal condition, start times as numbers or multiples."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from softstart.cli.options import Decorator, Mistakes
+from softstart.cli.usage import did_you_mean
+from softstart.errors import InputError, SimulationError
+
+if TYPE_CHECKING:
+    from softstart.drive import Drive
+
+METHODS = ("auto", "closed-form", "collocation", "lp")
+OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
+OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("terminal", "minimise", "method")}
+OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("torque_speed", "smoothness")}
+OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("gaps", "inertias", "load_torques")}
+
+
+class Asked(NamedTuple):
+    """A start time as it was asked for: in s, or as a multiple of the start time of `direct`."""
+
+    value: float
+    multiple: bool = False
+
+    def seconds(self, direct: float) -> float:
+        """The start time in s; `direct` is that of the drive under its constant starting torque."""
+        return self.value * direct if self.multiple else self.value
+
+
+# the options ---------------------------------------------------------------------------------------------
+
+
+def terminal_option(default: str) -> Decorator:
+    """--terminal."""
+    return click.option(
+        "--terminal",
+        metavar="synchronous|steady|reached",
+        help="How the start ends: motor and load at the target speed; also with the shaft torque at that of "
+        f"the load; or only the load at the target speed. By default {default}.",
+    )
+
+
+method_option = click.option(
+    "--method",
+    metavar="|".join(METHODS),
+    help="By default auto: the cheapest one that is valid.",
+)
+torque_speed_option = click.option(
+    "--torque-speed",
+    metavar="SPEED:TORQUE,...",
+    help="Limit of the motor's torque over its speed by its corners, as '0 rad/s:62 N*m,90 rad/s:40 N*m'.",
+)
+smoothness_option = click.option(
+    "--smoothness",
+    metavar="TIME",
+    help="Weight of a smooth torque against a low K_dyn, as 0.001 (s). By default 0.",
+)
+
+
+# reading them --------------------------------------------------------------------------------------------
+
+
+def read_choice(text: str, option: str, choices: Sequence[str]) -> Any:
+    """One of the words.
+
+    >>> read_choice("steedy", "--terminal", ("synchronous", "steady", "reached"))
+    Traceback (most recent call last):
+    softstart.errors.InputError: --terminal = "steedy": there is no such choice; did you mean steady?
+    """
+    if text not in choices:
+        raise InputError(f'{option} = "{text}": there is no such choice; {did_you_mean(text, choices)}')
+    return text
+
+
+def read_start_time(text: str, option: str = "--start-time") -> Asked:
+    """A start time in s, or a multiple of that of `direct`.
+
+    >>> read_start_time("250 ms"), read_start_time("1.2x")
+    (Asked(value=0.25, multiple=False), Asked(value=1.2, multiple=True))
+    """
+    stripped = text.strip()
+    if stripped[-1:] in ("x", "X"):
+        value = read_positive(
+            stripped[:-1], option, "1", "a multiple of the start time of direct, as 1.2x", text
+        )
+        return Asked(value, multiple=True)
+    return Asked(read_positive(text, option, "s", 'a time above 0 s, as 0.3, "300 ms" or 1.2x'))
+
+
+def read_positive(text: str, option: str, unit: str, meaning: str, shown: str | None = None) -> float:
+    """A finite quantity above 0."""
+    from softstart.units import to_si
+
+    said = text if shown is None else shown
+    try:
+        value = float(to_si(text, unit, name=option))
+    except InputError as error:
+        if shown is None:
+            raise
+        raise InputError(f'{option} = "{said}": give {meaning}.') from error
+    if not value > 0.0:
+        raise InputError(f'{option} = "{said}": give {meaning}.')
+    return value
+
+
+def read_start_times(text: str) -> list[Asked]:
+    """Start times with commas between, or as from:to:count.
+
+    >>> read_start_times("0.25, 1.2x")
+    [Asked(value=0.25, multiple=False), Asked(value=1.2, multiple=True)]
+    >>> [round(one.value, 3) for one in read_start_times("0.25:0.5:3")]
+    [0.25, 0.375, 0.5]
+    """
+    option = "--start-times"
+    if ":" not in text:
+        return _each(text, option, lambda part: read_start_time(part, option))
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) != 3:
+        raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
+    mistakes = Mistakes()
+    ends: list[Asked] = []
+    for part in parts[:2]:
+        with mistakes.noted():
+            ends.append(read_start_time(part, option))
+    count = int(parts[2]) if parts[2].isascii() and parts[2].isdigit() else 0
+    with mistakes.noted():
+        if not 1 < count <= 1000:
+            raise InputError(f'{option} = "{text}": the count is a whole number from 2 to 1000.')
+    mistakes.settle()
+    first, last = ends
+    if first.multiple != last.multiple:
+        raise InputError(
+            f'{option} = "{text}": give both ends as times, or both as multiples of direct (1.2x).'
+        )
+    step = (last.value - first.value) / (count - 1)
+    return [Asked(first.value + index * step, first.multiple) for index in range(count)]
+
+
+def read_quantities(text: str | None, option: str, unit: str) -> list[float]:
+    """Numbers or quantities with commas between; none if nothing was given.
+
+    >>> read_quantities("0.25, 500 mrad", "--gaps", "rad")
+    [0.25, 0.5]
+    """
+    if text is None:
+        return []
+    from softstart.units import to_si
+
+    return _each(text, option, lambda part: float(to_si(part, unit, name=option)))
+
+
+def read_corners(text: str | None) -> tuple[tuple[float, float], ...]:
+    """Corners of a torque-speed curve, rad/s and N m.
+
+    >>> read_corners("0:62, 900 rpm: 40 N*m")[1][1]
+    40.0
+    """
+    if text is None:
+        return ()
+    from softstart.units import to_si
+
+    def corner(part: str) -> tuple[float, float]:
+        speed, colon, torque = part.partition(":")
+        if not (colon and speed.strip() and torque.strip()):
+            raise InputError(f'--torque-speed = "{part}": write each corner as speed:torque, as 90:40.')
+        option = "--torque-speed"
+        return float(to_si(speed, "rad/s", name=option)), float(to_si(torque, "N*m", name=option))
+
+    return tuple(_each(text, "--torque-speed", corner))
+
+
+def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
+    """Every part of a list with commas between, read; all mistakes at once."""
+    parts = [part.strip() for part in text.split(",")]
+    if not all(parts):
+        raise InputError(
+            f'{option} = "{text}": a place in the list is empty; write values with commas between.'
+        )
+    mistakes = Mistakes()
+    found = []
+    for part in parts:
+        with mistakes.noted():
+            found.append(read(part))
+    mistakes.settle()
+    return found
+
+
+@contextmanager
+def named_as_options() -> Iterator[None]:
+    """Sentences about keywords of the Python functions, as sentences about the options."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
+
+
+def as_option(sentence: str) -> str:
+    """The sentence with the option's name where the keyword's was.
+
+    >>> as_option("terminal = 'x': choose one of ..."), as_option("smoothing is hard.")
+    ("--terminal = 'x': choose one of ...", 'smoothing is hard.')
+    """
+    found = re.match(r"(\w+)(?= =|:)", sentence)
+    if found is None or found[1] not in OPTION_OF:
+        return sentence
+    return OPTION_OF[found[1]] + sentence[found.end() :]
+
+
+# what comes of them --------------------------------------------------------------------------------------
+
+
+def start_time_of_direct(drive: Drive) -> float:
+    """Start time of the drive under its constant starting torque, s. Raises SimulationError without one."""
+    from softstart.simulation import simulate
+
+    run = simulate(drive, "direct")
+    if math.isnan(run.start_time):
+        raise SimulationError(
+            f"direct does not bring this load to its target speed ({run.status.value[:-1]}); "
+            "give start times in s instead of multiples."
+        )
+    return run.start_time
+
+
+@contextmanager
+def no_solution_told(as_json: bool) -> Iterator[None]:
+    """Where there is no optimum: its verdict as the JSON object, one sentence, and exit code 3."""
+    try:
+        yield
+    except RuntimeError as error:
+        if isinstance(error, SimulationError | RecursionError | NotImplementedError):
+            raise
+        from softstart.cli.show import print_json
+        from softstart.optimal.collocation import NotConverged
+        from softstart.optimal.result import InfeasibleError, OptimumError
+
+        if not isinstance(error, InfeasibleError | OptimumError | NotConverged):
+            raise
+        if as_json and isinstance(error, InfeasibleError):
+            print_json(error.verdict.summary())
+        raise SimulationError(as_option(str(error))) from error

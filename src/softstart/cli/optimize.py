@@ -1,0 +1,230 @@
+"""`softstart optimize`: the gentlest start within a given time, and how much better any start could be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from softstart.cli.folder import output_folder
+from softstart.cli.optimal_options import (
+    METHODS,
+    OPTION_OF,
+    Asked,
+    method_option,
+    named_as_options,
+    no_solution_told,
+    read_choice,
+    read_corners,
+    read_positive,
+    read_quantities,
+    read_start_time,
+    smoothness_option,
+    start_time_of_direct,
+    terminal_option,
+    torque_speed_option,
+)
+from softstart.cli.optimum_text import AIMS, controller_summary, show_optimum
+from softstart.cli.options import (
+    DEFAULT_DRIVE,
+    Mistakes,
+    command_line,
+    drive_argument,
+    json_option,
+    out_option,
+    read_drive,
+    set_option,
+)
+from softstart.cli.usage import Command
+from softstart.errors import InputError, SimulationError
+
+if TYPE_CHECKING:
+    from softstart.drive import Drive
+    from softstart.optimal.result import Optimum
+    from softstart.run import Run
+
+
+@click.command(cls=Command)
+@drive_argument(default=DEFAULT_DRIVE)
+@click.option(
+    "--start-time", metavar="TIME", help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct."
+)
+@terminal_option("synchronous")
+@method_option
+@click.option("--minimise", metavar="|".join(AIMS), help="By default k_dyn.")
+@click.option("--max-k-dyn", metavar="NUMBER", help="Largest K_dyn allowed, if another figure is minimised.")
+@click.option("--max-heat", metavar="TIME", help="Largest I2t heat allowed, in s of starting torque.")
+@torque_speed_option
+@smoothness_option
+@click.option(
+    "--gaps", metavar="GAP,...", help="One profile for these gaps, with a contact sensor and without."
+)
+@click.option("--inertias", metavar="INERTIA,...", help="... for these load inertias.")
+@click.option("--load-torques", metavar="TORQUE,...", help="... for these load torques.")
+@set_option
+@json_option
+@out_option("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
+def optimize(
+    *,
+    drive: str,
+    start_time: str | None,
+    gaps: str | None,
+    inertias: str | None,
+    load_torques: str | None,
+    settings: tuple[str, ...],
+    as_json: bool,
+    out: str | None,
+    **texts: str | None,
+) -> None:
+    """Find the torque profile with the least K_dyn for a start time, and prove how good it is.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
+    """
+    from softstart.optimal.problem import Problem
+
+    mistakes = Mistakes()
+    one: Drive | None = None
+    asked: Asked | None = None
+    varied: dict[str, list[float]] = {}
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    if start_time is not None:
+        with mistakes.noted():
+            asked = read_start_time(start_time)
+    bounds = bounds_of(texts, mistakes)
+    lists = (("gaps", gaps, "rad"), ("inertias", inertias, "kg*m^2"), ("load_torques", load_torques, "N*m"))
+    for name, text, unit in lists:
+        with mistakes.noted():
+            varied[name] = read_quantities(text, f"--{name.replace('_', '-')}", unit)
+    several = any(text is not None for _, text, _ in lists)
+    if several:
+        mistakes.sentences += not_for_several(bounds)
+    needed = start_time is None and bounds.get("minimise") != "start_time"
+    if one is not None and not mistakes.sentences:
+        if needed:
+            raise InputError(_suggestion(one, bounds))
+        with mistakes.noted(), named_as_options():
+            Problem(
+                one,
+                None if asked is None else 1.0,  # whichever it is, it is above 0
+                **{name: value for name, value in bounds.items() if name != "method"},
+            )
+    elif needed:
+        mistakes.sentences.append(f"{_missing(bounds)}, as --start-time 1.2x.")
+    mistakes.settle()
+    assert one is not None
+    if several:
+        from softstart.cli.optimize_robust import optimize_for_all
+
+        assert asked is not None
+        optimize_for_all(one, asked, varied, as_json, out)
+    else:
+        _optimize_one(one, asked, bounds, as_json, out)
+
+
+def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, Any]:
+    """The options that were given, read, under the names of the keywords of `softstart.optimize`."""
+    from softstart.optimal.problem import OBJECTIVES, TERMINALS
+
+    readers: dict[str, tuple[str, Callable[[str], Any]]] = {
+        "terminal": ("terminal", lambda text: read_choice(text, "--terminal", TERMINALS)),
+        "method": ("method", lambda text: read_choice(text, "--method", METHODS)),
+        "minimise": ("minimise", lambda text: read_choice(text, "--minimise", OBJECTIVES)),
+        "max_k_dyn": ("k_dyn", lambda text: read_positive(text, "--max-k-dyn", "1", "a number above 0")),
+        "max_heat": ("heat", lambda text: read_positive(text, "--max-heat", "s", "a time above 0 s")),
+        "torque_speed": ("torque_speed", read_corners),
+        "smoothness": ("smoothness", _weight),
+    }
+    found: dict[str, Any] = {}
+    for name, text in texts.items():
+        if text is not None:
+            key, read = readers[name]
+            with mistakes.noted():
+                found[key] = read(text)
+    return found
+
+
+def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
+    """What cannot be asked of one profile for several drives."""
+    fixed = {"terminal": "reached", "method": "auto", "minimise": "k_dyn"}
+    return [
+        f"{OPTION_OF[name]}: one profile for several drives is judged by its largest K_dyn, with terminal "
+        "reached; leave this option out."
+        for name, value in bounds.items()
+        if fixed.get(name) != value
+    ]
+
+
+def _weight(text: str) -> float:
+    from softstart.units import to_si
+
+    value = float(to_si(text, "s", name="--smoothness"))
+    if value < 0.0:
+        raise InputError(f'--smoothness = "{text}": a weight in s, 0 or more.')
+    return value
+
+
+def _missing(bounds: Mapping[str, Any]) -> str:
+    aim = AIMS[bounds.get("minimise", "k_dyn")]
+    return f"--start-time is missing: without it the start with the least {aim} would take for ever; give one"
+
+
+def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
+    """What to type instead, from what `direct` needs."""
+    from softstart.cli.running import working
+
+    with working("starting the drive ..."):
+        direct = start_time_of_direct(drive)
+    return (
+        f"{_missing(bounds)}, as --start-time 1.2x, which is {1.2 * direct:.4g} s: 1.2 times the "
+        f"{direct:.4g} s that direct needs."
+    )
+
+
+def _optimize_one(
+    drive: Drive, asked: Asked | None, bounds: dict[str, Any], as_json: bool, out: str | None
+) -> None:
+    with no_solution_told(as_json), output_folder(out) as folder:
+        from softstart.cli.running import working
+
+        with working("looking for the gentlest start ..."):
+            from softstart.optimal.solving import optimize as solve
+
+            direct = start_time_of_direct(drive) if asked is not None and asked.multiple else math.nan
+            seconds = None if asked is None else asked.seconds(direct)
+            with named_as_options():
+                best = solve(drive, seconds, **bounds)
+        with working("starting the drive under the shipped controllers ..."):
+            others = runs_beside(best)
+        if folder is not None:
+            from softstart.cli.optimal_report import write_optimum
+
+            with working("drawing the figure ..."):
+                write_optimum(best, others, folder, command_line())
+
+    from softstart.cli.show import console, print_json
+
+    if as_json:
+        print_json({**best.summary(), "controllers": [controller_summary(run) for run in others]})
+    else:
+        show_optimum(console(), best, others)
+        if out is not None:
+            print(f"\nWritten to {out}: report.md, the profile (CSV, TOML, C), figure and traces.")
+
+
+def runs_beside(best: Optimum) -> list[Run]:
+    """The same drive under every controller that runs without being given a parameter, and does not fail."""
+    from softstart.cli.running import Attributed
+    from softstart.controller import ready_controller_names
+    from softstart.simulation import simulate
+
+    drive, base = best.problem.drive, best.problem.base
+    runs = []
+    for name in ready_controller_names():
+        with suppress(InputError, SimulationError), Attributed(name):
+            runs.append(simulate(drive, name, base=base))
+    return runs

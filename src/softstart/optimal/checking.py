@@ -1,0 +1,258 @@
+"""The judge: a method's answer runs on the exact plant, and every promise it made is compared with that.
+
+Nothing is read off the method's own grid: the demand is judged over all of its straight lines, the realised
+torque over every span of the run, the peak is located, and the terminal condition is that of the plant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart import metrics
+from softstart.optimal.problem import Problem
+from softstart.optimal.replay import heat_of, replay
+from softstart.optimal.result import LowerBound, OptimumError
+from softstart.optimal.tail import torque_allowed
+from softstart.plant import layout as at
+from softstart.profile import TorqueProfile
+from softstart.run import Run
+
+Vector = NDArray[np.float64]
+
+ROUNDING = 1e-9  # of limits and times
+SHORT = 1e-6  # of the target speed: by so much it may be missed
+BELOW = 1e-5  # K_dyn may lie below its bound by what SHORT is worth
+LOCAL = 0.05  # above a certificate by more than this share: not the optimum
+SAMPLES = 64  # an elastic period, where the torque is compared with a torque-speed curve
+
+
+def check(
+    problem: Problem,
+    profile: TorqueProfile,
+    end_time: float,
+    claimed: float,
+    bound: LowerBound,
+    *,
+    tolerance: float = 1e-3,
+) -> Run:
+    """Run a profile on the exact plant to one elastic period after `end_time`, and hold it to its promises.
+
+    `end_time` is t_f in s, `claimed` the value of what is minimised as the method computed it, `tolerance`
+    how far, relatively, the exact figures may be from it and above bounds. Returns the run; raises
+    OptimumError with one sentence for each thing that does not hold, each with both numbers.
+
+    >>> from softstart import Drive
+    >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
+    >>> bound = LowerBound(0.909, "momentum", "every torque")
+    >>> check(problem, TorqueProfile([0.0], [62.0]), 0.2402535, 0.9, bound)
+    Traceback (most recent call last):
+    softstart.optimal.result.OptimumError: ...K_dyn is 3.1... in the exact re-simulation, 0.9 was claimed...
+    """
+    period = float(problem.drive.elastic_period)
+    if not 0.0 < end_time < math.inf:
+        raise OptimumError(f"The end time of the start is {end_time:g} s, which is no time above 0 s.")
+    run = replay(problem.drive, profile, end_time + period, problem.base)
+    wrong = [
+        *_demand(problem, profile),
+        *_realised(problem, run),
+        *_torque_speed(problem, run),
+        *_times(problem, run, end_time, tolerance),
+        *_terminal(problem, run, end_time, tolerance),
+        *_contacts(run, end_time, tolerance),
+        *_figures(problem, run, end_time, claimed, tolerance),
+        *_against_bound(problem, run, bound),
+    ]
+    if wrong:
+        raise OptimumError(" ".join(wrong))
+    return run
+
+
+def _demand(problem: Problem, profile: TorqueProfile, name: str = "demand") -> Iterator[str]:
+    """A straight line is extreme at its ends."""
+    low, high = problem.lowest_torque, problem.highest_torque
+    allowed = ROUNDING * max(abs(low), abs(high))
+    for i, limit, beyond in (
+        (int(np.argmax(profile.torque)), high, "above the highest"),
+        (int(np.argmin(profile.torque)), low, "below the lowest"),
+    ):
+        torque = float(profile.torque[i])
+        if (torque - limit if limit == high else limit - torque) > allowed:
+            yield (
+                f"The {name} is {torque:.6g} N m at {profile.time[i]:.6g} s, {beyond} motor torque of "
+                f"{limit:.6g} N m."
+            )
+    if profile.after_contact is not None:
+        yield from _demand(problem, profile.after_contact, "demand after contact")
+
+
+def _realised(problem: Problem, run: Run) -> Iterator[str]:
+    """u(s) = ua + ub s + ue exp(-s/lag) in each span: extreme at its ends or where its slope is 0."""
+    low, high = problem.lowest_torque, problem.highest_torque
+    lag = float(problem.drive.torque_lag)
+    start, end = run.segments[:, at.S_START], run.segments[:, at.S_END]
+    ua, ub, ue = (run.segments[:, column] for column in (at.S_UA, at.S_UB, at.S_UE))
+    length = end - start
+    turns = np.zeros_like(length)
+    if lag > 0.0:
+        bent = (ub != 0.0) & (ue / np.where(ub != 0.0, ub * lag, 1.0) > 0.0)
+        turns[bent] = lag * np.log(ue[bent] / (ub[bent] * lag))
+    s = np.stack([np.zeros_like(length), length, np.clip(turns, 0.0, length)])
+    u = ua + ub * s + (ue * np.exp(-s / lag) if lag > 0.0 else 0.0)
+    allowed = ROUNDING * max(abs(low), abs(high))
+    for i, limit, beyond in (
+        (int(np.argmax(u)), high, "above the highest"),
+        (int(np.argmin(u)), low, "below the lowest"),
+    ):
+        row, span = np.unravel_index(i, u.shape)
+        torque = float(u[row, span])
+        if (torque - limit if limit == high else limit - torque) > allowed:
+            yield (
+                f"The motor torque is {torque:.6g} N m at {start[span] + s[row, span]:.6g} s, {beyond} of "
+                f"{limit:.6g} N m."
+            )
+
+
+def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:
+    """Motor torque against the curve: densely in each span, then the worst instant located."""
+    if not problem.torque_speed:
+        return
+    from scipy.optimize import minimize_scalar
+
+    step = float(problem.drive.elastic_period) / SAMPLES
+    worst, when, span = -math.inf, 0.0, 0
+    for index, (start, end) in enumerate(run.segments[:, [at.S_START, at.S_END]].tolist()):
+        times = np.linspace(start, end, 2 + math.ceil((end - start) / step))
+        excess = _excess(problem, run, index, times)
+        i = int(np.argmax(excess))
+        if excess[i] > worst:
+            worst, when, span = float(excess[i]), float(times[i]), index
+    start, end = (float(run.segments[span, column]) for column in (at.S_START, at.S_END))
+    near = max(start, when - step), min(end, when + step)
+    if near[1] > near[0]:
+        found = minimize_scalar(
+            lambda t: -float(_excess(problem, run, span, np.array([t]))[0]),
+            bounds=near,
+            method="bounded",
+            options={"xatol": 1e-6 * step},
+        )
+        if -float(found.fun) > worst:
+            worst, when = -float(found.fun), float(found.x)
+    if worst > SHORT * problem.highest_torque:
+        state = run.states_in(np.array([span]), np.array([when]))
+        u, w1 = float(state["u"][0]), float(state["w1"][0])
+        yield (
+            f"The motor torque is {u:.6g} N m at {when:.6g} s and {w1:.6g} rad/s, where the torque-speed "
+            f"curve allows {u - worst:.6g} N m."
+        )
+
+
+def _excess(problem: Problem, run: Run, index: int, times: Vector) -> Vector:
+    """Motor torque minus what the curve allows, N m."""
+    state = run.states_in(np.full(times.size, index), times)
+    excess: Vector = state["u"] - torque_allowed(problem, state["w1"])
+    return excess
+
+
+def _times(problem: Problem, run: Run, end_time: float, tolerance: float) -> Iterator[str]:
+    latest = problem.start_time
+    if latest is not None and end_time > latest * (1.0 + ROUNDING):
+        yield f"The start takes {end_time:.9g} s, longer than the start time of {latest:.9g} s."
+    reached = run.start_time
+    if problem.minimise == "start_time" and reached < end_time * (1.0 - tolerance):
+        yield f"The load has its target speed at {reached:.6g} s already, {end_time:.6g} s was claimed."
+
+
+def _terminal(problem: Problem, run: Run, end_time: float, tolerance: float) -> Iterator[str]:
+    state = {name: float(value) for name, value in run.at(end_time).items()}
+    drive, target = problem.drive, problem.target
+    if state["w2"] < target * (1.0 - SHORT):
+        yield (
+            f"The load speed is {state['w2']:.9g} rad/s at {end_time:.6g} s, below its target of "
+            f"{target:.9g} rad/s."
+        )
+    if state["w2"] > target * (1.0 + tolerance):
+        yield (
+            f"The load speed is {state['w2']:.9g} rad/s at {end_time:.6g} s, above its target of "
+            f"{target:.9g} rad/s."
+        )
+    if problem.terminal == "reached":
+        return
+    # what is left of the relative speed swings T by c v/Omega: it must not show
+    swing = float(drive.c / drive.Omega) * abs(state["v"])
+    if swing > tolerance * problem.base_torque:
+        yield (
+            f"The motor speed is {state['w1']:.9g} rad/s and the load speed {state['w2']:.9g} rad/s at "
+            f"{end_time:.6g} s, and they should be equal."
+        )
+    if problem.terminal == "steady" and abs(state["T"] - float(drive.Mc)) > tolerance * problem.base_torque:
+        yield (
+            f"The shaft torque is {state['T']:.6g} N m at {end_time:.6g} s, and it should be the load torque "
+            f"of {drive.Mc:.6g} N m."
+        )
+
+
+def _contacts(run: Run, end_time: float, tolerance: float) -> Iterator[str]:
+    """Contacts until t_f; the gap closing again so softly that it does not show is none."""
+    drive = run.drive
+    closed = [
+        event.time
+        for event in run.events
+        if event.kind == "gap closed" and event.time < end_time * (1.0 - ROUNDING)
+    ]
+    soft = tolerance * run.peak_torque * float(drive.Omega / drive.c)
+    speeds = np.abs(run.at(closed)["v"]) if closed else np.zeros(0)
+    began_closed = run.contacts > sum(event.kind == "gap closed" for event in run.events)
+    first = 0 if began_closed else 1
+    again = [time for time, v in zip(closed[first:], speeds[first:], strict=True) if v > soft]
+    if again:
+        yield (
+            f"The gap closes {len(again) + 1} times before {end_time:.6g} s (again at {again[0]:.6g} s), and "
+            "it may close 1 time."
+        )
+    elif not closed and not began_closed:
+        yield f"The gap closes 0 times before {end_time:.6g} s, and it has to close 1 time."
+
+
+def _figures(problem: Problem, run: Run, end_time: float, claimed: float, tolerance: float) -> Iterator[str]:
+    """What was claimed, and the bounds of the problem on what is not minimised."""
+    k_dyn = _k_dyn(problem, run)
+    heat = heat_of(run, end_time)
+    short = not run.start_time <= end_time  # by so little that it passed as reached
+    taken = end_time if short else run.start_time
+    name, value, unit = {
+        "k_dyn": ("K_dyn", k_dyn, ""),
+        "heat": ("The heat", heat, " s"),
+        "start_time": ("The start time", taken, " s"),
+    }[problem.minimise]
+    if not abs(value - claimed) <= tolerance * abs(value):
+        yield (
+            f"{name} is {value:.8g}{unit} in the exact re-simulation, {claimed:.8g}{unit} was claimed "
+            f"({100.0 * (claimed / value - 1.0):+.3g} %)."
+        )
+    if problem.k_dyn is not None and k_dyn > problem.k_dyn * (1.0 + tolerance):
+        yield f"K_dyn is {k_dyn:.8g}, above its bound of {problem.k_dyn:.8g}."
+    if problem.heat is not None and heat > problem.heat * (1.0 + tolerance):
+        yield f"The heat is {heat:.8g} s, above its bound of {problem.heat:.8g} s."
+
+
+def _against_bound(problem: Problem, run: Run, bound: LowerBound) -> Iterator[str]:
+    if bound.kind == "none":
+        return
+    k_dyn = _k_dyn(problem, run)
+    if k_dyn < bound.k_dyn * (1.0 - BELOW):
+        yield f"K_dyn is {k_dyn:.8g}, below its lower bound of {bound.k_dyn:.8g} ({bound.kind})."
+    # a certificate is close to the optimum only where nothing but K_dyn and the torque's limits count
+    alone = problem.minimise == "k_dyn" and problem.ideal_torque and problem.heat is None
+    if bound.kind == "certificate" and alone and k_dyn > bound.k_dyn * (1.0 + LOCAL):
+        yield (
+            f"K_dyn is {k_dyn:.8g}, {100.0 * (k_dyn / bound.k_dyn - 1.0):.3g} % above its lower bound of "
+            f"{bound.k_dyn:.8g}: a local optimum."
+        )
+
+
+def _k_dyn(problem: Problem, run: Run) -> float:
+    return float(metrics.k_dyn(run.peak_torque, problem.base or problem.drive))

@@ -1,0 +1,272 @@
+"""The curve of the least K_dyn against the start time, and where the controllers lie beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from softstart import __version__
+from softstart.controller import Controller, make_controller, ready_controller_names
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.export import write_whole
+from softstart.optimal.front_points import ControllerPoint, FrontPoint, label_of
+from softstart.optimal.front_saved import SavedPoints
+from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.result import InfeasibleError, OptimumError
+from softstart.run import Run
+from softstart.simulation import simulate
+
+YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
+SHORT, LONG, COUNT = 1.02, 1.6, 12
+
+Progress = Callable[[str], object]
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """The least K_dyn for each bound on the start time, and the controllers against that limit.
+
+    `points` in order of start time; `controllers` each with its own start time and K_dyn and the optimum at
+    just that start time with terminal `reached`.
+    """
+
+    drive: Drive
+    terminal: Terminal
+    points: tuple[FrontPoint, ...]
+    controllers: tuple[ControllerPoint, ...]
+
+    @property
+    def shortest_start_time(self) -> float:
+        """Shortest feasible start time in s, known if a start time was too short; else NaN."""
+        judged = [one.optimum for one in self.controllers if one.optimum is not None]
+        known = [
+            point.shortest_start_time
+            for point in (*self.points, *judged)
+            if point.shortest_start_time is not None and point.terminal == self.terminal
+        ]
+        return known[0] if known else math.nan
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON."""
+        return {
+            "drive": self.drive.name,
+            "terminal": self.terminal,
+            "shortest_start_time": self.shortest_start_time,
+            "points": [point.summary() for point in self.points],
+            "controllers": [point.summary() for point in self.controllers],
+        }
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the curve, then the controllers, as one table; numbers with all their digits."""
+        columns = (
+            "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind",
+            "gap_percent", "optimal_k_dyn", "ratio", "heat", "contacts", "method", "status",
+        )  # fmt: skip
+        rows = [{"what": "optimum", **point.summary()} for point in self.points]
+        for one in self.controllers:
+            rows.append({**one.summary(), "what": one.name})
+
+        def cell(value: Any) -> str:
+            if value is None or (isinstance(value, float) and math.isnan(value)):
+                return ""
+            return repr(value) if isinstance(value, float) else str(value)
+
+        def write(stream: IO[Any]) -> None:
+            import csv
+
+            table = csv.writer(stream, lineterminator="\n")
+            table.writerow(columns)
+            table.writerows([cell(row.get(name)) for name in columns] for row in rows)
+
+        write_whole(Path(path), write)
+
+    def plot(self) -> Any:
+        """The curve with its bound, and the controllers as points."""
+        from softstart.optimal.pictures import front_figure
+
+        return front_figure(self)
+
+
+def pareto(
+    drive: Drive,
+    start_times: Sequence[float] | None = None,
+    *,
+    terminal: Terminal = "reached",
+    controllers: Sequence[str | Controller] | None = None,
+    method: str = "auto",
+    torque_speed: tuple[tuple[float, float], ...] = (),
+    smoothness: float = 0.0,
+    base: Drive | None = None,
+    save_to: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Front:
+    """The least K_dyn for each of several bounds on the start time, with its lower bound.
+
+    Parameters
+    ----------
+    drive : the drive.
+    start_times : bounds on the start time in s; by default `default_start_times(drive, terminal)`.
+    terminal, method, torque_speed, smoothness, base : as in `optimize`.
+    controllers : names or Controller objects to put beside the curve; by default all installed ones that run
+        without being given a parameter, none for an empty list. Each is simulated, and judged by the optimum
+        at its own start time with terminal `reached`: the fair yardstick.
+    save_to : a file in which each finished point is kept at once. A second call with the same inputs takes
+        them from there; other inputs are refused.
+    progress : told, before each point that is computed, what is being done.
+
+    The sweep goes from long start times to short ones, each optimum starting from the one before. Start times
+    too short for any start are marked infeasible, no error. Raises InputError, and OptimumError if not a
+    single point could be computed.
+
+    >>> from softstart import Drive
+    >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
+    >>> front = pareto(crane, [0.2, 0.2883042], terminal="synchronous", controllers=[])
+    >>> [point.status for point in front.points], round(front.points[1].k_dyn, 6)
+    (['INFEASIBLE', 'OPTIMAL'], 0.909247)
+    """
+    Problem(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
+    times = None if start_times is None else _checked(start_times)
+    made = [
+        make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
+    ]
+    inputs = _inputs(drive, base, terminal, method, torque_speed, smoothness)
+    saved = SavedPoints(None if save_to is None else Path(save_to), inputs)
+    runs = [simulate(drive, one, base=base) for one in made]
+    if times is None:
+        _tell(progress, "looking for the shortest start time")
+        times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
+    options = {"method": method, "torque_speed": torque_speed, "smoothness": smoothness, "base": base}
+    own = [run.start_time for run in runs if not math.isnan(run.start_time)]
+    asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
+    found = _Sweep(drive, options, saved, progress).through(asked)
+    points = tuple(found[terminal, t] for t in times)
+    if not any(point.found for point in points) and any(point.status == "NOT_FOUND" for point in points):
+        raise OptimumError(next(point.status_text for point in points if point.status == "NOT_FOUND"))
+    return Front(drive, terminal, points, tuple(_beside(run, found) for run in runs))
+
+
+def default_start_times(
+    drive: Drive, terminal: Terminal = "reached", count: int = COUNT, **options: Any
+) -> list[float]:
+    """`count` start times in s, from 1.02 of the shortest feasible one to 1.6 of that of `direct`.
+
+    Closer together towards the short end, where the curve is steep. `options` go to `Problem`.
+    """
+    from softstart.optimal.shortest import shortest_start_time
+
+    shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time", **options))
+    direct = simulate(drive, "direct").start_time
+    longest = LONG * (direct if LONG * direct > 1.2 * shortest else shortest)  # direct may never get there
+    share = np.linspace(0.0, 1.0, count) ** 2
+    times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
+    return times
+
+
+def even_start_times(first: float, last: float, count: int) -> list[float]:
+    """`count` start times in s from `first` to `last`, evenly spaced.
+
+    >>> even_start_times(0.25, 0.5, 3)
+    [0.25, 0.375, 0.5]
+    """
+    times: list[float] = np.linspace(first, last, count).tolist()
+    return times
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """Optima for many start times, the longest first, each from the one before."""
+
+    drive: Drive
+    options: dict[str, Any]
+    saved: SavedPoints
+    progress: Progress | None
+
+    def through(self, asked: set[tuple[Terminal, float]]) -> dict[tuple[Terminal, float], FrontPoint]:
+        """All points asked for."""
+        found: dict[tuple[Terminal, float], FrontPoint] = {}
+        warm: Any = None
+        too_short: FrontPoint | None = None
+        order = sorted(asked, key=lambda one: (one[0], -one[1]))
+        for number, (terminal, start_time) in enumerate(order, start=1):
+            if number > 1 and order[number - 2][0] != terminal:
+                warm = too_short = None
+            record = self.saved.find(terminal, start_time)
+            if record is not None:
+                point = FrontPoint.of_record(record)
+            elif too_short is not None:  # what no longer start time allowed, no shorter one does
+                point = too_short.for_shorter(start_time)
+            else:
+                _tell(self.progress, f"start time {number} of {len(order)}: {start_time:.5g} s, {terminal}")
+                point, warm = self._computed(terminal, start_time, warm)
+                if point.status != "NOT_FOUND":  # another attempt may find it
+                    self.saved.add(point.record())
+            if point.status == "INFEASIBLE":
+                too_short = point
+            found[terminal, start_time] = point
+        return found
+
+    def _computed(self, terminal: Terminal, start_time: float, warm: Any) -> tuple[FrontPoint, Any]:
+        """The point, and what the next one can start from."""
+        from softstart.optimal.collocation import NotConverged
+        from softstart.optimal.solving import optimize
+
+        why = ""
+        for start in (warm, None) if warm is not None else (None,):
+            try:
+                best = optimize(self.drive, start_time, terminal=terminal, warm=start, **self.options)
+            except InfeasibleError as error:
+                return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
+            except (OptimumError, NotConverged) as error:
+                why = str(error)
+                continue  # where the last optimum led astray, it is tried without
+            return FrontPoint.of_optimum(best, start_time), best.warm
+        return FrontPoint.not_found(why, start_time, terminal), None
+
+
+def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:
+    return ControllerPoint(
+        label_of(run.controller), run.k_dyn, run.start_time, run.status.value,
+        None if math.isnan(run.start_time) else found[YARDSTICK, run.start_time],
+    )  # fmt: skip
+
+
+def _inputs(
+    drive: Drive, base: Drive | None, terminal: str, method: str, corners: Any, smoothness: float
+) -> dict[str, Any]:
+    """All that a point depends on besides its start time, as plain data."""
+    return {
+        "version of softstart": __version__,
+        "drive": drive.to_toml(),
+        "base drive": base.to_toml() if base else "",
+        "terminal": terminal,
+        "method": method,
+        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in corners],
+        "smoothness": float(smoothness),
+    }
+
+
+def _checked(start_times: Sequence[float]) -> list[float]:
+    """Start times above 0, sorted, each once."""
+    given = list(start_times)
+    if not given:
+        raise InputError("start_times: the list is empty; give at least one start time in s.")
+    wrong = [
+        f"start_times = {t!r}: give times above 0 s as numbers."
+        for t in given
+        if not isinstance(t, Real) or isinstance(t, bool) or not 0.0 < float(t) < math.inf
+    ]
+    if wrong:
+        raise InputError(wrong)
+    return sorted({float(t) for t in given})
+
+
+def _tell(progress: Progress | None, doing: str) -> None:
+    if progress is not None:
+        progress(doing)

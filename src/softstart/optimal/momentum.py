@@ -1,0 +1,238 @@
+"""Lower bounds from momentum: valid for every torque over time, whatever controller makes it.
+
+Integrated from 0 to t_f, the load's J2 w2' = T - Mc says
+
+    J2 (target - w2(0)) = integral T dt - Mc t_f <= P (t_f - t_c) - Mc t_f
+
+for an active load: T <= P by what P is, and T <= 0 until t_c, the earliest instant at which the gap can close
+on the driving side (on the other side T < 0; the load falls back meanwhile, which Mc t_f counts). The least P
+that this allows falls with t_f, so t_f = start_time decides. Number of contacts, damping, contact law, torque
+lag, rate, torque-speed curve and smoothing do not enter: the realised torque stays within the limits of its
+demand, and that is all that is used.
+
+A reactive load takes Mc from a moving load only. Let t_s be the last instant at which it stands still: just
+after it T > Mc, so t_s >= t_c, and J2 target <= (P - Mc)(t_f - t_s). A load that moves at first may also
+never stop; then the line above holds. The lesser of both bounds counts.
+
+t_c. Where the twist cannot fall before the first contact (v0 >= 0, no braking torque), full torque is the
+soonest. Otherwise the motor may bounce off the other flank first: the speed v = theta' on a path, with the
+spring's energy, satisfies |d(v^2/2)| <= A |d theta|, where A is the largest relative acceleration, so that no
+path is quicker than the direct one with |v0| and A. (Bouncing dead-zone dampers may pull, and a reactive load
+that breaks away on the other flank may add energy: t_c = 0 then.) An undamped shaft does not move a reactive
+load at rest before T = Mc: the motor alone, at full torque, winds it up soonest (a bounce before costs more
+than the quarter period that this takes).
+
+Two sharper forms, where the twist cannot fall first and the load is active:
+
+- undamped: T is at no instant above that of pulse, coast, hold with the same peak P (pulse_coast_hold.py,
+  where the proof stands), and the hold is granted whether or not Ms suffices;
+- damped (`no-pull`, `dead-zone`): no torque of 0 or more makes T(s) lower than coasting does, up to half a
+  damped period after the contact (the answer of T to an impulse is not negative so long, so that T stays
+  above 0 and the contact lasts). So the impact speed v has T_coasting(s; v) <= P for every s, which limits v;
+  and in the gap the soonest contact with at most that speed is an early pulse. A contact that has to be
+  gentle comes later than t_c. Fewer instants s only lower the bound: a grid proves as much as it says.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.optimal.ideal import Contact
+from softstart.optimal.problem import Problem
+from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
+from softstart.optimal.result import LowerBound
+
+Vector = NDArray[np.float64]
+
+ROUNDING = 1e-10  # by so much, relatively, time is stretched and a bound lowered: not to lie above an optimum
+INSTANTS = 64  # at which the coasting shaft torque is looked at
+
+
+def momentum_bound(problem: Problem) -> LowerBound:
+    """A lower bound on K_dyn for every torque between the limits, any number of contacts, any drive.
+
+    Without a bound on the start time the peak must be above Mc, no more. It is inf where no torque at all
+    brings the load to its target speed in time.
+
+    >>> from softstart import Drive
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    >>> round(momentum_bound(Problem(drive, 0.2883042)).k_dyn, 4)
+    0.9092
+    >>> round(momentum_bound(Problem(drive.replace(load_kind="reactive"), 0.2883042)).k_dyn, 4)
+    0.8688
+    """
+    peak = least_peak(problem) * (1.0 - ROUNDING)
+    covers = (
+        f"every torque from {problem.lowest_torque:g} to {problem.highest_torque:g} N m over time, by "
+        "whatever controller, however often the gap closes"
+    )
+    return LowerBound(peak / problem.base_torque, "momentum", covers)
+
+
+def least_peak(problem: Problem) -> float:
+    """No start has a lower peak of T than this, N m."""
+    drive = problem.drive
+    if problem.start_time is None:
+        return float(drive.Mc)
+    time = problem.start_time * (1.0 + ROUNDING)
+    plain = _plain(problem, time)
+    if off_course(problem) or not math.isfinite(plain):
+        return plain
+    starts = PulseCoastHold.of(problem)
+    if drive.d == 0.0:
+        return max(plain, starts.least_peak_for(problem.target, time))
+    if starts.z0 < 0.0 and drive.contact_law != "modelica":
+        return max(plain, _gentle_contact(problem, starts, time, plain))
+    return plain
+
+
+def _plain(problem: Problem, time: float) -> float:
+    """T <= P from the earliest contact on."""
+    drive = problem.drive
+    left = time - earliest_pull(problem)
+    if left <= 0.0:
+        return math.inf
+    w2 = drive.initial_load_speed
+    if _reactive(problem):
+        # standing still at last, or never: J2 w2 is then what is left of it at the contact
+        w2 = max(w2 - drive.Mc / drive.J2 * (time - left), 0.0)
+        return float(drive.Mc + drive.J2 * (problem.target - w2) / left)
+    return float((drive.J2 * (problem.target - w2) + drive.Mc * time) / left)
+
+
+def _gentle_contact(problem: Problem, starts: PulseCoastHold, time: float, plain: float) -> float:
+    """The least P, N m, with P (time - t_c(P)) >= J2 (target - w2) + Mc time; damped shaft, gap open."""
+    from scipy.optimize import brentq
+
+    contact = Contact.of(problem.drive)
+    reach = min(contact.half_period, math.pi / contact.Omega)
+    s = reach * np.arange(INSTANTS + 1) / INSTANTS
+    _, by_speed, by_load, _ = contact.torque(s, np.array([0.0, 2.0 * reach]))
+    kept = by_speed > 1e-9 * float(np.max(by_speed))
+    by_speed, by_load = by_speed[kept], by_load[kept]
+
+    def peak(v: float) -> float:
+        return float(np.max(by_speed * v + by_load))
+
+    def missing(P: float) -> float:
+        v = float(np.min((P - by_load) / by_speed))
+        return P * (time - min(_contact_at(starts, v), 2.0 * time)) - needed
+
+    slowest = math.sqrt(starts.v0**2 - 2.0 * starts.pull * starts.z0)
+    fastest = math.sqrt(starts.v0**2 - 2.0 * (starts.pull + starts.push) * starts.z0)
+    needed = starts.J2 * (problem.target - starts.w2) + starts.Mc * time
+    low, high = max(plain, peak(slowest)), peak(fastest)
+    if low >= high or missing(low) >= 0.0:
+        return low
+    # rounding: at `high` the contact is the earliest, so that only the plain bound can ask for more
+    return float(brentq(missing, low, high, xtol=1e-14 * high)) if missing(high) > 0.0 else low
+
+
+def _contact_at(starts: PulseCoastHold, v: float) -> float:
+    """Earliest contact in s with an impact speed of at most v: pulse, then coast."""
+    way = 0.5 * (v * v - starts.v0**2 + 2.0 * starts.pull * starts.z0) / starts.push
+    way = min(max(way, 0.0), -starts.z0)
+    t1 = fall_time(way, starts.v0, starts.push + starts.pull)
+    v1 = starts.v0 + (starts.push + starts.pull) * t1
+    rest = -starts.z0 - way
+    if rest > 0.0 and v1 == 0.0 and starts.pull == 0.0:
+        return math.inf
+    return t1 + fall_time(rest, v1, starts.pull)
+
+
+def _reactive(problem: Problem) -> bool:
+    return bool(problem.drive.load_kind == "reactive" and problem.drive.Mc > 0.0)
+
+
+def _straight_up(problem: Problem) -> bool:
+    """Whether the twist cannot fall before the first contact."""
+    drive = problem.drive
+    return bool(
+        problem.lowest_torque >= 0.0
+        and drive.initial_motor_speed >= drive.initial_load_speed
+        and drive.start_position >= -0.5 * drive.gap
+        and not (_reactive(problem) and drive.initial_load_speed < 0.0)
+    )
+
+
+def earliest_pull(problem: Problem) -> float:
+    """Earliest instant in s at which the shaft can drive the load (a reactive one at rest: move it).
+
+    >>> from softstart import Drive
+    >>> round(earliest_pull(Problem(Drive.load("crane-4amtkf"), 0.5)), 5)
+    0.01661
+    """
+    drive = problem.drive
+    z0 = float(drive.start_position - 0.5 * drive.gap)
+    v0 = float(drive.initial_motor_speed - drive.initial_load_speed)
+    way = max(-z0, 0.0)
+    if not _straight_up(problem):
+        if _reactive(problem) or (drive.contact_law == "dead-zone" and drive.d > 0.0):
+            return 0.0
+        wound_up = drive.Omega * max(-0.5 * drive.gap - drive.start_position, 0.0)
+        U = max(problem.highest_torque, -problem.lowest_torque)
+        A = float(U / drive.J1 + drive.Mc / drive.J2)
+        return fall_time(way, math.hypot(v0, wound_up), A)
+    at_rest = _reactive(problem) and drive.initial_load_speed == 0.0
+    A = float(problem.highest_torque / drive.J1 + (0.0 if at_rest else drive.Mc / drive.J2))
+    contact = fall_time(way, v0, A)
+    if not at_rest or drive.d > 0.0:
+        return contact
+    return contact + _winding_up(problem, max(z0, 0.0), v0 + A * contact if way > 0.0 else v0)
+
+
+def _winding_up(problem: Problem, z: float, v: float) -> float:
+    """Time in s in which full torque winds the held shaft up from (z, v) to c z = Mc, undamped."""
+    drive = problem.drive
+    held = drive.Mc / drive.c
+    if z >= held:
+        return 0.0
+    w, mean = math.sqrt(drive.c / drive.J1), problem.highest_torque / drive.c
+    radius = math.hypot(z - mean, v / w)
+    before = math.atan2(v / w, z - mean)
+    after = math.acos(max((held - mean) / radius, -1.0))
+    return max(before - after, 0.0) / w
+
+
+def momentum_shortest_time(problem: Problem) -> float:
+    """No start of any kind can end sooner than this, in s, whatever its K_dyn.
+
+    Synchronous and steady, active load: the momentum (J1 + J2) target has to come from the motor, at no more
+    than Ms, and the load takes Mc all the time.
+
+    Synchronous and steady, reactive load: a load at rest is a wall off which the motor may bounce. Up to the
+    last standstill t_s the energy E of all grows by no more than U |w1| a second (U the largest |u|), so that
+    J1 |w1(t_s)| <= sqrt(2 J1 E(0)) + U t_s; from then on Ms - Mc is left of the motor torque. A load that
+    moves at first may never stand still: then it is as with an active one.
+
+    Reached, active load: with V the speed of both masses' centre and v = w1 - w2, w2 = V - v J1/(J1 + J2).
+    The swing sqrt(v^2 + Omega^2 z^2) (z the overlap) grows by no more than the largest relative acceleration
+    A a second, in contact and out of it, damped or not, so that |v| <= swing(0) + A t.
+
+    Always: the shaft has to pull before the load gains speed.
+
+    >>> from softstart import Drive
+    >>> round(momentum_shortest_time(Problem(Drive.load("crane-4amtkf").replace(target_speed=60), 0.3)), 4)
+    0.2298
+    """
+    drive = problem.drive
+    J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
+    w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
+    Ms, U = problem.highest_torque, max(problem.highest_torque, -problem.lowest_torque)
+    aim = (J1 + J2) * problem.target
+    overlap = max(abs(float(drive.start_position)) - 0.5 * float(drive.gap), 0.0)
+    first = earliest_pull(problem)
+    moving = (aim - J1 * w1 - J2 * w2) / (Ms - Mc)  # the load never stands still
+    if not _reactive(problem):
+        if problem.terminal != "reached":
+            return max(first, moving)
+        swing, A = math.hypot(w1 - w2, float(drive.Omega) * overlap), U / J1 + Mc / J2
+        return max(first, (aim - J1 * w1 - J2 * w2 - J1 * swing) / (Ms - Mc + J1 * A))
+    if problem.terminal == "reached":
+        return first  # breaking away on either flank adds to the swing
+    energy = 0.5 * (J1 * w1**2 + J2 * w2**2 + float(drive.c) * overlap**2)
+    stopping = (aim - math.sqrt(2.0 * J1 * energy)) / U
+    return max(first, min(stopping, moving) if w2 > 0.0 else stopping)

@@ -1,0 +1,158 @@
+"""The question an optimum answers: what to minimise, within which bounds, ending how."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Real
+from typing import Any, Literal, get_args
+
+from softstart import metrics
+from softstart.drive import Drive
+from softstart.errors import InputError
+
+Terminal = Literal["synchronous", "steady", "reached"]
+Objective = Literal["k_dyn", "heat", "start_time"]
+
+TERMINALS = get_args(Terminal)
+OBJECTIVES = get_args(Objective)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An optimal start.
+
+    minimise   K_dyn = peak |T| over the whole run / M12avg_base, or heat, or the start time
+    subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
+               t_f <= start_time, K_dyn <= k_dyn, heat <= heat
+    and at t_f synchronous: w1 = w2 = target_speed, from then on the shaft torque is held
+               steady:      also T = Mc
+               reached:     only w2 = target_speed for the first time; the motor coasts until T is at its peak
+
+    heat is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque. `torque_speed` are corners
+    (rad/s, N m) of a concave limit of the motor's torque over its speed. `smoothness` in s weighs
+    integral (du/dt)^2 dt / Ms^2 against K_dyn: it makes the demand continuous from 0 on. `k_dyn` as a bound
+    and all times refer to the drive itself unless `base` is another one. Raises InputError.
+
+    >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
+    >>> problem.terminal, problem.highest_torque, round(problem.base_torque, 2)
+    ('synchronous', 62.0, 52.86)
+    """
+
+    drive: Drive
+    start_time: float | None = None
+    terminal: Terminal = "synchronous"
+    minimise: Objective = "k_dyn"
+    k_dyn: float | None = None
+    heat: float | None = None
+    torque_speed: tuple[tuple[float, float], ...] = ()
+    smoothness: float = 0.0
+    base: Drive | None = None
+
+    def __post_init__(self) -> None:
+        wrong: list[str] = []
+        drive = self.drive
+        if not isinstance(drive, Drive):
+            raise InputError(f"drive = {drive!r}: give a Drive; Drive.load reads one from a file or by name.")
+        if drive.shape != ():
+            raise InputError(
+                "drive: an optimum is for one drive; for several under one profile, optimize_robust."
+            )
+        if drive.Mc < 0.0:
+            wrong.append(
+                f"load_torque = {drive.Mc:g} N m: this load drives instead of braking; an optimal start "
+                "needs a load torque of 0 or more."
+            )
+        for name, choices in (("terminal", TERMINALS), ("minimise", OBJECTIVES)):
+            if getattr(self, name) not in choices:
+                wrong.append(f"{name} = {getattr(self, name)!r}: choose one of {', '.join(choices)}.")
+        for name, unit in (("start_time", "s"), ("k_dyn", "1"), ("heat", "s")):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if not _number(value) or not 0.0 < float(value) < math.inf:
+                wrong.append(f"{name} = {value!r}: give a bound above 0 (in {unit}), or leave it out.")
+            else:
+                object.__setattr__(self, name, float(value))
+        if self.minimise == "start_time" and self.start_time is not None:
+            wrong.append(
+                "start_time: it is what is minimised; leave the bound out, or minimise something else."
+            )
+        elif self.minimise in ("k_dyn", "heat") and self.start_time is None:
+            wrong.append(
+                f"start_time: minimising {self.minimise} needs a bound on the start time, else the start may "
+                "take for ever."
+            )
+        if self.minimise == "k_dyn" and self.k_dyn is not None:
+            wrong.append("k_dyn: it is what is minimised; leave the bound out, or minimise something else.")
+        if self.minimise == "heat" and self.heat is not None:
+            wrong.append("heat: it is what is minimised; leave the bound out, or minimise something else.")
+        if not _number(self.smoothness) or not 0.0 <= float(self.smoothness) < math.inf:
+            wrong.append(f"smoothness = {self.smoothness!r}: a weight in s, 0 or more.")
+        wrong += _check_corners(self.torque_speed)
+        if drive.initial_load_speed >= drive.target_speed:
+            wrong.append(
+                f"initial_load_speed = {drive.initial_load_speed:g} rad/s: the load has its target speed of "
+                f"{drive.target_speed:g} rad/s already; there is nothing to optimise."
+            )
+        if wrong:
+            raise InputError(wrong)
+
+    @property
+    def lowest_torque(self) -> float:
+        """Smallest motor torque, N m: the drive's minimum_torque (0 unless the motor may brake)."""
+        return float(self.drive.minimum_torque)
+
+    @property
+    def highest_torque(self) -> float:
+        """Largest motor torque, N m: the starting torque Ms, or maximum_torque where that is less."""
+        return float(min(self.drive.Ms, self.drive.maximum_torque))
+
+    @property
+    def target(self) -> float:
+        """Speed in rad/s that is to be reached."""
+        return float(self.drive.target_speed)
+
+    @property
+    def base_torque(self) -> float:
+        """M12avg_base in N m, the torque to which K_dyn refers."""
+        return float(metrics.base_torque(self.base or self.drive))
+
+    @property
+    def ideal_torque(self) -> bool:
+        """True where any measurable torque within the limits can be had: no lag, rate, curve or smoothing."""
+        drive = self.drive
+        return (
+            drive.torque_lag == 0.0
+            and math.isinf(drive.torque_rate)
+            and not self.torque_speed
+            and self.smoothness == 0.0
+        )
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _check_corners(corners: Sequence[Sequence[float]]) -> list[str]:
+    """What is wrong with a torque-speed curve."""
+    if not corners:
+        return []
+    shown = f"torque_speed = {corners!r}"
+    try:
+        points = [(float(speed), float(torque)) for speed, torque in corners]
+    except (TypeError, ValueError):
+        return [f"{shown}: give corners (speed in rad/s, torque in N m)."]
+    if len(points) < 2 or any(b[0] <= a[0] for a, b in pairwise(points)):
+        return [f"{shown}: give two corners or more, in order of rising speed."]
+    if any(not math.isfinite(number) for point in points for number in point):
+        return [f"{shown}: give finite numbers."]
+    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points)]
+    if any(b > a + 1e-12 * abs(a) for a, b in pairwise(slopes)):
+        return [
+            f"{shown}: this curve bends upward, so the best torque could not be proved best; give a concave "
+            "one (each piece falls at least as steeply as the one before)."
+        ]
+    return []

@@ -1,0 +1,148 @@
+"""What comes out: a candidate of a method, a bound, and the optimum that has passed the exact plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from softstart import metrics
+from softstart.optimal.problem import Problem
+from softstart.profile import TorqueProfile
+from softstart.run import Run
+
+Method = Literal["closed-form", "lp", "collocation"]
+BoundKind = Literal["certificate", "momentum", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """What a method offers: a demand up to `end_time`, and the figure it claims for it.
+
+    `end_time` is t_f in s, at which the terminal condition holds; `claimed` is the value of what is minimised
+    as the method computed it; `warm` is whatever the method can start its next, similar problem from.
+    """
+
+    profile: TorqueProfile
+    end_time: float
+    claimed: float
+    method: Method
+    note: str = ""
+    warm: Any = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class LowerBound:
+    """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`."""
+
+    k_dyn: float
+    kind: BoundKind
+    covers: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimum:
+    """The best start found, as the exact plant runs it, and how much better any start could be.
+
+    `run` is the exact re-simulation to one elastic period after t_f; all figures are taken from it.
+    """
+
+    problem: Problem
+    profile: TorqueProfile
+    run: Run
+    bound: LowerBound
+    method: Method
+    why: str  # why this method
+    claimed: float  # what the method said, before the re-simulation
+    end_time: float  # t_f, s
+    seconds: float  # computing time
+    warm: Any = field(default=None, repr=False)
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, re-simulated."""
+        return float(metrics.k_dyn(self.run.peak_torque, self.problem.base or self.problem.drive))
+
+    @property
+    def k_dyn_lower_bound(self) -> float:
+        """No start of the class that the bound covers has a smaller K_dyn."""
+        return self.bound.k_dyn
+
+    @property
+    def gap_percent(self) -> float:
+        """How far K_dyn lies above its bound, in per cent."""
+        return 100.0 * (self.k_dyn / self.bound.k_dyn - 1.0)
+
+    @property
+    def heat(self) -> float:
+        """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
+        from softstart.optimal.replay import heat_of
+
+        return heat_of(self.run, self.end_time)
+
+    def __repr__(self) -> str:
+        """One line that says what came out."""
+        return (
+            f"<Optimum: K_dyn {self.k_dyn:.5f}, at least {self.bound.k_dyn:.5f} ({self.bound.kind}), "
+            f"start time {self.end_time:.5f} s, {self.problem.terminal}, {self.method}>"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """All figures under the names used everywhere (JSON, tables, docs)."""
+        problem = self.problem
+        return {
+            "drive": problem.drive.name,
+            "minimise": problem.minimise,
+            "terminal": problem.terminal,
+            "start_time_bound": problem.start_time,
+            "k_dyn_bound": problem.k_dyn,
+            "heat_bound": problem.heat,
+            "method": self.method,
+            "why": self.why,
+            "k_dyn": self.k_dyn,
+            "k_dyn_claimed": self.claimed if problem.minimise == "k_dyn" else None,
+            "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
+            "bound_kind": self.bound.kind,
+            "bound_covers": self.bound.covers,
+            "gap_percent": self.gap_percent if self.bound.kind != "none" else None,
+            "peak_torque": self.run.peak_torque,
+            "start_time": self.end_time,
+            "heat": self.heat,
+            "contacts": self.run.contacts,
+            "first_contact": self.run.first_contact,
+            "seconds": self.seconds,
+            "profile": {"time": self.profile.time.tolist(), "torque": self.profile.torque.tolist()},
+        }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Why no start of the class asked for exists, and how short the start time may be."""
+
+    problem: Problem
+    shortest_start_time: float
+    constraint: str  # what forbids it, in a few words
+    sentence: str
+
+    def summary(self) -> dict[str, Any]:
+        """The verdict under the names used everywhere."""
+        return {
+            "status": "INFEASIBLE",
+            "status_text": self.sentence,
+            "drive": self.problem.drive.name,
+            "terminal": self.problem.terminal,
+            "start_time_bound": self.problem.start_time,
+            "shortest_start_time": self.shortest_start_time,
+            "constraint": self.constraint,
+        }
+
+
+class InfeasibleError(RuntimeError):
+    """No torque profile meets the bounds: `verdict` says which constraint forbids it and what would do."""
+
+    def __init__(self, verdict: Verdict) -> None:
+        self.verdict = verdict
+        super().__init__(verdict.sentence)
+
+
+class OptimumError(RuntimeError):
+    """A method's answer does not stand: the exact plant or the lower bound contradicts it."""

@@ -1,0 +1,184 @@
+"""The shortest start time that a problem allows, and the verdict on one that is shorter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from softstart.errors import SimulationError
+from softstart.optimal.ideal import Contact, Entry, entry_of
+from softstart.optimal.linear_program import AIM, LinearProgram, first_grid
+from softstart.optimal.linear_search import golden, not_linear
+from softstart.optimal.momentum import momentum_shortest_time
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import Verdict
+from softstart.simulation import simulate
+
+COARSE, FINE = 40, 80  # steps of the linear programs
+WITHIN = 2e-6  # of the start time
+SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
+
+
+def shortest_start_time(problem: Problem) -> float:
+    """The shortest t_f in s of any start of the problem whose gap closes once; infinite if there is none.
+
+    K_dyn may be anything unless the problem bounds it. For an ideal torque the greatest speed that can be had
+    at a given t_f is a linear program, and it rises with t_f; otherwise collocation minimises t_f.
+
+    >>> from softstart import Drive
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    >>> round(shortest_start_time(Problem(drive, 0.3)), 4)
+    0.2498
+    """
+    plain = replace(problem, start_time=1.0, minimise="k_dyn", k_dyn=None, heat=None)
+    bounded = problem.k_dyn is not None or problem.heat is not None
+    if not bounded and not not_linear(plain):
+        return _by_linear_program(plain)
+    from softstart.optimal.collocation import NotConverged, solve
+
+    quickest = replace(problem, start_time=None, minimise="start_time")
+    try:
+        return solve(quickest).end_time
+    except NotConverged:
+        return math.inf
+
+
+def _by_linear_program(problem: Problem) -> float:
+    """Newton's iteration on the greatest speed over t_f, whose slope is near (Ms - Mc)/(J1 + J2)."""
+    entry = entry_of(problem)
+    contact = Contact.of(problem.drive)
+    slope = (problem.highest_torque - contact.Mc) / (contact.J1 + contact.J2)
+    soonest = max(momentum_shortest_time(problem), entry.earliest)
+    end = 1.2 * soonest + math.pi / contact.Omega
+    best, enough = math.nan, math.inf
+    for steps, within in ((COARSE, 1e-3), (FINE, WITHIN)):
+        enough, short_of = math.inf, 0.0
+        for _ in range(40):
+            speed, te = _greatest_speed(problem, entry, end, steps, best)
+            if not math.isfinite(speed):
+                short_of, best = max(short_of, end), math.nan
+                end = 0.5 * (end + enough) if math.isfinite(enough) else 1.3 * end
+                if end > 100.0 * soonest or abs(enough - short_of) <= within * end:
+                    break
+                continue
+            best = te
+            missing = (problem.target * AIM - speed) / slope
+            if missing <= 0.0:
+                enough = min(enough, end)
+            else:
+                short_of = max(short_of, end)
+            if abs(missing) <= within * end:
+                enough = min(enough, end + max(missing, 0.0))
+                break
+            end += missing
+            if not short_of < end < enough:
+                end = 0.5 * (short_of + enough)
+            if enough - short_of <= within * end:
+                break
+        end = enough
+        if not math.isfinite(end):
+            return math.inf
+    return enough
+
+
+def _greatest_speed(
+    problem: Problem, entry: Entry, end: float, steps: int, near: float
+) -> tuple[float, float]:
+    """The greatest load speed at `end`, rad/s, and the te it needs; -inf where the terminal cannot be met."""
+    contact = Contact.of(problem.drive)
+    known: dict[float, float] = {}
+
+    def short_by(te: float) -> float:
+        te = min(max(te, entry.earliest), entry.latest)
+        if te not in known:
+            found = None
+            if end > te:
+                program = LinearProgram(problem, end - te, first_grid(contact, end - te, steps))
+                found = program.solve(te, greatest_speed=True)
+            known[te] = -found if isinstance(found, float) else math.inf
+        return known[te]
+
+    last = min(entry.latest, end)
+    if last > entry.earliest:
+        tried = []
+        if not math.isnan(near):
+            spread = 0.1 * (near - entry.earliest) + 1e-3 * end
+            tried = [max(near - spread, entry.earliest), near, near + spread]
+        if not tried or not short_by(near) <= min(short_by(tried[0]), short_by(tried[2])) < math.inf:
+            tried += [entry.earliest + (last - entry.earliest) * share for share in SHARES]
+            tried.sort()
+        i = min(range(len(tried)), key=lambda k: short_by(tried[k]))
+        if math.isfinite(short_by(tried[i])):
+            low, high = tried[max(i - 1, 0)], tried[min(i + 1, len(tried) - 1)]
+            golden(short_by, low, high, max(0.02 * (high - low), 1e-5 * end))
+    else:
+        short_by(entry.earliest)
+    te = min(known, key=lambda t: known[t])
+    return -known[te], te
+
+
+def verdict_on(problem: Problem) -> Verdict:
+    """Why the problem has no solution, which constraint is to blame, and what start time would do."""
+    assert problem.start_time is not None
+    bound = problem.start_time
+    shortest = shortest_start_time(problem)
+    if not math.isfinite(shortest):
+        constraint = "the first contact, so hard that the gap opens again whatever the motor does"
+        shown = "no start time would do"
+        if problem.k_dyn is not None:
+            constraint = f"K_dyn <= {problem.k_dyn:g}"
+        elif problem.heat is not None:
+            constraint = f"heat <= {problem.heat:g} s"
+    else:
+        constraint, shown = _constraint(problem, shortest), f"the shortest start time is {shortest:.6g} s"
+    text = (
+        f"start_time = {bound:g} s: no torque brings {problem.drive.name} to {problem.target:g} rad/s "
+        f"({problem.terminal}) so soon while the gap closes only once; "
+        f"what forbids it is {constraint}; {shown}."
+    )
+    return Verdict(problem, shortest, constraint, text + _with_several_contacts(problem))
+
+
+def _constraint(problem: Problem, shortest: float) -> str:
+    """The first limit without which the start time would do."""
+    assert problem.start_time is not None
+    drive, bound = problem.drive, problem.start_time
+    if bound < momentum_shortest_time(problem):
+        return f"the largest motor torque of {problem.highest_torque:g} N m, even if it acted all the time"
+    ideal = drive.replace(torque_lag=0.0, torque_rate=math.inf)
+    plain = replace(
+        problem, drive=ideal, torque_speed=(), smoothness=0.0, k_dyn=None, heat=None, minimise="k_dyn"
+    )
+    if plain == replace(problem, minimise="k_dyn") or shortest_start_time(plain) > bound:
+        return "the gap and the swing of the shaft, which cost time at the largest motor torque"
+    dropped = {
+        f"the torque lag of {drive.torque_lag:g} s": replace(problem, drive=drive.replace(torque_lag=0.0)),
+        f"the torque rate of {drive.torque_rate:g} N m/s": replace(
+            problem, drive=drive.replace(torque_rate=math.inf)
+        ),
+        "the torque-speed curve of the motor": replace(problem, torque_speed=()),
+    }
+    if problem.k_dyn is not None:
+        dropped[f"the bound of {problem.k_dyn:g} on K_dyn"] = replace(problem, k_dyn=None)
+    if problem.heat is not None:
+        dropped[f"the bound of {problem.heat:g} s on the heat"] = replace(problem, heat=None)
+    for name, without in dropped.items():
+        if without != problem and shortest_start_time(without) <= bound:
+            return name
+    return "the limits of the motor torque together"
+
+
+def _with_several_contacts(problem: Problem) -> str:
+    """What constant torque does in that time, if it does: then the gap closes more than once."""
+    if problem.terminal != "reached" or problem.start_time is None:
+        return ""
+    try:
+        run = simulate(problem.drive, "direct", base=problem.base)
+    except SimulationError:
+        return ""
+    if not run.start_time <= problem.start_time:
+        return ""
+    return (
+        f" Constant torque gets there in {run.start_time:.6g} s, with {run.contacts} contacts and "
+        f"K_dyn {run.k_dyn:.3f}."
+    )

@@ -1,0 +1,150 @@
+"""The best start within a given time: `optimize`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.optimal import linear_search, pulse_coast_hold
+from softstart.optimal.certificate import certified_bound, not_certified
+from softstart.optimal.checking import check
+from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
+from softstart.optimal.problem import Objective, Problem, Terminal
+from softstart.optimal.replay import replay
+from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum
+from softstart.optimal.shortest import shortest_start_time, verdict_on
+from softstart.optimal.tail import with_tail
+from softstart.run import Run
+
+Choice = Literal["auto", "closed-form", "lp", "collocation"]
+METHODS = get_args(Choice)
+TIGHT = 1e-5  # a bound within this share needs no other one
+
+
+def optimize(
+    drive: Drive | str,
+    start_time: float | None = None,
+    *,
+    terminal: Terminal = "synchronous",
+    minimise: Objective = "k_dyn",
+    k_dyn: float | None = None,
+    heat: float | None = None,
+    torque_speed: Sequence[Sequence[float]] = (),
+    smoothness: float = 0.0,
+    method: Choice = "auto",
+    base: Drive | None = None,
+    warm: Any = None,
+) -> Optimum:
+    """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
+
+    Parameters
+    ----------
+    drive : a Drive, or the name or file of one.
+    start_time : bound on t_f in s; None only where the start time is what is minimised.
+    terminal : what holds at t_f: `synchronous` w1 = w2 = target_speed, `steady` also T = Mc, `reached` only
+        w2 = target_speed.
+    minimise : `k_dyn`, `heat` (integral of (u/Ms)^2 in s) or `start_time`.
+    k_dyn, heat : bounds on those that are not minimised.
+    torque_speed : corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
+    smoothness : weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
+    method : `closed-form` (pulse, coast, hold), `lp`, `collocation`, or `auto`, the
+        cheapest that is exact here.
+    base : the drive to whose mean torque K_dyn refers, if not `drive`.
+    warm : `warm` of the optimum of a similar problem, to start the collocation from.
+
+    Returns an Optimum: its figures are those of the exact plant running the profile, its bound says
+    how much better any other start could be. Raises InputError for bad input, InfeasibleError with a verdict
+    where no torque meets the terms, OptimumError if an answer does not stand up to the exact plant.
+
+    >>> from softstart import Drive, optimize
+    >>> best = optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
+    >>> round(best.k_dyn, 6), best.method, best.bound.kind
+    (0.909247, 'closed-form', 'momentum')
+    """
+    if isinstance(drive, str):
+        drive = Drive.load(drive)
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}: choose one of {', '.join(METHODS)}.")
+    corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
+    problem = Problem(drive, start_time, terminal, minimise, k_dyn, heat, corners, smoothness, base)
+    return solve(problem, method, warm)
+
+
+def solve(problem: Problem, method: Choice = "auto", warm: Any = None) -> Optimum:
+    """The optimum of a problem; see `optimize`."""
+    began = time.perf_counter()
+    candidate, why = _candidate(problem, method, warm)
+    profile = with_tail(problem, candidate.profile, candidate.end_time)
+    bound = _bound(problem, candidate, profile)
+    run = check(problem, profile, candidate.end_time, candidate.claimed, bound)
+    return Optimum(
+        problem=problem,
+        profile=profile,
+        run=run,
+        bound=bound,
+        method=candidate.method,
+        why=why,
+        claimed=candidate.claimed,
+        end_time=candidate.end_time,
+        seconds=time.perf_counter() - began,
+        warm=candidate.warm,
+    )
+
+
+def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, str]:
+    """What the chosen method offers, and why it was chosen."""
+    if problem.start_time is not None and problem.start_time < momentum_shortest_time(problem):
+        raise InfeasibleError(verdict_on(problem))
+    asked = "asked for"
+    no_formula = pulse_coast_hold.applies(problem)
+    if method == "closed-form" and no_formula:
+        raise InputError(f"method = closed-form: {no_formula}; use method = auto.")
+    if not no_formula and method in ("auto", "closed-form"):
+        try:
+            found = pulse_coast_hold.solve(problem)
+        except pulse_coast_hold.NotApplicable as reason:
+            no_formula = str(reason)
+            if method == "closed-form":
+                raise InputError(f"method = closed-form: {reason} Use method = auto.") from None
+        else:
+            return found, "pulse, coast, hold is optimal here" if method == "auto" else asked
+    no_program = linear_search.not_linear(problem)
+    if method == "lp" or (method == "auto" and not no_program):
+        best = linear_search.solve(problem)
+        if best is None:
+            raise InfeasibleError(verdict_on(problem))
+        return best, f"no closed form: {no_formula}" if method == "auto" else asked
+    from softstart.optimal import collocation
+
+    try:
+        best = collocation.solve(problem, warm=warm)
+    except collocation.NotConverged:
+        if problem.start_time is not None and problem.start_time < shortest_start_time(problem):
+            raise InfeasibleError(verdict_on(problem)) from None
+        raise
+    return best, f"no linear program: {no_program}" if method == "auto" else asked
+
+
+def _bound(problem: Problem, candidate: Candidate, profile: Any) -> LowerBound:
+    """The certificate where there is one for this class of problems, else the bound by momentum."""
+    timed = problem
+    if problem.start_time is None:
+        timed = replace(problem, start_time=candidate.end_time, minimise="k_dyn", k_dyn=None)
+    by_momentum = momentum_bound(timed)
+    if problem.minimise != "k_dyn" or not_certified(problem):
+        return by_momentum
+    run = replay(problem.drive, profile, candidate.end_time, problem.base)
+    if run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
+        return by_momentum  # nothing better can be proved
+    bound = certified_bound(problem, run.k_dyn, entry_near=_entry_of(run))
+    return bound if bound.k_dyn >= by_momentum.k_dyn else by_momentum
+
+
+def _entry_of(run: Run) -> float:
+    """When both masses begin to move in contact, s."""
+    starts = [event.time for event in run.events if event.kind == "load starts"]
+    return starts[0] if starts and run.drive.load_kind == "reactive" else run.first_contact

@@ -1,0 +1,255 @@
+"""`softstart optimize`: the figures, the JSON, the files, and what is refused."""
+
+import csv
+import json
+import math
+
+import pytest
+
+from softstart import Drive, simulate
+from softstart.optimal.solving import optimize
+from softstart.profile import TorqueProfile
+
+SIXTY = ("--set", "start.target_speed=60 rad/s")
+ANCHOR = ("optimize", *SIXTY, "--start-time", "0.2883042")
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+def test_json_is_the_summary_of_the_optimum(run):
+    code, out, err = run(*ANCHOR, "--json")
+    assert (code, err) == (0, "")
+    assert out.startswith("{")
+    told = json.loads(out, parse_constant=pytest.fail)
+    wanted = optimize(CRANE, 0.2883042).summary()
+    assert told.keys() == {*wanted, "controllers"}
+    assert told["k_dyn"] == pytest.approx(0.90924724, rel=1e-6)
+    for key in wanted.keys() - {"seconds"}:
+        assert told[key] == wanted[key]
+    direct = next(one for one in told["controllers"] if one["controller"] == "direct")
+    assert direct["k_dyn"] == simulate(CRANE, "direct").k_dyn
+
+
+def test_a_multiple_is_of_the_start_time_of_direct(run):
+    code, out, _ = run("optimize", *SIXTY, "--start-time", "1.2x", "--json")
+    assert code == 0
+    assert json.loads(out)["start_time_bound"] == pytest.approx(1.2 * simulate(CRANE, "direct").start_time)
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_the_figures_are_shown_and_fit(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    code, out, err = run(*ANCHOR)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= int(width)
+    assert not any(line != line.rstrip() for line in lines)
+    assert "\x1b" not in out
+    flat = " ".join(out.split())
+    for words in (
+        "least K_dyn, start time at most 0.288304 s, terminal synchronous", "method closed-form", "0.909247",
+        "lower bound of K_dyn", "gap between them", "I2t heat", "contacts", "; direct has 3.",
+        "shipped controller as quick", "The lower bound (", ") covers",
+    ):  # fmt: skip
+        assert words in flat
+
+
+FILES = {
+    "report.md", "profile.csv", "profile.toml", "profile.c", "optimum.svg", "optimum.png",
+    "trace-optimum.csv", "drive.toml", "figures.csv",
+}  # fmt: skip
+
+
+def test_the_files(run, place):
+    code, out, err = run(*ANCHOR, "--out", "deep/best")
+    assert (code, err) == (0, "")
+    assert out.endswith("Written to deep/best: report.md, the profile (CSV, TOML, C), figure and traces.\n")
+    folder = place / "deep" / "best"
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert [path.name for path in (place / "deep").iterdir()] == ["best"]
+    assert (folder / "optimum.png").read_bytes().startswith(b"\x89PNG")
+    assert "</svg>" in (folder / "optimum.svg").read_text("utf-8")
+    with (folder / "figures.csv").open(encoding="utf-8") as stream:
+        (row,) = csv.DictReader(stream)
+    report = (folder / "report.md").read_text("utf-8")
+    linked = {part.split(")")[0] for part in report.split("](")[1:]}
+    assert linked <= FILES
+    assert "softstart optimize --set 'start.target_speed=60 rad/s' --start-time 0.2883042" in report
+    assert "double" in (folder / "profile.c").read_text("utf-8")
+    for name in ("profile.csv", "profile.toml"):
+        assert isinstance(TorqueProfile.load(folder / name), TorqueProfile)
+        code, out, _ = run(
+            "simulate", str(folder / "drive.toml"), "--controller", "profile",
+            "--param", f"file={folder / name}", "--json",
+        )  # fmt: skip
+        assert code == 0
+        assert json.loads(out)["k_dyn"] == pytest.approx(float(row["k_dyn"]), rel=1e-9)
+
+
+def test_the_same_command_writes_the_same_files(run, place):
+    seen = []
+    for _ in range(2):
+        assert run(*ANCHOR, "--out", "best").code == 0
+        seen.append({path.name: path.read_bytes() for path in (place / "best").iterdir()})
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize("output", [(), ("--json",), ("--out", "best")])
+def test_too_short_a_start_time(run, nothing_left, output):
+    code, out, err = run("optimize", *SIXTY, "--start-time", "0.2", *output)
+    assert code == 3
+    assert err.count("\n") == 1
+    assert err.startswith("softstart: ")
+    if output == ("--json",):
+        told = json.loads(out)
+        assert told["status"] == "INFEASIBLE"
+        assert 0.2 < told["shortest_start_time"] < 0.26
+        shortest = told["shortest_start_time"]
+        again = run("optimize", *SIXTY, "--start-time", repr(1.001 * shortest), "--json")
+        assert again.code == 0
+    else:
+        assert out == ""
+    assert "0.2" in err
+    nothing_left()
+
+
+def test_other_aims_and_bounds(run):
+    code, out, err = run("optimize", *SIXTY, "--minimise", "start_time", "--max-k-dyn", "1.2", "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["k_dyn"] <= 1.2 * (1 + 1e-4)  # the tolerance of the collocation
+    tighter = json.loads(
+        run("optimize", *SIXTY, "--start-time", repr(0.99 * told["start_time"]), "--json").out
+    )
+    assert tighter["k_dyn"] > 1.2
+
+
+def test_missing_start_time_is_suggested(run, nothing_left):
+    code, out, err = run("optimize", *SIXTY)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    direct = simulate(CRANE, "direct").start_time
+    for words in ("--start-time is missing", "--start-time 1.2x", f"{1.2 * direct:.4g} s", f"{direct:.4g} s"):
+        assert words in err
+    nothing_left()
+
+
+ONE_SENTENCE = {
+    "zero": (["--start-time", "0"], ['--start-time = "0"', "above 0 s"]),
+    "a word": (["--start-time", "soon"], ["--start-time", "a time"]),
+    "a speed": (["--start-time", "5 rad/s"], ["not a time"]),
+    "a multiple of nothing": (["--start-time", "x"], ['--start-time = "x"', "a multiple"]),
+    "a negative multiple": (["--start-time=-2x"], ['"-2x"', "a multiple"]),
+    "nan": (["--start-time", "nan"], ["--start-time", "not a number"]),
+    "terminal": (["--start-time", "1.2x", "--terminal", "steedy"], ["--terminal", "did you mean steady?"]),
+    "method": (["--start-time", "1.2x", "--method", "simplex"], ["--method", "there are auto"]),
+    "minimise": (["--start-time", "1.2x", "--minimise", "kdyn"], ["--minimise", "did you mean k_dyn?"]),
+    "K_dyn twice": (["--start-time", "1.2x", "--max-k-dyn", "1"], ["--max-k-dyn", "is what is minimised"]),
+    "time twice": (["--minimise", "start_time", "--start-time", "1"], ["--start-time", "what is minimised"]),
+    "no K_dyn": (["--minimise", "start_time", "--max-k-dyn", "0"], ["--max-k-dyn", "above 0"]),
+    "no heat": (["--start-time", "1.2x", "--max-heat", "-1"], ["--max-heat", "above 0"]),
+    "one corner": (["--start-time", "1x", "--torque-speed", "0:62"], ["--torque-speed", "two corners"]),
+    "no corner": (["--start-time", "1x", "--torque-speed", "62"], ["--torque-speed", "speed:torque"]),
+    "convex": (["--start-time", "1x", "--torque-speed", "0:62,10:20,90:10"], ["--torque-speed", "bends"]),
+    "unit of a corner": (["--start-time", "1x", "--torque-speed", "0 N:62,9:1"], ["--torque-speed", "speed"]),
+    "smoothness": (["--start-time", "1x", "--smoothness", "-1"], ["--smoothness", "0 or more"]),
+    "gaps": (["--start-time", "1.2x", "--gaps", "0.5,,1"], ["--gaps", "empty"]),
+    "unit of a gap": (["--start-time", "1.2x", "--gaps", "0.5 m"], ["--gaps", "not an angle"]),
+    "drive": (["crane-4amtk", "--start-time", "1.2x"], ["did you mean crane-4amtkf?"]),
+    "output": (["--start-time", "1.2x", "--out", "good.toml"], ["is a file, not a folder"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind, run, nothing_left):
+    arguments, says = ONE_SENTENCE[kind]
+    code, out, err = run("optimize", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: ")
+    assert err.count("\n") == 1
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_all_mistakes_are_told_at_once(run, nothing_left):
+    code, out, err = run(
+        "optimize", "wrong.toml", "--terminal", "sync", "--method", "best", "--max-heat", "0", "--set", "a=1",
+        "--smoothness", "rough", "--torque-speed", "62",
+    )  # fmt: skip
+    assert (code, out) == (2, "")
+    for words in (
+        "starting_torque", "--terminal", "--method", "--max-heat", "--smoothness", "--torque-speed",
+        "--start-time is missing",
+    ):  # fmt: skip
+        assert words in err
+    assert err.splitlines()[0].endswith("things are wrong:")
+    nothing_left()
+
+
+def test_a_method_that_does_not_apply_is_refused(run, nothing_left):
+    arguments = ("--set", "shaft.damping=0.5", "--method", "closed-form")
+    code, out, err = run("optimize", *SIXTY, "--start-time", "1.2x", *arguments)
+    assert (code, out) == (2, "")
+    assert "closed-form" in err
+    assert err.count("\n") == 1
+    nothing_left()
+
+
+def test_best_controllers_are_named_rightly(run):
+    told = json.loads(run(*ANCHOR, "--json").out)
+    quick = [
+        one for one in told["controllers"]
+        if one["start_time"] <= told["start_time"] and one["controller"] != "direct"
+    ]  # fmt: skip
+    best = min(quick, key=lambda one: one["k_dyn"])
+    said = " ".join(run(*ANCHOR).out.split())
+    assert f"as quick, {best['controller']}, has {best['k_dyn']:.3f}" in said
+    assert not any(math.isnan(one["k_dyn"]) for one in told["controllers"])
+
+
+NOT_FOR_SEVERAL = {
+    "terminal": ["--terminal", "steady"],
+    "minimise": ["--minimise", "heat"],
+    "method": ["--method", "lp"],
+    "max-heat": ["--max-heat", "1"],
+    "smoothness": ["--smoothness", "0.001"],
+}
+
+
+@pytest.mark.parametrize("name", NOT_FOR_SEVERAL)
+def test_several_drives_are_judged_in_one_way(name, run, nothing_left):
+    code, out, err = run("optimize", "--start-time", "1.2x", "--gaps", "0.5,1", *NOT_FOR_SEVERAL[name])
+    assert (code, out) == (2, "")
+    assert f"--{name}: one profile for several drives" in err
+    nothing_left()
+
+
+def test_a_gap_that_no_drive_has(run, nothing_left):
+    code, out, err = run("optimize", "--start-time", "1.2x", "--gaps=-0.5,1")
+    assert (code, out) == (2, "")
+    assert "gap" in err
+    assert "Traceback" not in err
+    nothing_left()
+
+
+@pytest.mark.slow
+def test_one_profile_for_two_gaps(run, place):
+    code, out, err = run(
+        "optimize", *SIXTY, "--start-time", "0.32", "--gaps", "0.4 rad", "--json", "--out", "both"
+    )
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    assert [one["gap"] for one in told["blind"]["scenarios"]] == [0.5, 0.4]
+    assert told["k_dyn_blind"] == max(told["blind"]["k_dyn_each"])
+    assert max(told["reacting"]["start_times"]) <= 0.32
+    folder = place / "both"
+    files = {path.name for path in folder.iterdir()}
+    report = (folder / "report.md").read_text("utf-8")
+    assert {part.split(")")[0] for part in report.split("](")[1:]} <= files
+    for side in ("blind", "reacting"):
+        wanted = told[side]["k_dyn_each"][0]
+        code, out, _ = run(
+            "simulate", "both/drive.toml", "--controller", "profile",
+            "--param", f"file=both/profile-{side}.toml", "--json",
+        )  # fmt: skip
+        assert json.loads(out)["k_dyn"] == pytest.approx(wanted, rel=1e-9)

@@ -1,0 +1,196 @@
+"""`softstart pareto`: the tables, the JSON, the files, and going on after an interruption."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+from softstart import Drive, simulate
+from softstart.optimal.front import pareto
+
+SIXTY = ("--set", "start.target_speed=60 rad/s")
+TWO = ("pareto", *SIXTY, "--start-times", "0.28,0.3", "--controllers", "ramp")
+THREE = ("pareto", *SIXTY, "--start-times", "0.2,0.28,0.3", "--controllers", "ramp")
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A front and the file of its finished points."""
+    path = tmp_path_factory.mktemp("finished") / "pareto.jsonl"
+    return pareto(CRANE, [0.2, 0.28, 0.3], controllers=["ramp"], save_to=path), path.read_bytes()
+
+
+@pytest.fixture
+def begun(place, finished):
+    """A folder that holds these points already."""
+    (place / "front").mkdir()
+    (place / "front" / "pareto.jsonl").write_bytes(finished[1])
+    return "front"
+
+
+def test_json_is_the_summary_of_the_front(run, begun, finished):
+    code, out, err = run(*THREE, "--json", "--out", begun)
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    assert told == json.loads(json.dumps(finished[0].summary()))
+
+
+def test_without_a_folder_all_is_computed(run, finished):
+    code, out, err = run(*TWO, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    for point, other in zip(told["points"], finished[0].points[1:], strict=True):
+        assert point["k_dyn"] == pytest.approx(other.k_dyn, rel=1e-9)
+    assert told["shortest_start_time"] is None
+
+
+def test_ranges_of_multiples_and_times(run):
+    direct = simulate(CRANE, "direct").start_time
+    code, out, _ = run("pareto", *SIXTY, "--start-times", "1.2x:1.4x:2", "--controllers", "ramp", "--json")
+    assert code == 0
+    bounds = [point["start_time_bound"] for point in json.loads(out)["points"]]
+    assert bounds == pytest.approx([1.2 * direct, 1.4 * direct])
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_the_tables_are_shown_and_fit(run, monkeypatch, width, begun):
+    monkeypatch.setenv("COLUMNS", width)
+    code, out, err = run(*THREE, "--out", begun)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= int(width)
+    assert not any(line != line.rstrip() for line in lines)
+    flat = " ".join(out.split())
+    for words in (
+        "Least K_dyn, terminal reached",
+        "infeasible",
+        "Nearest to the limit: ramp",
+        "times",
+        "bound",
+    ):
+        assert words in flat
+
+
+FILES = {"report.md", "pareto.csv", "pareto.jsonl", "pareto.svg", "pareto.png", "drive.toml"}
+
+
+def test_the_files(run, place):
+    code, out, err = run(*TWO, "--out", "deep/front")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1].startswith("Written to deep/front: ")
+    folder = place / "deep" / "front"
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert [path.name for path in (place / "deep").iterdir()] == ["front"]
+    assert (folder / "pareto.png").read_bytes().startswith(b"\x89PNG")
+    with (folder / "pareto.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["what"] for row in rows] == ["optimum", "optimum", "ramp"]
+    report = (folder / "report.md").read_text("utf-8")
+    assert {part.split(")")[0] for part in report.split("](")[1:]} <= FILES
+    assert "--start-times 0.28,0.3 --controllers ramp --out deep/front" in report
+    assert "| ramp |" in report
+
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert run(*TWO, "--out", "deep/front").code == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_points_of_another_drive_are_refused(run, place, begun):
+    before = {path.name: path.read_bytes() for path in (place / "front").iterdir()}
+    code, out, err = run(*TWO, "--set", "gap=0.6", "--out", "front")
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    for words in ("--out", "pareto.jsonl", "another drive", "give another folder"):
+        assert words in err
+    assert {path.name: path.read_bytes() for path in (place / "front").iterdir()} == before
+
+
+def test_no_feasible_start_time(run):
+    code, out, err = run("pareto", *SIXTY, "--start-times", "0.1,0.2", "--controllers", "ramp", "--json")
+    assert code == 3
+    assert err.count("\n") == 1
+    assert err.startswith("softstart: --start-time = 0.2 s")
+    told = json.loads(out)
+    assert [point["status"] for point in told["points"]] == ["INFEASIBLE", "INFEASIBLE"]
+    assert 0.2 < told["shortest_start_time"] < 0.26
+
+
+def test_an_interrupted_command_keeps_its_points_and_goes_on(command, place, run):
+    arguments = [
+        "pareto",
+        *SIXTY,
+        "--start-times",
+        "0.245:0.4:40",
+        "--controllers",
+        "direct",
+        "--out",
+        "front",
+    ]
+    process = subprocess.Popen(
+        [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    state = place / "front" / "pareto.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        if state.exists() and len(state.read_text("utf-8").splitlines()) > 2:
+            break
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate()
+    assert (process.returncode, out) == (130, "")
+    assert "finished points are kept in front/pareto.jsonl" in err
+    assert "Traceback" not in err
+    assert os.listdir(place / "front") == ["pareto.jsonl"]
+    assert not list(place.rglob("*.part"))
+    kept = [json.loads(line) for line in state.read_text("utf-8").splitlines()[1:]]
+    assert kept
+    few = ",".join(repr(one["start_time_bound"]) for one in kept[:2])
+    code, out, _ = run(
+        "pareto", *SIXTY, "--start-times", few, "--controllers", "ramp", "--out", "front", "--json"
+    )
+    assert code == 0
+    seconds = {point["start_time_bound"]: point["seconds"] for point in json.loads(out)["points"]}
+    assert seconds == {one["start_time_bound"]: one["seconds"] for one in kept[:2]}  # not computed again
+
+
+ONE_SENTENCE = {
+    "no time": (["--start-times", ""], ["--start-times", "empty"]),
+    "zero": (["--start-times", "0.3,0"], ['--start-times = "0"', "above 0 s"]),
+    "half a range": (["--start-times", "0.3:0.4"], ["from:to:count"]),
+    "count of one": (["--start-times", "0.3:0.4:1"], ["from 2 to 1000"]),
+    "count of a word": (["--start-times", "0.3:0.4:many"], ["from 2 to 1000"]),
+    "mixed range": (["--start-times", "0.3:1.2x:5"], ["both ends"]),
+    "terminal": (["--terminal", "steedy"], ["--terminal", "did you mean steady?"]),
+    "method": (["--method", "lq"], ["--method", "did you mean lp?"]),
+    "controller": (["--controllers", "dirct"], ["did you mean direct?"]),
+    "a controller that needs a parameter": (["--controllers", "profile"], ["profile"]),
+    "drive": (["crane-4amtk"], ["did you mean crane-4amtkf?"]),
+    "output": (["--out", "good.toml"], ["is a file, not a folder"]),
+}
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind, run, nothing_left):
+    arguments, says = ONE_SENTENCE[kind]
+    code, out, err = run("pareto", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: ")
+    assert err.count("\n") == 1
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_all_mistakes_are_told_at_once(run, nothing_left):
+    code, out, err = run(
+        "pareto", "wrong.toml", "--start-times", "soon,0.3", "--terminal", "x", "--controllers", "dirct,ramp"
+    )
+    assert (code, out) == (2, "")
+    for words in ("starting_torque", "--start-times", "--terminal", "did you mean direct?"):
+        assert words in err
+    nothing_left()

@@ -1,0 +1,218 @@
+"""The curve of the least K_dyn over the start time, and its saved state."""
+
+import csv
+import json
+import math
+
+import pytest
+
+from softstart import Drive, InputError, simulate
+from softstart.controller import ready_controller_names
+from softstart.optimal.front import default_start_times, even_start_times, pareto
+from softstart.optimal.front_points import ControllerPoint, FrontPoint
+from softstart.optimal.front_saved import SavedPoints
+from softstart.optimal.problem import Problem
+from softstart.optimal.shortest import shortest_start_time
+from softstart.optimal.solving import optimize
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+TIMES = [0.33, 0.29, 0.31]
+
+
+class StopError(Exception):
+    """Ends a sweep from within its progress."""
+
+
+def told(front):
+    return [(point.start_time_bound, point.k_dyn, point.k_dyn_lower_bound) for point in front.points]
+
+
+@pytest.fixture(scope="module")
+def front():
+    """Three points of the crane drive, and all controllers."""
+    return pareto(CRANE, TIMES)
+
+
+def test_each_point_is_the_optimum_of_its_start_time(front):
+    assert [point.start_time_bound for point in front.points] == sorted(TIMES)
+    for point in front.points:
+        assert point.start_time <= point.start_time_bound
+        assert point.k_dyn_lower_bound <= point.k_dyn * (1 + 1e-9)
+        assert point.gap_percent == pytest.approx(100 * (point.k_dyn / point.k_dyn_lower_bound - 1))
+        assert point.contacts == 1
+    alone = optimize(CRANE, TIMES[0], terminal="reached")
+    assert front.points[-1].k_dyn == pytest.approx(alone.k_dyn, rel=1e-6)
+    k = [point.k_dyn for point in front.points]
+    assert k == sorted(k, reverse=True)
+
+
+def test_controllers_are_judged_at_their_own_start_time(front):
+    assert [one.name for one in front.controllers] == list(ready_controller_names())
+    for one in front.controllers:
+        run = simulate(CRANE, one.name)
+        assert (one.k_dyn, one.start_time) == (run.k_dyn, run.start_time)
+        assert (one.optimum.terminal, one.optimum.start_time_bound) == ("reached", run.start_time)
+    ramp = next(one for one in front.controllers if one.name == "ramp")
+    least = optimize(CRANE, ramp.start_time, terminal="reached")
+    assert ramp.ratio == pytest.approx(ramp.k_dyn / least.k_dyn, rel=1e-6)
+    assert ramp.ratio > 1.0
+
+
+def test_no_controller_beats_the_lower_bound(front):
+    judged = [one for one in front.controllers if one.ratio is not None]
+    assert len(judged) >= 4
+    for one in judged:
+        if one.optimum.bound_kind == "momentum" or simulate(CRANE, one.name).contacts == 1:
+            assert one.k_dyn >= one.optimum.k_dyn_lower_bound
+
+
+def test_a_controller_quicker_than_any_single_contact_has_no_optimum(front):
+    direct = next(one for one in front.controllers if one.name == "direct")
+    assert simulate(CRANE, "direct").contacts > 1
+    assert direct.optimum.status == "INFEASIBLE"
+    assert direct.start_time < front.shortest_start_time < min(point.start_time for point in front.points)
+
+
+def test_start_times_that_are_too_short_are_marked():
+    front = pareto(CRANE, [0.2, 0.1, 0.3], terminal="synchronous", controllers=[])
+    short = front.points[:2]
+    assert [point.status for point in front.points] == ["INFEASIBLE", "INFEASIBLE", "OPTIMAL"]
+    shortest = shortest_start_time(Problem(CRANE, minimise="start_time"))
+    for point in short:
+        assert point.shortest_start_time == pytest.approx(shortest, rel=1e-3)
+        assert point.k_dyn is None
+        assert f"{point.shortest_start_time:.6g}" in point.status_text
+        assert f"{point.start_time_bound:g} s" in point.status_text
+    assert front.shortest_start_time == short[0].shortest_start_time
+
+
+def test_a_sweep_that_was_stopped_goes_on_where_it_was(tmp_path, front):
+    kept = tmp_path / "deep" / "front.jsonl"
+    asked = []
+
+    def stops(doing):
+        asked.append(doing)
+        if len(asked) == 3:
+            raise StopError
+
+    options = {"controllers": [], "save_to": kept}
+    with pytest.raises(StopError):
+        pareto(CRANE, TIMES, **options, progress=stops)
+    assert len(kept.read_text("utf-8").splitlines()) == 3  # what was asked, and two points
+    before = [json.loads(line) for line in kept.read_text("utf-8").splitlines()[1:]]
+
+    again = []
+    second = pareto(CRANE, TIMES, **options, progress=again.append)
+    assert len(again) == 1
+    assert "0.29 s" in again[0]
+    by_time = {point.start_time_bound: point for point in second.points}
+    for record in before:
+        assert by_time[record["start_time_bound"]] == FrontPoint.of_record(record)  # its computing time too
+
+    pareto(CRANE, TIMES, **options, progress=again.append)
+    assert len(again) == 1
+    pareto(CRANE, [0.33, 0.3], **options, progress=again.append)  # further start times join the file
+    assert len(again) == 2
+    for kept_point, fresh in zip(told(second), told(front), strict=True):
+        assert kept_point == pytest.approx(fresh, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def kept_point(tmp_path_factory):
+    """What is saved of a front of one point."""
+    path = tmp_path_factory.mktemp("kept") / "front.jsonl"
+    pareto(CRANE, [0.32], controllers=[], save_to=path)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"drive": CRANE.replace(gap=0.6)}, "drive"),
+        ({"terminal": "steady"}, "terminal"),
+        ({"method": "lp"}, "method"),
+        ({"smoothness": 1e-4}, "smoothness"),
+        ({"base": CRANE}, "base drive"),
+    ],
+)
+def test_points_of_other_inputs_are_refused_and_kept(tmp_path, kept_point, change, names):
+    kept = tmp_path / "front.jsonl"
+    kept.write_bytes(kept_point)
+    options = {"drive": CRANE, "controllers": [], "save_to": kept}
+    before = kept.read_bytes()
+    with pytest.raises(InputError, match=f"computed with another {names}; ") as refused:
+        pareto(start_times=[0.32], **options | change)
+    assert len(refused.value.sentences) == 1
+    assert kept.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "text", ["not json\n", "[1]\n", '{"k_dyn": 1}\n', '{"inputs": {}, "key": ""}\n{"a": 1}\n']
+)
+def test_a_file_that_holds_something_else_is_refused(tmp_path, text):
+    (tmp_path / "notes").write_text(text)
+    with pytest.raises(InputError, match=r"no file of saved points|another input"):
+        SavedPoints(tmp_path / "notes", {})
+    assert (tmp_path / "notes").read_text() == text
+
+
+def test_a_torn_last_line_costs_that_point_only(tmp_path):
+    path = tmp_path / "front.jsonl"
+    saved = SavedPoints(path, {"a": 1})
+    for time in (0.3, 0.31):
+        saved.add({"terminal": "reached", "start_time_bound": time})
+    path.write_text(path.read_text()[:-9])
+    again = SavedPoints(path, {"a": 1})
+    assert again.find("reached", 0.3)
+    assert again.find("reached", 0.31) is None
+
+
+def test_an_unwritable_place_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="its folder cannot be made"):
+        SavedPoints(tmp_path / "file" / "x.jsonl", {}).add({"terminal": "reached", "start_time_bound": 0.3})
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"start_times": []}, "the list is empty"),
+        ({"start_times": [0.3, -1.0, math.nan]}, "start_times = -1.0"),
+        ({"start_times": [True]}, "start_times = True"),
+        ({"terminal": "stedy"}, "terminal = 'stedy'"),
+        ({"method": "guess"}, "method"),
+        ({"controllers": ["dirct"]}, "did you mean"),
+        ({"drive": "crane-4amtkf"}, "give a Drive"),
+    ],
+)
+def test_bad_input(options, says):
+    with pytest.raises(InputError, match=says):
+        pareto(**{"drive": CRANE, "start_times": [0.3], "controllers": []} | options)
+
+
+def test_table(tmp_path, front):
+    front.to_csv(tmp_path / "front.csv")
+    with (tmp_path / "front.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["what"] for row in rows] == ["optimum"] * 3 + [one.name for one in front.controllers]
+    assert [row["status"] for row in rows[:3]] == ["OPTIMAL"] * 3
+    assert [float(row["k_dyn"]) for row in rows[:3]] == [point.k_dyn for point in front.points]
+    for row, one in zip(rows[3:], front.controllers, strict=True):
+        assert row["ratio"] == ("" if one.ratio is None else repr(one.ratio))
+    assert json.dumps(front.summary())
+
+
+def test_default_start_times():
+    times = default_start_times(CRANE, "synchronous")
+    shortest = shortest_start_time(Problem(CRANE, minimise="start_time"))
+    assert times[0] == pytest.approx(1.02 * shortest)
+    assert times[-1] == pytest.approx(1.6 * simulate(CRANE, "direct").start_time)
+    assert len(times) == 12
+    assert times == sorted(times)
+    assert even_start_times(1.0, 2.0, 2) == [1.0, 2.0]
+
+
+def test_a_controller_that_never_starts_has_no_ratio():
+    one = ControllerPoint("weak", 0.5, math.nan, "not reached", None)
+    assert one.ratio is None
+    assert one.summary()["optimum_status"] is None

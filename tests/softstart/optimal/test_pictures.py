@@ -1,0 +1,193 @@
+"""Figures of optima: the data behind them, and that nothing covers anything."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from softstart import Drive, simulate
+from softstart.controller import make_controller
+from softstart.figures import save_figure
+from softstart.optimal.front import Front
+from softstart.optimal.front_points import ControllerPoint, FrontPoint
+from softstart.optimal.labels import name_points, shared
+from softstart.optimal.pictures import front_figure, optimum_figure, worth_figure
+from softstart.optimal.problem import Problem
+from softstart.optimal.replay import replay
+from softstart.optimal.result import LowerBound, Optimum
+from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
+from softstart.profile import TorqueProfile
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+def optimum(kind="certificate", **options) -> Optimum:
+    """A start that is no optimum, but has all that is drawn."""
+    problem = Problem(CRANE, 0.28, **options)
+    profile = TorqueProfile.steps([0.0, 0.0184, 0.0333, 0.34], [62.0, 0.0, 55.0])
+    run = replay(CRANE, profile, 0.34)
+    return Optimum(problem, profile, run, LowerBound(0.9, kind, "all"), "lp", "why", run.k_dyn, 0.28, 0.1)
+
+
+def lines(axes):
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def boxes(figure, artists):
+    return [tuple(artist.get_window_extent().extents) for artist in artists]
+
+
+def test_an_optimum_is_drawn_from_its_run():
+    best = optimum()
+    motor, shaft, speed, twist = optimum_figure(best).axes
+    run = best.run
+    assert np.array_equal(lines(shaft)["shaft torque"].get_xydata(), np.column_stack([run.t, run.T]))
+    assert lines(shaft)["peak"].get_ydata()[0] == run.peak_torque
+    assert lines(shaft)["bound"].get_ydata()[0] == 0.9 * best.problem.base_torque
+    assert lines(shaft)["K_dyn = 1"].get_ydata()[0] == best.problem.base_torque
+    assert lines(shaft)["contact"].get_xdata()[0] == run.first_contact
+    assert np.array_equal(lines(motor)["realised u"].get_ydata(), run.u)
+    demand = lines(motor)["demand"].get_xydata()
+    assert demand.tolist() == [
+        [0, 62],
+        [0.0184, 62],
+        [0.0184, 0],
+        [0.0333, 0],
+        [0.0333, 55],
+        [run.end_time, 55],
+    ]
+    assert np.array_equal(lines(speed)["load w2"].get_ydata(), run.w2)
+    assert lines(speed)["allowed"].get_xdata()[0] == 0.28
+    assert np.array_equal(lines(twist)["twist phi1 - phi2"].get_ydata(), run.theta)
+    assert twist.get_title(loc="left").startswith(f"{run.contacts} contacts")
+
+
+def test_no_bound_no_line():
+    shaft = optimum_figure(optimum(kind="none")).axes[1]
+    assert "bound" not in lines(shaft)
+    assert "at least" not in shaft.get_title(loc="left")
+
+
+@pytest.mark.parametrize("options", [{}, {"torque_speed": ((0.0, 62.0), (60.0, 55.0))}])
+def test_titles_and_legends_keep_apart(options):
+    figure = optimum_figure(optimum(**options))
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        title, legend = boxes(figure, [axes._left_title, axes.get_legend()])
+        assert shared(title, legend) == 0.0
+
+
+def point(time, k, low=None):
+    return FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=k, k_dyn_lower_bound=low)
+
+
+def front(controllers):
+    points = [
+        FrontPoint(0.22, "reached", "INFEASIBLE", "too short", shortest_start_time=0.235),
+        *(point(t, 0.6 + 0.2 / (t - 0.1), 0.59 + 0.2 / (t - 0.1)) for t in np.linspace(0.24, 0.5, 9)),
+    ]
+    placed = [ControllerPoint(name, k, time, "", point(time, 1.0)) for name, time, k in controllers]
+    return Front(CRANE, "reached", tuple(points), tuple(placed))
+
+
+CROWDED = [
+    ("direct", 0.2402, 3.1), ("ramp", 0.262, 2.1), ("s-curve", 0.262, 1.9), ("own", 0.2634, 1.95),
+    ("reduced-first-stage", 0.236, 2.39),
+    ("reduced-two-stage", 0.2632, 2.39), ("acceleration-delay", 0.2633, 2.387),
+    ("current-limit-feedback", 0.27, 1.3), ("pulse-coast-hold", 0.28, 1.45),
+]  # fmt: skip
+
+
+def test_the_front_is_drawn_from_its_points():
+    one = front(CROWDED)
+    axes = front_figure(one).axes[0]
+    found = [p for p in one.points if p.found]
+    drawn = lines(axes)
+    assert drawn["optimum"].get_xydata().tolist() == [[p.start_time_bound, p.k_dyn] for p in found]
+    assert drawn["lower bound"].get_ydata().tolist() == [p.k_dyn_lower_bound for p in found]
+    assert drawn["no optimum"].get_xdata().tolist() == [0.22]
+    assert drawn["shortest with one contact, 0.2350 s"].get_xdata()[0] == 0.235
+    texts = "\n".join(text.get_text() for text in axes.texts).split("\n")
+    assert sorted(texts) == sorted(f"{name}, x{k:.2f}" for name, _, k in CROWDED)
+
+
+@pytest.mark.parametrize("count", [1, 3, 6, 9])
+def test_labels_cover_neither_each_other_nor_points_nor_the_curve(count):
+    figure = front_figure(front(CROWDED[:count]))
+    axes = figure.axes[0]
+    labels = boxes(figure, axes.texts)
+    labels += boxes(figure, [axes.get_legend()])
+    frame = tuple(figure.bbox.extents)
+    for a, b in itertools.combinations(labels, 2):
+        assert shared(a, b) < 1.0
+    curve = axes.transData.transform(lines(axes)["optimum"].get_xydata())
+    for left, bottom, right, top in labels:
+        assert frame[0] <= left < right <= frame[2]
+        assert frame[1] <= bottom < top <= frame[3]
+        for x, y in curve:
+            assert not (left < x < right and bottom < y < top)
+        for _, time, k in CROWDED[:count]:
+            x, y = axes.transData.transform((time, k))
+            assert not (left < x < right and bottom < y < top)
+
+
+def test_a_tall_front_has_a_logarithmic_axis_a_flat_one_begins_at_zero():
+    assert front_figure(front([("direct", 0.24, 9.0)])).axes[0].get_yscale() == "log"
+    flat = front_figure(front([])).axes[0]
+    assert flat.get_yscale() == "linear"
+    assert flat.get_ylim()[0] == 0.0
+
+
+def test_points_at_one_place_share_a_label():
+    from softstart.figures import new_figure
+
+    figure, axes = new_figure()
+    axes.plot([0, 1], [0, 1])
+    name_points(figure, axes, [("a", 0.2, 0.8), ("b", 0.2, 0.8), ("c", 0.8, 0.2)])
+    assert sorted(text.get_text() for text in axes.texts) == ["a\nb", "c"]
+
+
+def test_pictures_are_files(tmp_path):
+    for stem, figure in (("a", optimum_figure(optimum())), ("b", front_figure(front(CROWDED)))):
+        save_figure(figure, tmp_path, stem)
+        assert (tmp_path / f"{stem}.png").read_bytes().startswith(b"\x89PNG")
+        assert "</svg>" in (tmp_path / f"{stem}.svg").read_text("utf-8")
+
+
+def worth(gaps) -> SensorWorth:
+    """Starts that are no optima, but have all that is drawn."""
+    drives = tuple(CRANE.replace(gap=gap) for gap in gaps)
+    after = TorqueProfile([0.0, 0.05], [0.0, 50.0])
+    sides = []
+    for react in (False, True):
+        profile = TorqueProfile([0.0, 0.0184, 0.0184], [62.0, 62.0, 50.0], after if react else None)
+        runs = tuple(
+            simulate(drive, make_controller("profile", {"profile": profile}), base=CRANE) for drive in drives
+        )
+        bound = LowerBound(0.8, "momentum", "all")
+        sides.append(RobustOptimum(drives, 0.32, CRANE, react, profile, runs, bound, 1.0))
+    return SensorWorth(*sides)
+
+
+def test_the_worth_of_a_sensor_is_drawn_from_all_runs():
+    one = worth([0.5, 1.0])
+    left, right, below_left, below_right = worth_figure(one).axes
+    for best, motor, shaft in ((one.blind, left, below_left), (one.reacting, right, below_right)):
+        for run, line in zip(best.runs, motor.get_lines(), strict=False):
+            assert np.array_equal(line.get_xydata(), np.column_stack([run.t, run.u]))
+        for run, gap in zip(best.runs, ("gap 0.5", "gap 1"), strict=True):
+            assert np.array_equal(lines(shaft)[gap].get_ydata(), run.T)
+        assert lines(shaft)["largest peak"].get_ydata()[0] == pytest.approx(
+            max(run.peak_torque for run in best.runs)
+        )
+        assert shaft.get_title(loc="left") == f"largest K_dyn {best.k_dyn:.4f}"
+
+
+def test_drives_are_named_by_what_differs():
+    labels = lines(worth_figure(worth([0.5])).axes[2])
+    assert "the drive" in labels
+
+
+def test_a_front_without_any_optimum_is_drawn():
+    refused = FrontPoint(0.2, "reached", "INFEASIBLE", "too short", shortest_start_time=0.235)
+    assert front_figure(Front(CRANE, "reached", (refused,), ())).axes[0].get_legend() is not None

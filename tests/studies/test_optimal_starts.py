@@ -1,0 +1,253 @@
+"""`softstart study optimal-starts`: a part of it against plant and closed forms, and what is drawn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softstart import TorqueProfile
+from softstart.metrics import base_torque
+from softstart.optimal.pictures import front_figure
+from softstart.optimal.replay import replay
+from softstart.optimal.robust import RobustOptimum, SensorWorth
+from softstart.optimal.solving import optimize
+from softstart.study import Verdict, find_study
+from softstart_studies.optimal_starts import OptimalStarts, find, limits, pictures, present, sensor, smooth
+from softstart_studies.optimal_starts.crane import (
+    DAMPING,
+    TARGET,
+    Extent,
+    crane,
+    direct_time,
+    front_times,
+    shortest_time,
+)
+from softstart_studies.optimal_starts.fronts import any_contacts_bound
+
+PART = Extent(
+    gaps=(0.5,),
+    multiples=(1.02, 1.2),
+    points=3,
+    sensor_multiples=(),
+    rates=(5000.0,),
+    lags=(0.0,),
+    weights=(),
+    kinds=("reactive",),
+    kind_multiples=(1.2,),
+    controllers=("direct", "reduced-two-stage", "current-limit-feedback"),
+    kind_controllers=("current-limit-feedback",),
+)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """A part of the study; profiles for several gaps, slow to find, have a stand-in."""
+    return replace(find(PART, lambda text: None), sensed=[stand_in()])
+
+
+def stand_in() -> sensor.Sensed:
+    """The optimum of 0.5 rad played blindly at 0.5 and 0.6 rad, as if it were the best for both."""
+    time = 1.2 * direct_time(0.5)
+    drives = crane(0.5), crane(0.6)
+    best = [optimize(drive, time, terminal="reached") for drive in drives]
+    profile, bound = best[0].profile, best[1].bound
+    runs = tuple(replay(drive, profile, 0.35) for drive in drives)
+    one = RobustOptimum(drives, time, drives[0], False, profile, runs, bound, 0.0)
+    worth = SensorWorth(one, replace(one, react_to_contact=True), tuple(b.k_dyn for b in best))
+    return sensor.Sensed(time, worth)
+
+
+@pytest.fixture(scope="module")
+def result(found):
+    return present(found, lambda text: None)
+
+
+# the drives ----------------------------------------------------------------------------------------------
+
+
+def test_it_is_registered():
+    assert isinstance(find_study("optimal-starts"), OptimalStarts)
+
+
+def test_kinds_of_drives_differ_in_what_their_name_says_only():
+    plain, both = crane(2.0), crane(2.0, "reactive, damped")
+    assert (both.load_kind, both.d) == ("reactive", DAMPING)
+    assert both.replace(load_kind="active", damping=0.0) == plain
+    assert crane(0.5).replace(gap=2.0, name=plain.name) == plain
+
+
+def test_start_times_of_a_front_are_all_feasible_and_in_order():
+    times = front_times(0.5, 8)
+    assert times[0] > shortest_time(0.5) > direct_time(0.5)
+    assert np.all(np.diff(times) > 0.0)
+
+
+# what is found -------------------------------------------------------------------------------------------
+
+
+def test_profiles_are_those_of_the_anchor_and_end_in_step(found):
+    short, start = found.profiles
+    assert (short.run, short.point.status) == (None, "INFEASIBLE")
+    assert short.point.shortest_start_time > 1.02 * direct_time(0.5)
+    assert start.point.k_dyn == pytest.approx(0.90924724, abs=1e-6)  # DESIGN's anchor
+    end = start.run.at(start.point.start_time)
+    assert [float(end[name]) for name in ("w1", "w2")] == pytest.approx([TARGET, TARGET], rel=1e-8)
+    assert start.run.contacts == 1
+    assert 0.0 <= start.run.u.min() <= start.run.u.max() <= 62.0
+    assert start.run.peak_torque / base_torque(crane()) == pytest.approx(start.point.k_dyn, rel=1e-12)
+
+
+def test_the_front_falls_and_holds_its_bound(found):
+    (front,) = found.fronts
+    k = np.array([point.k_dyn for point in front.points])
+    low = np.array([point.k_dyn_lower_bound for point in front.points])
+    assert np.all(np.diff(k) < 0.0)
+    assert np.all(low <= k)
+    assert np.all(k < 1.005 * low)
+
+
+def test_controllers_lie_above_both_limits(found):
+    (front,) = found.fronts
+    assert len(front.controllers) == 3
+    for one in front.controllers:
+        assert one.k_dyn > any_contacts_bound(front, one)
+        if one.optimum.found:
+            assert one.optimum.k_dyn >= any_contacts_bound(front, one) * (1.0 - 1e-9)
+            assert one.ratio > 1.0
+
+
+def test_a_stricter_terminal_is_never_gentler(found):
+    (one,) = found.endings
+    for terminal in ("synchronous", "steady"):
+        for _, cost in one.costs(terminal):
+            assert cost >= 1.0 - 5e-4  # what the linear program's grid may be worth
+    last = one.by_terminal["steady"][-1]
+    assert last.k_dyn >= one.at("synchronous", last.start_time_bound).k_dyn
+
+
+@pytest.mark.slow
+def test_one_profile_for_several_gaps_is_in_time_and_above_the_own_optima():
+    (one,) = sensor.sensed(Extent(sensor_multiples=(1.2,), sensor_gaps=(0.5, 0.6)), lambda text: None)
+    for robust in (one.worth.blind, one.worth.reacting):
+        assert max(robust.start_times) <= one.start_time
+        assert robust.k_dyn >= one.hardest * (1.0 - 1e-6)  # both own optima hold for any number of contacts
+    assert one.alone[0] == pytest.approx(0.90924724, abs=1e-6)
+    assert one.worth.reacting.k_dyn < one.worth.blind.k_dyn
+
+
+def test_what_is_said_of_a_profile_for_several_gaps(found):
+    (one,) = found.sensed
+    assert one.hardest == one.alone[1] > one.alone[0]
+    rows = sensor.table(found.sensed).rows
+    assert [row[1] for row in rows] == [0.5, 0.6]
+    for row, run in zip(rows, one.worth.blind.runs, strict=True):
+        assert row[3] == pytest.approx(run.peak_torque / base_torque(crane()), abs=1e-4)
+    blind, by_gap = sensor.claims(found.sensed)
+    assert blind.verdict is Verdict.REFUTED  # reacting like the blind one it is worth nothing
+    assert by_gap.verdict is Verdict.REFUTED
+
+
+def test_a_reactive_load_is_started_more_gently_and_the_controller_is_above_it(found):
+    (kind,) = found.kinds
+    (point,) = kind.front.points
+    assert point.k_dyn < found.profiles[1].point.k_dyn  # it does not turn back while the gap is open
+    assert 0.999 * point.k_dyn < point.k_dyn_lower_bound <= point.k_dyn
+    assert all(one.ratio > 1.0 for one in kind.front.controllers)
+
+
+def test_a_limited_torque_rate_costs_something(found):
+    ideal, limited = found.prices
+    assert ideal.k_dyn == pytest.approx(0.90924724, abs=1e-6)
+    assert ideal.k_dyn < limited.k_dyn < 1.05 * ideal.k_dyn
+    assert ideal.steepest == math.inf
+
+
+def test_steepest_demand_leaves_out_what_follows_the_start():
+    best = optimize(crane(), 1.2 * direct_time(0.5))
+    assert smooth.steepest(best) == math.inf
+    ramp = TorqueProfile([0.0, 0.1, 0.3], [0.0, 10.0, 16.0])
+
+    class Ramped:
+        profile, end_time = ramp, 0.1
+
+    assert smooth.steepest(Ramped()) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("gap", [0.5, 2.0])
+def test_landmarks(gap):
+    one = limits.limit(gap)
+    best = optimize(
+        crane(gap), one.time_of_one * (1.0 + 1e-6), terminal="reached"
+    )  # the hold is just within Ms
+    assert (best.method, best.k_dyn) == ("closed-form", pytest.approx(1.0, abs=1e-5))
+    idle = replay(crane(gap), TorqueProfile([0.0], [0.0]), until=1.0)
+    assert idle.stages[1].peak_torque / base_torque(crane(gap)) == pytest.approx(one.floor, rel=1e-9)
+
+
+# what is said and drawn ----------------------------------------------------------------------------------
+
+
+def test_verdicts(result):
+    said = {claim.statement: claim.verdict for claim in result.claims}
+    assert len(said) == len(result.claims)
+    for beginning, verdict in (
+        ("Pulse, coast, hold is optimal", Verdict.CONFIRMED),
+        ("K_dyn below 1 is possible", Verdict.CONFIRMED),
+        ("Method 2 of [G] is close", Verdict.REFUTED),
+        ("No controller gets below", Verdict.CONFIRMED),
+        ("Reached is up to 5 % below", Verdict.REFUTED),
+        ("The optimum is invariant to the gap", Verdict.REFUTED),
+        ("(Not in [G]) A torque that an inverter", Verdict.CONFIRMED),
+    ):
+        (found,) = [verdict for statement, verdict in said.items() if statement.startswith(beginning)]
+        assert found is verdict, beginning
+
+
+def test_tables_hold_numbers_that_can_be_written(result):
+    for table in result.tables:
+        assert table.rows
+        for row in table.rows:
+            assert all(cell is None or isinstance(cell, str | int | float) for cell in row)
+            assert not any(isinstance(cell, float) and not math.isfinite(cell) for cell in row)
+
+
+def test_all_announced_pictures_are_there(result):
+    assert tuple(result.figures) == OptimalStarts.pictures
+
+
+def test_profiles_drawn_are_the_runs(found):
+    start = found.profiles[1]
+    figure = pictures.profiles_figure(found.profiles, 52.86, TARGET)
+    motor, shaft, speed = figure.axes
+    assert np.array_equal(motor.lines[0].get_ydata(), start.run.u)
+    assert np.array_equal(shaft.lines[1].get_ydata(), start.run.T)
+    assert np.array_equal(speed.lines[0].get_ydata(), start.run.w2)
+    assert "1.02 x: infeasible" in motor.get_title(loc="left")
+
+
+def test_fronts_drawn_are_the_points(found):
+    (front,) = found.fronts
+    curves = [line.get_xydata() for line in front_figure(front).axes[0].lines]
+    expected = np.array([(point.start_time_bound, point.k_dyn) for point in front.points])
+    assert any(curve.shape == expected.shape and np.allclose(curve, expected) for curve in curves)
+
+
+def test_sensor_and_smoothness_drawn_are_the_numbers(found):
+    (panel,) = pictures.sensor_figure(found.sensed).axes
+    drawn = {line.get_label(): tuple(line.get_ydata()) for line in panel.lines}
+    assert drawn["one profile, blind"] == found.sensed[0].worth.blind.k_dyn_each
+    assert drawn["own optimum of each gap"] == found.sensed[0].alone
+    left = pictures.smooth_figure(found.prices).axes[0]
+    (curve,) = [line for line in left.lines if line.get_label() == "no lag"]
+    assert curve.get_xydata().tolist() == [[5000.0, found.prices[1].k_dyn]]
+
+
+def test_terminals_drawn_are_the_numbers(found):
+    (one,) = found.endings
+    above, below = pictures.terminals_figure([one]).axes
+    steady = next(line for line in above.lines if line.get_label() == "steady").get_ydata()
+    assert list(steady) == [p.k_dyn for p in one.by_terminal["steady"] if p.k_dyn is not None]
+    assert np.allclose(below.lines[0].get_ydata(), [100 * (cost - 1) for _, cost in one.costs("synchronous")])
