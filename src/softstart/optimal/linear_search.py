@@ -24,6 +24,7 @@ Vector = NDArray[np.float64]
 COARSE, MIDDLE, MOST = 40, 80, 400  # steps of the grid: to find the entry, to refine it, at most
 ROUNDS = 3
 SCANNED, LOCAL_MINIMA = 20, 3
+SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
 
 
 def solve(problem: Problem, entry_near: float | None = None) -> Candidate | None:
@@ -59,6 +60,8 @@ def search(problem: Problem, entry_near: float | None = None) -> Answer | None:
     entry = entry_of(problem)
     latest = float(problem.start_time)
     best = _best_entry(problem, entry, latest, COARSE, entry_near)
+    if best is None:  # hardly enough time: the torque has no room for a coarse grid
+        best = _best_entry(problem, entry, latest, MIDDLE, entry_near)
     if best is None or _sooner(problem, best) < best.P * (1.0 - 1e-4):
         best = _best_end(problem, entry, latest) or best  # more time does not help, or does not fit
     if best is None:
@@ -123,8 +126,14 @@ def _best_entry(
                 limit = latest_for(lowest)
         if near is not None:
             lowest = min(lowest, peak_at(min(max(near, entry.earliest), last)))
-        if not math.isfinite(lowest):
-            return None
+        if not math.isfinite(lowest):  # little time: a narrow window of te is left, if any
+            speed, te = greatest_speed(problem, entry, end, steps, math.nan)
+            if not speed >= problem.target:
+                return None
+            lowest = peak_at(te)
+            if not math.isfinite(lowest):
+                return None
+            limit = latest_for(lowest)
         for share in np.linspace(0.0, 1.0, SCANNED)[1:] ** 1.5:
             peak_at(entry.earliest + (limit - entry.earliest) * float(share))
         tried = sorted(answers)
@@ -144,6 +153,42 @@ def _minima(values: list[float]) -> list[int]:
         if math.isfinite(value) and padded[i] >= value and value <= padded[i + 2]
     ]
     return sorted(local, key=lambda i: values[i])[:LOCAL_MINIMA]
+
+
+def greatest_speed(
+    problem: Problem, entry: Entry, end: float, steps: int, near: float
+) -> tuple[float, float]:
+    """The greatest load speed at `end`, rad/s, and the te it needs; -inf where the terminal cannot be met."""
+    contact = Contact.of(problem.drive)
+    known: dict[float, float] = {}
+
+    def short_by(te: float) -> float:
+        te = min(max(te, entry.earliest), entry.latest)
+        if te not in known:
+            found = None
+            if end > te:
+                program = LinearProgram(problem, end - te, first_grid(contact, end - te, steps))
+                found = program.solve(te, greatest_speed=True)
+            known[te] = -found if isinstance(found, float) else math.inf
+        return known[te]
+
+    last = min(entry.latest, end)
+    if last > entry.earliest:
+        tried = []
+        if not math.isnan(near):
+            spread = 0.1 * (near - entry.earliest) + 1e-3 * end
+            tried = [max(near - spread, entry.earliest), near, near + spread]
+        if not tried or not short_by(near) <= min(short_by(tried[0]), short_by(tried[2])) < math.inf:
+            tried += [entry.earliest + (last - entry.earliest) * share for share in SHARES]
+            tried.sort()
+        i = min(range(len(tried)), key=lambda k: short_by(tried[k]))
+        if math.isfinite(short_by(tried[i])):
+            low, high = tried[max(i - 1, 0)], tried[min(i + 1, len(tried) - 1)]
+            golden(short_by, low, high, max(0.02 * (high - low), 1e-5 * end))
+    else:
+        short_by(entry.earliest)
+    te = min(known, key=lambda t: known[t])
+    return -known[te], te
 
 
 def _best_end(problem: Problem, entry: Entry, latest: float) -> Answer | None:

@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 
 from softstart.errors import SimulationError
-from softstart.optimal.ideal import Contact, Entry, entry_of
-from softstart.optimal.linear_program import AIM, LinearProgram, first_grid
-from softstart.optimal.linear_search import golden, not_linear
+from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.linear_program import AIM
+from softstart.optimal.linear_search import greatest_speed, not_linear
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Verdict
@@ -16,7 +16,6 @@ from softstart.simulation import simulate
 
 COARSE, FINE = 40, 80  # steps of the linear programs
 WITHIN = 2e-6  # of the start time
-SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
 
 
 def shortest_start_time(problem: Problem) -> float:
@@ -54,7 +53,7 @@ def _by_linear_program(problem: Problem) -> float:
     for steps, within in ((COARSE, 1e-3), (FINE, WITHIN)):
         enough, short_of = math.inf, 0.0
         for _ in range(40):
-            speed, te = _greatest_speed(problem, entry, end, steps, best)
+            speed, te = greatest_speed(problem, entry, end, steps, best)
             if not math.isfinite(speed):
                 short_of, best = max(short_of, end), math.nan
                 end = 0.5 * (end + enough) if math.isfinite(enough) else 1.3 * end
@@ -79,42 +78,6 @@ def _by_linear_program(problem: Problem) -> float:
         if not math.isfinite(end):
             return math.inf
     return enough
-
-
-def _greatest_speed(
-    problem: Problem, entry: Entry, end: float, steps: int, near: float
-) -> tuple[float, float]:
-    """The greatest load speed at `end`, rad/s, and the te it needs; -inf where the terminal cannot be met."""
-    contact = Contact.of(problem.drive)
-    known: dict[float, float] = {}
-
-    def short_by(te: float) -> float:
-        te = min(max(te, entry.earliest), entry.latest)
-        if te not in known:
-            found = None
-            if end > te:
-                program = LinearProgram(problem, end - te, first_grid(contact, end - te, steps))
-                found = program.solve(te, greatest_speed=True)
-            known[te] = -found if isinstance(found, float) else math.inf
-        return known[te]
-
-    last = min(entry.latest, end)
-    if last > entry.earliest:
-        tried = []
-        if not math.isnan(near):
-            spread = 0.1 * (near - entry.earliest) + 1e-3 * end
-            tried = [max(near - spread, entry.earliest), near, near + spread]
-        if not tried or not short_by(near) <= min(short_by(tried[0]), short_by(tried[2])) < math.inf:
-            tried += [entry.earliest + (last - entry.earliest) * share for share in SHARES]
-            tried.sort()
-        i = min(range(len(tried)), key=lambda k: short_by(tried[k]))
-        if math.isfinite(short_by(tried[i])):
-            low, high = tried[max(i - 1, 0)], tried[min(i + 1, len(tried) - 1)]
-            golden(short_by, low, high, max(0.02 * (high - low), 1e-5 * end))
-    else:
-        short_by(entry.earliest)
-    te = min(known, key=lambda t: known[t])
-    return -known[te], te
 
 
 def verdict_on(problem: Problem) -> Verdict:
@@ -149,7 +112,8 @@ def _constraint(problem: Problem, shortest: float) -> str:
     plain = replace(
         problem, drive=ideal, torque_speed=(), smoothness=0.0, k_dyn=None, heat=None, minimise="k_dyn"
     )
-    if plain == replace(problem, minimise="k_dyn") or shortest_start_time(plain) > bound:
+    unbounded = problem.k_dyn is None and problem.heat is None
+    if (unbounded and problem.ideal_torque) or shortest_start_time(plain) > bound:
         return "the gap and the swing of the shaft, which cost time at the largest motor torque"
     dropped = {
         f"the torque lag of {drive.torque_lag:g} s": replace(problem, drive=drive.replace(torque_lag=0.0)),

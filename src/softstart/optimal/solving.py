@@ -15,7 +15,7 @@ from softstart.optimal.checking import check
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Objective, Problem, Terminal
 from softstart.optimal.replay import replay
-from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum
+from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum, OptimumError
 from softstart.optimal.shortest import shortest_start_time, verdict_on
 from softstart.optimal.tail import with_tail
 from softstart.run import Run
@@ -116,7 +116,7 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
     if method == "lp" or (method == "auto" and not no_program):
         best = linear_search.solve(problem)
         if best is None:
-            raise InfeasibleError(verdict_on(problem))
+            raise _refusal(problem)
         return best, f"no closed form: {no_formula}" if method == "auto" else asked
     from softstart.optimal import collocation
 
@@ -127,6 +127,19 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
             raise InfeasibleError(verdict_on(problem)) from None
         raise
     return best, f"no linear program: {no_program}" if method == "auto" else asked
+
+
+def _refusal(problem: Problem) -> InfeasibleError | OptimumError:
+    """The verdict, unless a start so quick exists and was only not found."""
+    verdict = verdict_on(problem)
+    assert problem.start_time is not None
+    if verdict.shortest_start_time <= problem.start_time * (1.0 - 1e-4):
+        return OptimumError(
+            f"The linear program found no start within {problem.start_time:g} s, though one of "
+            f"{verdict.shortest_start_time:.6g} s exists; ask for a little more time "
+            "or for method = collocation."
+        )
+    return InfeasibleError(verdict)
 
 
 def _bound(problem: Problem, candidate: Candidate, profile: Any) -> LowerBound:

@@ -65,6 +65,16 @@ def test_too_short_a_start_time() -> None:
     assert verdict.summary()["status"] == "INFEASIBLE"
 
 
+@pytest.mark.parametrize("share", [1.0005, 1.002, 1.007])
+def test_hardly_enough_time_is_enough(share: float) -> None:
+    """A wide gap leaves a window of a millisecond for the contact: it must be found."""
+    worn = CRANE.replace(gap=2.0)
+    shortest = shortest_start_time(Problem(worn, 1.0, "reached"))
+    best = optimize(worn, share * shortest, terminal="reached")
+    assert 1.8 < best.k_dyn < 2.0
+    assert best.gap_percent < 0.3
+
+
 def test_less_than_momentum_allows_names_the_torque() -> None:
     with pytest.raises(InfeasibleError, match="62 N m, even if it acted all the time"):
         optimize(CRANE, 0.2)
