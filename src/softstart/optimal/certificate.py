@@ -97,7 +97,7 @@ def certified_bound(
     goal = k_dyn * problem.base_torque * (1.0 - within)
     peak = _Search(problem, goal, entry_near).bound()
     return LowerBound(
-        min(peak / problem.base_torque, k_dyn),
+        peak / problem.base_torque,
         "certificate",
         _covers(problem, entry_of(problem)),
     )

@@ -96,20 +96,20 @@ class Contact:
         settled = (1.0 - dh - 2.0 * self.zeta * h) / self.Omega**2
         return np.where(np.asarray(s) >= 0.0, settled, 0.0)
 
-    def sums(
-        self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector, *, before: bool = False
-    ) -> Vector:
+    def sums(self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector, *, before: bool = False) -> Vector:
         """Sum over j with at_j > s of of_h_j h(at_j - s) + of_dh_j dh(at_j - s), for rising s.
 
-        It jumps at every at_j, as dh does at 0: `before` counts at_j = s too, the limit from below. By running
-        sums over the two exponentials of h, so that it costs no more than s.size + at.size.
+        It jumps at every at_j, as dh does at 0: `before` counts at_j = s too, the limit from below. By
+        running sums over the two exponentials of h, so that it costs no more than s.size + at.size.
         """
         r1, r2 = self._exponents()
         order = np.argsort(at)
         at, of_h, of_dh = at[order], of_h[order], of_dh[order]
         first = np.searchsorted(at, s, side="left" if before else "right")
         longest = float(max(at[-1], s[-1])) if at.size else 0.0
-        if max(abs(r1.real), abs(r2.real)) * longest > 300.0:  # the sums would lose themselves in huge factors
+        if (
+            max(abs(r1.real), abs(r2.real)) * longest > 300.0
+        ):  # the sums would lose themselves in huge factors
             counted = np.arange(at.size)[None, :] >= first[:, None]
             lag = np.where(counted, at[None, :] - s[:, None], -1.0)
             dense: Vector = self.h(lag) @ of_h + self.dh(lag) @ of_dh
@@ -298,8 +298,8 @@ class ThroughStandstill(Entry):
 
     te is the instant of the breakaway, z0 = Mc/c. An early pulse has the least speed there (its lead on any
     other torque with the same arrival is concave from the end of the pulse on); a late one the greatest, and
-    waiting (where the shaft is wound up: holding it) costs nothing, so that one can be had at any te. Letting a
-    wound shaft go first makes v greater still: that is in `fastest_between`, for bounds, not in `fastest`.
+    waiting (where the shaft is wound up: holding it) costs nothing, so that one can be had at any te. Letting
+    a wound shaft go first makes v greater still: `fastest_between`, for bounds, has that, `fastest` not.
     """
 
     way: float  # rad still open

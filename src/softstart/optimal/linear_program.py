@@ -146,6 +146,9 @@ class LinearProgram:
         a, b = self._from_node(self.tail_at, np.full(TAIL_POINTS, self.n), None)
         self.tail = a[0] + damping * b[0], a[1] + damping * b[1]
         self.T_end = self._single({self.first_a + self.n: 1.0, self.first_b + self.n: damping})
+        # a damped contact begins with T = d v; for the certificate's relaxation it need not count
+        self.T_first: Rows = self._single({self.first_a: 1.0, self.first_b: damping}), np.zeros(1)
+        self.jumps = damping > 0.0 and mix is None and margin > 0.0
 
     # rows: pairs (sparse matrix over the variables, constant) --------------------------------------------
 
@@ -263,6 +266,7 @@ class LinearProgram:
             below_P(self.T, -1.0) if self.pulls and not greatest_speed else none,
             (-1.0 * self.kept[0], self.kept[1] - self.least),
             below_P(self.tail) if coasting and not greatest_speed else none,
+            below_P(self.T_first) if self.jumps and not greatest_speed else none,
         ]
         equations = terminal
         A_eq = sparse.vstack([self.dynamics[0], *(row for row, _ in equations)])
@@ -312,8 +316,8 @@ class LinearProgram:
     def _multipliers(self, found: Any, sizes: list[int]) -> Multipliers:
         """HiGHS's marginals in N m per unit of each limit; signs so that a larger left side raises P."""
         least = np.maximum(-np.asarray(found.ineqlin.marginals), 0.0)
-        parts = np.split(least, np.cumsum(sizes)[:-1])
-        total = parts[0].sum() + parts[1].sum() + parts[3].sum()
+        parts = np.split(least, np.cumsum(sizes)[:-1])[:4]
+        total = float(parts[0].sum() + parts[1].sum() + parts[3].sum()) or 1.0
         peak, trough, closed, tail = (part / total for part in parts)
         none = np.zeros(self.share.size)
         if self.mix is not None:

@@ -1,4 +1,4 @@
-"""The linear maps of an ideal start: kernels against matrix exponentials, entries against the exact plant and search."""
+"""Kernels of an ideal start against matrix exponentials, entries against the exact plant and by search."""
 
 from __future__ import annotations
 
@@ -150,7 +150,9 @@ def as_profile(entry: Entry, te: float, v: float) -> TorqueProfile:
     return TorqueProfile.steps(times, [torque for _, torque in pieces])
 
 
-@pytest.mark.parametrize("given", [{}, {"start_position": -0.2, "initial_motor_speed": 2.0}, {"load_torque": 0.0}])
+@pytest.mark.parametrize(
+    "given", [{}, {"start_position": -0.2, "initial_motor_speed": 2.0}, {"load_torque": 0.0}]
+)
 def test_least_and_greatest_speed_after_the_gap_against_a_program(given: dict[str, float]) -> None:
     """Of all torques on a fine grid with the way as their moment: the grid can only be a little worse."""
     entry = entry_of(Problem(CRANE.replace(**given), 0.5))
@@ -188,7 +190,8 @@ def breakaway(entry: ThroughStandstill, pieces: list[tuple[float, float]]) -> tu
     """
     ws, z0, t = math.sqrt(entry.c / entry.J1), entry.Mc / entry.c, 0.0
     z, v = (-entry.way, 0.0) if entry.way > 0.0 else (entry.preload, 0.0)
-    for left, u in pieces:
+    for duration, u in pieces:
+        left = duration
         if z < 0.0:
             a = u / entry.J1
             arriving = v + math.sqrt(v * v - 2.0 * a * z)
@@ -203,8 +206,9 @@ def breakaway(entry: ThroughStandstill, pieces: list[tuple[float, float]]) -> tu
         if radius > 0.0 and abs(z0 - mean) <= radius:
             turn = angle - math.acos((z0 - mean) / radius)
             s = max(turn if turn > -1e-9 else turn + 2.0 * math.pi, 0.0) / ws
-        lowest = (angle + math.pi) / ws
-        if mean < radius and lowest < min(s, left) or mean + radius * math.cos(angle - ws * min(s, left)) < 0.0:
+        stop = min(s, left)
+        turns_back = mean < radius and (angle + math.pi) / ws < stop
+        if turns_back or mean + radius * math.cos(angle - ws * stop) < 0.0:
             return None
         if s <= left:
             return t + s, ws * radius * math.sin(angle - ws * s)

@@ -75,6 +75,13 @@ def test_hardly_enough_time_is_enough(share: float) -> None:
     assert best.gap_percent < 0.3
 
 
+def test_a_heavily_damped_contact_begins_with_a_jump_of_torque() -> None:
+    """T(0+) = d v is the peak here: the gap has to be crossed slowly."""
+    best = optimize(CRANE.replace(damping=20.0), 0.35, terminal="reached")
+    assert best.run.peak_time == pytest.approx(best.run.first_contact, abs=1e-6)
+    assert best.gap_percent < 0.2
+
+
 def test_less_than_momentum_allows_names_the_torque() -> None:
     with pytest.raises(InfeasibleError, match="62 N m, even if it acted all the time"):
         optimize(CRANE, 0.2)

@@ -1,0 +1,101 @@
+"""The linear program against the closed form, the exact plant, its own refinement and its dual."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softstart import Drive
+from softstart.errors import InputError
+from softstart.optimal import linear_search, pulse_coast_hold
+from softstart.optimal.certificate import _Dual, _Envelope
+from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.linear_program import Answer, LinearProgram
+from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.replay import replay
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+@pytest.mark.parametrize("given", [{}, {"start_position": -0.25, "load_torque": 12.0}])
+def test_pulse_coast_hold_comes_out(given: dict[str, float]) -> None:
+    problem = Problem(CRANE.replace(**given), 0.33)
+    best = linear_search.search(problem)
+    assert best is not None
+    truth = pulse_coast_hold.solve(problem).claimed
+    assert best.P / problem.base_torque == pytest.approx(truth, rel=3e-4)  # T stays 2e-4 Ms above 0
+    assert best.P / problem.base_torque >= truth * (1.0 - 1e-5)
+
+
+CASES: dict[str, tuple[dict[str, Any], float, Terminal]] = {
+    "bang-bang": ({}, 0.2522662, "synchronous"),
+    "reached": ({}, 0.2522662, "reached"),
+    "steady": ({}, 0.3, "steady"),
+    "damped": ({"damping": 0.5}, 0.27, "synchronous"),
+    "dead-zone": ({"damping": 0.5, "contact_law": "dead-zone"}, 0.27, "synchronous"),
+    "reactive": ({"load_kind": "reactive"}, 0.27, "synchronous"),
+}
+
+
+@pytest.mark.parametrize(("given", "end", "terminal"), CASES.values(), ids=CASES)
+def test_the_exact_plant_agrees(given: dict[str, Any], end: float, terminal: Terminal) -> None:
+    problem = Problem(CRANE.replace(**given), end, terminal)
+    best = linear_search.search(problem)
+    assert best is not None
+    run = replay(problem.drive, linear_search.assemble(problem, best), best.end_time)
+    assert best.end_time <= end * (1.0 + 1e-12)
+    assert run.contacts == 1
+    state = {name: float(value) for name, value in run.at(best.end_time).items()}
+    assert state["w2"] == pytest.approx(problem.target, rel=1e-6)
+    if terminal != "reached":
+        assert run.peak_torque == pytest.approx(best.P, rel=2e-4)
+        assert state["v"] == pytest.approx(0.0, abs=1e-6 * problem.target)
+    assert run.peak_torque <= best.P * (1.0 + 2e-4)
+    if terminal == "steady":
+        assert state["T"] == pytest.approx(float(problem.drive.Mc), abs=1e-6 * problem.highest_torque)
+
+
+def test_finer_grids_converge() -> None:
+    """Every torque on a grid is one on a grid twice as fine, checked twice as often: P falls, ever less."""
+    problem = Problem(CRANE, 0.2522662)
+    peaks = []
+    for steps in (20, 40, 80, 160):
+        answer = LinearProgram(problem, 0.2355, steps, None, (0.25, 0.5, 0.75, 1.0), 0.0).solve(0.0167662)
+        assert isinstance(answer, Answer)
+        peaks.append(answer.P)
+    changes = np.abs(np.diff(peaks))
+    assert changes[-1] < 2e-3 * peaks[-1]
+    assert changes[-1] < changes[0]
+
+
+@pytest.mark.parametrize(("given", "end", "terminal"), CASES.values(), ids=CASES)
+def test_no_answer_is_below_its_own_dual(given: dict[str, Any], end: float, terminal: Terminal) -> None:
+    problem = Problem(CRANE.replace(**given), end, terminal)
+    entry, contact = entry_of(problem), Contact.of(problem.drive)
+    te = 1.05 * entry.earliest
+    low, high = float(entry.slowest(np.array([te]))[0]), float(entry.fastest(np.array([te]))[0])
+    answer = LinearProgram(problem, end - te, 120).solve(te)
+    assert isinstance(answer, Answer)
+    assert low - 1e-9 <= answer.v <= high + 1e-9
+    assert answer.u.min() >= -1e-9
+    assert answer.u.max() <= problem.highest_torque * (1.0 + 1e-9)
+    dual = _Dual(problem, entry, answer.multipliers, _Envelope(contact, 1.5 * end), high)
+    fixed, by_v = dual.at(answer.end_time - te)
+    missing = problem.target - float(entry.load_speed(np.array([te]))[0])
+    D = fixed + min(by_v * low, by_v * high) + answer.multipliers.speed * missing
+    assert D <= answer.P * (1.0 + 1e-6)
+    assert D >= answer.P * 0.95  # the gap that is left belongs to the grid
+
+
+def test_what_is_not_linear_is_refused() -> None:
+    for given, words in (
+        ({"torque_lag": 0.01}, "jump freely"),
+        ({"minimum_torque": -5.0}, "brake"),
+        ({"damping": 0.5, "contact_law": "modelica"}, "modelica"),
+    ):
+        with pytest.raises(InputError, match=words):
+            linear_search.solve(Problem(CRANE.replace(**given), 0.3))
+    with pytest.raises(InputError, match="not heat"):
+        linear_search.solve(Problem(CRANE, 0.3, minimise="heat"))
