@@ -124,7 +124,7 @@ def exponential_response(m: Vector, s: float) -> Pair:
     before = 0.0
     this = 0.5
     power = s * s
-    total = 0.5 * power
+    term = total = 0.5 * power
     total_rate = s
     for n in range(2, 200):
         after = (-2.0 * shift * n * this - resonance * before) / ((n + 1.0) * n)
@@ -132,9 +132,10 @@ def exponential_response(m: Vector, s: float) -> Pair:
         this = after
         total_rate += (n + 1.0) * this * power
         power *= s
+        last = term
         term = this * power
         total += term
-        if abs(term) <= 1e-18 * abs(total):
+        if abs(last) + abs(term) <= 1e-18 * abs(total):  # every other term is 0 where shift is
             break
     return e * tail * total, e * tail * (total_rate - rate * total)
 

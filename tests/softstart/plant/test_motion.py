@@ -48,6 +48,7 @@ def by_matrix(
 )
 @example(w0=1.0, ratio=1.0, nearness=1.0, forcing=(1.0, -2.0, 3.0), s=2.5)  # all three rates equal
 @example(w0=2.0, ratio=1.5, nearness=1.0, forcing=(1.0, -2.0, 3.0), s=2.5)  # lag on the slow rate
+@example(w0=1.0, ratio=0.99999, nearness=0.99999, forcing=(0.0, 0.0, 1.0), s=1.0)  # lag on the decay rate
 def test_contact(
     w0: float, ratio: float, nearness: float, forcing: tuple[float, float, float], s: float
 ) -> None:
