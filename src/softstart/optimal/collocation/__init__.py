@@ -1,8 +1,9 @@
 """Optimal starts by direct collocation: CasADi, phases of free duration, IPOPT.
 
 Read in this order: phases.py (which motions follow each other), statement.py (the mathematics: dynamics, path
-constraints, boundary conditions, objective), transcription.py (the same as a nonlinear program), guess.py
-(where the search begins), search.py (`solve`: starts, retries, refinement), reading.py (a solution in SI).
+constraints, boundary conditions, objective), interval.py and transcription.py (the same as a nonlinear
+program), guess.py (where the search begins), search.py (`solve`: starts, retries, refinement), reading.py (a
+solution in SI).
 """
 
 from __future__ import annotations

@@ -10,8 +10,9 @@ class NotConverged(RuntimeError):  # noqa: N818 - the name says what happened
     a problem without solution, a small one for a search that lost its way.
     """
 
-    def __init__(self, reason: str, violation: float) -> None:
+    def __init__(self, reason: str, violation: float, final: bool = False) -> None:
         self.reason, self.violation = reason, violation
+        self.final = final  # no other first guess is worth trying
         super().__init__(
             f"collocation: {reason} (largest violated constraint {violation:.2g} of the drive's own units)."
         )

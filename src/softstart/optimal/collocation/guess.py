@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.optimal.collocation.interval import POINTS
 from softstart.optimal.collocation.phases import Phase, Program
 from softstart.optimal.collocation.scaling import Numbers
-from softstart.optimal.collocation.transcription import POINTS, Mesh, Slot
+from softstart.optimal.collocation.transcription import Mesh, Slot
+from softstart.optimal.problem import Problem
+from softstart.optimal.pulse_coast_hold import PulseCoastHold
 
 Vector = NDArray[np.float64]
 Reading = tuple[Vector, float, float, Vector, Vector]  # durations, peak, heat, states, demands
@@ -71,6 +74,19 @@ def quickest_contact(p: Numbers) -> float:
     within = (6.0 * way * p.J1 / p.rate) ** (1.0 / 3.0) if p.rate < 1e20 else 0.0
     slow = min(crossing + 0.5 * ramp, within) if p.rate < 1e20 else crossing
     return max(crossing, slow) + min(p.lag, crossing)
+
+
+def likely_contact(problem: Problem, p: Numbers) -> float:
+    """Instant of the contact in the best start: as much later than the quickest as in pulse, coast, hold."""
+    quickest = quickest_contact(p)
+    starts = PulseCoastHold.of(problem)
+    if problem.start_time is None or quickest == 0.0 or starts.v0 < 0.0:
+        return 1.15 * quickest
+    ideal = starts.course(starts.full_peak).t_contact
+    time = problem.start_time - max(0.0, quickest * p.units.time - ideal)
+    P = starts.least_peak_for(problem.target, time) if time > ideal else math.inf
+    later = starts.course(P).t_contact / ideal if math.isfinite(P) else 1.15
+    return quickest * min(max(later, 1.05), 4.0)
 
 
 def make_course(program: Program, p: Numbers, contact: float, end: float) -> Course:

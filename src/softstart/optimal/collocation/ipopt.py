@@ -23,9 +23,13 @@ ACCURACY = {
     "ipopt.acceptable_constr_viol_tol": 1e-9,
     "ipopt.acceptable_iter": 8,
     "ipopt.bound_relax_factor": 0.0,
-    "ipopt.max_iter": 250,
-    "ipopt.mu_strategy": "adaptive",
+    "ipopt.max_iter": 200,
+    "ipopt.max_resto_iter": 30,
+    "ipopt.mu_strategy": "monotone",
 }
+# s of computing time a variable: 200 iterations take half of it, only a search that is lost in restoration
+# takes more.
+PATIENCE = 2e-3
 NEAR = {  # from a solution on a coarser mesh
     "ipopt.mu_strategy": "monotone",
     "ipopt.bound_push": 1e-4,
@@ -75,9 +79,12 @@ class Solution:
 
 
 @lru_cache(maxsize=32)
-def _solver(transcribed: Transcribed, mu: float, full: bool) -> Any:
+def _solver(transcribed: Transcribed, mu: float, full: bool, adaptive: bool) -> Any:
     """The solver of a program; `mu` above 0: begun near, at barrier parameter; `full`: with multipliers."""
     options: dict[str, Any] = {**QUIET, **ACCURACY}
+    options["ipopt.max_cpu_time"] = PATIENCE * max(1000, len(transcribed.slots))
+    if adaptive:
+        options["ipopt.mu_strategy"] = "adaptive"
     if mu > 0.0:
         options |= {**(WARM if full else NEAR), "ipopt.mu_init": mu}
     return ca.nlpsol("start", "ipopt", transcribed.nlp, options)
@@ -90,13 +97,17 @@ def run(
     x: Vector,
     multipliers: tuple[Vector, Vector] | None = None,
     mu: float = 0.0,
+    adaptive: bool = False,
 ) -> Solution:
-    """Solve from x; `mu` above 0: x is near, begin at this barrier parameter; with multipliers very near."""
+    """Solve from x; `mu` above 0: x is near, begin at this barrier parameter; with multipliers very near.
+
+    `adaptive`: another course of the barrier parameter, mostly slower; it may end where the usual one fails.
+    """
     lbx, ubx, lbg, ubg = transcribed.limits(parameters)
     given: dict[str, Any] = {"x0": x, "p": parameters, "lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
     if multipliers is not None:
         given |= {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
-    solver = _solver(transcribed, mu, multipliers is not None)
+    solver = _solver(transcribed, mu, multipliers is not None, adaptive)
     try:
         out = solver(**given)
     except RuntimeError as error:

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from softstart.optimal.collocation.failure import NotConverged
-from softstart.optimal.collocation.guess import Course, from_solution, make_course, quickest_contact
+from softstart.optimal.collocation.guess import (
+    Course,
+    from_solution,
+    likely_contact,
+    make_course,
+)
+from softstart.optimal.collocation.interval import parameter_vector
 from softstart.optimal.collocation.ipopt import Solution, Vector, run
 from softstart.optimal.collocation.mesh import first_mesh, intervals, refined
 from softstart.optimal.collocation.phases import Program, programs
 from softstart.optimal.collocation.reading import Claim, Replayed, claim, replayed
 from softstart.optimal.collocation.scaling import BEYOND, Numbers, numbers
 from softstart.optimal.collocation.tail import tail_rows
-from softstart.optimal.collocation.transcription import Mesh, parameter_vector, transcribe
+from softstart.optimal.collocation.transcription import Mesh, transcribe
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
 
-ALWAYS = (1.15, 1.8)  # contact instants tried first, in units of the quickest one
-OTHERWISE = (1.0, 1.4, 2.6, 4.0)  # tried where these fail
+OTHERWISE = (1.6, 0.7)  # contact instants tried where the likely one fails, in units of that
+WIDE_BARRIER = 1e-2
 WARM_BARRIER = 1e-5
 NEAR_BARRIER = 1e-4
 WORSE = 1e-3  # relative: so much a finer mesh may cost
+CLEARLY = 1.02  # of the start time: a quickest start on the first mesh is known to about 1 %
+SIMILAR = 0.02  # relative: within this the mesh of a warm start may stay as it is
 LANDING = 1e-6  # of target speed and Ms: how well the exact plant must meet the terminal conditions
 ASTRAY = 2e-3  # relative: what the exact plant contradicts by more is no solution
 STRIDE = 0.35  # rad of the elastic oscillation an interval may span where the landing is to be exact
@@ -41,6 +49,7 @@ class Warm:
     lam_g: Vector
     barrier: float
     iterations: int
+    refined_value: float  # of what is minimised, when the mesh was last made finer
 
 
 def solve(
@@ -54,11 +63,19 @@ def solve(
         spent = solution.iterations
         if not solution.found:
             solution = None
-    how = "warm" if solution is not None else "cold"
-    if solution is None:
-        solution, cost = _best_start(problem, contact_guess)
-        spent += cost
-    return _refine(problem, solution, spent, how, tolerance, max_refinements)
+    if solution is not None:
+        return _refine(problem, solution, spent, tolerance, max_refinements, warm.refined_value)
+    failure: NotConverged | None = None
+    for contact in _contacts(problem, contact_guess):
+        try:
+            solution, cost = _first(problem, contact)
+            return _refine(problem, solution, spent + cost, tolerance, max_refinements)
+        except NotConverged as astray:
+            failure = failure or astray
+            if astray.final:
+                break
+    assert failure is not None
+    raise failure
 
 
 def _from(problem: Problem, warm: Warm) -> Solution:
@@ -74,27 +91,54 @@ def _parameters(program: Program, p: Numbers) -> Vector:
 # ---- first solutions -------------------------------------------------------------------------------------
 
 
-def _best_start(problem: Problem, contact_guess: float | None) -> tuple[Solution, int]:
-    """The best of several first guesses, and the iterations they took."""
+def _first(problem: Problem, contact: float) -> tuple[Solution, int]:
+    """A first solution from an instant of contact, and the iterations it took.
+
+    Where IPOPT finds none, it is asked for the quickest start on the same mesh, which always exists: that is
+    the better first guess, or says that there is nothing to find.
+    """
     p = numbers(problem)
-    quickest = quickest_contact(p)
-    own = [] if contact_guess is None else [contact_guess / p.units.time]
     tried: list[Solution] = []
-    meshes: dict[Program, Mesh] = {}  # one for all guesses, so that it is transcribed once
-    for factors in (ALWAYS, OTHERWISE):
-        contacts = [*(own if factors is ALWAYS else []), *(f * quickest for f in factors)]
-        for program in programs(problem):
-            for contact in contacts if quickest > 0.0 else contacts[:1]:
-                course = _course(program, p, contact)
-                mesh = meshes.setdefault(program, first_mesh(program, p, course))
-                tried.append(_on(program, p, mesh, course))
-        if any(s.found for s in tried):
-            break
+    quickest = np.inf
+    for program in programs(problem):
+        course = _course(program, p, contact)
+        mesh = first_mesh(program, p, course)
+        tried.append(_on(program, p, mesh, course))
+        if tried[-1].found or program.minimise == "start_time":
+            continue
+        for adaptive in (False, True):
+            quick = _quickest(program, p, mesh, course, adaptive)
+            if quick.found:
+                break
+        end = float(quick.read()[0][: program.start_arcs].sum()) if quick.found else np.inf
+        quickest = min(quickest, end)
+        if end <= 1.0:
+            parameters = _parameters(program, p)
+            tried.append(run(transcribe(program, mesh), p, parameters, quick.x, None, WIDE_BARRIER))
     found = [s for s in tried if s.found]
-    if not found:
-        nearest = min(tried, key=lambda s: s.violation)
-        raise NotConverged(_told(nearest.reason), nearest.violation)
-    return min(found, key=lambda s: s.value), sum(s.iterations for s in tried)
+    if found:
+        return min(found, key=lambda s: s.value), sum(s.iterations for s in tried)
+    if 1.0 < quickest < np.inf:
+        told = f"IPOPT finds no start quicker than {quickest * p.units.time:.6g} s"
+        raise NotConverged(told, quickest - 1.0, final=quickest > CLEARLY)
+    nearest = min(tried, key=lambda s: s.violation)
+    # a mesh and guess that led astray once mostly do so again, at length
+    raise NotConverged(_told(nearest.reason), nearest.violation, final=problem.start_time is not None)
+
+
+def _contacts(problem: Problem, contact_guess: float | None) -> list[float]:
+    """Instants of contact from which to begin, in units of the problem."""
+    p = numbers(problem)
+    likely = likely_contact(problem, p)
+    if contact_guess is not None:
+        return [contact_guess / p.units.time, likely]
+    return [f * likely for f in (1.0, *OTHERWISE)] if likely > 0.0 else [0.0]
+
+
+def _quickest(program: Program, p: Numbers, mesh: Mesh, course: Course, adaptive: bool) -> Solution:
+    """The quickest start within all other bounds, with the same variables."""
+    free = replace(p, values={**p.values, "latest": 100.0})
+    return _on(replace(program, minimise="start_time", smooth=False), free, mesh, course, 0.0, adaptive)
 
 
 def _course(program: Program, p: Numbers, contact: float) -> Course:
@@ -102,17 +146,19 @@ def _course(program: Program, p: Numbers, contact: float) -> Course:
     return make_course(program, p, min(contact, 0.6 * end), end)
 
 
-def _on(program: Program, p: Numbers, mesh: Mesh, course: Course, mu: float = 0.0) -> Solution:
+def _on(
+    program: Program, p: Numbers, mesh: Mesh, course: Course, mu: float = 0.0, adaptive: bool = False
+) -> Solution:
     transcribed = transcribe(program, mesh)
-    return run(
-        transcribed, p, _parameters(program, p), course.values(program, p, transcribed.slots), None, mu
-    )
+    x = course.values(program, p, transcribed.slots)
+    return run(transcribed, p, _parameters(program, p), x, None, mu, adaptive)
 
 
 def _told(reason: str) -> str:
     return {
         "Infeasible_Problem_Detected": "IPOPT finds no start that meets all conditions",
         "Maximum_Iterations_Exceeded": "IPOPT came to its largest number of iterations",
+        "Maximum_CpuTime_Exceeded": "IPOPT lost its way",
         "Restoration_Failed": "IPOPT cannot reduce the violation of the conditions any further",
     }.get(reason, f"IPOPT stopped with {reason}")
 
@@ -121,9 +167,12 @@ def _told(reason: str) -> str:
 
 
 def _refine(
-    problem: Problem, solution: Solution, spent: int, how: str, tolerance: float, most: int
+    problem: Problem, solution: Solution, spent: int, tolerance: float, most: int, known: float | None = None
 ) -> Candidate:
-    """Halve intervals until the claimed figure stands still and the exact plant agrees with it."""
+    """Halve intervals until the claimed figure stands still and the exact plant agrees with it.
+
+    `known` is the figure of the similar problem for which the mesh was last made finer: near it, it will do.
+    """
     refinements = 0
     before = (np.inf, np.inf)
     settled = False
@@ -139,6 +188,8 @@ def _refine(
         agrees = abs(exact.value - own.value) <= tolerance * abs(own.value)
         still = min(abs(exact.value - before[0]), abs(own.value - before[1])) <= tolerance * abs(own.value)
         lands = exact.landing <= LANDING and not exact.parted.any()
+        if known is not None and refinements == 0:
+            still = abs(own.value - known) <= SIMILAR * abs(known)
         settled = agrees and still and lands
         # a finer mesh may end a little worse: what counts is the exact plant
         merit = exact.value * (1.0 if lands else 1.1)
@@ -158,11 +209,20 @@ def _refine(
     if off > ASTRAY:
         raise NotConverged(f"the exact plant is off by {off:.2g} after {refinements} refinements", off)
     mesh = solution.transcribed.mesh
+    how = "cold" if known is None else "warm"
     note = f"{refinements} refinements to {intervals(mesh)} intervals, {spent} iterations of IPOPT ({how})"
     if not settled:
         note += "; the mesh has not settled"
+    last = known if known is not None and refinements == 0 else own.value
     warm = Warm(
-        solution.transcribed.program, mesh, solution.x, solution.lam_x, solution.lam_g, WARM_BARRIER, spent
+        solution.transcribed.program,
+        mesh,
+        solution.x,
+        solution.lam_x,
+        solution.lam_g,
+        WARM_BARRIER,
+        spent,
+        last,
     )
     return Candidate(own.profile, own.end_time, own.value, "collocation", note, warm)
 
