@@ -60,7 +60,10 @@ def search(problem: Problem, entry_near: float | None = None) -> Answer | None:
     entry = entry_of(problem)
     latest = float(problem.start_time)
     best = _best_entry(problem, entry, latest, COARSE, entry_near)
-    if best is None:  # hardly enough time: the torque has no room for a coarse grid
+    if best is None:
+        if greatest_speed(problem, entry, latest, MIDDLE, math.nan)[0] < problem.target:
+            return None
+        # hardly enough time: the torque has no room for a coarse grid
         best = _best_entry(problem, entry, latest, MIDDLE, entry_near)
     if best is None or _sooner(problem, best) < best.P * (1.0 - 1e-4):
         best = _best_end(problem, entry, latest) or best  # more time does not help, or does not fit
