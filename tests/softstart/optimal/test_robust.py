@@ -7,6 +7,8 @@ coast, hold: K_dyn 0.90924724 (the same for `reached`: below 1 the torque limit 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,52 +17,108 @@ from tests.oracle import integrate
 from softstart import Drive, simulate
 from softstart.controller import make_controller
 from softstart.metrics import base_torque
-from softstart.optimal.robust import RobustOptimum, SensorWorth, optimize_robust
+from softstart.optimal.result import InfeasibleError, Verdict
+from softstart.optimal.robust import RobustOptimum, SensorWorth, families, optimize_robust, pursuit, solving
+from softstart.optimal.robust.scenarios import reached
 from softstart.profile import TorqueProfile
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-WIDE = CRANE.replace(gap=1.0)
 START_TIME = 0.2883042
 ALONE = 0.90924724  # closed form
-COARSE_SEARCH = 0.005  # relative: what the search may miss
+SEARCH = 0.005  # relative: what the search may miss
 
 
-def solved(drives: list[Drive], **given: object) -> RobustOptimum:
-    return optimize_robust(drives, START_TIME, **given)  # type: ignore[arg-type]
-
-
-@pytest.fixture(scope="module")
-def alone() -> RobustOptimum:
-    return solved([CRANE])
+def solved(*gaps: float) -> RobustOptimum:
+    return optimize_robust([CRANE.replace(gap=gap) for gap in gaps], START_TIME, base=CRANE)
 
 
 @pytest.fixture(scope="module")
-def worth() -> SensorWorth:
-    blind, reacting = (solved([CRANE, WIDE], react_to_contact=react) for react in (False, True))
-    return SensorWorth(blind, reacting)
+def small_search() -> Iterator[None]:
+    """Fewer starts: enough where the question has one good local optimum or its quality is not the claim."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(families, "PULSES", 3)
+        patch.setattr(families, "COASTS", 2)
+        patch.setattr(families, "COASTS_REACTING", 2)
+        patch.setattr(pursuit, "LOOKS", ((3, 0),))
+        patch.setattr(pursuit, "PURSUED", 2)
+        patch.setattr(pursuit, "FINE", 60)
+        yield
 
 
 @pytest.fixture(scope="module")
-def optima(alone: RobustOptimum, worth: SensorWorth) -> list[RobustOptimum]:
-    return [alone, worth.blind, worth.reacting]
+def nested() -> list[RobustOptimum]:
+    """Optima over more and more gaps, by the search as it is."""
+    return [solved(0.5, 0.7), solved(0.3, 0.5, 0.7)]
+
+
+@pytest.fixture(scope="module")
+def alone(nested: list[RobustOptimum], small_search: None) -> RobustOptimum:
+    return solved(0.5)
+
+
+@pytest.fixture(scope="module")
+def worth(nested: list[RobustOptimum], small_search: None) -> SensorWorth:
+    return SensorWorth(nested[0], solving._reacting(nested[0], lambda text: None))
+
+
+@pytest.fixture(scope="module")
+def optima(alone: RobustOptimum, nested: list[RobustOptimum], worth: SensorWorth) -> list[RobustOptimum]:
+    return [alone, *nested, worth.reacting]
 
 
 def test_one_scenario_is_the_single_optimum(alone: RobustOptimum) -> None:
-    assert alone.k_dyn == pytest.approx(ALONE, rel=COARSE_SEARCH)
+    assert alone.k_dyn == pytest.approx(ALONE, rel=SEARCH)
     assert alone.k_dyn >= ALONE * (1.0 - 1e-7)  # nothing is better than the best
-
-
-def test_a_wider_gap_costs_and_a_contact_sensor_gains(alone: RobustOptimum, worth: SensorWorth) -> None:
-    """The wide gap alone is pulse, coast, hold too: its best start is a line search over the pulse."""
-    wide_alone = best_pulse_coast_hold(WIDE)
     assert best_pulse_coast_hold(CRANE) == pytest.approx(ALONE, rel=1e-4)
-    assert wide_alone > ALONE
-    floor = wide_alone * (1.0 - 1e-4)
-    assert worth.reacting.k_dyn >= floor
-    assert worth.blind.k_dyn >= floor
-    assert worth.reacting.k_dyn <= worth.blind.k_dyn
+
+
+def test_more_scenarios_never_lower_k_dyn(alone: RobustOptimum, nested: list[RobustOptimum]) -> None:
+    """And a profile over all of them is one over each part: it bounds the optimum of the part."""
+    two, three = nested
+    assert two.k_dyn >= ALONE * (1.0 - 1e-9)
+    assert two.k_dyn <= max(three.k_dyn_each[1:]) * (1.0 + SEARCH)
+    assert two.k_dyn <= three.k_dyn * (1.0 + SEARCH)
+    assert alone.k_dyn <= two.k_dyn_each[0] * (1.0 + SEARCH)
+
+
+def test_wide_gaps_reach_the_rebound_that_is_caught(nested: list[RobustOptimum]) -> None:
+    """Upper bounds by the best of 250 descents from random starts on a coarse grid: 1.1693 and 1.2780.
+
+    The next local optima of those descents are at 1.219 and 1.47: a search that ends there fails this.
+    """
+    assert nested[0].k_dyn <= 1.1693 * (1.0 + SEARCH)
+    assert nested[1].k_dyn <= 1.2780 * (1.0 + SEARCH)
+    assert all(run.contacts >= 2 for run in nested[1].runs)
+
+
+def test_reacting_is_never_worse_than_blind(worth: SensorWorth) -> None:
+    wide_alone = best_pulse_coast_hold(CRANE.replace(gap=0.7))
+    assert wide_alone * (1.0 - 1e-4) <= worth.reacting.k_dyn <= worth.blind.k_dyn
     assert worth.percent == pytest.approx(100.0 * (1.0 - worth.reacting.k_dyn / worth.blind.k_dyn))
-    assert worth.blind.k_dyn >= alone.k_dyn  # one scenario more never makes it easier
+    assert worth.reacting.react_to_contact
+    assert worth.reacting.note == ""
+    assert worth.reacting.profile.after_contact is not None
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_useless_sensor_is_left_unused(
+    worth: SensorWorth, monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    """A search that finds only worse, or nothing in time, gives the blind profile back and says so."""
+    verdict = Verdict(reached(CRANE, START_TIME, None), 1.0, "torque limit", "too short")
+
+    def nothing_better(*given: Any, **more: Any) -> RobustOptimum:
+        if fails:
+            raise InfeasibleError(verdict)
+        return worth.blind
+
+    monkeypatch.setattr(solving, "_optimum", nothing_better)
+    reacting = solving._reacting(worth.reacting, lambda text: None)
+    assert reacting.k_dyn == worth.reacting.k_dyn
+    assert reacting.profile is worth.reacting.profile
+    assert "left unused" in reacting.note
+    assert reacting.summary()["note"] == reacting.note
+    assert SensorWorth(worth.reacting, reacting).percent == 0.0
 
 
 def best_pulse_coast_hold(drive: Drive) -> float:
@@ -124,19 +182,19 @@ def test_the_oracle_sees_the_same_starts(optima: list[RobustOptimum]) -> None:
 
 
 def test_no_random_change_beats_it(worth: SensorWorth) -> None:
-    """200 random changes of the profile that keep the start time and the limits: none is 0.1 % better."""
+    """200 random changes that keep the start time and the limits, of each profile: none is 0.1 % better."""
     random = np.random.default_rng(1)
     for optimum in (worth.blind, worth.reacting):
-        tried = better = 0
-        for _ in range(100):
+        in_time = better = tried = 0
+        while in_time < 200:
+            tried += 1
+            assert tried <= 2000
             changed = disturbed(optimum.profile, random)
             player = make_controller("profile", {"profile": changed})
-            runs = [simulate(drive, player, base=CRANE, time_limit=1.0) for drive in optimum.scenarios]
-            if not all(run.start_time <= START_TIME for run in runs):
-                continue
-            tried += 1
-            better += max(run.k_dyn for run in runs) < optimum.k_dyn * (1.0 - 1e-3)
-        assert tried >= 20
+            runs = [simulate(drive, player, base=CRANE, time_limit=0.4) for drive in optimum.scenarios]
+            if all(run.start_time <= START_TIME for run in runs):
+                in_time += 1
+                better += max(run.k_dyn for run in runs) < optimum.k_dyn * (1.0 - 1e-3)
         assert better == 0
 
 

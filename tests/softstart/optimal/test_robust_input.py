@@ -10,7 +10,13 @@ import pytest
 
 from softstart import Drive, InputError, simulate
 from softstart.optimal.result import InfeasibleError, LowerBound
-from softstart.optimal.robust import optimize_robust, scenarios_of, solving, worth_of_contact_sensor
+from softstart.optimal.robust import (
+    families,
+    optimize_robust,
+    pursuit,
+    scenarios_of,
+    worth_of_contact_sensor,
+)
 from softstart.optimal.robust.plays import Plays
 from softstart.optimal.robust.shape import Player, Staircase, merged, refined
 
@@ -24,13 +30,19 @@ def nothing(drive: Drive) -> LowerBound:
 @pytest.fixture
 def _hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that is quick and rough: enough where the quality of the optimum is not the question."""
-    monkeypatch.setattr(solving, "LOOKS", ((4, 0),))
-    monkeypatch.setattr(solving, "QUICK_LOOKS", ((3, 0),))
-    monkeypatch.setattr(solving, "PURSUED", 1)
-    monkeypatch.setattr(solving, "ROUNDS", 10)
-    monkeypatch.setattr(solving, "LOOK_ROUNDS", 150)
-    monkeypatch.setattr(solving, "COARSE", 20)
-    monkeypatch.setattr(solving, "FINE", 30)
+    monkeypatch.setattr(families, "PULSES", 2)
+    monkeypatch.setattr(families, "COASTS", 2)
+    monkeypatch.setattr(families, "COASTS_REACTING", 2)
+    monkeypatch.setattr(pursuit, "LOOKS", ((3, 0),))
+    monkeypatch.setattr(pursuit, "LOOK_ROUNDS", 100)
+    monkeypatch.setattr(pursuit, "QUICK_LOOKS", ((3, 0),))
+    monkeypatch.setattr(pursuit, "FIRST_ROUNDS", 3)
+    monkeypatch.setattr(pursuit, "PURSUED", 1)
+    monkeypatch.setattr(pursuit, "DENSE", 8)
+    monkeypatch.setattr(pursuit, "SPARSE", 3)
+    monkeypatch.setattr(pursuit, "ROUNDS", 8)
+    monkeypatch.setattr(pursuit, "COARSE", 15)
+    monkeypatch.setattr(pursuit, "FINE", 20)
 
 
 @pytest.mark.usefixtures("_hasty")
@@ -43,6 +55,7 @@ def test_order_of_scenarios_changes_nothing() -> None:
     assert other.scenarios[other.worst] == one.scenarios[one.worst]
     again = optimize_robust([*drives, CRANE], 0.3, base=CRANE, bound_of=nothing)
     assert again.k_dyn == one.k_dyn  # a scenario named twice is one scenario
+    assert np.array_equal(again.profile.time, one.profile.time)  # the same question has the same answer
 
 
 @pytest.mark.usefixtures("_hasty")

@@ -2,8 +2,8 @@
 
 A profile is a staircase (shape.py), played by the `profile` controller on the exact plant (plays.py). The
 shaft torques and their differences (differences.py) make a linear program for a small change
-(linear_step.py); descent.py repeats that as long as the exact plant agrees; search.py finds where to begin;
-solving.py leads.
+(linear_step.py); descent.py repeats that as long as the exact plant agrees; families.py and search.py find
+where to begin; pursuit.py leads from many starts down to one; solving.py answers.
 """
 
 from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth

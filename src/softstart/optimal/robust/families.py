@@ -20,7 +20,8 @@ from softstart.optimal.robust.shape import Matrix, Player, Staircase
 from softstart.profile import Vector
 
 PULSES, COASTS = 6, 5  # cells of the lengths of the pulse and of the coast
-MEMBERS = 24  # random members of each cell
+COASTS_REACTING = 3  # fewer: on the contact's own clock the gaps differ less
+MEMBERS = 200  # random members of each cell
 N_NUMBERS = 8
 PULSE, COAST, CATCH, COAST_AGAIN, LEVEL, LEVEL_AGAIN, HOLD, CONTACT_LEVEL = range(N_NUMBERS)
 
@@ -44,11 +45,12 @@ class Family:
         random = np.random.default_rng(seed)
         cost = gentleness(self.plays, self.high - self.low)
         chosen = []
+        coasts = COASTS_REACTING if self.react else COASTS
         for pulse in range(PULSES):
-            for coast in range(COASTS):
+            for coast in range(coasts):
                 numbers = random.random((members, N_NUMBERS))
                 numbers[:, PULSE] = (pulse + numbers[:, PULSE]) / PULSES
-                numbers[:, COAST] = (coast + numbers[:, COAST]) / COASTS
+                numbers[:, COAST] = (coast + numbers[:, COAST]) / coasts
                 unknowns = self._unknowns(numbers)
                 best = int(np.argmin(cost(self.plays.figures(self.player, unknowns))))
                 chosen.append(self._shape(unknowns[best]))
@@ -89,4 +91,5 @@ class Family:
 def _crossing(drive: Drive, high: float) -> float:
     """How long the motor takes through the gap at its highest torque, s, with what its torque is late by."""
     way = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
-    return math.sqrt(2.0 * way * float(drive.J1) / high) + float(drive.torque_lag) + high / drive.torque_rate
+    delay = float(drive.torque_lag) + high / float(drive.torque_rate)
+    return math.sqrt(2.0 * way * float(drive.J1) / high) + delay

@@ -31,6 +31,7 @@ class RobustOptimum:
     runs: tuple[Run, ...]
     lower_bound: LowerBound
     seconds: float  # computing time
+    note: str = ""  # where a contact sensor is left unused, that this is so
 
     @property
     def k_dyn_each(self) -> tuple[float, ...]:
@@ -76,6 +77,7 @@ class RobustOptimum:
             "drive": self.base.name,
             "terminal": "reached",
             "react_to_contact": self.react_to_contact,
+            "note": self.note,
             "start_time_bound": self.start_time,
             "k_dyn": self.k_dyn,
             "k_dyn_each": list(self.k_dyn_each),
@@ -110,11 +112,7 @@ class SensorWorth:
 
     @property
     def percent(self) -> float:
-        """By how much the sensor lowers the worst K_dyn, in per cent of the blind one; at least 0.
-
-        A profile that reacts knows the contact but forgets the clock, so it does not contain the blind ones;
-        where it is worse, the sensor is left unused.
-        """
+        """By how much the sensor lowers the worst K_dyn, per cent of the blind one; 0 if left unused."""
         return max(100.0 * (1.0 - self.reacting.k_dyn / self.blind.k_dyn), 0.0)
 
     def __repr__(self) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.optimal.problem import Problem
@@ -108,3 +110,23 @@ def limits(drives: Sequence[Drive]) -> tuple[float, float]:
     """The torque in N m that every scenario allows: highest of the lowest, lowest of the highest."""
     problems = [reached(drive, 1.0, None) for drive in drives]
     return max(p.lowest_torque for p in problems), min(p.highest_torque for p in problems)
+
+
+def differing(drives: Sequence[Drive], count: int) -> tuple[Drive, ...]:
+    """So many of the drives that differ most in gap, inertia, load torque, stiffness; in their order.
+
+    The two ends of the widest spread come first, then always the one farthest from those chosen.
+
+    >>> drive = Drive.load("crane-4amtkf")
+    >>> [d.gap for d in differing([drive.replace(gap=g) for g in (0.3, 0.4, 0.5, 0.7)], 2)]
+    [0.3, 0.7]
+    """
+    if len(drives) <= count:
+        return tuple(drives)
+    rows = np.array([[d.gap, d.J1, d.J2, d.Mc, d.c, d.d, d.Ms] for d in drives], dtype=np.float64)
+    rows = rows / np.maximum(np.abs(rows).max(axis=0), 1e-300)
+    apart = np.linalg.norm(rows[:, None] - rows[None], axis=2)
+    chosen = [int(i) for i in np.unravel_index(int(np.argmax(apart)), apart.shape)]
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(apart[chosen].min(axis=0))))
+    return tuple(drives[i] for i in sorted(chosen[:count]))
