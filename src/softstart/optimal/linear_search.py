@@ -27,16 +27,15 @@ SCANNED, LOCAL_MINIMA = 20, 3
 SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
 
 
-def solve(problem: Problem, entry_near: float | None = None) -> Candidate | None:
+def solve(problem: Problem) -> Candidate | None:
     """The optimum of a problem with an ideal torque; None where no torque meets the terms.
 
-    `entry_near` in s is a guess of te, looked at beside the scan. Raises InputError where the problem is not
-    linear from the contact on (see `no_ideal`).
+    Raises InputError where the problem is not linear from the contact on (see `no_ideal`).
     """
     reason = not_linear(problem)
     if reason:
         raise InputError(f"method = lp: {reason}; use method = collocation.")
-    best = search(problem, entry_near)
+    best = search(problem)
     if best is None:
         return None
     profile = assemble(problem, best)
@@ -48,23 +47,23 @@ def not_linear(problem: Problem) -> str:
     if not problem.ideal_torque:
         return "the motor torque cannot jump freely (lag, rate, torque-speed curve or smoothness)"
     if problem.minimise != "k_dyn":
-        return f"it minimises K_dyn, not {problem.minimise}"
+        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
     if problem.heat is not None:
         return "a bound on the heat is not linear"
     return no_ideal(problem)
 
 
-def search(problem: Problem, entry_near: float | None = None) -> Answer | None:
+def search(problem: Problem) -> Answer | None:
     """The best entry te and end t_f, and the answer there on a grid refined where the torque switches."""
     assert problem.start_time is not None
     entry = entry_of(problem)
     latest = float(problem.start_time)
-    best = _best_entry(problem, entry, latest, COARSE, entry_near)
+    best = _best_entry(problem, entry, latest, COARSE)
     if best is None:
         if greatest_speed(problem, entry, latest, MIDDLE, math.nan)[0] < problem.target:
             return None
         # hardly enough time: the torque has no room for a coarse grid
-        best = _best_entry(problem, entry, latest, MIDDLE, entry_near)
+        best = _best_entry(problem, entry, latest, MIDDLE)
     if best is None or _sooner(problem, best) < best.P * (1.0 - 1e-4):
         best = _best_end(problem, entry, latest) or best  # more time does not help, or does not fit
     if best is None:
@@ -85,12 +84,10 @@ def _peak(answer: Answer | float | None) -> float:
     return answer.P if isinstance(answer, Answer) else math.inf
 
 
-def _best_entry(
-    problem: Problem, entry: Entry, end: float, steps: int, near: float | None = None
-) -> Answer | None:
+def _best_entry(problem: Problem, entry: Entry, end: float, steps: int) -> Answer | None:
     """Scan te, then narrow down around the best ones: P over te has kinks, and may have several minima.
 
-    An entry so late that momentum alone asks for more than the best P known is not tried. `near` is a guess.
+    An entry so late that momentum alone asks for more than the best P known is not tried.
     """
     last = min(entry.latest, end)
     contact = Contact.of(problem.drive)
@@ -127,8 +124,6 @@ def _best_entry(
             if peak_at(te) < lowest:
                 lowest = peak_at(te)
                 limit = latest_for(lowest)
-        if near is not None:
-            lowest = min(lowest, peak_at(min(max(near, entry.earliest), last)))
         if not math.isfinite(lowest):  # little time: a narrow window of te is left, if any
             speed, te = greatest_speed(problem, entry, end, steps, math.nan)
             if not speed >= problem.target:
@@ -242,13 +237,13 @@ def _refined(problem: Problem, entry: Entry, best: Answer) -> Answer:
         width *= 0.4
         if grid.size > MOST:
             break
-        grid = cut(grid, _switching(problem, best) | _broken(problem, best))
+        grid = cut(best, _switching(problem, best) | _broken(problem, best))
     for _ in range(ROUNDS):
         best = _moved(problem, entry, best, grid, width, 2e-7 * best.end_time)
         broken = _broken(problem, best)
         if not broken.any():
             break
-        grid = cut(grid, broken)
+        grid = cut(best, broken)
         width *= 0.3
     return best
 
@@ -286,8 +281,12 @@ def _moved(problem: Problem, entry: Entry, best: Answer, grid: Vector, width: fl
     return found if isinstance(found, Answer) else best
 
 
-def cut(grid: Vector, wanted: NDArray[np.bool_]) -> Vector:
-    """The grid with the wanted steps split in four, but for the few long ones and the finest."""
+def cut(answer: Answer, wanted: NDArray[np.bool_]) -> Vector:
+    """The answer's grid with the wanted steps split in four, but for the few long ones and the finest.
+
+    Its own grid: where a finer one had no answer, the last one stands, on the grid it was found on.
+    """
+    grid = answer.edges / answer.edges[-1]
     steps = np.diff(grid)
     split = wanted & (steps < 5.0 * np.median(steps)) & (steps > 1e-6)
     each = zip(grid[:-1], grid[1:], split, strict=True)

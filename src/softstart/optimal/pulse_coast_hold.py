@@ -225,7 +225,7 @@ def applies(problem: Problem) -> str:
     """
     drive = problem.drive
     if problem.minimise != "k_dyn":
-        return f"it minimises K_dyn, not {problem.minimise}"
+        return f"what is asked for is the least {problem.minimise}, and this form has the least K_dyn"
     if problem.heat is not None:
         return "the heat is bounded"
     if problem.terminal == "steady":

@@ -97,5 +97,21 @@ def test_what_is_not_linear_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=words):
             linear_search.solve(Problem(CRANE.replace(**given), 0.3))
-    with pytest.raises(InputError, match="not heat"):
+    with pytest.raises(InputError, match="the least heat, and only K_dyn is linear"):
         linear_search.solve(Problem(CRANE, 0.3, minimise="heat"))
+
+
+def test_where_a_finer_grid_has_no_answer_the_last_one_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The answer kept belongs to the grid it was found on; cutting goes on from that one."""
+    problem = Problem(CRANE, 0.2883042)
+    moved, calls = linear_search._moved, []
+
+    def once(problem, entry, best, grid, width, within):
+        calls.append(grid.size)
+        return moved(problem, entry, best, grid, width, within) if len(calls) == 1 else best
+
+    monkeypatch.setattr(linear_search, "_moved", once)
+    found = linear_search.search(problem)
+    assert found is not None
+    assert len(calls) > 2
+    assert found.edges.size == calls[0]

@@ -183,7 +183,7 @@ def test_no_hold_beyond_the_motor() -> None:
         ({}, {"torque_speed": ((0.0, 62.0), (90.0, 20.0))}, "over its speed"),
         ({}, {"smoothness": 0.01}, "smooth"),
         ({}, {"heat": 0.2}, "heat"),
-        ({}, {"minimise": "heat"}, "minimises"),
+        ({}, {"minimise": "heat"}, "the least heat, and this form has the least K_dyn"),
     ],
 )
 def test_what_it_is_not_for(changes: Any, terms: Any, reason: str) -> None:

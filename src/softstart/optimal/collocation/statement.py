@@ -41,14 +41,17 @@ class Condition(NamedTuple):
 
 
 def at_most(name: str, value: SX, upper: SX) -> Condition:
+    """Value <= upper."""
     return Condition(name, value - upper, -INFINITY, 0.0)
 
 
 def at_least(name: str, value: SX, lower: SX) -> Condition:
+    """Value >= lower."""
     return Condition(name, value - lower, 0.0, INFINITY)
 
 
 def equal(name: str, value: SX, other: SX) -> Condition:
+    """Value = other."""
     return Condition(name, value - other, 0.0, 0.0)
 
 

@@ -25,10 +25,6 @@ class Place:
     peak: float  # worst |T|, N m
     late: float  # s by which the latest start misses the time asked for; 0 or below if all are in time
 
-    def better_than(self, other: Place | None) -> bool:
-        """Whether this one is less late, or as timely and gentler."""
-        return other is None or (max(self.late, 0.0), self.peak) < (max(other.late, 0.0), other.peak)
-
 
 def look(plays: Plays, player: Player, shape: Staircase) -> Place:
     """The exact plant's word on one staircase."""
