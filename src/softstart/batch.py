@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart import metrics, stages
-from softstart.controller.base import CompiledController, Controller, Sensor
+from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.drive import Drive
 from softstart.engine import Book, run_plain
 from softstart.errors import InputError
@@ -20,6 +21,8 @@ from softstart.status import status_of
 
 if TYPE_CHECKING:
     import xarray
+
+MAX_EVENTS = 1_000_000  # events and control instants of one start
 
 # name in the results, column of the kernel's notes, unit, meaning
 _COLUMNS = (
@@ -51,36 +54,49 @@ def simulate_many(
     their own and NaN in every figure.
     """
     if isinstance(drives, Drive):
-        results = _array_starts(drives, controller, until, fitted_to, time_limit, max_events)
+        results = array_starts(drives, controller, until, fitted_to, time_limit, max_events)
         return _label(drives, results, until, base or drives)
     listed = list(drives) if isinstance(drives, Sequence) else []
     if not listed or not all(isinstance(drive, Drive) and drive.shape == () for drive in listed):
         raise InputError("drive: give one Drive, a Drive with array fields, or a list of Drives, not empty.")
     rows = []
     for drive in listed:
-        own = fitted_to or drive
-        rows.append(_starts(controller.fitted(own), own, plant_vector(drive, time_limit, max_events), until))
+        ready, own = controller.set_up(fitted_to or drive)
+        rows.append(_starts(ready, own, plant_vector(drive, time_limit, max_events), until))
     return _label_list(listed, np.concatenate(rows), until, base)
 
 
-def _array_starts(
+def array_starts(
     drive: Drive,
     controller: Controller,
-    until: float | None,
-    fitted_to: Drive | None,
-    time_limit: float | None,
-    max_events: int,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+    time_limit: float | None = None,
+    max_events: int = MAX_EVENTS,
 ) -> at.Matrix:
-    own = fitted_to or drive
+    """The kernel's notes of all starts of a batch: one row a start, last index of the drive fastest.
+
+    The columns are those of `x` in `softstart.plant.layout`; `figures` turns them into labelled figures. The
+    controller's parameters may be arrays of the drive's shape. Unlike `simulate`, nothing is checked.
+
+    >>> from softstart.controller import make_controller
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> notes = array_starts(crane.replace(gap=[0.5, 2.0]), make_controller("direct"))
+    >>> notes[:, at.PEAK].round(2).tolist()
+    [164.82, 257.18]
+    """
     p = plant_vector(drive, time_limit, max_events)
-    if isinstance(controller, CompiledController):
-        return _starts(controller.fitted(own), own, p, until)
-    return np.concatenate(
-        [
-            _starts(controller.fitted(fitted_to or one), fitted_to or one, p[i : i + 1], until)
-            for i, one in enumerate(drive.elements())
-        ]
-    )
+    if not isinstance(controller, PlainController):
+        ready, own = controller.set_up(fitted_to or drive)
+        if isinstance(ready, CompiledController):
+            return _starts(ready, own, p, until)
+    single = fitted_to is None or fitted_to.shape == ()
+    nominal = repeat(fitted_to) if single else fitted_to.elements()  # type: ignore[union-attr]
+    rows = []
+    for i, (one, other) in enumerate(zip(drive.elements(), nominal, strict=False)):
+        ready, own = controller.set_up(other or one)
+        rows.append(_starts(ready, own, p[i : i + 1], until))
+    return np.concatenate(rows)
 
 
 def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | None) -> at.Matrix:
@@ -107,8 +123,12 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
     return results
 
 
-def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tuple[Any, str, str]]:
-    """The labelled figures as name -> (values, unit, meaning)."""
+def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[str, tuple[Any, str, str]]:
+    """The figures of `array_starts` as name -> (values, unit, meaning).
+
+    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
+    could not be finished have NaN.
+    """
     reached = ~np.isnan(results[:, at.START_TIME])
     ended, which = np.unique(2 * results[:, at.STATUS].astype(np.int64) + reached, return_inverse=True)
     kinds = [status_of(code // 2, bool(code % 2), until is not None) for code in ended.tolist()]
@@ -121,7 +141,7 @@ def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tu
     first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
     k_dyn = stages.dynamic_coefficient(np.where(good, peak, 0.0), base)
     k_first = stages.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
-    figures: dict[str, tuple[Any, str, str]] = {
+    found: dict[str, tuple[Any, str, str]] = {
         "k_dyn": (kept(k_dyn), "1", "dynamic coefficient of the whole run, [G](16)"),
         "k_dyn_first_contact": (
             np.where(np.isnan(kept(first)), np.nan, k_first),
@@ -131,9 +151,9 @@ def _figures(results: at.Matrix, base: Any, until: float | None) -> dict[str, tu
         "peak_torque": (kept(peak), "N*m", "largest |T| of the run"),
     }
     for name, column, unit, meaning in _COLUMNS:
-        figures[name] = (kept(results[:, column]), unit, meaning)
-    figures["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
-    return figures
+        found[name] = (kept(results[:, column]), unit, meaning)
+    found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
+    return found
 
 
 def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -> xarray.Dataset:
@@ -144,7 +164,7 @@ def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -
     per_start = np.broadcast_to(metrics.base_torque(base), shape).reshape(-1)
     data = {
         name: (dims, values.reshape(shape), {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in _figures(results, per_start, until).items()
+        for name, (values, unit, meaning) in figures(results, per_start, until).items()
     }
     coordinates = {
         name: (dims, np.broadcast_to(values, shape).copy())
@@ -162,7 +182,7 @@ def _label_list(
     per_start = np.array([metrics.base_torque(base or drive) for drive in drives])
     data = {
         name: (("start",), values, {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in _figures(results, per_start, until).items()
+        for name, (values, unit, meaning) in figures(results, per_start, until).items()
     }
     coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
     for name in type(drives[0]).model_fields:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, overload
 
-from softstart.batch import simulate_many
+from softstart.batch import MAX_EVENTS, simulate_many
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
@@ -20,8 +20,6 @@ from softstart.status import Status, status_of
 
 if TYPE_CHECKING:
     import xarray
-
-MAX_EVENTS = 1_000_000
 
 
 @overload
@@ -98,10 +96,10 @@ def simulate(
         _check_other(name, other, drive)
     if not isinstance(drive, Drive) or drive.shape != ():
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
-    fitted = made.fitted(fitted_to or drive)
+    fitted, own = made.set_up(fitted_to or drive)
     p = plant_vector(drive, time_limit, max_events)[0]
     book = Book(int(fitted.sensors))
-    reason = run_one(fitted, fitted_to or drive, p, book, until)
+    reason = run_one(fitted, own, p, book, until)
     status = status_of(reason, not math.isnan(book.x[at.START_TIME]), until is not None)
     if not status.finished:
         remedy = ""

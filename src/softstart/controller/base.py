@@ -70,14 +70,32 @@ class Command(NamedTuple):
     slope: float = 0.0
 
 
-def parameter(unit: str, meaning: str, default: str = "", kind: Kind = "quantity") -> Any:
+def parameter(
+    unit: str,
+    meaning: str,
+    default: str = "",
+    kind: Kind = "quantity",
+    *,
+    multiples: tuple[float, float] | None = None,
+    between: tuple[float, float] | None = None,
+) -> Any:
     """A parameter of a controller, for use as a dataclass field.
 
     `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
     the drive when none is given. A `kind` other than a quantity is handed over as it is: a text (the path of
     a file, say), or an object, which only Python can give.
+
+    Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
+    the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first to the second.
+    A parameter with neither is left at its default unless the user names a range.
     """
-    return field(default=None, metadata={"unit": unit, "meaning": meaning, "default": default, "kind": kind})
+    return field(
+        default=None,
+        metadata={
+            "unit": unit, "meaning": meaning, "default": default, "kind": kind,
+            "multiples": multiples, "between": between,
+        },
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -102,6 +120,13 @@ class Controller:
             return self
         derived = self.defaults(drive)
         return replace(self, **{name: derived[name] for name in missing if name in derived})
+
+    def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
+        """The controller with every parameter a number, and the drive whose numbers it works with.
+
+        That is `fitted(drive)` and the same drive; gains that were tuned for another drive bring that one.
+        """
+        return self.fitted(drive), drive
 
     @property
     def parameters(self) -> dict[str, Any]:
