@@ -83,7 +83,7 @@ def array_starts(
     >>> crane = Drive.load("crane-4amtkf")
     >>> notes = array_starts(crane.replace(gap=[0.5, 2.0]), make_controller("direct"))
     >>> notes[:, at.PEAK].round(2).tolist()
-    [164.82, 257.18]
+    [164.81, 257.18]
     """
     p = plant_vector(drive, time_limit, max_events)
     if not isinstance(controller, PlainController):

@@ -106,7 +106,8 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
                     f"controller {type(controller).__name__}: its step answered {answer!r}; "
                     "answer with Command(torque, ask_again, state, slope)."
                 ) from None
-            if not kernel.obey(p, book.x, torque, ask_again, slope):
-                return at.BAD_COMMAND
+            taken: int = kernel.obey(p, book.x, book.m, torque, ask_again, slope)
+            if taken != at.ASK:
+                return taken
         else:
             return reason

@@ -24,6 +24,10 @@ class Status(Enum):
         "The start was given up: the controller answered with NaN or with a past instant, "
         "or with a slope without an end."
     )
+    QUEUE_FULL = (
+        "The start was given up: more than 16 answers of the controller are on their way at once; shorten "
+        "the drive's computing_delay, or sample less often."
+    )
 
     @property
     def finished(self) -> bool:
@@ -37,6 +41,7 @@ _BROKEN = {
     at.NOT_LOCATED: Status.NOT_LOCATED,
     at.NOT_FINITE: Status.NOT_FINITE,
     at.BAD_COMMAND: Status.BAD_COMMAND,
+    at.QUEUE_FULL: Status.QUEUE_FULL,
 }
 
 

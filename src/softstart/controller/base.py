@@ -86,7 +86,7 @@ def parameter(
     a file, say), or an object, which only Python can give.
 
     Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
-    the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first to the second.
+    the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first.
     A parameter with neither is left at its default unless the user names a range.
     """
     return field(

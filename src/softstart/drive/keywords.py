@@ -24,6 +24,10 @@ class _Free(TypedDict, total=False):
     torque_lag: Given
     torque_rate: Given
     encoder_lines: Given
+    encoder_phase: Given
+    torque_noise: Given
+    noise_seed: Given
+    computing_delay: Given
     damping: Given
     contact_law: ContactLaw
     start_position: Given

@@ -67,6 +67,10 @@ class Drive(FrozenModel):
     torque_lag: Value = _default("torque_lag")
     torque_rate: Value = _default("torque_rate")
     encoder_lines: Value = _default("encoder_lines")
+    encoder_phase: Value = _default("encoder_phase")
+    torque_noise: Value = _default("torque_noise")
+    noise_seed: Value = _default("noise_seed")
+    computing_delay: Value = _default("computing_delay")
     stiffness: Value
     damping: Value = _default("damping")
     gap: Value

@@ -12,7 +12,7 @@ __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "LoadKind", "Parameter"]
 LoadKind = Literal["active", "reactive"]
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
 
-Limit = Literal["any", "above 0", "0 or more", "0 or less", "a whole number, 0 or more"]
+Limit = Literal["any", "above 0", "0 or more", "0 or less", "from 0 to 1", "a whole number, 0 or more"]
 
 
 class Parameter(NamedTuple):
@@ -89,6 +89,26 @@ _TABLE = (
         "encoder_lines", "motor", "encoder_lines", "", "1",
         "number of encoder lines (four counts each; 0 for an ideal encoder)",
         "4096", "a whole number, 0 or more", default=4096.0,
+    ),
+    Parameter(
+        "encoder_phase", "motor", "encoder_phase", "", "1",
+        "where between two edges of the encoder the start lies, as a share of a count",
+        "0.5", "from 0 to 1", default=0.0,
+    ),
+    Parameter(
+        "torque_noise", "motor", "torque_noise", "", "N*m",
+        "standard deviation of the noise on the measured motor torque, in each sample",
+        '"0.2 N*m"', "0 or more", default=0.0,
+    ),
+    Parameter(
+        "noise_seed", "motor", "noise_seed", "", "1",
+        "number of the noise: the same number gives the same noise",
+        "1", "a whole number, 0 or more", default=0.0,
+    ),
+    Parameter(
+        "computing_delay", "motor", "computing_delay", "", "s",
+        "dead time between what a controller measures and the torque demand that follows from it",
+        '"1 ms"', "0 or more", default=0.0,
     ),
     Parameter(
         "stiffness", "shaft", "stiffness", "c", "N*m/rad", "stiffness of the shaft",

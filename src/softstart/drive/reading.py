@@ -47,6 +47,7 @@ _LIMITS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.bool_]]] = {
     "above 0": lambda x: np.asarray(x > 0.0),
     "0 or more": lambda x: np.asarray(x >= 0.0),
     "0 or less": lambda x: np.asarray(x <= 0.0),
+    "from 0 to 1": lambda x: np.asarray((x >= 0.0) & (x <= 1.0)),
     "a whole number, 0 or more": lambda x: np.asarray((x >= 0.0) & (x == np.floor(x))),
 }
 

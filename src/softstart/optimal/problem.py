@@ -34,7 +34,8 @@ class Problem:
     heat is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque. `torque_speed` are corners
     (rad/s, N m) of a concave limit of the motor's torque over its speed. `smoothness` in s weighs
     integral (du/dt)^2 dt / Ms^2 against K_dyn: it makes the demand continuous from 0 on. `k_dyn` as a bound
-    and all times refer to the drive itself unless `base` is another one. Raises InputError.
+    and all times refer to the drive itself unless `base` is another one. The drive's computing_delay is left
+    out: a profile that is known beforehand is sent that much earlier. Raises InputError.
 
     >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
     >>> problem.terminal, problem.highest_torque, round(problem.base_torque, 2)
@@ -60,6 +61,8 @@ class Problem:
             raise InputError(
                 "drive: an optimum is for one drive; for several under one profile, optimize_robust."
             )
+        if drive.computing_delay != 0.0:
+            object.__setattr__(self, "drive", drive := drive.replace(computing_delay=0.0))
         if drive.Mc < 0.0:
             wrong.append(
                 f"load_torque = {drive.Mc:g} N m: this load drives instead of braking; an optimal start "

@@ -7,11 +7,11 @@ import math
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    ASK, ASKED, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, DEMAND_SLOPE, ENDED, END_KNOWN, END_V, END_Z, EVENTS,
-    EVENT_CAP, EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING,
-    NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, PASSING, PERIOD, PHI2, REF, SIDE,
-    SLEW_END, START_TIME, STEADY, TARGET, THETA, TIME, TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V,
-    W2, Z0, Septuple, Vector,
+    ASK, ASKED, ASK_AT, ASK_ON_GAP, BUFFER_FULL, DEMAND, DEMAND_SLOPE, ENDED, END_KNOWN, END_V, END_Z,
+    EVENTS, EVENT_CAP, EVENT_LIMIT, EXIT, GAP, INV_J, J1, LAMBDA, LAST_V, LOAD, MASK, MEMO_DONE, NOTHING,
+    NOT_FINITE, NOT_LOCATED, NO_EVENT, N_EVENTS, N_SEGMENTS, N_STAGES, N_WAITING, PASSING, PENDING, PERIOD,
+    PHI2, QUEUE, Q_DEMAND, Q_SLOPE, Q_TIME, REF, SIDE, SLEW_END, START_TIME, STEADY, TARGET, THETA, TIME,
+    TIME_LIMIT, T_END, U, UA, UB, UE, UNSOLVED, V, W2, Z0, Septuple, Vector,
 )  # fmt: skip
 from softstart.plant.modes import handle, reach_target
 from softstart.plant.motion import motion
@@ -21,6 +21,27 @@ from softstart.plant.steady import bounce, repeats
 
 # A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
 LONGEST_SPAN = 16.0
+SLOPE_ROUNDING = 1e-13  # a demand that goes on where a ramp has ended, but for so much, is no step
+
+
+@inlined
+def take_demand(x: Vector, demand: float, slope: float) -> None:
+    """From now on the demand is this line."""
+    if x[DEMAND_SLOPE] != 0.0 and x[REF] == x[DEMAND]:
+        rounding = SLOPE_ROUNDING * (abs(demand) + abs(x[DEMAND_SLOPE]) * x[TIME])
+        if abs(demand - x[REF]) <= rounding:
+            x[REF] = demand
+    x[DEMAND] = demand
+    x[DEMAND_SLOPE] = slope
+
+
+@inlined
+def next_in_queue(x: Vector, m: Vector) -> None:
+    """The answer that has waited longest takes effect."""
+    take_demand(x, m[QUEUE + Q_DEMAND], m[QUEUE + Q_SLOPE])
+    m[PENDING] -= 1.0
+    for i in range(QUEUE, QUEUE + N_WAITING * int(m[PENDING])):
+        m[i] = m[i + N_WAITING]
 
 
 @inlined
@@ -81,11 +102,16 @@ def advance(p: Vector, x: Vector, m: Vector, segments: Vector, events: Vector, s
         if t >= stop:
             end_stage(x, stages)
             return ENDED
+        if m[PENDING] > 0.0 and t >= m[QUEUE + Q_TIME]:
+            next_in_queue(x, m)
+            continue
         if t >= x[ASK_AT]:
             return ASK if x[ASKED] < p[EVENT_CAP] else EVENT_LIMIT
         torque_course(p, x, m)
         load = begin_span(p, x, m)
         until = min(x[ASK_AT], stop)
+        if m[PENDING] > 0.0:
+            until = min(until, m[QUEUE + Q_TIME])
         if not recording and repeats(p, x, m) and bounce(p, x, m, load, until) > 0:
             if x[EVENTS] > p[EVENT_CAP]:
                 return EVENT_LIMIT

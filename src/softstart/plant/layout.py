@@ -23,8 +23,9 @@ Septuple = tuple[float, float, float, float, float, float, float]
     J1, J2, C, D, GAP, MC, REACTIVE, LAW, LAG, RATE, U_MIN, U_MAX,
     TARGET, ENCODER, THETA_0, W1_0, W2_0, PERIOD, TIME_LIMIT, EVENT_CAP,
     INV_J1, INV_J2, INV_J, W0SQ_SLIP, INV_W0SQ, W0_SLIP,  # derived: divisions are dear
-) = range(26)  # fmt: skip
-N_P: Final = 26
+    ENCODER_PHASE, TORQUE_NOISE, NOISE_SEED, DEAD_TIME,
+) = range(30)  # fmt: skip
+N_P: Final = 30
 
 # contact laws
 NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
@@ -56,8 +57,13 @@ N_X: Final = 39
     MEMO_DONE,  # 1 once that contact has run from flank to flank, its peak noted
     END_KNOWN, END_Z, END_V,  # the motion at the end of the span, once it has been evaluated
     PASSING,  # when, within this contact, the load passes its target speed; NaN if it does not
-) = range(35)  # fmt: skip
-N_M: Final = 35
+    PENDING,  # how many answers of the controller are on their way (computing_delay); from QUEUE on they wait
+    QUEUE,
+) = range(37)  # fmt: skip
+Q_TIME, Q_DEMAND, Q_SLOPE = range(3)  # of an answer that waits: when it takes effect, and what it is
+N_WAITING: Final = 3
+MOST_PENDING: Final = 16
+N_M: Final = QUEUE + N_WAITING * MOST_PENDING
 
 # a recorded span: enough to evaluate every state within it exactly
 (
@@ -75,7 +81,7 @@ G_NUMBER, G_START, G_END, G_SIDE, G_PEAK, G_PEAK_TIME = range(6)
 N_STAGE: Final = 6
 
 # why `advance` came back
-ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND = range(7)
+ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL = range(8)
 
 # what a span ends with
 (

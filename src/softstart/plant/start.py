@@ -7,15 +7,17 @@ import math
 import numpy as np
 from numba import types
 
-from softstart.plant.advance import advance
+from softstart.plant.advance import advance, take_demand
 from softstart.plant.jit import compiled, compiled_as
 from softstart.plant.layout import (
     ASK, ASKED, ASK_AT, ASK_ON_GAP, BAD_COMMAND, BEYOND, C, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE,
-    DEMAND, DEMAND_SLOPE, ENCODER, FIRST_CONTACT, GAP, IMPACT_SPEED, LAG, LAW, LOAD, MEMO_V, N_P, N_X, PHI2,
-    RATE, REACTIVE, REF, SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA,
-    THETA_0, TIME, T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
+    DEAD_TIME, ENCODER, ENCODER_PHASE, FIRST_CONTACT, GAP, IMPACT_SPEED, LAG, LAW, LOAD, MEMO_V, MOST_PENDING,
+    NOISE_SEED, N_P, N_WAITING, N_X, PENDING, PHI2, QUEUE, QUEUE_FULL, Q_DEMAND, Q_SLOPE, Q_TIME, RATE,
+    REACTIVE, SAMPLE_ANGLE, SAMPLE_TIME, SIDE, STAGE, STAGE_2_END, START_TIME, STATUS, THETA, THETA_0, TIME,
+    TORQUE_NOISE, T_END, U, U_MAX, U_MIN, V, W1_0, W2, W2_0, Vector,
 )  # fmt: skip
 from softstart.plant.modes import engage, shaft_torque
+from softstart.plant.noise import gauss
 
 # what a controller is given: the indices of `measured`
 N_MEASURED = 7
@@ -24,8 +26,6 @@ M_TIME, M_MOTOR_ANGLE, M_MOTOR_SPEED, M_MOTOR_TORQUE, M_STAGE, M_SHAFT_TORQUE, M
 SEES_STAGE, SEES_SHAFT_TORQUE, SEES_LOAD_SPEED = 1, 2, 4
 # what it returns: torque demand, when to be asked again, the demand's slope until then; its new state follows
 TORQUE, ASK_AGAIN, SLOPE, NEW_STATE = range(4)
-
-SLOPE_ROUNDING = 1e-13  # a demand that goes on where a ramp has ended, but for so much, is no step
 
 _A = types.Array(types.float64, 1, "C")
 STEP_SIGNATURE = types.void(_A, _A, _A, _A)
@@ -68,13 +68,17 @@ def begin(p: Vector, x: Vector, until: float, events: Vector) -> None:
 
 @compiled
 def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
-    """What the controller sees now: the encoder rounds, and what it has not declared is NaN."""
+    """What the controller sees now: the encoder rounds, and what it has not declared is NaN.
+
+    The encoder counts edges from 0 on; the start lies `encoder_phase` of a count beyond the middle of two.
+    """
     t = x[TIME]
     angle = x[PHI2] + x[THETA]
     speed = x[V] + x[W2]
     count = p[ENCODER]
     if count > 0.0:
-        angle = math.floor(angle / count + 0.5) * count
+        edge = p[ENCODER_PHASE] + 0.5
+        angle = (math.floor(angle / count + edge) - math.floor(edge)) * count
         if x[ASKED] != 0.0 and t > x[SAMPLE_TIME]:
             speed = (angle - x[SAMPLE_ANGLE]) / (t - x[SAMPLE_TIME])
     x[SAMPLE_ANGLE] = angle
@@ -83,44 +87,53 @@ def measure(p: Vector, x: Vector, sees: int, measured: Vector) -> None:
     measured[M_MOTOR_ANGLE] = angle
     measured[M_MOTOR_SPEED] = speed
     measured[M_MOTOR_TORQUE] = x[U]
+    if p[TORQUE_NOISE] > 0.0:
+        measured[M_MOTOR_TORQUE] += p[TORQUE_NOISE] * gauss(p[NOISE_SEED], x[ASKED])
     measured[M_STAGE] = x[STAGE] if sees & SEES_STAGE else math.nan
     measured[M_SHAFT_TORQUE] = shaft_torque(p, x) if sees & SEES_SHAFT_TORQUE else math.nan
     measured[M_LOAD_SPEED] = x[W2] if sees & SEES_LOAD_SPEED else math.nan
 
 
 @compiled
-def obey(p: Vector, x: Vector, torque: float, ask_again: float, slope: float) -> bool:
-    """Take the controller's answer; False if it is none: not a number, a past instant, a slope without end.
+def obey(p: Vector, x: Vector, m: Vector, torque: float, ask_again: float, slope: float) -> int:
+    """Take the controller's answer; returns ASK, or why it cannot be taken.
 
+    An answer is none if it is not a number, names a past instant, or has a slope without end.
     The demand is the straight line from `torque` now to torque + slope (ask_again - now) then, both ends
-    clipped to the drive's limits. ask_again = -inf (NEVER) also ends the asking at gap events.
+    clipped to the drive's limits. ask_again = -inf (NEVER) also ends the asking at gap events. With a
+    dead time the answer waits in the queue until it takes effect; the asking does not.
     """
     if ask_again == -math.inf:
         x[ASK_ON_GAP] = 0.0
         ask_again = math.inf
     if math.isnan(torque) or not ask_again > x[TIME]:
-        return False
+        return BAD_COMMAND
     demand = min(max(torque, p[U_MIN]), p[U_MAX])
     if slope != 0.0:
         length = ask_again - x[TIME]
         end = torque + slope * length
         if not math.isfinite(end):
-            return False
+            return BAD_COMMAND
         within = min(max(end, p[U_MIN]), p[U_MAX])
         if demand != torque or within != end:
             slope = (within - demand) / length
-    if x[DEMAND_SLOPE] != 0.0 and x[REF] == x[DEMAND]:
-        rounding = SLOPE_ROUNDING * (abs(demand) + abs(x[DEMAND_SLOPE]) * x[TIME])
-        if abs(demand - x[REF]) <= rounding:
-            x[REF] = demand
-    x[DEMAND] = demand
-    x[DEMAND_SLOPE] = slope
+    if p[DEAD_TIME] > 0.0:
+        waiting = int(m[PENDING])
+        if waiting == MOST_PENDING:
+            return QUEUE_FULL
+        place = QUEUE + N_WAITING * waiting
+        m[place + Q_TIME] = x[TIME] + p[DEAD_TIME]
+        m[place + Q_DEMAND] = demand
+        m[place + Q_SLOPE] = slope
+        m[PENDING] += 1.0
+    else:
+        take_demand(x, demand, slope)
     x[ASK_AT] = ask_again
     x[ASKED] += 1.0
     if x[CONTACTS] == 1.0 and math.isnan(x[CONTACT_TORQUE]):  # the start is in contact
-        immediate = p[LAG] == 0.0 and p[RATE] == math.inf
-        x[CONTACT_TORQUE] = x[DEMAND] if immediate else x[U]
-    return True
+        immediate = p[LAG] == 0.0 and p[RATE] == math.inf and p[DEAD_TIME] == 0.0
+        x[CONTACT_TORQUE] = demand if immediate else x[U]
+    return ASK
 
 
 @compiled
@@ -133,9 +146,10 @@ def _run(step, p, parameters, sees, x, m, measured, state, command, segments, ev
         measure(p, x, sees, measured)
         command[SLOPE] = 0.0
         step(parameters, measured, state, command)
-        if not obey(p, x, command[TORQUE], command[ASK_AGAIN], command[SLOPE]):
-            x[STATUS] = BAD_COMMAND
-            return BAD_COMMAND
+        taken = obey(p, x, m, command[TORQUE], command[ASK_AGAIN], command[SLOPE])
+        if taken != ASK:
+            x[STATUS] = taken
+            return taken
         for i in range(state.shape[0]):
             state[i] = command[NEW_STATE + i]
 
@@ -164,6 +178,7 @@ def run_many(  # type: ignore[no-untyped-def]
         for j in range(state.shape[0]):
             state[j] = 0.0
         m[MEMO_V] = math.nan
+        m[PENDING] = 0.0
         begin(drive, x, until[i if until.shape[0] > 1 else 0], nothing)
         x[ASK_ON_GAP] = 1.0 if on_gap else 0.0
         _run(step, drive, own, sees, x, m, measured, state, command, nothing, nothing, nothing)

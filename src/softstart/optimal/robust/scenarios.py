@@ -98,7 +98,7 @@ def check_scenarios(scenarios: Sequence[Drive], start_time: Any, base: Any) -> t
         ]
     if wrong:
         raise InputError(wrong)
-    return drives
+    return tuple(reached(drive, float(start_time), base).drive for drive in drives)
 
 
 def reached(drive: Drive, start_time: float, base: Drive | None) -> Problem:
