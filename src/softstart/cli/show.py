@@ -192,6 +192,10 @@ def drive_lines(drive: Drive) -> list[str]:
         extra.append(f"torque lag {short(float(drive.torque_lag))} s")
     if math.isfinite(float(drive.torque_rate)):
         extra.append(f"torque rate {short(float(drive.torque_rate))} N m/s")
+    if drive.computing_delay:
+        extra.append(f"computing delay {short(float(drive.computing_delay))} s")
+    if drive.torque_noise:
+        extra.append(f"noise of the measured torque {short(float(drive.torque_noise))} N m")
     if drive.initial_load_speed or drive.initial_motor_speed:
         w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
         extra.append(f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s")
