@@ -11,7 +11,7 @@ from softstart.drive.parameters import PARAMETERS, Parameter
 from softstart.drive.sentences import Wording
 from softstart.units import RefusedError, Value, nearest, parse, show
 
-__all__ = ["cross_checks", "elastic_frequency", "read_parameter"]
+__all__ = ["LIMITS", "cross_checks", "elastic_frequency", "read_parameter"]
 
 Values = Mapping[str, object]
 
@@ -30,7 +30,7 @@ def read_parameter(parameter: Parameter, value: object) -> Value | str | None:
     if value is None and parameter.default is None and not parameter.required:
         return None
     number = parse(value, parameter.unit, infinite=parameter.infinite)
-    allowed = _LIMITS[parameter.limit](np.asarray(number))
+    allowed = LIMITS[parameter.limit](np.asarray(number))
     if not np.all(allowed):
         reason = f"the {parameter.meaning} must be {parameter.limit}"
         if isinstance(number, float):
@@ -42,7 +42,7 @@ def read_parameter(parameter: Parameter, value: object) -> Value | str | None:
     return number
 
 
-_LIMITS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.bool_]]] = {
+LIMITS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.bool_]]] = {
     "any": lambda x: np.ones(x.shape, dtype=np.bool_),
     "above 0": lambda x: np.asarray(x > 0.0),
     "0 or more": lambda x: np.asarray(x >= 0.0),

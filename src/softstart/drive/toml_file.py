@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from softstart.drive.sentences import Mistake, Wording
 from softstart.errors import InputError
 from softstart.units import nearest
 
-__all__ = ["flatten", "write"]
+__all__ = ["flatten", "parsed", "write"]
 
 _TOP = {p.key: p for p in PARAMETERS.values() if not p.table}
 _KEYS = {table: {p.key: p for p in PARAMETERS.values() if p.table == table} for table in TABLES}
@@ -33,23 +33,31 @@ def flatten(text: str, wording: Wording) -> tuple[dict[str, object], list[Mistak
     >>> mistakes[0].sentence
     'gap = 0.5: gap belongs below [shaft].'
     """
-    document = _parse(text, wording)
+    document = parsed(text, wording, "a drive file", TABLES)
     reader = _Reader(wording)
     for key, value in document.items():
         reader.take_top(key, value)
     return reader.settled(), reader.mistakes
 
 
-def _parse(text: str, wording: Wording) -> dict[str, Any]:
+def parsed(text: str, wording: Wording, what: str, tables: Iterable[str]) -> dict[str, Any]:
+    """The document that the TOML text holds; `what` and its `tables` are named if it holds none.
+
+    Raises `InputError`, with the line, for text that is no TOML, or that is empty.
+
+    >>> parsed("gap = 0.5 rad", Wording(), "a drive file", ["shaft"])
+    Traceback (most recent call last):
+    softstart.errors.InputError: line 1, column 11, 'gap = 0.5 rad': this is not valid TOML (expected ...
+    """
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(_invalid(str(error), text, wording)) from None
     except RecursionError:
-        raise InputError(wording.whole("lists or tables are nested too deeply for a drive file")) from None
+        raise InputError(wording.whole(f"lists or tables are nested too deeply for {what}")) from None
     if not document:
-        tables = " and ".join(f"[{table}]" for table in TABLES)
-        raise InputError(wording.whole(f"it is empty; a drive file has the tables {tables}"))
+        named = " and ".join(f"[{table}]" for table in tables)
+        raise InputError(wording.whole(f"it is empty; {what} has the tables {named}"))
     return document
 
 
