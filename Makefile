@@ -12,7 +12,7 @@ compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal  # a worker a core: more threads spin
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -138,11 +138,19 @@ class AccelerationDelay(CompiledController):
     state_size: ClassVar[int] = S_RING + RING
 
     torque: float | None = parameter(
-        "N*m", "reduced torque", "load torque plus 15 % of the accelerating torque"
+        "N*m",
+        "reduced torque",
+        "load torque plus 15 % of the accelerating torque",
+        multiples=(0.3, 4.0),
     )
-    full_torque: float | None = parameter("N*m", "torque after the delay", "starting torque Ms")
+    full_torque: float | None = parameter(
+        "N*m", "torque after the delay", "starting torque Ms", multiples=(0.4, 1.0)
+    )
     delay: float | None = parameter(
-        "s", "how long the torque stays reduced after contact", "length of stage 2, [G](15)"
+        "s",
+        "how long the torque stays reduced after contact",
+        "length of stage 2, [G](15)",
+        multiples=(0.2, 3.0),
     )
     drop: float | None = parameter(
         "1",

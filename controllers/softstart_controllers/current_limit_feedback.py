@@ -191,17 +191,28 @@ class CurrentLimitFeedback(CompiledController):
     state_size: ClassVar[int] = N_STATE
 
     low_torque: float | None = parameter(
-        "N*m", "torque limit while the gap is open", "load torque plus 15 % of the accelerating torque"
+        "N*m",
+        "torque limit while the gap is open",
+        "load torque plus 15 % of the accelerating torque",
+        multiples=(0.3, 4.0),
     )
     approach_speed: float | None = parameter(
-        "rad/s", "speed at which the gap is closed", "Omega M12avg_base/c: the impact alone makes K_dyn = 1"
+        "rad/s",
+        "speed at which the gap is closed",
+        "Omega M12avg_base/c: the impact alone makes K_dyn = 1",
+        multiples=(0.3, 3.0),
     )
-    full_torque: float | None = parameter("N*m", "torque limit after the rise", "starting torque Ms")
-    rise: float | None = parameter("s", "time in which the limit rises after contact", "one elastic period")
+    full_torque: float | None = parameter(
+        "N*m", "torque limit after the rise", "starting torque Ms", multiples=(0.4, 1.0)
+    )
+    rise: float | None = parameter(
+        "s", "time in which the limit rises after contact", "one elastic period", multiples=(0.2, 5.0)
+    )
     damping_ratio: float | None = parameter(
         "1",
         "damping ratio added by the feedback",
         "0.7 less that of the shaft, or what the delays allow, down to 0",
+        between=(0.0, 1.5),
     )
     threshold: float | None = parameter(
         "N*m",
@@ -212,6 +223,7 @@ class CurrentLimitFeedback(CompiledController):
         "1",
         "unknown part of the second derivative of T, as a share of Omega^2 Ms",
         "0.05, less for a coarse encoder",
+        multiples=(0.3, 3.0),
     )
     patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)

@@ -55,9 +55,13 @@ class Ramp(CompiledController):
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = 1
 
-    initial: float | None = parameter("N*m", "torque at the start", "load torque, 0 where it does not brake")
-    time: float | None = parameter("s", "duration of the rise", "two elastic periods")
-    full_torque: float | None = parameter("N*m", "torque after the rise", "starting torque Ms")
+    initial: float | None = parameter(
+        "N*m", "torque at the start", "load torque, 0 where it does not brake", multiples=(0.3, 4.0)
+    )
+    time: float | None = parameter("s", "duration of the rise", "two elastic periods", multiples=(0.1, 10.0))
+    full_torque: float | None = parameter(
+        "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
+    )
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
 
     def __post_init__(self) -> None:

@@ -39,9 +39,14 @@ class ReducedFirstStage(CompiledController):
     kernel: ClassVar[Any] = step
 
     torque: float | None = parameter(
-        "N*m", "reduced torque of stage 1", "load torque plus 15 % of the accelerating torque"
+        "N*m",
+        "reduced torque of stage 1",
+        "load torque plus 15 % of the accelerating torque",
+        multiples=(0.3, 4.0),
     )
-    full_torque: float | None = parameter("N*m", "torque from contact on", "starting torque Ms")
+    full_torque: float | None = parameter(
+        "N*m", "torque from contact on", "starting torque Ms", multiples=(0.4, 1.0)
+    )
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Reduced torque from the drive's load and starting torque."""

@@ -54,9 +54,14 @@ class ReducedTwoStage(CompiledController):
     state_size: ClassVar[int] = 1
 
     torque: float | None = parameter(
-        "N*m", "reduced torque of stages 1 and 2", "load torque plus 15 % of the accelerating torque"
+        "N*m",
+        "reduced torque of stages 1 and 2",
+        "load torque plus 15 % of the accelerating torque",
+        multiples=(0.3, 4.0),
     )
-    full_torque: float | None = parameter("N*m", "torque from stage 3 on", "starting torque Ms")
+    full_torque: float | None = parameter(
+        "N*m", "torque from stage 3 on", "starting torque Ms", multiples=(0.4, 1.0)
+    )
     patience: float | None = parameter(
         "s", "longest wait after contact", "two elastic periods; an undamped stage 2 lasts less than one"
     )

@@ -70,10 +70,16 @@ class SCurve(CompiledController):
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = 1
 
-    initial: float | None = parameter("N*m", "torque at the start", "load torque, 0 where it does not brake")
-    time: float | None = parameter("s", "duration of the rise", "two elastic periods")
-    rounding: float | None = parameter("1", "share of the time spent in the rounded ends, 0 to 1", "1")
-    full_torque: float | None = parameter("N*m", "torque after the rise", "starting torque Ms")
+    initial: float | None = parameter(
+        "N*m", "torque at the start", "load torque, 0 where it does not brake", multiples=(0.3, 4.0)
+    )
+    time: float | None = parameter("s", "duration of the rise", "two elastic periods", multiples=(0.1, 10.0))
+    rounding: float | None = parameter(
+        "1", "share of the time spent in the rounded ends, 0 to 1", "1", between=(0.0, 1.0)
+    )
+    full_torque: float | None = parameter(
+        "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
+    )
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
 
     def __post_init__(self) -> None:

@@ -93,7 +93,7 @@ def check(controller: Controller, above_zero: Iterable[str] = (), not_negative: 
     above, from_zero = set(above_zero), set(not_negative)
     wrong = []
     for name, value in controller.parameters.items():
-        if value is None:
+        if value is None or isinstance(value, str):
             continue
         values = np.asarray(value, dtype=np.float64)
         good, rule = np.isfinite(values), "finite"

@@ -24,8 +24,10 @@ ALL = (
     "reduced-first-stage",
     "reduced-two-stage",
     "s-curve",
+    "shaped",
+    "state-feedback",
 )
-SAMPLED = ("acceleration-delay", "current-limit-feedback", "ramp", "s-curve")
+SAMPLED = ("acceleration-delay", "current-limit-feedback", "ramp", "s-curve", "shaped", "state-feedback")
 DRIVES = [Drive.load(name) for name in names()]
 
 
@@ -49,6 +51,8 @@ def test_is_described(name: str) -> None:
 @pytest.mark.parametrize("drive", DRIVES, ids=lambda drive: drive.name)
 def test_defaults_are_complete_and_plain_numbers(name: str, drive: Drive) -> None:
     values = make_controller(name).fitted(drive).parameters
+    texts = {f.name for f in dataclasses.fields(controller_class(name)) if f.metadata["kind"] == "text"}
+    assert all(isinstance(values.pop(text), str) for text in texts)
     assert all(isinstance(value, float) for value in values.values()), values
     assert all(math.isfinite(value) for value in values.values()), values
 

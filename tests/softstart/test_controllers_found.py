@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -191,3 +194,31 @@ def test_a_step_compiled_before_the_interface_changed_is_compiled_again(tmp_path
     compiled_step(space["step"])
     assert not any(path.stat().st_mtime == 0.0 for path in kept.glob("own.*"))
     assert (kept / "other.step-1.py311.nbi").exists()
+
+
+def test_a_compiled_step_notices_a_change_in_what_it_calls(tmp_path):
+    (tmp_path / "helper_of_a_step.py").write_text(
+        "from numba import njit\n\n@njit(cache=True)\ndef answer():\n    return 10.0\n"
+    )
+    (tmp_path / "step_with_helper.py").write_text(
+        "import numpy as np\nfrom softstart.controller.compiled import compiled_step, TORQUE, ASK_AGAIN\n"
+        "from helper_of_a_step import answer\n\n"
+        "@compiled_step\ndef step(parameters, measured, state, command):\n"
+        "    command[TORQUE] = answer()\n    command[ASK_AGAIN] = 1.0\n\n"
+        "command = np.zeros(3)\nstep(np.zeros(1), np.zeros(7), np.zeros(0), command)\n"
+        "print(command[TORQUE])\n"
+    )
+
+    def run() -> str:
+        done = subprocess.run(
+            [sys.executable, "step_with_helper.py"], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    # __main__ is compiled from its file too, and kept beside it
+    assert run() == "10.0"
+    helper = tmp_path / "helper_of_a_step.py"
+    helper.write_text(helper.read_text().replace("10.0", "25.0"))
+    later = time.time() + 5.0
+    os.utime(helper, (later, later))
+    assert run() == "25.0"

@@ -49,15 +49,32 @@ __all__ = [
 ]
 
 
-def _drop_if_older_than_the_interface(source: Path) -> None:
-    """The indices above are compiled into every step; numba would not notice that one of them has changed."""
+def _drop_if_stale(function: Callable[..., None], source: Path) -> None:
+    """Drop compiled steps that are older than the interface, or than a file with functions they call.
+
+    The indices above are compiled into every step, and so is every function it calls: numba would notice a
+    change in the step's own file only.
+    """
+    own = _called(function, set())
     try:
-        changed = max(path.stat().st_mtime for path in (Path(__file__), Path(start.__file__)))
-        for path in (source.parent / "__pycache__").glob(f"{source.stem}.*.nbi"):
-            if path.stat().st_mtime < changed:
-                path.unlink(missing_ok=True)
+        changed = max(path.stat().st_mtime for path in {Path(__file__), Path(start.__file__), *own})
+        for file in {source, *own}:
+            for path in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]"):
+                if path.stat().st_mtime < changed:
+                    path.unlink(missing_ok=True)
     except OSError:
         return  # another process is cleaning, or the folder is read-only: numba decides
+
+
+def _called(function: Any, seen: set[int]) -> set[Path]:
+    """The files of all compiled functions that this one names, and those that they name."""
+    files: set[Path] = set()
+    for name in function.__code__.co_names:
+        inner = getattr(function.__globals__.get(name), "py_func", None)
+        if inner is not None and id(inner) not in seen:
+            seen.add(id(inner))
+            files |= {Path(inner.__code__.co_filename), *_called(inner, seen)}
+    return files
 
 
 def compiled_step(function: Callable[..., None]) -> Any:
@@ -81,5 +98,5 @@ def compiled_step(function: Callable[..., None]) -> Any:
     file = "<unknown>" if source is None else str(source.co_filename)
     in_a_file = not file.startswith("<")
     if in_a_file:
-        _drop_if_older_than_the_interface(Path(file))
+        _drop_if_stale(function, Path(file))
     return compiled_as(STEP_SIGNATURE, cache=in_a_file)(function)
