@@ -186,12 +186,22 @@ def read_names(text: str | None) -> list[str] | None:
 
 
 def check_name(name: str, option: str) -> str:
-    """The name, if it is that of an installed controller or leads to a Python file that is there."""
+    """The name, if it is that of an installed controller or leads to a file that is there.
+
+    Such a file holds Python code, or tuned gains as TOML or CSV.
+    """
     if ".py" in name:
         path = Path(name[: name.index(".py") + 3])
         if not path.is_file():
             what = "is a directory" if path.is_dir() else "is not there"
             raise InputError(f'{option} = "{name}": the file {path} {what}; give path/to/file.py:ClassName.')
+    elif name.lower().endswith((".toml", ".csv")):
+        path = Path(name)
+        if not path.is_file():
+            what = "is a directory" if path.is_dir() else "is not there"
+            raise InputError(
+                f'{option} = "{name}": the file {path} {what}; give one that softstart tune has written.'
+            )
     elif name not in controller_names():
         hint = did_you_mean(name, controller_names())
         raise InputError(f'{option} = "{name}": there is no controller of this name; {hint}')

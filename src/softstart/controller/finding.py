@@ -1,4 +1,4 @@
-"""Finding controllers: by entry point, or in a file of the user's own."""
+"""Finding controllers: by entry point, in a file of the user's own, or in a file of tuned gains."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart.controller.base import Controller, Sensor
+from softstart.controller.gain_files import SUFFIXES
 from softstart.errors import InputError
 from softstart.plugins import load, registered
 from softstart.units import to_si
@@ -61,6 +62,8 @@ def controller_class(name: str) -> type[Controller]:
 def make_controller(name: str | Controller, parameters: Mapping[str, object] | None = None) -> Controller:
     """A controller from its name and parameters (bare SI numbers or strings with a unit).
 
+    A name that ends in .toml or .csv is a file of tuned gains (see `softstart.controller.tuned`).
+
     >>> make_controller("ramp", {"time": "120 ms"}).time
     0.12
     """
@@ -76,6 +79,10 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, "
             "or a Controller object."
         )
+    if name.lower().endswith(SUFFIXES):
+        from softstart.controller.tuned import load_gains
+
+        return load_gains(name, parameters)
     cls = controller_class(name)
     known = {f.name: f for f in fields(cls)}
     values: dict[str, Any] = {}

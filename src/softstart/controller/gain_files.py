@@ -1,0 +1,244 @@
+"""Tuned gains from files: TOML for a robust set and for a schedule, CSV for a schedule."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError
+
+Scale = Literal["linear", "logarithmic"]
+
+ROBUST, SCHEDULE = "robust set", "gain schedule"
+CSV_TITLE = "# softstart gain schedule"
+SUFFIXES = (".toml", ".csv")
+AXES = ("gap", "load_inertia")
+
+
+class Gain(NamedTuple):
+    """A parameter over the grid: a value for each gap (rows) and load inertia (columns)."""
+
+    scale: Scale
+    values: NDArray[np.float64]
+
+
+class RobustFile(NamedTuple):
+    """A robust set: a controller, its parameters, and the drive they are fitted to."""
+
+    controller: str
+    parameters: dict[str, Any]
+    drive: Drive
+
+
+class ScheduleFile(NamedTuple):
+    """A schedule: a controller, its gains over gaps (rad) and load inertias (kg m2), fixed parameters."""
+
+    controller: str
+    gaps: tuple[float, ...]
+    load_inertias: tuple[float, ...]
+    gains: dict[str, Gain]
+    fixed: dict[str, Any]
+
+
+def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
+    """Tuned gains from a file. Raises InputError in sentences that name file, key and remedy."""
+    try:
+        text = path.read_text("utf-8")
+    except FileNotFoundError:
+        raise _wrong(
+            path, "there is no such file; softstart tune --out DIR writes robust.toml and schedule.toml"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise _wrong(path, f"the file cannot be read ({reason})") from None
+    return read_gains(text, path)
+
+
+def read_gains(text: str, path: Path) -> RobustFile | ScheduleFile:
+    """Tuned gains from text; the name of `path` tells TOML from CSV."""
+    if path.suffix.lower() == ".csv":
+        return _read_csv(text, path)
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise _wrong(path, f"this is not valid TOML ({error})") from None
+    kind = document.get("kind")
+    if kind == ROBUST:
+        return _read_robust(document, path)
+    if kind == SCHEDULE:
+        return _read_schedule(document, path)
+    raise _foreign(path)
+
+
+def _foreign(path: Path) -> InputError:
+    return _wrong(
+        path,
+        "this file holds no tuned gains; give one that softstart tune has written, or play a torque profile "
+        "with --controller profile --param file=PATH",
+    )
+
+
+def _wrong(path: Path, reason: str) -> InputError:
+    return InputError(f'controller = "{path}": {reason}.')
+
+
+def _name(document: Mapping[str, Any], path: Path) -> str:
+    name = document.get("controller")
+    if not isinstance(name, str) or not name:
+        raise _wrong(
+            path, 'the key controller is missing; write the controller\'s name, as controller = "ramp"'
+        )
+    return name
+
+
+def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
+    found = document.get(key, None if needed else {})
+    if not isinstance(found, dict):
+        raise _wrong(path, f"the table [{key}] is missing; let softstart tune write the file anew")
+    return found
+
+
+def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
+    name = _name(document, path)
+    parameters = _section(document, "parameters", path)
+    return RobustFile(name, dict(parameters), _drive(_section(document, "drive", path), path))
+
+
+def _drive(tables: Mapping[str, Any], path: Path) -> Drive:
+    """The drive below [drive]."""
+    given: dict[str, Any] = {}
+    wrong: list[str] = []
+    places = {(p.table, p.key): p.name for p in PARAMETERS.values()}
+    for key, value in tables.items():
+        entries = value.items() if isinstance(value, dict) else [(key, value)]
+        table = key if isinstance(value, dict) else ""
+        for inner, content in entries:
+            if (table, inner) in places:
+                given[places[table, inner]] = content
+            else:
+                place = f"[drive.{table}] {inner}" if table else f"[drive] {inner}"
+                wrong.append(f'controller = "{path}": {place}: a drive has no such key; delete the line.')
+    if wrong:
+        raise InputError(wrong)
+    try:
+        return Drive(**given)
+    except InputError as error:
+        raise InputError([f'controller = "{path}", [drive]: {one}' for one in error.sentences]) from None
+
+
+def _read_schedule(document: Mapping[str, Any], path: Path) -> ScheduleFile:
+    name = _name(document, path)
+    gaps = _axis(document.get("gaps"), "gaps", path)
+    inertias = _axis(document.get("load_inertias"), "load_inertias", path)
+    gains: dict[str, Gain] = {}
+    for key, table in _section(document, "gains", path).items():
+        scale = table.get("scale") if isinstance(table, dict) else None
+        values = table.get("values") if isinstance(table, dict) else None
+        shape = (len(gaps), len(inertias))
+        gains[key] = Gain(_scale(scale, key, path), _values(values, shape, key, path))
+    fixed = _section(document, "fixed", path, needed=False)
+    return ScheduleFile(name, gaps, inertias, _positive(gains, path), dict(fixed))
+
+
+def _axis(values: Any, name: str, path: Path) -> tuple[float, ...]:
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    good = numbers.ndim == 1 and numbers.size > 0 and bool(np.all(np.isfinite(numbers)))
+    if not good or bool(np.any(np.diff(numbers) <= 0.0)) or numbers[0] < 0.0:
+        raise _wrong(path, f"{name} = {values}: give a list of numbers that rise, 0 or more")
+    return tuple(numbers.tolist())
+
+
+def _scale(scale: Any, name: str, path: Path) -> Scale:
+    if scale == "linear":
+        return "linear"
+    if scale == "logarithmic":
+        return "logarithmic"
+    raise _wrong(path, f'[gains.{name}] scale = {scale!r}: write "linear" or "logarithmic"')
+
+
+def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArray[np.float64]:
+    try:
+        table = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        table = np.zeros(0)
+    if table.shape != shape or not np.all(np.isfinite(table)):
+        raise _wrong(
+            path,
+            f"[gains.{name}] values: give {shape[0]} rows, one a gap, of {shape[1]} numbers, one an inertia",
+        )
+    return table
+
+
+def _positive(gains: dict[str, Gain], path: Path) -> dict[str, Gain]:
+    for name, gain in gains.items():
+        if gain.scale == "logarithmic" and not np.all(gain.values > 0.0):
+            raise _wrong(path, f'the gain {name} is 0 or less in a cell; its scale must be "linear"')
+    if not gains:
+        raise _wrong(path, "it has no gains; let softstart tune write the file anew")
+    return gains
+
+
+def _read_csv(text: str, path: Path) -> ScheduleFile:
+    lines = text.splitlines()
+    if not lines or lines[0].strip() != CSV_TITLE:
+        raise _foreign(path)
+    notes = {}
+    for line in lines[1:]:
+        if line.startswith("#"):
+            key, _, value = line[1:].partition(":")
+            notes[key.strip()] = value.strip()
+    scales, fixed = _note(notes, "gains", path), _note(notes, "fixed", path)
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    cells = [_row(row, (*AXES, *scales), path) for row in rows]
+    gaps = tuple(sorted({cell["gap"] for cell in cells}))
+    inertias = tuple(sorted({cell["load_inertia"] for cell in cells}))
+    if len(cells) != len(gaps) * len(inertias) or len({(c["gap"], c["load_inertia"]) for c in cells}) < len(
+        cells
+    ):
+        raise _wrong(path, "give one row for each combination of gap and load inertia, no more and no fewer")
+    document = {
+        "controller": notes.get("controller"),
+        "gaps": gaps,
+        "load_inertias": inertias,
+        "gains": {name: {"scale": scale, "values": _grid(cells, name)} for name, scale in scales.items()},
+        "fixed": fixed,
+    }
+    return _read_schedule(document, path)
+
+
+def _note(notes: Mapping[str, str], key: str, path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(notes.get(key, "{}"))
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise _wrong(path, f'the comment line "# {key}: ..." is no JSON object, as {{"time": "linear"}}')
+    return found
+
+
+def _row(row: Mapping[str, str | None], names: Sequence[str], path: Path) -> dict[str, float]:
+    found = {}
+    for name in names:
+        try:
+            found[name] = float(row.get(name) or "")
+        except ValueError:
+            raise _wrong(path, f'{name} = "{row.get(name) or ""}": give a number in each row') from None
+    return found
+
+
+def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
+    ordered = sorted(cells, key=lambda cell: (cell["gap"], cell["load_inertia"]))
+    width = len({cell["load_inertia"] for cell in cells})
+    values = [cell[name] for cell in ordered]
+    return [values[k : k + width] for k in range(0, len(values), width)]

@@ -1,0 +1,239 @@
+"""What tuning has found: the schedule, the robust set, the price of robustness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from softstart import __version__
+from softstart.controller.gain_files import Gain, RobustFile, ScheduleFile
+from softstart.controller.gain_text import robust_text, schedule_csv, schedule_text
+from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
+from softstart.errors import InputError
+from softstart.export import write_whole
+from softstart.tuning.question import Question
+
+if TYPE_CHECKING:
+    import xarray
+
+    from softstart.drive import Drive
+
+What = Literal["schedule", "robust"]
+
+
+@dataclass(frozen=True, eq=False)
+class RobustSet:
+    """One set of gains for all cells and scenarios.
+
+    `parameters` are all parameters of the controller, set up for the nominal drive; `gains` those that were
+    tuned, `defaults` what these were. `worst` is the metric at the quantile over all starts, `worst_default`
+    that of the defaults; `excess` by which share the start times are beyond their bounds at the same
+    quantile (0: in time). `cells` has the figures of each cell. `agreement` of `restarts` searches came
+    within 1 % of the best; `spread` is how far apart they are.
+    """
+
+    parameters: dict[str, Any]
+    gains: dict[str, float]
+    defaults: dict[str, float]
+    worst: float
+    worst_default: float
+    excess: float
+    excess_default: float
+    agreement: int
+    restarts: int
+    spread: float
+    kept_default: bool
+    cells: xarray.Dataset
+    controller: RobustGains
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the bound on the start time is kept."""
+        return self.excess == 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON."""
+        return {
+            "parameters": self.parameters,
+            "gains": self.gains,
+            "defaults": self.defaults,
+            "worst": self.worst,
+            "worst_default": self.worst_default,
+            "feasible": self.feasible,
+            "excess": self.excess,
+            "agreement": self.agreement,
+            "restarts": self.restarts,
+            "spread": self.spread,
+            "kept_default": self.kept_default,
+            "cells": table_of(self.cells),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """Tuned gains of one controller over a grid of gaps and load inertias.
+
+    `schedule` is a Dataset over `gap` (rad) and `load_inertia` (kg m2): each tuned parameter, the metric
+    tuned and with the defaults, start times, their bounds, and how many searches agree. `robust` is the one
+    set for all cells. `price` sets side by side, per cell, the robust set, the schedule, and the certified
+    optimum within the same time. `between` has the schedule half way between the cells, where its gains are
+    interpolated: where these differ much from cell to cell, nothing says that it does well there. What was
+    not asked for is None. `starts` were simulated in `seconds`.
+    """
+
+    question: Question
+    schedule: xarray.Dataset | None
+    robust: RobustSet | None
+    price: xarray.Dataset | None
+    between: xarray.Dataset | None
+    starts: int
+    seconds: float
+
+    @property
+    def drive(self) -> Drive:
+        """The nominal drive."""
+        return self.question.drive
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller."""
+        return self.question.recipe.label
+
+    @property
+    def metric(self) -> str:
+        """Name of the figure that was made small."""
+        return self.question.metric_name
+
+    @property
+    def scheduled(self) -> GainSchedule:
+        """The controller that takes its gains from the schedule. InputError if none was asked for."""
+        return scheduled(self._schedule_file(), "schedule", self.question.recipe.make())
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Least and largest metric of the schedule over the grid, or of the robust set if there is none."""
+        table = self.schedule if self.schedule is not None else self._robust().cells
+        return float(table[self.metric].min()), float(table[self.metric].max())
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON."""
+        q = self.question
+        return {
+            "drive": self.drive.name,
+            "controller": self.controller,
+            "given": q.recipe.given,
+            "metric": self.metric,
+            "start_time_bound": q.bound.text(),
+            "free": {one.name: one.text() for one in q.ranges},
+            "gaps": list(q.gaps),
+            "load_inertias": list(q.load_inertias),
+            "scenarios": len(q.scenarios),
+            "quantile": q.quantile,
+            "seed": q.seed,
+            "restarts": q.restarts,
+            "schedule": None if self.schedule is None else table_of(self.schedule),
+            "robust": None if self.robust is None else self.robust.summary(),
+            "price": None if self.price is None else table_of(self.price),
+            "between": None if self.between is None else table_of(self.between),
+            "starts": self.starts,
+            "seconds": self.seconds,
+        }
+
+    def plot(self, what: Literal["gains", "metric", "robust", "price"] | None = None) -> Any:
+        """A figure: maps of the gains, of the metric tuned and by default, of the robust set, of its price.
+
+        By default the price of robustness if there is one, else the maps of the metric.
+        """
+        from softstart.tuning.pictures import figure_of
+
+        return figure_of(self, what)
+
+    def to_toml(self, path: str | Path, what: What | None = None) -> None:
+        """Write the schedule or the robust set as TOML, which any controller's name may stand for.
+
+        By default the schedule, or the robust set if there is no schedule.
+        """
+        about = self._about()
+        if what == "robust" or (what is None and self.schedule is None):
+            one = self._robust()
+            saved = RobustFile(self._name(), one.parameters, self.drive)
+            told = {"worst": one.worst, "worst_default": one.worst_default, "in_time": one.feasible}
+            text = robust_text(saved, about | told)
+        else:
+            text = schedule_text(self._schedule_file(), about)
+        write_whole(Path(path), lambda stream: stream.write(text))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the schedule as CSV, with the figures of each cell beside the gains; it can be played too."""
+        saved = self._schedule_file()
+        assert self.schedule is not None
+        columns = {
+            str(name): np.asarray(values) for name, values in self.schedule.items() if name not in saved.gains
+        }
+        text = schedule_csv(saved, columns)
+        write_whole(Path(path), lambda stream: stream.write(text))
+
+    def _about(self) -> dict[str, Any]:
+        q = self.question
+        return {
+            "softstart": __version__,
+            "drive": self.drive.name,
+            "metric": self.metric,
+            "start_time": q.bound.text(),
+            "quantile": q.quantile,
+            "scenarios": len(q.scenarios),
+            "gaps_tuned": list(q.gaps),
+            "load_inertias_tuned": list(q.load_inertias),
+            "tuned": list(q.names),
+            "seed": q.seed,
+            "restarts": q.restarts,
+        }
+
+    def _robust(self) -> RobustSet:
+        if self.robust is None:
+            raise InputError("robust: no robust set was tuned; call tune with robust=True.")
+        return self.robust
+
+    def _schedule_file(self) -> ScheduleFile:
+        if self.schedule is None:
+            raise InputError("schedule: no schedule was tuned; call tune with schedule=True.")
+        q = self.question
+        gains = gains_on_grid(q, {one.name: self.schedule[one.name].to_numpy() for one in q.ranges})
+        given = {name: value for name, value in q.recipe.given.items() if name not in gains}
+        return ScheduleFile(q.recipe.name, q.gaps, q.load_inertias, gains, given)
+
+    def _name(self) -> str:
+        name = self.question.recipe.name
+        if not name:
+            raise InputError(
+                f"controller = {self.controller}: it has no name under which a file could call it; give tune "
+                "its name or path/to/file.py:ClassName instead of the object."
+            )
+        return name
+
+
+def gains_on_grid(question: Question, values: Mapping[str, Any]) -> dict[str, Gain]:
+    """The gains of all cells as tables; a gain searched in the logarithm is interpolated in it too."""
+    found = {}
+    for one in question.ranges:
+        table = np.asarray(values[one.name]).reshape(len(question.gaps), len(question.load_inertias))
+        curved = one.logarithmic and bool(np.all(table > 0.0))
+        found[one.name] = Gain("logarithmic" if curved else "linear", table)
+    return found
+
+
+def table_of(dataset: xarray.Dataset) -> dict[str, Any]:
+    """A dataset over the grid as nested lists, one row a gap; NaN is None."""
+    return {
+        str(name): [[_plain(value) for value in row] for row in np.asarray(values).tolist()]
+        for name, values in dataset.items()
+    }
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

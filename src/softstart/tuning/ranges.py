@@ -1,0 +1,205 @@
+"""Which parameters of a controller are tuned, and within what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import Field, dataclass, fields
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.controller import Controller
+from softstart.errors import InputError
+from softstart.units import nearest, to_si
+
+Vector = NDArray[np.float64]
+
+WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter with the values it may take, in `unit`: multiples of its default, or fixed ends, or both.
+
+    A place in the range is a number from 0 to 1, evenly in the value or, if `logarithmic`, in its logarithm.
+
+    >>> time = Range("time", "s", multiples=(0.1, 10.0), logarithmic=True)
+    >>> round(float(time.value(0.5, 0.12)), 9), round(float(time.place(1.2, 0.12)), 9)
+    (0.12, 1.0)
+    """
+
+    name: str
+    unit: str
+    multiples: tuple[float, float] | None = None
+    between: tuple[float, float] | None = None
+    logarithmic: bool = False
+    named: bool = False  # the user's own range: nothing outside it is a candidate, not even the default
+
+    def ends(self, default: Any) -> tuple[Vector, Vector]:
+        """Lowest and highest value, where the derived default is this."""
+        value = np.asarray(default, dtype=np.float64)
+        if self.multiples is None:
+            assert self.between is not None
+            return np.full(value.shape, self.between[0]), np.full(value.shape, self.between[1])
+        low, high = (np.asarray(multiple * value) for multiple in self.multiples)
+        if self.between is not None:
+            low, high = np.clip(low, *self.between), np.clip(high, *self.between)
+        return low, high
+
+    def value(self, place: Any, default: Any) -> Vector:
+        """The value at a place."""
+        low, high = self.ends(default)
+        share = np.asarray(place, dtype=np.float64)
+        straight = low + share * (high - low)
+        if not self.logarithmic:
+            return np.asarray(straight)
+        positive = low > 0.0
+        safe_low, safe_high = np.where(positive, low, 1.0), np.where(positive, high, 1.0)
+        curved = np.exp((1.0 - share) * np.log(safe_low) + share * np.log(safe_high))
+        inside = np.where(share == 0.0, low, np.where(share == 1.0, high, np.clip(curved, low, high)))
+        return np.where(positive, inside, straight)
+
+    def place(self, value: Any, default: Any) -> Vector:
+        """The place of a value, within 0 and 1."""
+        low, high = self.ends(default)
+        given = np.clip(np.asarray(value, dtype=np.float64), low, high)
+        if self.logarithmic:
+            positive = low > 0.0
+            low, high, given = (np.log(np.where(positive, x, 1.0)) + np.where(positive, 0.0, x)
+                                for x in (low, high, given))  # fmt: skip
+        width = high - low
+        return np.where(width > 0.0, (given - low) / np.where(width > 0.0, width, 1.0), 0.5)
+
+    def text(self) -> str:
+        """The range in words."""
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        parts = []
+        if self.multiples is not None:
+            parts.append(f"{self.multiples[0]:g} to {self.multiples[1]:g} times its default")
+        if self.between is not None:
+            parts.append(f"{self.between[0]:g} to {self.between[1]:g}{unit}")
+        return ", within ".join(parts)
+
+
+Free = Iterable[str] | Mapping[str, Any] | None
+
+
+def tunable(controller: Controller) -> tuple[str, ...]:
+    """Names of the parameters that a controller says may be tuned.
+
+    >>> from softstart.controller import make_controller
+    >>> "time" in tunable(make_controller("ramp")), tunable(make_controller("direct"))
+    (True, ())
+    """
+    return tuple(f.name for f in fields(controller) if _declared(f) is not None)
+
+
+def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
+    """The ranges of the parameters to tune: those asked for, or all that the controller says may be tuned.
+
+    `free` maps a name to (low, high), each a number, a text with a unit, or a multiple of the default as
+    "0.5x"; or to None for the controller's own range. Parameters given to the controller are left as given.
+    Raises InputError with all mistakes.
+
+    >>> from softstart.controller import make_controller
+    >>> [one.text() for one in ranges_of(make_controller("ramp"), {"time": ("50 ms", "0.3 s")})]
+    ['0.05 to 0.3 s']
+    """
+    what = controller.name or type(controller).__name__
+    known = {f.name: f for f in fields(controller)}
+    if free is None:
+        given = {f.name for f in fields(controller) if getattr(controller, f.name) is not None}
+        asked: dict[str, Any] = {name: None for name in tunable(controller) if name not in given}
+        if not asked:
+            raise InputError(
+                f"controller = {what}: it has no parameter to tune; name one with its range, "
+                'as free={"torque": (10, 60)}.'
+            )
+    elif isinstance(free, str):
+        asked = {free: None}
+    else:
+        asked = dict(free) if isinstance(free, Mapping) else dict.fromkeys(free)
+    if not asked:
+        raise InputError("free: it names no parameter; leave it out to tune all that the controller offers.")
+    found: list[Range] = []
+    wrong: list[str] = []
+    for name, ends in asked.items():
+        try:
+            found.append(_range(what, name, ends, known))
+        except InputError as error:
+            wrong += error.sentences
+    if wrong:
+        raise InputError(wrong)
+    return tuple(found)
+
+
+def _declared(field: Field[Any]) -> Range | None:
+    """The range that a controller's own lines give a parameter."""
+    multiples, between = field.metadata.get("multiples"), field.metadata.get("between")
+    if multiples is None and between is None:
+        return None
+    unit = field.metadata.get("unit", "")
+    return Range(field.name, unit, multiples, between, logarithmic=multiples is not None)
+
+
+def _range(controller: str, name: str, ends: Any, known: Mapping[str, Field[Any]]) -> Range:
+    if name not in known:
+        near = nearest(name, known)
+        hint = f"did you mean {near}?" if near else f"it has {', '.join(known) or 'none'}."
+        raise InputError(f"free: the controller {controller} has no parameter {name}; {hint}")
+    field = known[name]
+    if field.metadata.get("kind", "quantity") != "quantity":
+        raise InputError(f"free: {name} of the controller {controller} is no quantity; it cannot be tuned.")
+    declared = _declared(field)
+    if ends is None:
+        if declared is None:
+            raise InputError(
+                f"free: the controller {controller} gives no range for {name}; give one, "
+                f'as free={{"{name}": ("0.5x", "2x")}} or with two values.'
+            )
+        return declared
+    return _named(name, ends, field.metadata.get("unit", ""))
+
+
+def _named(name: str, ends: Any, unit: str) -> Range:
+    """The user's own range."""
+    if isinstance(ends, str) or not isinstance(ends, Iterable) or len(both := list(ends)) != 2:
+        raise InputError(f"free: {name} = {ends!r}: give its lowest and highest value, as (0.1, 0.5).")
+    multiples = [isinstance(end, str) and end.strip()[-1:] in ("x", "X") for end in both]
+    if any(multiples) and not all(multiples):
+        raise InputError(f"free: {name} = {ends!r}: give both ends as values, or both as multiples (2x).")
+    texts = [end.strip()[:-1] if multiples[0] else end for end in both]
+    label = f"free {name}"
+    low, high = (float(to_si(end, "1" if multiples[0] else unit or "1", name=label)) for end in texts)
+    if not low < high:
+        raise InputError(f"free: {name} = {ends!r}: the lowest value must be below the highest.")
+    if multiples[0] and low <= 0.0:
+        raise InputError(f"free: {name} = {ends!r}: multiples of the default must be above 0.")
+    pair = (low, high)
+    if multiples[0]:
+        return Range(name, unit, multiples=pair, logarithmic=True, named=True)
+    wide = low > 0.0 and high >= WIDE * low
+    return Range(name, unit, between=pair, logarithmic=wide, named=True)
+
+
+def inside(ranges: Iterable[Range], values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Any:
+    """Whether the values respect every range that the user has named; elsewhere anything goes."""
+    good = np.True_
+    for one in ranges:
+        if one.named:
+            low, high = one.ends(defaults[one.name])
+            slack = 1e-9 * np.maximum(np.abs(low), np.abs(high))
+            good = good & (values[one.name] >= low - slack) & (values[one.name] <= high + slack)
+    return good
+
+
+def check_number(name: str, value: object, low: float, high: float, meaning: str) -> float:
+    """A finite number above `low` and up to `high`, or an InputError that says what is meant."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        number = float(value)
+        if math.isfinite(number) and low < number <= high:
+            return number
+    raise InputError(f"{name} = {value!r}: give {meaning}.")

@@ -1,0 +1,148 @@
+"""The best gains of each cell: searched alone, then with the neighbours' help, then made smooth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.tuning.log import Log
+from softstart.tuning.ranges import inside
+from softstart.tuning.ranking import cost, in_time
+from softstart.tuning.saved import SavedParts
+from softstart.tuning.search import Found
+from softstart.tuning.trials import Judged
+from softstart.tuning.work import Advice, CellSearch, ask_neighbours, cell_costs, own_values, search_cells
+from softstart.tuning.workers import Workers
+
+Vector = NDArray[np.float64]
+
+STARTS_A_CALL, LARGEST_BLOCK = 600, 12
+TURNS = 3  # times that each cell asks its neighbours
+SMOOTHINGS = 4
+SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
+EQUALLY_GOOD = 1e-3  # share of the metric that smoothness may cost
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduleFound:
+    """Gains by name, one value a cell; what they reach; their costs, and those of each restart."""
+
+    values: dict[str, Vector]
+    judged: Judged
+    costs: Vector
+    restart_costs: Vector
+    kept_default: Any  # whether a cell's defaults were best, one a cell
+
+
+def schedule(workers: Workers, saved: SavedParts, log: Log) -> ScheduleFound:
+    """The best gains of every cell."""
+    trials = workers.trials
+    question = trials.question
+    cells = range(len(question.cells))
+    pairs = [CellSearch(cell, restart) for cell in cells for restart in range(question.restarts)]
+    found = _parts(workers, saved, log, "schedule, searches", search_cells, pairs)
+    restart_costs = np.array([one.cost for one in found]).reshape(len(cells), question.restarts)
+    best = [
+        min(found[i : i + question.restarts], key=lambda one: one.cost)
+        for i in range(0, len(found), question.restarts)
+    ]
+    places = np.array([one.place for one in best])
+    costs = np.array([one.cost for one in best])
+    changed = np.ones(len(cells), dtype=bool)
+    for turn in range(TURNS):
+        asking = [cell for cell in cells if any(changed[list(question.neighbours(cell))])]
+        if not asking:
+            break
+        items = [Advice(c, turn, places[c], float(costs[c]), _beside(trials, c, places)) for c in asking]
+        title = f"schedule, neighbours asked, turn {turn + 1}"
+        after = _parts(workers, saved, log, title, ask_neighbours, items)
+        changed[:] = False
+        for cell, one in zip(asking, after, strict=True):
+            changed[cell] = one.cost < costs[cell]
+            places[cell], costs[cell] = one.place, one.cost
+    return _settled(workers, _smooth(workers, places, costs), restart_costs)
+
+
+def _parts(
+    workers: Workers, saved: SavedParts, log: Log, title: str, work: Any, items: list[Any]
+) -> list[Found]:
+    """The results of all items, those saved taken from there; several a call, whatever the workers."""
+    question = workers.trials.question
+    found: dict[int, Found] = {}
+    for index, item in enumerate(items):
+        record = saved.find(_key(item))
+        if record is not None:
+            found[index] = Found(np.array(record["place"]), record["cost"], record["tried"])
+    missing = [index for index in range(len(items)) if index not in found]
+    size = min(max(STARTS_A_CALL // (question.population * len(question.scenarios)), 1), LARGEST_BLOCK)
+    blocks = [missing[i : i + size] for i in range(0, len(missing), size)]
+    log.begin(title, len(items), len(found))
+    for k, results in workers.each(work, [([items[index] for index in block],) for block in blocks]):
+        for index, one in zip(blocks[k], results, strict=True):
+            found[index] = one
+            record = {"place": one.place.tolist(), "cost": one.cost, "tried": one.tried}
+            saved.add(_key(items[index]), record)
+            log.did(one.tried * len(question.scenarios))
+    return [found[index] for index in range(len(items))]
+
+
+def _key(item: CellSearch | Advice) -> tuple[str, int, int]:
+    """Under which an item is saved."""
+    if isinstance(item, CellSearch):
+        return ("cell", item.cell, item.restart)
+    return ("neighbours", item.cell, item.turn)
+
+
+def _beside(trials: Any, cell: int, places: Vector) -> Vector:
+    """Where the neighbours' gains lie in a cell: as multiples of its own defaults, and as they are."""
+    question = trials.question
+    near = list(question.neighbours(cell))
+    theirs = own_values(trials, near, places[near])
+    same = [one.place(theirs[one.name], trials.own_defaults[one.name][cell]) for one in question.ranges]
+    return np.concatenate([places[near], np.stack(same, axis=-1)])
+
+
+def _smooth(workers: Workers, places: Vector, costs: Vector) -> Vector:
+    """Places nearer to the median of their neighbours, where that is equally good within 0.1 %.
+
+    First all parameters move together, then each by itself: one that hardly matters is often far off.
+    """
+    trials = workers.trials
+    question = trials.question
+    cells = range(len(question.cells))
+    allowed = np.where(in_time(costs), costs + EQUALLY_GOOD * np.abs(costs), -np.inf)
+    shares = np.array(SHARES)[:, None, None]
+    near = [list(question.neighbours(cell)) for cell in cells]
+    size = places.shape[1]
+    for _ in range(SMOOTHINGS):
+        for mask in np.concatenate([np.ones((1, size)), np.eye(size)]) if size > 1 else np.ones((1, 1)):
+            aims = [np.median(places[some], axis=0) if some else places[c] for c, some in enumerate(near)]
+            nearer = places + shares * mask * (np.array(aims) - places)
+            found = cell_costs(trials, np.tile(list(cells), len(SHARES)), nearer.reshape(-1, size))
+            good = found.reshape(len(SHARES), len(cells)) <= allowed
+            moving = np.flatnonzero(np.any(good, axis=0))
+            places = places.copy()
+            places[moving] = nearer[np.argmax(good, axis=0)[moving], moving]  # the farthest that is good
+    return places
+
+
+def _settled(workers: Workers, places: Vector, restart_costs: Vector) -> ScheduleFound:
+    """The gains with what they reach; the defaults where these are better, and allowed."""
+    trials = workers.trials
+    question, yardstick = trials.question, trials.yardstick
+    cells = list(range(len(question.cells)))
+    defaults = trials.own_defaults
+    values = own_values(trials, cells, places)
+    tuned, bound = trials.of_pairs(values, cells), yardstick.own_bound
+    ours = cost(tuned.metric, tuned.start_time, bound, question.quantile)
+    before = cost(yardstick.own.metric, yardstick.own.start_time, bound, question.quantile)
+    back = np.asarray((before < ours) & inside(question.ranges, defaults, defaults))
+    values = {name: np.where(back, defaults[name], value) for name, value in values.items()}
+    judged = Judged(
+        np.where(back[:, None], yardstick.own.metric, tuned.metric),
+        np.where(back[:, None], yardstick.own.start_time, tuned.start_time),
+    )
+    return ScheduleFound(values, judged, np.where(back, before, ours), restart_costs, back)

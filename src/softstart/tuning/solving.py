@@ -1,0 +1,204 @@
+"""Tuning a controller over gaps and load inertias: `tune`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from softstart.controller import Controller
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.tuning.grid import gaps_of, inertias_of
+from softstart.tuning.log import Log, Progress
+from softstart.tuning.outcome import Tuning
+from softstart.tuning.price import Optima, optima
+from softstart.tuning.question import Metric, Question, bound_of
+from softstart.tuning.ranges import Free, check_number, ranges_of
+from softstart.tuning.recipe import recipe_of
+from softstart.tuning.robust_set import robust_set
+from softstart.tuning.saved import SavedParts
+from softstart.tuning.schedule import schedule as tuned_schedule
+from softstart.tuning.tables import between_table, check_metric, price_table, robust_outcome, schedule_table
+from softstart.tuning.tolerances import scenarios_of
+from softstart.tuning.trials import Trials
+from softstart.tuning.workers import Workers, count_of
+
+GENERATIONS = 40
+SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
+WORTH_SHARING = 20_000  # starts from which on other processes are begun
+
+
+def tune(
+    drive: Drive | str,
+    controller: str | Controller,
+    gaps: Iterable[Any] | Any | None = None,
+    inertias: Iterable[Any] | Any | None = None,
+    *,
+    parameters: Mapping[str, object] | None = None,
+    free: Free = None,
+    metric: Metric = "k_dyn",
+    start_time: float | str | None = None,
+    tolerances: Mapping[str, Any] | None = None,
+    quantile: float = 1.0,
+    schedule: bool = True,
+    robust: bool = True,
+    certified: bool = True,
+    base: Drive | None = None,
+    seed: int = 0,
+    restarts: int = 3,
+    population: int | None = None,
+    generations: int = GENERATIONS,
+    workers: int | None = None,
+    save_to: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Find the gains of a controller for each gap and load inertia, and one set of gains for all.
+
+    Parameters
+    ----------
+    drive : the nominal drive, or its name or file.
+    controller : a name, `path/to/file.py:ClassName`, or a Controller object.
+    gaps : gaps in rad, numbers or texts with a unit, or multiples of the drive's own as "2x". By default
+        0.5, 1, 2 and 4 times its own.
+    inertias : load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1
+        and 2 times the drive's own.
+    parameters : parameters of a controller given by name. What is given is not tuned, unless it is `free`.
+    free : names of the parameters to tune, or name -> (low, high) with ends in SI, with a unit, or as
+        multiples of the default ("0.5x", "2x"). By default all that the controller says may be tuned,
+        within the ranges that it names.
+    metric : what is made small: a figure of `softstart.batch.figures`, or a function of those figures.
+    start_time : bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x").
+        By default each start is to be no slower than with the controller's own defaults.
+    tolerances : what drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity,
+        or a list of values; see `softstart.tuning.tolerances`. Every candidate has to stand all of them.
+    quantile : share of the starts that metric and bound are judged by: 1 is the worst case.
+    schedule, robust : which of the two questions to answer. *Schedule*: the best gains of each cell, the
+        controller set up for that cell's drive. *Robust*: one set, set up for the nominal drive, that is best
+        over all cells.
+    certified : whether to compute each cell's optimum within the same time (metric `k_dyn` only).
+    base : the drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
+    seed, restarts, population, generations : of the search. The same ones give the same bits, however many
+        workers there are.
+    workers : processes; by default one a processor. Scripts need `if __name__ == "__main__":` then.
+    save_to : a file in which each finished part is kept at once, from which the same call goes on.
+    progress : told what is being done, how many starts were made, and how many a second.
+
+    A candidate that keeps the bound beats one that does not, then the smaller excess, then the smaller
+    metric. The defaults are a candidate everywhere, so that no cell becomes worse by this rule (but where the
+    user's own range in `free` leaves them out). Raises InputError for bad input.
+
+    >>> from softstart import Drive, tune
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> options = {"free": ["torque"], "certified": False, "workers": 1}
+    >>> tuned = tune(crane, "reduced-first-stage", ["1x"], ["1x"], **options)
+    >>> cell = tuned.schedule.isel(gap=0, load_inertia=0)
+    >>> bool(cell.k_dyn <= cell.k_dyn_default), tuned.robust.agreement
+    (True, 3)
+    """
+    if isinstance(drive, str):
+        drive = Drive.load(drive)
+    if not isinstance(drive, Drive) or drive.shape != ():
+        raise InputError("drive: tune takes one Drive, the path of its file, or the name of a shipped one.")
+    question = _question(
+        drive, controller, gaps, inertias, parameters, free, metric, start_time, tolerances, quantile, base,
+        seed, restarts, population, generations,
+    )  # fmt: skip
+    if not (schedule or robust):
+        raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
+    log = Log(progress)
+    log.begin("starts with the defaults")
+    trials = Trials(question)
+    check_metric(trials)
+    count = count_of(workers, trials)
+    size = len(question.cells) * len(question.scenarios) * question.restarts
+    planned = size * question.population * question.generations
+    kept = SavedParts(None if save_to is None else Path(save_to), question.inputs())
+    found, one = None, None
+    best: Optima = {}
+    certified = certified and metric == "k_dyn"
+    with Workers(trials, count if planned >= WORTH_SHARING or certified else 1) as pool:
+        if schedule:
+            found = tuned_schedule(pool, kept, log)
+        if robust:
+            one = robust_set(pool, kept, log, found)
+        if certified:
+            yardstick = trials.yardstick
+            bounds = [
+                *(yardstick.own_bound[:, 0] if schedule else ()),
+                *(yardstick.nominal_bound[:, 0] if robust else ()),
+            ]
+            cells = [*range(len(question.cells))] * (int(schedule) + int(robust))
+            best = optima(pool, kept, log, [(c, float(b)) for c, b in zip(cells, bounds, strict=True)])
+    return Tuning(
+        question,
+        None if found is None else schedule_table(trials, found),
+        None if one is None else robust_outcome(trials, one),
+        price_table(trials, found, one, best),
+        None if found is None else between_table(trials, found),
+        log.starts,
+        log.seconds,
+    )
+
+
+def _bounds(trials: Trials, schedule: bool, robust: bool) -> list[tuple[int, float]]:
+    """Cells and the bounds on the start time within which their optima are asked for."""
+    sides = ((schedule, trials.yardstick.own_bound), (robust, trials.yardstick.nominal_bound))
+    return [(cell, float(t)) for asked, bounds in sides if asked for cell, t in enumerate(bounds[:, 0])]
+
+
+def _question(
+    drive: Drive,
+    controller: str | Controller,
+    gaps: Any,
+    inertias: Any,
+    parameters: Mapping[str, object] | None,
+    free: Free,
+    metric: Any,
+    start_time: Any,
+    tolerances: Any,
+    quantile: Any,
+    base: Any,
+    seed: Any,
+    restarts: Any,
+    population: Any,
+    generations: Any,
+) -> Question:
+    """All that was given, read; every mistake at once."""
+    wrong: list[str] = []
+
+    def read(what: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return what(*arguments)
+        except InputError as error:
+            wrong.extend(error.sentences)
+            return None
+
+    recipe = read(recipe_of, controller, parameters)
+    ranges = read(lambda: ranges_of(recipe.make(), free)) if recipe is not None else None
+    rows, columns = read(gaps_of, drive, gaps), read(inertias_of, drive, inertias)
+    bound = read(bound_of, start_time)
+    share = read(check_number, "quantile", quantile, 0.0, 1.0, "a share of the starts above 0, at most 1")
+    first = read(_whole, "seed", seed, 0)
+    again = read(_whole, "restarts", restarts, 1)
+    long = read(_whole, "generations", generations, 1)
+    room = None
+    if ranges is not None:
+        room = max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))
+        room = room if population is None else read(_whole, "population", population, 5)
+    scenarios = read(scenarios_of, drive, tolerances, first or 0)
+    if base is not None and (not isinstance(base, Drive) or base.shape != ()):
+        wrong.append(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
+    if not isinstance(metric, str) and not callable(metric):
+        wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
+    if wrong or ranges is None or room is None:
+        raise InputError(wrong)
+    return Question(
+        drive, recipe, rows, columns, ranges, scenarios, metric, bound, share, base, first, again, room, long
+    )
+
+
+def _whole(name: str, value: object, least: int) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and value >= least:
+        return value
+    raise InputError(f"{name} = {value!r}: give a whole number of {least} or more.")

@@ -1,0 +1,258 @@
+"""Candidates tried: their starts in every cell and scenario, in one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart import metrics
+from softstart.batch import array_starts, figures
+from softstart.controller import Controller, PlainController, make_controller
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.tuning.question import Question
+from softstart.units import nearest
+
+Vector = NDArray[np.float64]
+Cells = NDArray[np.int64]  # axes: candidate, cell
+Values = Mapping[str, Any]  # name -> one value a candidate
+
+AXES = ("gap", "load_inertia")
+
+PATIENCE = 3.0  # a start is given up at so many times the longest bound
+
+
+class Judged(NamedTuple):
+    """Metric and start time in s of starts, with the scenario as last axis. NaN where a start failed."""
+
+    metric: Vector
+    start_time: Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Yardstick:
+    """What the defaults reach, and the bounds on the start time in s: axes cell, scenario.
+
+    `own` is for a controller set up for the drive of each cell, `nominal` for one set up for the nominal
+    drive.
+    """
+
+    own: Judged
+    nominal: Judged
+    own_bound: Vector
+    nominal_bound: Vector
+
+    @property
+    def time_limit(self) -> float | None:
+        """When a start is given up, s: far beyond every bound."""
+        longest = max(float(self.own_bound.max()), float(self.nominal_bound.max()))
+        return PATIENCE * longest if np.isfinite(longest) else None
+
+
+class Trials:
+    """Tries candidates for a question."""
+
+    def __init__(self, question: Question, yardstick: Yardstick | None = None) -> None:
+        self.question = question
+        self.controller = question.recipe.make()
+        gaps, inertias = (np.array(axis) for axis in zip(*question.cells, strict=True))
+        self.gap, self.load_inertia = gaps, inertias
+        self.fields = self._fields()
+        bases = [metrics.base_torque(question.base or question.drive_of(i)) for i in range(len(gaps))]
+        self.base_torque = np.array(bases, dtype=np.float64)
+        self.own_defaults = self._defaults(question.drive.replace(gap=gaps, load_inertia=inertias), len(gaps))
+        self.nominal_defaults = {
+            name: float(value[0]) for name, value in self._defaults(question.drive, 1).items()
+        }
+        self.time_limit: float | None = None
+        self.batched = not isinstance(self.controller, PlainController) and self._takes_arrays()
+        self.yardstick = self._measured() if yardstick is None else yardstick
+        self.time_limit = self.yardstick.time_limit
+
+    def _fields(self) -> dict[str, Vector]:
+        """The fields of the drives that start, axes cell and scenario."""
+        scenarios = self.question.scenarios
+        own: dict[str, Any] = {"gap": self.gap, "load_inertia": self.load_inertia}
+        varied = {"gap", "load_inertia", *(name for one in scenarios for name in one)}
+        cells = self.gap.size
+        found = {}
+        for name in sorted(varied):
+            value = own.get(name, np.full(cells, getattr(self.question.drive, name), dtype=np.float64))
+            columns = [one[name].of(value) if name in one else value for one in scenarios]
+            found[name] = np.stack(columns, axis=1)
+        _changed(self.question.drive, found)  # each of them is a drive
+        return found
+
+    def _defaults(self, drive: Drive, count: int) -> dict[str, Vector]:
+        """The tuned parameters as derived from the drives of all cells, or of the nominal one."""
+        plain = isinstance(self.controller, PlainController)
+        rows = [self.controller.set_up(one)[0].parameters for one in drive.elements()] if plain else []
+        fitted = {} if plain else self.controller.set_up(drive)[0].parameters
+        found = {}
+        for name in self.question.names:
+            value = [row[name] for row in rows] if plain else fitted[name]
+            if value is None or (plain and None in rows):
+                raise InputError(
+                    f"free: the controller {self.question.recipe.label} derives no default for {name}; "
+                    "tuning starts from the default, so give the parameter one."
+                )
+            found[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), (count,)).copy()
+        return found
+
+    def _measured(self) -> Yardstick:
+        """The defaults, and the bounds that follow."""
+        bound = self.question.bound
+        own = self.of_pairs({}, range(self.gap.size))
+        nominal = Judged(*(part[0] for part in self.of_set({})))
+        if bound.kind == "seconds":
+            both = [np.full(own.start_time.shape, bound.value)] * 2
+        elif bound.kind == "direct":
+            both = [bound.value * self._direct()] * 2
+        else:
+            both = [np.where(np.isnan(t), np.inf, t) for t in (own.start_time, nominal.start_time)]
+        return Yardstick(own, nominal, *both)
+
+    def _direct(self) -> Vector:
+        """Start time of `direct` in every cell and scenario."""
+        shape = self.fields["gap"].shape
+        drive = _changed(self.question.drive, {name: v.ravel() for name, v in self.fields.items()})
+        notes = array_starts(drive, make_controller("direct"))
+        found: Vector = figures(notes, 1.0)["start_time"][0].reshape(shape)
+        if np.any(np.isnan(found)):
+            gap, inertia = self.question.cells[int(np.argwhere(np.isnan(found))[0][0])]
+            raise InputError(
+                f"start_time: direct does not bring a load of {inertia:g} kg m2 behind a gap of {gap:g} rad "
+                "to its target speed; give the start time in s instead of a multiple."
+            )
+        return found
+
+    # candidates -------------------------------------------------------------------------------------------
+
+    def of_pairs(self, values: Values, cells: Any) -> Judged:
+        """Candidates each for a cell of its own, and set up for it. Axes: candidate, scenario."""
+        which = np.asarray(cells, dtype=np.int64).reshape(-1, 1)
+        judged = self._judged(values, which, own=True)
+        return Judged(judged.metric[:, 0], judged.start_time[:, 0])
+
+    def of_set(self, values: Values, count: int = 1) -> Judged:
+        """Candidates for all cells, set up for the nominal drive. Axes: candidate, cell, scenario.
+
+        `count` is their number where there are no values, that is, for the defaults.
+        """
+        count = max((np.size(value) for value in values.values()), default=count)
+        return self._judged(values, np.tile(np.arange(self.gap.size), (count, 1)), own=False)
+
+    def _judged(self, values: Values, which: Cells, own: bool) -> Judged:
+        if self.batched:
+            try:
+                return self._batch(values, which, own)
+            except _RefusedError:  # which one?
+                if len(which) == 1:
+                    return self._refused(which)
+        rows = []
+        for k in range(len(which)):
+            one = {name: np.asarray(value)[k : k + 1] for name, value in values.items()}
+            try:
+                rows.append((self._batch if self.batched else self._single)(one, which[k : k + 1], own))
+            except _RefusedError:
+                rows.append(self._refused(which[k : k + 1]))
+        return Judged(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+
+    def _refused(self, which: Cells) -> Judged:
+        nothing = np.full((*which.shape, len(self.question.scenarios)), np.nan)
+        return Judged(nothing, nothing)
+
+    def _batch(self, values: Values, which: Cells, own: bool) -> Judged:
+        """All starts in one call: candidate k in the cells which[k] and all scenarios."""
+        each = which.shape[1] * len(self.question.scenarios)
+        fit_to = self._set_up_for(which, own)
+        starting = self._starting(which)
+        with _candidate():
+            ready, used = replace(self.controller, **values).set_up(fit_to)
+            spread = {
+                name: np.repeat(value, each)
+                for name, value in ready.parameters.items()
+                if isinstance(value, np.ndarray) and value.shape == fit_to.shape
+            }
+            wide = _changed(used, {name: np.repeat(getattr(used, name), each) for name in AXES})
+            notes = array_starts(starting, replace(ready, **spread), None, wide, self.time_limit)
+        return self._read(notes, which)
+
+    def _single(self, values: Values, which: Cells, own: bool) -> Judged:
+        """One candidate after the other: for controllers whose parameters cannot be arrays."""
+        notes = []
+        for k, nominal in enumerate(self._set_up_for(which, own).elements()):
+            starting = self._starting(which[k : k + 1])
+            with _candidate():
+                controller = single(self.controller, {name: value[k] for name, value in values.items()})
+                notes.append(array_starts(starting, controller, None, nominal, self.time_limit))
+        return self._read(np.concatenate(notes), which)
+
+    def _set_up_for(self, which: Cells, own: bool) -> Drive:
+        """The drives that the candidates are set up for."""
+        drive = self.question.drive
+        gap, inertia = self.gap[which[:, 0]], self.load_inertia[which[:, 0]]
+        if not own:
+            gap, inertia = np.full_like(gap, drive.gap), np.full_like(inertia, drive.load_inertia)
+        return drive.replace(gap=gap, load_inertia=inertia)
+
+    def _starting(self, which: Cells) -> Drive:
+        """The drives that start."""
+        return _changed(self.question.drive, {name: v[which].ravel() for name, v in self.fields.items()})
+
+    def _read(self, notes: Vector, which: Cells) -> Judged:
+        shape = (*which.shape, len(self.question.scenarios))
+        base = np.broadcast_to(self.base_torque[which][..., None], shape).ravel()
+        found = {name: values for name, (values, _, _) in figures(notes, base).items()}
+        metric = self.question.metric
+        if isinstance(metric, str) and metric not in found:
+            near = nearest(metric, found)
+            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(found)}."
+            raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
+        value = found[metric] if isinstance(metric, str) else metric(found)
+        numbers = np.asarray(value)
+        if numbers.shape != notes.shape[:1] or numbers.dtype.kind not in "fiu":
+            raise InputError(
+                f"metric = {self.question.metric_name}: for {notes.shape[0]} starts it gives {numbers.dtype} "
+                f"of shape {numbers.shape}; it has to be one number a start."
+            )
+        return Judged(numbers.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
+
+    def _takes_arrays(self) -> bool:
+        """Whether the controller gives the same starts from arrays of parameters as from single ones."""
+        which = np.array([[0], [self.gap.size - 1]])
+        values = {name: value[which[:, 0]] for name, value in self.own_defaults.items()}
+        try:
+            together, alone = self._batch(values, which, True), self._single(values, which, True)
+        except (TypeError, ValueError):
+            return False
+        except _RefusedError as refused:
+            raise InputError(str(refused.__cause__)) from refused
+        return all(np.array_equal(a, b, equal_nan=True) for a, b in zip(together, alone, strict=True))
+
+
+class _RefusedError(Exception):
+    """The controller does not take the values of some candidate."""
+
+
+@contextmanager
+def _candidate() -> Iterator[None]:
+    """What is refused inside is a candidate, not the input."""
+    try:
+        yield
+    except InputError as error:
+        raise _RefusedError from error
+
+
+def _changed(drive: Drive, fields: Mapping[str, Any]) -> Drive:
+    return drive.replace(**fields)
+
+
+def single(controller: Controller, values: Values) -> Controller:
+    """The controller with these values as single numbers."""
+    return replace(controller, **{name: float(value) for name, value in values.items()})

@@ -1,0 +1,233 @@
+"""`softstart tune`: the tables, the JSON, the files that play, and going on after an interruption."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+from softstart import Drive, tune
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+SIXTY = ("--set", "start.target_speed=60 rad/s")
+GRID = ("--gaps", "0.5,2", "--inertias", "2J1,5J1")
+QUICK = ("--restarts", "1", "--workers", "1", "--no-optimum")
+RAMP = ("tune", "--controller", "ramp", *SIXTY, *GRID, *QUICK, "--free", "time")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """What the command above finds, and the file of its finished parts."""
+    path = tmp_path_factory.mktemp("finished") / "tuning.jsonl"
+    options = {"restarts": 1, "workers": 1, "certified": False, "free": {"time": None}, "parameters": {}}
+    return tune(CRANE, "ramp", [0.5, 2.0], [0.07, 0.175], save_to=path, **options), path.read_bytes()
+
+
+@pytest.fixture
+def begun(place, finished):
+    """A folder that holds these parts already."""
+    (place / "tuned").mkdir()
+    (place / "tuned" / "tuning.jsonl").write_bytes(finished[1])
+    return "tuned"
+
+
+def untimed(summary):
+    return {key: value for key, value in summary.items() if key not in ("seconds", "starts")}
+
+
+def test_json_is_the_summary_of_the_tuning(run, begun, finished):
+    code, out, err = run(*RAMP, "--json", "--out", begun)
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    assert told["starts"] == 0  # all of it was there
+    assert untimed(told) == untimed(json.loads(json.dumps(finished[0].summary())))
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_the_tables_are_shown_and_fit(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    code, out, err = run(*RAMP)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= int(width)
+    assert not any(line != line.rstrip() for line in lines)
+    flat = " ".join(out.split())
+    for words in (
+        "Gains for each cell",
+        "One set for all",
+        "Price of robustness",
+        "no slower than with the defaults",
+        "all in time",
+        "1 of 1 searches agree",
+        "Half way between the cells",
+    ):
+        assert words in flat
+
+
+PICTURES = {f"{name}.{end}" for name in ("gains", "metric", "robust", "price") for end in ("svg", "png")}
+FILES = PICTURES | {
+    "report.md", "schedule.toml", "schedule.csv", "robust.toml", "robust-cells.csv", "between.csv",
+    "price.csv", "tuning.jsonl", "drive.toml",
+}  # fmt: skip
+
+
+def test_the_files_are_whole_and_play(run, place, begun, finished):
+    code, out, err = run(*RAMP, "--out", begun)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1].startswith(f"Written to {begun}: ")
+    folder = place / begun
+    assert {path.name for path in folder.iterdir()} == FILES
+    report = (folder / "report.md").read_text("utf-8")
+    assert {part.split(")")[0] for part in report.split("](")[1:]} <= FILES
+    assert "--gaps 0.5,2 --inertias 2J1,5J1" in report
+    with (folder / "price.csv").open(encoding="utf-8") as stream:
+        assert len(list(csv.DictReader(stream))) == 4
+    tuned = finished[0]
+    for file, table in (("schedule.toml", tuned.schedule), ("schedule.csv", tuned.schedule),
+                        ("robust.toml", tuned.robust.cells)):  # fmt: skip
+        arguments = (
+            "--controller",
+            f"{begun}/{file}",
+            *SIXTY,
+            "--set",
+            "gap=2",
+            "--set",
+            "load.inertia=0.07",
+        )
+        code, out, err = run("simulate", "crane-4amtkf", *arguments, "--json")
+        assert (code, err) == (0, "")
+        assert json.loads(out)["k_dyn"] == float(table.k_dyn.sel(gap=2.0, load_inertia=0.07))
+    code, out, err = run(
+        "compare", *SIXTY, "--controllers", f"ramp,{begun}/robust.toml,{begun}/schedule.csv", "--json"
+    )
+    assert (code, err) == (0, "")
+    names = [row["controller"] for row in json.loads(out)["strategies"]]
+    assert names == ["ramp", "ramp (robust)", "ramp (schedule)"]
+
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert run(*RAMP, "--out", begun).code == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_one_question_only(run):
+    code, out, err = run(
+        *RAMP, "--only", "robust", "--json", "--tolerance", "stiffness=10%", "--quantile", "0.9"
+    )
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["schedule"] is None
+    assert (told["scenarios"], told["quantile"]) == (3, 0.9)
+    assert told["robust"]["gains"].keys() == {"time"}
+
+
+def test_nothing_in_time_is_no_solution(run):
+    code, out, err = run(*RAMP, "--start-time", "0.05", "--json")
+    assert code == 3
+    assert err.startswith("softstart: No gains within these ranges start in time (at most 0.05 s)")
+    told = json.loads(out)
+    assert told["robust"]["feasible"] is False
+    assert told["schedule"]["in_time"] == [[False, False], [False, False]]
+
+
+def test_parts_of_another_drive_are_refused(run, place, begun):
+    before = {path.name: path.read_bytes() for path in (place / begun).iterdir()}
+    code, out, err = run(*RAMP, "--set", "damping=0.6", "--out", begun)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    for words in ("--out", "tuning.jsonl", "another drive", "give another folder"):
+        assert words in err
+    assert {path.name: path.read_bytes() for path in (place / begun).iterdir()} == before
+
+
+def test_an_interrupted_command_keeps_its_parts_and_goes_on(command, place):
+    arguments = [
+        "tune", "--controller", "ramp", *SIXTY, "--gaps", "0.5:2:6", "--inertias", "2J1:5J1:6",
+        "--no-optimum", "--workers", "2", "--out", "tuned",
+    ]  # fmt: skip
+    process = subprocess.Popen(
+        [*command, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    state = place / "tuned" / "tuning.jsonl"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        if state.exists() and len(state.read_text("utf-8").splitlines()) > 2:
+            break
+        time.sleep(0.005)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it: to the workers too
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "finished parts are kept in tuned/tuning.jsonl" in err
+    assert "Traceback" not in err
+    assert os.listdir(place / "tuned") == ["tuning.jsonl"]
+    kept = [json.loads(line) for line in state.read_text("utf-8").splitlines()[1:]]
+    assert {one["part"][0] for one in kept} == {"cell"}
+    assert {tuple(one["part"][2:]) for one in kept} <= {(0,), (1,), (2,)}
+
+
+ONE_SENTENCE = {
+    "no gap": (["--gaps", ""], ["--gaps", "empty"]),
+    "half a range": (["--gaps", "0.5:2"], ["from:to:count"]),
+    "count of one": (["--gaps", "0.5:2:1"], ["from 2 to 100"]),
+    "mixed range": (["--inertias", "2J1:0.2:4"], ["--inertias", "both"]),
+    "unit": (["--inertias", "2 N"], ["--inertias", "2 N"]),
+    "negative": (["--gaps=-1"], ["--gaps", "gap = -1"]),
+    "free": (["--free", "tme"], ["--free", "did you mean time?"]),
+    "free range": (["--free", "time=3"], ["name=low:high"]),
+    "free twice": (["--free", "time,time"], ["named twice"]),
+    "metric": (["--metric", "k_dym"], ["--metric", "did you mean k_dyn?"]),
+    "start time": (["--start-time", "soon"], ["--start-time", "1.2x"]),
+    "tolerance": (["--tolerance", "stiffness"], ["KEY=SPREAD"]),
+    "tolerance key": (["--tolerance", "stifness=10%"], ["--tolerance", "did you mean stiffness?"]),
+    "quantile": (["--quantile", "2"], ["--quantile"]),
+    "only": (["--only", "schedul"], ["--only", "did you mean schedule?"]),
+    "seed": (["--seed", "x"], ['--seed = "x"']),
+    "restarts": (["--restarts", "0"], ["--restarts"]),
+    "workers": (["--workers", "0"], ["--workers"]),
+    "parameter": (["--param", "tim=3"], ["did you mean", "time"]),
+    "controller": (["--controller", "rmp"], ["did you mean ramp?"]),
+    "gains": (["--controller", "good.toml"], ["no tuned gains"]),
+    "missing gains": (["--controller", "not.toml"], ["is not there"]),
+    "nothing to tune": (["--controller", "direct"], ["no parameter to tune"]),
+    "drive": (["crane-4amtk"], ["did you mean crane-4amtkf?"]),
+    "output": (["--out", "good.toml"], ["is a file, not a folder"]),
+}
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind, run, nothing_left):
+    arguments, says = ONE_SENTENCE[kind]
+    code, out, err = run("tune", "--controller", "ramp", *GRID, *QUICK, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: ")
+    assert err.count("\n") == 1
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_all_mistakes_are_told_at_once(run, nothing_left):
+    code, out, err = run(
+        "tune",
+        "wrong.toml",
+        "--controller",
+        "rmp",
+        "--gaps",
+        "x",
+        "--free",
+        "a=1",
+        "--only",
+        "b",
+        "--seed",
+        "c",
+    )
+    assert (code, out) == (2, "")
+    for words in ("starting_torque", "did you mean ramp?", "--gaps", "--free", "--only", "--seed"):
+        assert words in err
+    nothing_left()

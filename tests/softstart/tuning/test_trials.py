@@ -1,0 +1,147 @@
+"""Candidates tried in one batch are the very starts that `simulate` makes one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, simulate
+from softstart.controller import make_controller
+from softstart.tuning.grid import gaps_of, inertias_of
+from softstart.tuning.question import Question, bound_of
+from softstart.tuning.ranges import Range, ranges_of
+from softstart.tuning.recipe import recipe_of
+from softstart.tuning.tolerances import scenarios_of
+from softstart.tuning.trials import Trials
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+
+
+def trials(name, tolerances=None, **change):
+    recipe = recipe_of(name)
+    asked = {
+        "drive": CRANE, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
+        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(CRANE, tolerances),
+        "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
+        "population": 8, "generations": 2,
+    }  # fmt: skip
+    return Trials(Question(**(asked | change)))
+
+
+@pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback", "s-curve"])
+def test_each_candidate_is_the_start_that_simulate_makes(name):
+    tried = trials(name, {"load_torque": "20 %"})
+    assert tried.batched
+    places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
+    cells = np.array([0, 3, 1])
+    values = {
+        one.name: one.value(places[:, k], tried.own_defaults[one.name][cells])
+        for k, one in enumerate(tried.question.ranges)
+    }
+    judged = tried.of_pairs(values, cells)
+    for k, cell in enumerate(cells):
+        drive = tried.question.drive_of(int(cell))
+        controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
+        for s, share in enumerate((1.0, 0.8, 1.2)):
+            off = drive.replace(load_torque=share * drive.load_torque)
+            run = simulate(off, controller, fitted_to=drive, base=drive)
+            assert judged.start_time[k, s] == run.start_time
+            assert judged.metric[k, s] == run.k_dyn
+
+
+def test_one_set_is_set_up_for_the_nominal_drive():
+    tried = trials("acceleration-delay")
+    judged = tried.of_set({"torque": np.array([12.0, 20.0])})
+    for k, torque in enumerate((12.0, 20.0)):
+        for cell in range(4):
+            drive = tried.question.drive_of(cell)
+            run = simulate(drive, "acceleration-delay", parameters={"torque": torque}, fitted_to=CRANE)
+            assert judged.metric[k, cell, 0] == pytest.approx(run.k_dyn, rel=1e-12)
+            assert judged.start_time[k, cell, 0] == pytest.approx(run.start_time, rel=1e-12)
+
+
+def test_what_follows_from_a_gain_follows_the_candidate():
+    """The default delay is the length of stage 2 under the candidate's torque, not under the default's."""
+    tried = trials("acceleration-delay", ranges=ranges_of(make_controller("acceleration-delay"), ["torque"]))
+    judged = tried.of_pairs({"torque": np.array([20.0])}, [3])
+    run = simulate(tried.question.drive_of(3), "acceleration-delay", parameters={"torque": 20.0})
+    assert judged.metric[0, 0] == run.k_dyn
+
+
+def test_a_candidate_that_its_controller_refuses_is_the_worst_and_alone():
+    tried = trials("s-curve")
+    values = {"rounding": np.array([0.5, 1.5, 1.0])}  # a share
+    judged = tried.of_pairs(values, [0, 0, 0])
+    assert np.isnan(judged.metric[:, 0]).tolist() == [False, True, False]
+    run = simulate(tried.question.drive_of(0), "s-curve", parameters={"rounding": 0.5})
+    assert judged.metric[0, 0] == run.k_dyn
+
+
+# ranges ---------------------------------------------------------------------------------------------------
+
+
+@given(
+    place=st.floats(0.0, 1.0),
+    default=st.floats(1e-6, 1e6),
+    low=st.floats(0.01, 0.9),
+    high=st.floats(1.0, 100.0),
+    logarithmic=st.booleans(),
+)
+def test_places_and_values(place, default, low, high, logarithmic):
+    one = Range("x", "1", multiples=(low, high), logarithmic=logarithmic)
+    value = float(one.value(place, default))
+    assert low * default * (1 - 1e-12) <= value <= high * default * (1 + 1e-12)
+    assert float(one.value(one.place(value, default), default)) == pytest.approx(value, rel=1e-9)
+    assert float(one.value(0.0, default)) == pytest.approx(low * default)
+    assert float(one.value(1.0, default)) == pytest.approx(high * default)
+
+
+def test_multiples_of_nothing_and_narrowed_ones():
+    wide = Range("x", "1", multiples=(0.2, 5.0), between=(0.0, 1.0), logarithmic=True)
+    assert wide.value([0.0, 1.0], 0.5).tolist() == [0.1, 1.0]
+    assert wide.value([0.0, 1.0], 0.0).tolist() == [0.0, 0.0]
+    assert wide.place([0.0, 9.0], 0.5).tolist() == [0.0, 1.0]
+
+
+def test_the_users_ranges():
+    ramp = make_controller("ramp")
+    wide, narrow, share = ranges_of(
+        ramp, {"time": (0.01, 1), "initial": (7, 20), "full_torque": ("0.5x", "1x")}
+    )
+    assert (wide.logarithmic, narrow.logarithmic, share.multiples) == (True, False, (0.5, 1.0))
+    assert [one.name for one in ranges_of(ramp, ["time"])] == ["time"]
+    assert [one.name for one in ranges_of(ramp, "time")] == ["time"]
+    with pytest.raises(InputError) as refused:
+        ranges_of(ramp, {"tme": None, "period": None, "time": (2, 1)})
+    assert len(refused.value.sentences) == 3
+
+
+def test_default_grids():
+    assert gaps_of(CRANE, None) == (0.25, 0.5, 1.0, 2.0)
+    assert inertias_of(CRANE, None) == (0.07, 0.175, 0.35)
+    assert inertias_of(CRANE, ["5J1", "2 J1", 0.07]) == (0.07, 0.175)
+    assert gaps_of(CRANE, 1.0) == (1.0,)
+    with pytest.raises(InputError, match="the drive has no gap"):
+        gaps_of(CRANE.replace(gap=0.0), None)
+
+
+# tolerances -----------------------------------------------------------------------------------------------
+
+
+def test_all_combinations_or_a_sample_of_them():
+    three = {"stiffness": "10 %", "load_torque": "1 N*m", "encoder_phase": [0.0, 0.25, 0.5]}
+    found = scenarios_of(CRANE, three)
+    assert found[0] == {}
+    assert len(found) == 1 + 2 * 2 * 3
+    phases = {one["encoder_phase"].of(0.7) for one in found[1:]}
+    assert phases == {0.0, 0.25, 0.5}
+    assert {round(one["load_torque"].of(7.16), 9) for one in found[1:]} == {6.16, 8.16}
+    more = scenarios_of(CRANE, three | {"motor_inertia": "5 %", "torque_lag": ["1 ms", "3 ms"]}, seed=1)
+    assert len(more) == 17
+    shares = np.array([one["stiffness"].of(1.0) for one in more[1:]])
+    assert np.all((shares >= 0.9) & (shares <= 1.1))
+    assert np.array_equal(np.sort(np.floor((shares - 0.9) / 0.2 * 16)), np.arange(16))  # one in each stratum
+    assert {one["torque_lag"].of(0.0) for one in more[1:]} == {0.001, 0.003}
+    assert more == scenarios_of(
+        CRANE, three | {"motor_inertia": "5 %", "torque_lag": ["1 ms", "3 ms"]}, seed=1
+    )

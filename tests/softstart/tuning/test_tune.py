@@ -1,0 +1,404 @@
+"""tune: never worse than the defaults, the known optimum, the same bits, going on where it was stopped."""
+
+import json
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from softstart import Command, Drive, InputError, PlainController, optimize, simulate, stages, tune
+from softstart.controller import controller_class, controller_names, make_controller, parameter
+from softstart.tuning import solving
+from softstart.tuning.ranges import tunable
+from softstart.tuning.workers import Workers
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+GRID = {"gaps": [0.5, 2.0], "inertias": ["2 J1", "5 J1"]}
+SMALL = {"generations": 3, "population": 8, "restarts": 2, "certified": False, "workers": 1}
+
+
+class StopError(Exception):
+    """Ends a tuning from within its progress."""
+
+
+TUNABLE = [
+    name for name in controller_names() if not controller_class(name).needs and tunable(make_controller(name))
+]
+
+
+def told(tuning):
+    """Everything that was found, to the bit."""
+    found = tuning.summary()
+    return {key: value for key, value in found.items() if key not in ("starts", "seconds")}
+
+
+def test_most_controllers_can_be_tuned():
+    assert {"acceleration-delay", "current-limit-feedback", "ramp", "s-curve"} <= set(TUNABLE)
+
+
+# item 1: nowhere worse than the defaults ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TUNABLE)
+def test_tuned_per_cell_is_never_worse_than_the_defaults(name):
+    tuned = tune(CRANE, name, **GRID, **(SMALL | {"restarts": 1}))
+    for gap in (0.5, 2.0):
+        for inertia in (0.07, 0.175):
+            cell = tuned.schedule.sel(gap=gap, load_inertia=inertia)
+            drive = CRANE.replace(gap=gap, load_inertia=inertia)
+            before, after = simulate(drive, name), simulate(drive, tuned.scheduled)
+            # the table holds what the drive does with the schedule, not an echo of the search
+            assert float(cell.k_dyn) == after.k_dyn
+            assert float(cell.start_time) == after.start_time
+            assert float(cell.k_dyn_default) == before.k_dyn
+            assert after.k_dyn <= before.k_dyn
+            assert after.start_time <= before.start_time * (1.0 + 1e-9)
+    one = tuned.robust
+    assert one.worst <= one.worst_default
+    assert one.feasible
+    for gap, inertia, k in (
+        (gap, inertia, float(one.cells.k_dyn.sel(gap=gap, load_inertia=inertia)))
+        for gap in (0.5, 2.0)
+        for inertia in (0.07, 0.175)
+    ):
+        drive = CRANE.replace(gap=gap, load_inertia=inertia)
+        run = simulate(drive, one.controller)
+        assert run.k_dyn == pytest.approx(k, rel=1e-9)
+        default = simulate(drive, name, fitted_to=CRANE)
+        assert run.start_time <= default.start_time * (1.0 + 1e-9)
+    assert one.worst == float(one.cells.k_dyn.max())
+
+
+# the optimum in closed form -------------------------------------------------------------------------------
+
+LOW = CRANE.replace(target_speed=3.0)  # the load has this speed in stage 2
+FREE = {"free": ["torque"], "certified": False, "workers": 1, "schedule": True, "robust": True}
+
+
+def stage_1(torque):
+    """Duration, closing speed and load speed at the end of stage 1 from mid-gap, [G](10)."""
+    a = torque / LOW.J1 + LOW.Mc / LOW.J2
+    t = math.sqrt(LOW.gap / a)
+    return t, a * t, -LOW.Mc / LOW.J2 * t
+
+
+def start_time(torque, torque_2):
+    """When the load has its target speed in stage 2, from the integral of [G](11)."""
+    t, dw12, w2 = stage_1(torque)
+    mean = stages.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
+
+    def short_of(s):
+        swing = mean * (s - math.sin(LOW.Omega * s) / LOW.Omega)
+        kick = LOW.c * dw12 / LOW.Omega**2 * (1.0 - math.cos(LOW.Omega * s))
+        return w2 + (swing + kick - LOW.Mc * s) / LOW.J2 - LOW.target_speed
+
+    return t + brentq(short_of, 0.0, math.pi / LOW.Omega, xtol=1e-14)
+
+
+def first_peak(torque, torque_2):
+    """K_dyn of stage 2, [G](17) and (18)."""
+    _, dw12, _ = stage_1(torque)
+    mean = stages.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
+    full = stages.mean_shaft_torque(LOW.Ms, LOW.J1, LOW.J2, LOW.Mc)
+    return mean / full * (1.0 + math.sqrt(1.0 + (LOW.c * dw12 / (LOW.Omega * mean)) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("name", "torque_2"),
+    [("reduced-two-stage", lambda low: low), ("reduced-first-stage", lambda low: LOW.Ms)],
+)
+def test_the_optimum_of_g_is_found(name, torque_2):
+    """K_dyn of stage 2 rises with the torque and the start time falls: the bound decides."""
+    bound = start_time(22.0, torque_2(22.0))
+    best = brentq(lambda low: start_time(low, torque_2(low)) - bound, 10.0, 40.0, xtol=1e-12)
+    assert best == pytest.approx(22.0)
+    least = first_peak(best, torque_2(best))
+    tuned = tune(LOW, name, ["1x"], ["1x"], metric="k_dyn_first_contact", start_time=bound, **FREE)
+    cell = tuned.schedule.isel(gap=0, load_inertia=0)
+    for torque, k in (
+        (float(cell.torque), float(cell.k_dyn_first_contact)),
+        (tuned.robust.gains["torque"], tuned.robust.worst),
+    ):
+        assert k == pytest.approx(first_peak(torque, torque_2(torque)), rel=1e-9)
+        assert least * (1.0 - 1e-9) <= k <= least * (1.0 + 2e-3)  # the mesh of the polish ends at 2e-4
+        assert torque >= best * (1.0 - 1e-9)
+    assert int(cell.agreement) == tuned.robust.agreement == 3
+    assert bool(cell.in_time)
+
+
+def test_an_impossible_bound_gives_the_least_delay():
+    bound = 0.9 * start_time(61.544, 61.544)
+    tuned = tune(
+        LOW, "reduced-two-stage", ["1x"], ["1x"], start_time=bound, metric="k_dyn_first_contact", **FREE
+    )
+    cell = tuned.schedule.isel(gap=0, load_inertia=0)
+    assert not bool(cell.in_time)
+    assert not tuned.robust.feasible
+    assert float(cell.torque) == pytest.approx(4 * 15.386, rel=1e-3)  # the strongest torque in the range
+    assert float(cell.excess) == pytest.approx(start_time(61.544, 61.544) / bound - 1.0, rel=1e-2)
+    assert float(cell.excess) <= float(cell.excess_default)
+
+
+# the same bits --------------------------------------------------------------------------------------------
+
+
+SURE = {"tolerances": {"stiffness": "10 %"}, "free": ["time", "initial"]}
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return tune(CRANE, "ramp", **GRID, **SMALL, **SURE)
+
+
+def test_the_same_seed_gives_the_same_bits(alone):
+    again = tune(CRANE, "ramp", **GRID, **SMALL, **SURE)
+    assert told(again) == told(alone)
+    other = tune(CRANE, "ramp", **GRID, **SMALL, **SURE, seed=1)
+    assert told(other) != told(alone)
+
+
+def test_the_number_of_workers_changes_nothing(alone, monkeypatch):
+    monkeypatch.setattr(solving, "WORTH_SHARING", 0)
+    monkeypatch.setattr("softstart.tuning.schedule.LARGEST_BLOCK", 3)  # so that there is something to share
+    monkeypatch.setattr("softstart.tuning.robust_set.STARTS_A_CALL", 48)
+    begun = []
+    start_pool = Workers._pool
+    monkeypatch.setattr(Workers, "_pool", lambda self: begun.append(self) or start_pool(self))
+    shared = tune(CRANE, "ramp", **GRID, **(SMALL | {"workers": 2}), **SURE)
+    assert told(shared) == told(alone)
+    assert len(begun) > 10
+
+
+@pytest.mark.parametrize("word", ["schedule, searches 5", "neighbours", "robust set, search 2"])
+def test_an_interrupted_tuning_goes_on_where_it_was(alone, tmp_path, word, monkeypatch):
+    monkeypatch.setattr("softstart.tuning.schedule.LARGEST_BLOCK", 3)
+    kept = tmp_path / "deep" / "tuning.jsonl"
+    options = {**GRID, **SMALL, **SURE, "save_to": kept}
+
+    def stops(doing):
+        if word in doing:
+            raise StopError
+
+    with pytest.raises(StopError):
+        tune(CRANE, "ramp", **options, progress=stops)
+    before = kept.read_text("utf-8").splitlines()
+    assert len(before) > 3
+    kept.write_text("\n".join([*before, before[-1][:-9]]), "utf-8")  # the last line was cut off
+    second = tune(CRANE, "ramp", **options)
+    assert told(second) == told(alone)
+    assert kept.read_text("utf-8").splitlines()[: len(before)] == before
+    third = tune(CRANE, "ramp", **options)
+    assert told(third) == told(alone)
+    assert third.starts == 0
+
+
+def test_parts_of_another_question_are_refused_and_kept(tmp_path):
+    kept = tmp_path / "tuning.jsonl"
+    options = {**GRID, **SMALL, "robust": False, "free": ["torque"], "save_to": kept}
+    tune(CRANE, "reduced-first-stage", **options)
+    before = kept.read_bytes()
+    with pytest.raises(InputError, match="another drive and seed; name another file"):
+        tune(CRANE.replace(damping=0.1), "reduced-first-stage", **options, seed=3)
+    kept_elsewhere = tmp_path / "notes"
+    kept_elsewhere.write_text("[1]\n")
+    with pytest.raises(InputError, match="no file of a saved tuning"):
+        tune(CRANE, "reduced-first-stage", **(options | {"save_to": kept_elsewhere}))
+    assert kept.read_bytes() == before
+    assert kept_elsewhere.read_text() == "[1]\n"
+
+
+# what is judged -------------------------------------------------------------------------------------------
+
+
+def test_tolerances_are_unknown_to_the_controller_and_the_worst_counts(alone):
+    cell = alone.schedule.sel(gap=2.0, load_inertia=0.07)
+    drive = CRANE.replace(gap=2.0, load_inertia=0.07)
+    runs = [
+        simulate(drive.replace(stiffness=share * drive.c), alone.scheduled, fitted_to=drive, base=drive)
+        for share in (1.0, 0.9, 1.1)
+    ]
+    assert float(cell.k_dyn) == pytest.approx(max(run.k_dyn for run in runs), rel=1e-12)
+    assert float(cell.k_dyn_as_is) == runs[0].k_dyn
+    assert float(cell.start_time) == runs[0].start_time
+
+
+def test_a_quantile_forgives_the_rest():
+    options = {**GRID, **SMALL, "schedule": False, "free": ["torque"]}
+    worst = tune(CRANE, "reduced-first-stage", **options)
+    most = tune(CRANE, "reduced-first-stage", **options, quantile=0.75)
+    assert most.robust.worst < worst.robust.worst
+    cells = np.sort(most.robust.cells.k_dyn.to_numpy().ravel())
+    assert most.robust.worst == cells[2]  # three of the four cells
+    late = most.robust.cells.excess.to_numpy().ravel()
+    assert np.sum(late == 0.0) >= 3
+
+
+def softness(figures):
+    return figures["peak_torque"] + 1e3 * figures["impact_speed"]
+
+
+def test_a_metric_of_ones_own_and_other_figures():
+    options = {**GRID, **SMALL, "robust": False, "free": ["torque"]}
+    own = tune(CRANE, "reduced-first-stage", **options, metric=softness)
+    assert own.metric == "softness"
+    assert bool((own.schedule.softness <= own.schedule.softness_default).all())
+    quick = tune(CRANE, "reduced-first-stage", **options, metric="start_time")
+    assert bool((quick.schedule.start_time < quick.schedule.start_time_default).all())
+
+
+@pytest.mark.parametrize("bad", [lambda f: 1.0, lambda f: f["status"], lambda f: f["k_dyn"][:1]])
+def test_a_metric_that_is_no_number_a_start_is_refused(bad):
+    with pytest.raises(InputError, match="one number a start"):
+        tune(CRANE, "reduced-first-stage", **GRID, **SMALL, metric=bad)
+
+
+def test_the_bound_as_a_multiple_of_direct():
+    tuned = tune(CRANE, "ramp", **GRID, **SMALL, start_time="1.3x")
+    for gap in (0.5, 2.0):
+        for inertia in (0.07, 0.175):
+            direct = simulate(CRANE.replace(gap=gap, load_inertia=inertia), "direct").start_time
+            for table in (tuned.schedule, tuned.robust.cells):
+                cell = table.sel(gap=gap, load_inertia=inertia)
+                assert float(cell.start_time_bound) == pytest.approx(1.3 * direct, rel=1e-12)
+                if bool(cell.in_time):
+                    assert float(cell.start_time) <= 1.3 * direct * (1 + 1e-9)
+
+
+def test_a_range_of_ones_own_is_kept_even_where_the_defaults_are_better():
+    tuned = tune(CRANE, "ramp", **GRID, **SMALL, free={"time": ("20 ms", "30 ms")})
+    times = tuned.schedule.time.to_numpy()
+    assert np.all((times >= 0.02) & (times <= 0.03))
+    assert 0.02 <= tuned.robust.gains["time"] <= 0.03
+    assert set(tuned.robust.gains) == {"time"}
+
+
+def test_given_parameters_are_left_as_given():
+    tuned = tune(CRANE, "ramp", **GRID, **SMALL, parameters={"initial": "12 N*m"})
+    assert "initial" not in tuned.question.names
+    assert tuned.robust.parameters["initial"] == 12.0
+    assert simulate(CRANE, tuned.scheduled).controller.initial == 12.0
+
+
+@dataclass(frozen=True)
+class Wait(PlainController):
+    """Plain Python: its parameters cannot be arrays."""
+
+    wait: float | None = parameter("s", "how long", "60 ms", multiples=(0.5, 4.0))
+
+    def defaults(self, drive):
+        return {"wait": 0.06 * math.sqrt(drive.gap)}
+
+    def step(self, measured, state):
+        return Command(15.0 if measured.time < self.wait else 62.0, measured.time + 0.005)
+
+
+def test_a_plain_controller_is_tuned_too():
+    tuned = tune(CRANE, Wait(), [0.5, 1.0], ["1x"], generations=2, population=5, restarts=1, certified=False)
+    cell = tuned.schedule.isel(gap=1, load_inertia=0)
+    run = simulate(CRANE.replace(gap=1.0), Wait(wait=float(cell.wait)))
+    assert float(cell.k_dyn) == run.k_dyn <= float(cell.k_dyn_default)
+    with pytest.raises(InputError, match="no name under which a file"):
+        tuned.to_toml("x.toml", "robust")
+
+
+# the price ------------------------------------------------------------------------------------------------
+
+
+def test_the_price_sets_the_optimum_beside_it():
+    options = {"generations": 3, "population": 8, "restarts": 1, "workers": 1, "start_time": "1.4x"}
+    tuned = tune(CRANE, "acceleration-delay", [0.5], ["5 J1"], **options)
+    price = tuned.price.isel(gap=0, load_inertia=0)
+    best = optimize(CRANE, float(price.schedule_bound), terminal="reached")
+    assert float(price.schedule_optimum) == pytest.approx(best.k_dyn, rel=1e-9)
+    assert float(price.schedule_lower_bound) == pytest.approx(best.k_dyn_lower_bound, rel=1e-9)
+    assert float(price.schedule) == float(tuned.schedule.k_dyn[0, 0]) >= best.k_dyn_lower_bound
+    assert float(price.robust_over_schedule) == pytest.approx(float(price.robust / price.schedule))
+    assert float(price.schedule_over_optimum) == pytest.approx(float(price.schedule) / best.k_dyn)
+    assert tuned.between is None
+
+
+# bad input ------------------------------------------------------------------------------------------------
+
+BAD = {
+    "gap": ({"gaps": [0.5, "2 kg"]}, ["gaps", "2 kg"]),
+    "empty": ({"gaps": []}, ["gaps: the list is empty"]),
+    "negative gap": ({"gaps": [-1.0]}, ["gaps: gap = -1"]),
+    "inertia": ({"inertias": ["0 J1"]}, ["inertias: load_inertia = 0"]),
+    "parameter": ({"free": ["tork"]}, ["no parameter tork", "did you mean torque?"]),
+    "no range": ({"free": ["drop"]}, ["gives no range for drop"]),
+    "ends": ({"free": {"torque": (20, 10)}}, ["lowest value must be below"]),
+    "one end": ({"free": {"torque": "20"}}, ["lowest and highest"]),
+    "mixed ends": ({"free": {"torque": ("1x", 20)}}, ["both as multiples"]),
+    "metric": ({"metric": "k_dym"}, ["k_dym", "did you mean k_dyn?"]),
+    "no metric": ({"metric": 3}, ["name a figure"]),
+    "start time": ({"start_time": "soon"}, ["start_time", "a time above 0 s"]),
+    "zero": ({"start_time": 0.0}, ["start_time = 0.0"]),
+    "quantile": ({"quantile": 1.5}, ["quantile = 1.5"]),
+    "seed": ({"seed": -1}, ["seed = -1"]),
+    "restarts": ({"restarts": 0}, ["restarts = 0"]),
+    "workers": ({"workers": 0}, ["workers = 0"]),
+    "tolerance": ({"tolerances": {"stifness": "10 %"}}, ["stifness", "did you mean stiffness?"]),
+    "share": ({"tolerances": {"stiffness": "110 %"}}, ["below 100 %"]),
+    "impossible": ({"tolerances": {"stiffness": [-3.0]}}, ["tolerances", "stiffness = -3"]),
+    "nothing": ({"schedule": False, "robust": False}, ["nothing is asked for"]),
+    "base": ({"base": "crane-4amtkf"}, ["one single Drive"]),
+    "drive": ({"drive": CRANE.replace(gap=[0.5, 1.0])}, ["one Drive"]),
+    "controller": ({"controller": "dirct"}, ["did you mean"]),
+    "nothing to tune": ({"controller": "direct"}, ["no parameter to tune", "free="]),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_input_is_one_sentence(kind):
+    change, says = BAD[kind]
+    given = {"drive": CRANE, "controller": "acceleration-delay", **GRID, **SMALL} | change
+    with pytest.raises(InputError) as refused:
+        tune(**given)
+    assert len(refused.value.sentences) == 1
+    for words in says:
+        assert words in str(refused.value)
+
+
+def test_all_mistakes_are_told_at_once():
+    with pytest.raises(InputError) as refused:
+        tune(CRANE, "ramp", [-1], ["x"], free=["tme"], quantile=0, start_time=-1, tolerances={"a": 1})
+    assert len(refused.value.sentences) == 6
+
+
+def test_gains_that_are_tuned_already_are_not_tuned_again(alone):
+    with pytest.raises(InputError, match="tuned already"):
+        tune(CRANE, alone.robust.controller, **GRID, **SMALL)
+
+
+def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(tmp_path):
+    kept = tmp_path / "tuning.jsonl"
+    grid = {"gaps": [0.5, 1.0, 2.0], "inertias": ["2 J1", "3 J1", "5 J1"]}
+    options = SMALL | {"restarts": 1, "robust": False, "free": ["time", "initial"], "save_to": kept}
+    tuned = tune(CRANE, "ramp", **grid, **options)
+    parts = [json.loads(line) for line in kept.read_text("utf-8").splitlines()[1:]]
+    cells = range(9)
+    best = [min((p for p in parts if p["part"][1] == cell), key=lambda p: p["cost"]) for cell in cells]
+    found = tuned.schedule.k_dyn.to_numpy().ravel()
+    assert np.all(found <= np.array([p["cost"] for p in best]) * (1.0 + 1.001e-3))
+
+    def roughness(places):
+        return sum(
+            np.abs(places[cell] - places[other]).sum()
+            for cell in cells
+            for other in tuned.question.neighbours(cell)
+        )
+
+    defaults = {
+        one.name: tuned.schedule[f"{one.name}_default"].to_numpy().ravel() for one in tuned.question.ranges
+    }
+    after = np.stack(
+        [
+            one.place(tuned.schedule[one.name].to_numpy().ravel(), defaults[one.name])
+            for one in tuned.question.ranges
+        ],
+        axis=1,
+    )
+    before = np.array([p["place"] for p in best])
+    assert roughness(after) < roughness(before)
