@@ -40,14 +40,17 @@ QUANTITIES: dict[str, Quantity] = {
         Quantity("s", "a time", "20 ms"),
         Quantity("W", "a power", "2.2 kW", ("N*m/s", "N*m*rad/s")),
         Quantity("Hz", "a frequency", "50 Hz"),
+        Quantity("m", "a length", "82 mm"),
+        Quantity("kg", "a mass", "0.68 kg"),
+        Quantity("kg*m", "an imbalance", "0.045 kg*m"),
+        Quantity("Pa", "a pressure", "10 bar", ("J/m^3",)),
+        Quantity("m^2", "an area", "0.05 m^2"),
         Quantity("1", "a plain number", "3"),
     )
 }
 
 # What a unit in the wrong place is called, besides the quantities above.
 OTHER_NOUNS = {
-    "m": "a length",
-    "kg": "a mass",
     "N": "a force",
     "J": "an energy",
     "m/s": "a speed along a line",
@@ -55,7 +58,6 @@ OTHER_NOUNS = {
     "rad/s^2": "an angular acceleration",
     "N/m": "a stiffness along a line",
     "N*s/m": "a damping along a line",
-    "kg*m": "an imbalance",
     "N*m^2": "a flywheel moment",
     "N*m*s": "an angular momentum",
     "W/s": "a rate of power",
@@ -92,6 +94,8 @@ kilogram_force = 9.80665 * newton = kgf = force_kilogram
 pound_force = 4.4482216152605 * newton = lbf = force_pound
 ounce_force = 0.27801385095378125 * newton = ozf = force_ounce
 newton_meter = newton * meter = Nm
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
 watt = joule / second = W
 horsepower = 745.6998715822702 * watt = hp
 metric_horsepower = 735.49875 * watt = PS
@@ -100,7 +104,7 @@ metric_horsepower = 735.49875 * watt = PS
 # Spellings that are offered for an unknown one.
 _USUAL = """
 m mm cm in ft kg g lb t s ms min h rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf Nm kNm mNm
-J kJ W kW MW hp PS
+J kJ W kW MW hp PS Pa kPa MPa bar mbar
 """
 
 _SYMBOLS = str.maketrans(

@@ -1,0 +1,34 @@
+"""Piston engines: the torques and forces they shake their mounts with, and two-shaft balancers [B].
+
+[B]: Khalaakin, on reducing the dynamic load of piston engines with balancing mechanisms (VAZ-11113).
+
+>>> from softstart.balancing import Engine, balance
+>>> found = balance(Engine.load("vaz-11113"))
+>>> round(float(found.residual("none").first_order[found.tuning_index]), 1)
+149.5
+"""
+
+from __future__ import annotations
+
+from softstart.balancing.cycle import SimpleCycle
+from softstart.balancing.engine import Engine
+from softstart.balancing.indicator import MeasuredCycle
+from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Layout, Masses, Operation
+from softstart.balancing.periodic_torque import PeriodicTorque
+from softstart.balancing.result import Balance, Residual, balance
+
+__all__ = [
+    "Balance",
+    "BalancerShaft",
+    "Counterweights",
+    "Cylinders",
+    "Engine",
+    "Layout",
+    "Masses",
+    "MeasuredCycle",
+    "Operation",
+    "PeriodicTorque",
+    "Residual",
+    "SimpleCycle",
+    "balance",
+]

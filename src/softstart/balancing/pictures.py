@@ -1,0 +1,194 @@
+"""Figures of engines and balancers: they draw what is in a `Balance` and compute nothing that is a claim."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.balancing.parts import CYCLE_ANGLE
+from softstart.figures import COLOURS, DASHES, drawing, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from softstart.balancing.result import Balance
+
+RPM = math.pi / 30.0
+GREY = "#666666"
+SMALL = 9.5
+BARS = 6.0  # highest order in the bar chart
+LOOKS = {
+    "none": (COLOURS[6], DASHES[0]),
+    "own-shafts": (COLOURS[7], DASHES[3]),
+    "inertia-only": (COLOURS[1], DASHES[1]),
+    "fixed-h": (COLOURS[0], DASHES[0]),
+    "variable-h": (COLOURS[2], DASHES[2]),
+    "fixed-h-e": (COLOURS[3], DASHES[4]),
+    "variable-h-e": (COLOURS[4], DASHES[5]),
+}
+
+
+def _title(found: Balance, what: str) -> str:
+    assumed = "   (with assumed values)" if found.engine.assumed else ""
+    return f"{found.engine.name}: {what}{assumed}"
+
+
+def _below(axes: Axes, columns: int) -> None:
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1)
+
+
+def torque_figure(found: Balance) -> Any:
+    """Torque over the crank angle at the tuning speed with its first order, and the orders as bars."""
+    engine, w = found.engine, found.tuning_speed
+    phi = np.linspace(0.0, CYCLE_ANGLE, 1441)
+    gas, inertia = engine.gas_torque(phi, w, found.load), engine.inertia_torque(phi, w)
+    harmonics = engine.torque_harmonics(w, found.load)
+    mean, first = harmonics[0].real, harmonics[2]
+    degrees = np.degrees(phi)
+    with drawing():
+        figure, (course, bars) = new_figure(2, 1, (8.0, 6.8))
+        course.plot(degrees, gas, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="gas")
+        course.plot(degrees, inertia, color=COLOURS[2], ls=DASHES[2], lw=1.1, label="inertia")
+        course.plot(degrees, gas + inertia, color=COLOURS[0], label="both")
+        wave = mean + (first * np.exp(1j * phi)).real
+        course.plot(degrees, wave, color=COLOURS[6], ls=DASHES[3], lw=1.8, label="mean and first order")
+        course.set_xticks(np.arange(0.0, 721.0, 90.0))
+        course.set_xlim(0.0, 720.0)
+        course.set_xlabel("crank angle, deg")
+        course.set_ylabel("torque on the crank, N m")
+        course.set_title(f"mean {mean:.1f} N m", loc="left", fontsize=SMALL)
+        _below(course, 4)
+        _bars(bars, found)
+        what = f"reaction torque at {w / RPM:.0f} rpm, load {found.load:g}"
+        figure.suptitle(_title(found, what), x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _bars(axes: Axes, found: Balance) -> None:
+    """Amplitudes of the orders of gas, inertia and both."""
+    rows = [row for row in found.orders() if row["order"] <= BARS and row["torque"] > 0.0]
+    places = np.arange(len(rows))
+    kinds = (
+        ("gas", [math.hypot(row["gas_cosine"], row["gas_sine"]) for row in rows], COLOURS[1], "//"),
+        (
+            "inertia",
+            [math.hypot(row["inertia_cosine"], row["inertia_sine"]) for row in rows],
+            COLOURS[2],
+            "..",
+        ),
+        ("both", [row["torque"] for row in rows], COLOURS[0], ""),
+    )
+    for index, (name, heights, colour, hatch) in enumerate(kinds):
+        drawn = axes.bar(
+            places + 0.27 * (index - 1),
+            heights,
+            0.25,
+            color=colour,
+            hatch=hatch,
+            edgecolor="white",
+            label=name,
+        )
+        if name == "both":
+            axes.bar_label(drawn, [f"{height:.0f}" for height in heights], fontsize=8, padding=1)
+    axes.set_xticks(places, [f"{row['order']:g}" for row in rows])
+    axes.set_xlabel("order of the crank speed")
+    axes.set_ylabel("amplitude, N m")
+    axes.grid(False, axis="x")
+    _below(axes, 3)
+
+
+def residual_figure(found: Balance) -> Any:
+    """First-order moment left, the arm that each design needs, and the forces, over the speed."""
+    rpm = found.speeds / RPM
+    designed = [one for one in found.residuals if one.height is not None]
+    with drawing():
+        rows = 3 if designed else 2
+        figure, panels = new_figure(rows, 1, (8.0, 3.1 * rows), sharex=True)
+        moment, force = panels[0], panels[-1]
+        for one in found.residuals:
+            colour, dash = LOOKS[one.name]
+            moment.plot(rpm, one.first_order, color=colour, ls=dash, label=one.name, clip_on=False, zorder=3)
+        moment.set_ylabel("moment of first order\non the housing, N m")
+        moment.set_ylim(bottom=0.0)
+        if designed:
+            _arms(panels[1], found)
+        _forces(force, found)
+        for axes in panels:
+            axes.axvline(found.tuning_speed / RPM, color=GREY, lw=0.9, ls=":")
+        force.set_xlabel("crank speed, rpm     (dotted: tuning speed)")
+        force.set_xlim(rpm[0], rpm[-1])
+        figure.suptitle(_title(found, f"what is left, load {found.load:g}"), x=0.01, ha="left", fontsize=11)
+        handles, labels = moment.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _arms(axes: Axes, found: Balance) -> None:
+    """Height of each design, and the sideways offset of the last."""
+    rpm = found.speeds / RPM
+    for one in found.residuals:
+        if one.height is not None and one.name in ("inertia-only", "fixed-h", "variable-h"):
+            colour, dash = LOOKS[one.name]
+            axes.plot(rpm, 1e3 * np.abs(one.height), color=colour, ls=dash)
+    last = found.residuals[-1]
+    if last.offset is not None:
+        colour, dash = LOOKS[last.name]
+        axes.plot(rpm, 1e3 * np.abs(last.offset), color=colour, ls=dash, label="sideways |e(n)|")
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, place: f"{value:g}")
+    axes.set_ylabel("height |h| of the shafts\nfrom the crank, mm")
+    _below(axes, 1)
+
+
+def _forces(axes: Axes, found: Balance) -> None:
+    """Forces of first order and of all orders, without shafts and with the designed ones."""
+    rpm = found.speeds / RPM
+    shown = [found.residuals[0]]
+    shown += [one for one in found.residuals if one.name in ("own-shafts", "fixed-h")]
+    for one in shown:
+        colour, dash = LOOKS[one.name]
+        label = "any designed shafts" if one.height is not None else one.name
+        axes.plot(rpm, 1e-3 * one.all_forces, color=colour, ls=dash, label=label)
+    _below(axes, 3)
+    axes.set_ylabel("largest force\non the housing, kN")
+    axes.set_ylim(bottom=0.0)
+
+
+def force_figure(found: Balance) -> Any:
+    """The force vector over a turn at the tuning speed: first order on the left, all orders on the right."""
+    engine, w2 = found.engine, found.tuning_speed**2
+    crank = engine.crank_shaking[0]
+    reciprocating = engine.bare_shaking[0]
+    kinds = [
+        ("without counterweights", reciprocating, COLOURS[1], DASHES[1]),
+        ("with counterweights", crank, COLOURS[6], DASHES[0]),
+    ]
+    if found.imbalance:
+        shafts = engine.shaft_shaking(found.shafts("fixed-h"))[0]
+        kinds.append(("force of the two shafts", shafts, COLOURS[2], DASHES[2]))
+        kinds.append(("left with the shafts", crank + shafts, COLOURS[0], DASHES[0]))
+    elif engine.shafts:
+        kinds.append(("left with the shafts", crank + engine.shaft_shaking()[0], COLOURS[0], DASHES[0]))
+    phi = np.linspace(0.0, 2.0 * np.pi, 721)
+    with drawing():
+        figure, panels = new_figure(1, 2, (6.6, 5.6), sharex=True, sharey=True)
+        for axes, title, highest in ((panels[0], "first order", 1), (panels[1], "all orders", None)):
+            for name, shaking, colour, dash in kinds:
+                force = 1e-3 * w2 * shaking.up_to(highest).at(phi)
+                axes.plot(force.imag, force.real, color=colour, ls=dash, label=name)
+                axes.plot(force.imag[:1], force.real[:1], "o", ms=5, color=colour)
+                axes.plot(force.imag[180:181], force.real[180:181], "s", ms=5, color=colour, mfc="white")
+            axes.set_aspect("equal", adjustable="box")
+            axes.axhline(0.0, color=GREY, lw=0.6)
+            axes.axvline(0.0, color=GREY, lw=0.6)
+            axes.set_title(title, loc="left", fontsize=SMALL)
+            axes.set_xlabel("sideways, kN")
+        panels[0].set_ylabel("along the cylinders, kN")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        title = _title(found, f"force on the housing at {found.tuning_speed / RPM:.0f} rpm")
+        dots = "dot: crank at top dead centre; square: 90 deg later"
+        figure.suptitle(f"{title}\n{dots}", x=0.01, ha="left", fontsize=10)
+    return figure

@@ -1,0 +1,179 @@
+"""The slider crank, exactly: height of the piston, its derivatives, and their harmonics in two ways.
+
+The piston moves on a line through the crank axis. phi is the angle of the crank from top dead centre (TDC).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "SliderCrank",
+    "acceleration_harmonics",
+    "acceleration_series",
+    "inertia_torque_harmonics",
+    "inertia_torque_series",
+]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SliderCrank:
+    """Crank radius `r` and length `rod` of the connecting rod, both in m, rod > r.
+
+    >>> crank = SliderCrank(0.0355, 0.121)
+    >>> round(crank.ratio, 4), float(crank.height(0.0))
+    (0.2934, 0.1565)
+    """
+
+    r: float
+    rod: float
+
+    @property
+    def ratio(self) -> float:
+        """The ratio lambda of crank radius and rod length."""
+        return self.r / self.rod
+
+    def height(self, phi: ArrayLike) -> Vector:
+        """Height in m of the piston pin above the crank axis, r cos(phi) + sqrt(rod^2 - r^2 sin(phi)^2)."""
+        phi = np.asarray(phi, dtype=np.float64)
+        found: Vector = self.r * np.cos(phi) + self.rod * self._cosine(phi)
+        return found
+
+    def slope(self, phi: ArrayLike) -> Vector:
+        """First derivative of the height by phi, in m/rad; at constant w the piston's speed over w.
+
+        >>> float(SliderCrank(1.0, 3.0).slope(math.pi / 2))
+        -1.0
+        """
+        phi = np.asarray(phi, dtype=np.float64)
+        found: Vector = -self.r * np.sin(phi) * (1.0 + self.ratio * np.cos(phi) / self._cosine(phi))
+        return found
+
+    def curvature(self, phi: ArrayLike) -> Vector:
+        """Second derivative of the height by phi, in m/rad^2; at constant w the acceleration over w^2.
+
+        >>> float(SliderCrank(1.0, 4.0).curvature(0.0))
+        -1.25
+        """
+        phi = np.asarray(phi, dtype=np.float64)
+        q = self._cosine(phi)
+        bend = np.cos(2.0 * phi) / q + (0.5 * self.ratio * np.sin(2.0 * phi)) ** 2 / q**3
+        found: Vector = -self.r * (np.cos(phi) + self.ratio * bend)
+        return found
+
+    def _cosine(self, phi: Vector) -> Vector:
+        """Cosine of the angle between rod and cylinder."""
+        return np.sqrt(1.0 - (self.ratio * np.sin(phi)) ** 2)
+
+
+def samples_needed(ratio: float) -> int:
+    """So many samples of a revolution that the harmonics are exact to rounding.
+
+    The rod's square root is singular at sin(phi) = 1/lambda, arccosh(1/lambda) off the real axis: harmonics
+    fall by that factor an order.
+
+    >>> samples_needed(0.3), samples_needed(0.95)
+    (64, 256)
+    """
+    decay = math.acosh(1.0 / ratio)
+    return int(2 ** math.ceil(math.log2(max(32.0, 80.0 / decay))))
+
+
+@lru_cache(maxsize=64)
+def acceleration_harmonics(ratio: float, orders: int) -> tuple[float, ...]:
+    """A_q, q = 0 .. orders, of the acceleration -r w^2 sum A_q cos(q phi), by FFT of the exact one.
+
+    A_1 = 1 is that of [B](1).
+
+    >>> [round(a, 6) for a in acceleration_harmonics(0.25, 4)]
+    [0.0, 1.0, 0.254025, 0.0, -0.004098]
+    """
+    n = max(samples_needed(ratio), 2 ** math.ceil(math.log2(2 * orders + 2)))
+    phi = 2.0 * np.pi * np.arange(n) / n
+    found = -2.0 / n * np.fft.rfft(SliderCrank(ratio, 1.0).curvature(phi) / ratio).real
+    found[0] = 0.0
+    found[3::2] = 0.0  # by symmetry
+    return tuple(float(a) for a in found[: orders + 1])
+
+
+@lru_cache(maxsize=64)
+def inertia_torque_harmonics(ratio: float, orders: int) -> tuple[float, ...]:
+    """B_k, k = 0 .. orders, of the inertia torque m r^2 w^2 sum B_k sin(k phi), [B](3), by FFT.
+
+    The torque of a mass m at the piston pin on the crank at constant speed is -m w^2 s' s''.
+
+    >>> [round(b, 6) for b in inertia_torque_harmonics(0.25, 4)]
+    [0.0, 0.063506, -0.50013, -0.192056, -0.016129]
+    """
+    n = max(2 * samples_needed(ratio), 2 ** math.ceil(math.log2(2 * orders + 2)))
+    phi = 2.0 * np.pi * np.arange(n) / n
+    crank = SliderCrank(ratio, 1.0)
+    torque = -crank.slope(phi) * crank.curvature(phi) / ratio**2
+    found = -2.0 / n * np.fft.rfft(torque).imag
+    found[0] = 0.0
+    return tuple(float(b) for b in found[: orders + 1])
+
+
+def acceleration_series(ratio: float, orders: int) -> Vector:
+    """The same A_q from the power series in lambda: A_2 = lambda + lambda^3/4 + 15 lambda^5/128 + ...
+
+    >>> bool(np.allclose(acceleration_series(0.3, 8), acceleration_harmonics(0.3, 8), rtol=0, atol=1e-15))
+    True
+    """
+    q = np.arange(orders + 1)
+    return q * _speed_series(ratio, orders)
+
+
+def inertia_torque_series(ratio: float, orders: int) -> Vector:
+    """The same B_k from the power series: B_1 = lambda/4 + lambda^3/16 + 15 lambda^5/512 + ...
+
+    The products of the harmonics of s' and s'' are summed up to orders where they vanish.
+
+    >>> bool(np.allclose(inertia_torque_series(0.3, 8), inertia_torque_harmonics(0.3, 8), rtol=0, atol=1e-15))
+    True
+    """
+    n = max(samples_needed(ratio), orders)
+    sine = _speed_series(ratio, n)  # s' = -r sum sine_p sin(p phi), s'' = -r sum p sine_p cos(p phi)
+    cosine = np.arange(n + 1) * sine
+    sums = np.convolve(sine, cosine)  # sin p cos q = [sin(p + q) + sin(p - q)]/2
+    differences = np.correlate(sine, cosine, "full")  # index n + p - q
+    k = np.arange(orders + 1)
+    found: Vector = -0.5 * (sums[k] + differences[n + k] - differences[n - k])
+    return found
+
+
+def _speed_series(ratio: float, orders: int) -> Vector:
+    """S_q of s' = -r sum S_q sin(q phi): S_1 = 1, S_2i = 2 i c_2i/lambda."""
+    found = np.zeros(orders + 1)
+    found[1:2] = 1.0
+    even = np.arange(2, orders + 1, 2)
+    found[even] = even * _rod_series(ratio, orders // 2)[1:] / ratio
+    return found
+
+
+def _rod_series(ratio: float, count: int) -> Vector:
+    """c_0, c_2 .. c_2count of sqrt(1 - lambda^2 sin(phi)^2) = sum c_2i cos(2 i phi), by the binomial series.
+
+    sqrt(1 - x) = 1 - sum_j |C(1/2, j)| x^j, and
+    sin^2j = 4^-j [C(2j, j) + 2 sum_i (-1)^i C(2j, j-i) cos(2 i phi)].
+    """
+    i = np.arange(count)
+    signs = np.where(np.arange(count + 1) % 2, -2.0, 2.0)
+    signs[0] = 1.0
+    found = np.zeros(count + 1)
+    found[0] = 1.0
+    term, middle, j = 1.0, 1.0, 0  # |C(1/2, j)| lambda^2j and 4^-j C(2j, j)
+    while term > 1e-19:
+        j += 1
+        term *= abs(j - 1.5) / j * ratio**2
+        middle *= (2 * j - 1) / (2 * j)
+        row = middle * np.cumprod(np.concatenate([[1.0], np.maximum(j - i, 0) / (j + i + 1)]))
+        found -= term * signs * row
+    return found

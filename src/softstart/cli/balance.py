@@ -1,0 +1,142 @@
+"""`softstart balance`: what an engine shakes its mounts with, and what a two-shaft balancer takes away."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from softstart.cli.folder import output_folder
+from softstart.cli.options import Mistakes, command_line, json_option, out_option
+from softstart.cli.usage import Command
+from softstart.errors import InputError
+
+if TYPE_CHECKING:
+    from softstart.balancing import Engine
+
+DEFAULT_ENGINE = "vaz-11113"
+
+
+def _engines(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from softstart.balancing.files import names
+
+    found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
+    return found or [CompletionItem(incomplete, type="file")]
+
+
+@click.command(cls=Command)
+@click.argument("engine", metavar="[ENGINE]", default=DEFAULT_ENGINE, shell_complete=_engines)
+@click.option(
+    "--speed",
+    "speeds",
+    metavar="SPEED",
+    multiple=True,
+    help="A speed to show, as 4500rpm. May be repeated; by default round ones over the range.",
+)
+@click.option(
+    "--set",
+    "settings",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5. May be "
+    "repeated.",
+)
+@json_option
+@out_option("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")
+def balance(
+    *, engine: str, speeds: tuple[str, ...], settings: tuple[str, ...], as_json: bool, out: str | None
+) -> None:
+    """Find the forces and moments of a piston engine by order, and design a two-shaft balancer.
+
+    ENGINE is a TOML file or the name of a shipped engine; without it, the two-cylinder engine VAZ-11113 of
+    the literature is taken, with values that are partly assumed. The balancer is tuned at one speed:
+    balancer.tuning_speed.
+    """
+    mistakes = Mistakes()
+    one: Engine | None = None
+    asked: list[float] | None = None
+    with mistakes.noted():
+        one = read_engine(engine, settings)
+    with mistakes.noted():
+        asked = read_speeds(speeds)
+    mistakes.settle()
+    assert one is not None
+
+    from softstart.balancing.result import balance as compute
+
+    with output_folder(out) as folder:
+        found = compute(one, asked)
+        if folder is not None:
+            from softstart.cli.balance_report import write_balance
+
+            write_balance(found, folder, command_line())
+
+    from softstart.cli.balance_text import show_balance
+    from softstart.cli.show import console, print_json
+
+    if as_json:
+        print_json(found.summary())
+        return
+    show_balance(console(), found)
+    if out is not None:
+        print(f"\nWritten to {out}: report.md, the figures and the tables.")
+
+
+def read_engine(name: str, settings: Sequence[str]) -> Engine:
+    """The engine asked for, with its changes."""
+    from softstart.balancing import Engine
+
+    mistakes = Mistakes()
+    changes: dict[str, Any] = {}
+    with mistakes.noted():
+        changes = read_changes(settings)
+    mistakes.settle()
+    return Engine.load(name, also=changes)
+
+
+def read_changes(settings: Sequence[str]) -> dict[str, Any]:
+    """`key=value` texts as a mapping: a value is read as in TOML if it is such, else it is text.
+
+    >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
+    {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
+    """
+    found: dict[str, Any] = {}
+    mistakes = Mistakes()
+    for text in settings:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        with mistakes.noted():
+            if not (key and equals and value):
+                raise InputError(
+                    f'--set "{text}": write a key, an equals sign and a value, as operation.load=0.5.'
+                )
+            if key in found:
+                raise InputError(f'--set "{text}": {key} is given twice; keep one of the two.')
+            try:
+                found[key] = tomllib.loads(f"value = {value}")["value"]
+            except tomllib.TOMLDecodeError:
+                found[key] = value
+    mistakes.settle()
+    return found
+
+
+def read_speeds(texts: Sequence[str]) -> list[float] | None:
+    """The speeds in rad/s; None if none was given.
+
+    >>> [round(speed, 3) for speed in read_speeds(["4500rpm", "100"])]
+    [471.239, 100.0]
+    """
+    from softstart.units import to_si
+
+    found = []
+    mistakes = Mistakes()
+    for text in texts:
+        with mistakes.noted():
+            speed = float(to_si(text, "rad/s", name="--speed"))
+            if not speed > 0.0:
+                raise InputError(f'--speed = "{text}": a speed above 0, as 4500rpm.')
+            found.append(speed)
+    mistakes.settle()
+    return found or None

@@ -1,0 +1,227 @@
+"""What [B] claims, and the number that decides each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softstart.balancing import Balance
+from softstart.study import Claim, Verdict
+from softstart_studies.paper_b import convergence, over_speed, printed, sensitivity
+from softstart_studies.paper_b.vaz import RPM, TUNING, VAZ, balanced, first_order
+
+TINY = 1e-9  # N or N m: rounding
+
+
+def tiny(value: float) -> str:
+    """A number that is zero but for rounding.
+
+    >>> tiny(0.0), tiny(2.8e-14)
+    ('0', '3e-14')
+    """
+    return f"{value:.0e}" if value else "0"
+
+
+def claims(found: Balance | None = None) -> list[Claim]:
+    """All of them.
+
+    >>> len(claims())
+    10
+    """
+    found = found or balanced()
+    return [
+        forces_vanish(found),
+        gas_orders(),
+        inertia_orders(),
+        formula_4(),
+        formula_5(),
+        speed_dependence(found),
+        fixed_arm(found),
+        variable_arm(found),
+        inertia_alone(found),
+        all_orders(found),
+    ]
+
+
+def forces_vanish(found: Balance) -> Claim:
+    """Counterweights and shafts against the first-order force."""
+    i = found.tuning_index
+    none, fixed = found.residual("none"), found.residual("fixed-h")
+    bare = VAZ.bare_shaking[0].largest[1] * found.tuning_speed**2
+    return Claim(
+        "Two shafts against the crank and counterweights for half of the reciprocating masses balance the "
+        "centrifugal forces and the first-order inertia force completely.",
+        Verdict.CONFIRMED if fixed.force.max() < TINY else Verdict.REFUTED,
+        f"First order at 4500 rpm: {bare:.0f} N without anything, {none.force[i]:.0f} N with the "
+        "counterweights, "
+        f"{tiny(fixed.force[i])} N with the shafts too. The even orders stay: up to "
+        f"{fixed.all_forces[i]:.0f} N.",
+    )
+
+
+def gas_orders() -> Claim:
+    """Which orders of the gas torque there are."""
+    harmonics = np.abs(VAZ.gas_harmonics(TUNING * RPM, 1.0))
+    halves = float(harmonics[1::2].max())
+    return Claim(
+        "(2): the gas torque of z evenly firing cylinders has the orders k z/2 only.",
+        Verdict.CONFIRMED if halves < TINY < harmonics[2] else Verdict.REFUTED,
+        f"Two cylinders: orders 1, 2, 3 of {harmonics[2]:.1f}, {harmonics[4]:.1f}, {harmonics[6]:.1f} N m; "
+        "the "
+        f"orders 1/2, 3/2 .. of at most {tiny(halves)} N m. In (2) the sums of A and B are those of one "
+        "cylinder, "
+        "times z.",
+    )
+
+
+def inertia_orders() -> Claim:
+    """The inertia torque as a sum of sines."""
+    ratio = VAZ.cylinders.crank.ratio
+    difference = convergence.differences(ratio)[1]
+    phi = np.linspace(0.0, 2.0 * np.pi, 97)
+    w = TUNING * RPM
+    harmonics = w**2 * VAZ.inertia_harmonics
+    series = (np.exp(1j * np.outer(phi, VAZ.orders)) @ harmonics).real
+    error = float(np.abs(series - VAZ.inertia_torque(phi, w)).max())
+    return Claim(
+        "(3): the inertia torque is a sum of sines, m r^2 w^2 sum B_k sin k(phi + theta (i-1)).",
+        Verdict.CONFIRMED if error < 1e-8 and difference < 1e-12 else Verdict.REFUTED,
+        f"24 orders meet the exact crank drive within {tiny(error)} N m; B_k by FFT and by the power series "
+        "in "
+        f"lambda = {ratio:.4f} differ by {tiny(difference)}. B_1 = {-harmonics[2].imag:.1f} N m at 4500 rpm.",
+    )
+
+
+def formula_4() -> Claim:
+    """The balancing force."""
+    whole, shafts = printed.imbalances()
+    given = printed.printed_imbalance()
+    mass = given / VAZ.cylinders.crank.r
+    return Claim(
+        "(4): the two-shaft mechanism makes F_b = 4.98e-4 n^2 N.",
+        Verdict.PARTLY,
+        f"That is m r = {given:.4f} kg m, {mass:.2f} kg on 35.5 mm. With the masses assumed the whole "
+        "first-order "
+        f"force has {whole:.4f} kg m ({100 * (given / whole - 1):+.0f} %), so (4) fits shafts and "
+        "counterweights "
+        f"together. The shafts alone carry half, {shafts:.4f} kg m; for (4) to be theirs a cylinder would "
+        "need "
+        f"{mass:.2f} kg of reciprocating mass instead of {VAZ.masses.reciprocating:g} kg.",
+    )
+
+
+def formula_5() -> Claim:
+    """The balancing moment, both readings."""
+    span = sensitivity.corners()
+    sine = first_order(VAZ, TUNING)[1]
+    low, high = span.sine
+    readings = sensitivity.readings()
+    within = [name for name, moment, _ in readings if low <= moment <= high]
+    said = "; ".join(
+        f"read with {name} it is {moment:.1f} N m, which needs a mean indicated pressure of {pressure:.1f} "
+        "bar"
+        for name, moment, pressure in readings
+    )
+    assumed = 1e-5 * VAZ.indicated_work(TUNING * RPM, 1.0) / VAZ.displacement
+    h = [1e3 * printed.printed_arm(moment / TUNING**2) for _, moment, _ in readings]
+    return Claim(
+        "(5): at the tuning speed the shafts' moment 2.099e-5 n^2 (or e-6) N m balances the first-order "
+        "reaction "
+        "torque.",
+        Verdict.PARTLY if within else Verdict.REFUTED,
+        f"By (4) and (5) h is {h[0]:.1f} or {h[1]:.2f} mm. The model has {sine:.1f} N m ({low:.0f} to "
+        f"{high:.0f} "
+        f"over the corners of what is assumed); (5) {said}. Assumed are {assumed:.1f} bar.",
+    )
+
+
+def speed_dependence(found: Balance) -> Claim:
+    """How gas and inertia depend on the speed."""
+    course = over_speed.course(found)
+    spread = over_speed.spread(course.gas)
+    light = abs(VAZ.gas_harmonics(TUNING * RPM, 0.0)[2])
+    full = abs(VAZ.gas_harmonics(TUNING * RPM, 1.0)[2])
+    return Claim(
+        "Inertia and balancing moments grow with n^2, the gas moment hardly depends on n.",
+        Verdict.PARTLY if spread > 5.0 or light < 0.5 * full else Verdict.CONFIRMED,
+        f"The first two exactly. The gas moment of first order is {course.gas.min():.0f} to "
+        f"{course.gas.max():.0f} "
+        f"N m over the speeds at full load (the assumed torque curve), {spread:.0f} % of its mean, while "
+        "that of "
+        f"inertia grows from {course.inertia.min():.1f} to {course.inertia.max():.1f}; but it depends on "
+        "the load: "
+        f"{full:.0f} N m at full load, {light:.0f} at load 0 (4500 rpm).",
+    )
+
+
+def fixed_arm(found: Balance) -> Claim:
+    """A fixed arm is complete at one speed."""
+    i = found.tuning_index
+    none, fixed, both = (found.residual(name) for name in ("none", "fixed-h", "fixed-h-e"))
+    assert fixed.height is not None
+    assert both.offset is not None
+    elsewhere = np.delete(both.first_order, i)
+    complete = fixed.first_order[i] < TINY
+    return Claim(
+        "With h fixed, the balance of the first-order reaction torque is complete at the tuning speed only.",
+        Verdict.CONFIRMED if complete else Verdict.PARTLY,
+        f"At 4500 rpm h = {1e3 * fixed.height[i]:.1f} mm leaves {fixed.first_order[i]:.1f} of "
+        f"{none.first_order[i]:.1f} "
+        "N m: the sine goes, the cosine that the gas has stays (with M_b equal in amplitude instead, "
+        f"{over_speed.tuned_without_phase():.1f}). Shafts moved sideways too, by e = "
+        f"{1e3 * both.offset[i]:.1f} mm, "
+        f"leave {tiny(both.first_order[i])} there and at least {elsewhere.min():.1f}, at most "
+        f"{both.first_order.max():.0f} "
+        "N m at the other speeds computed.",
+    )
+
+
+def variable_arm(found: Balance) -> Claim:
+    """An arm over the speed."""
+    variable, both = found.residual("variable-h"), found.residual("variable-h-e")
+    low, high = over_speed.distance(found)
+    without, left = over_speed.left_at_load(0.0, TUNING, sideways=True)
+    complete = variable.first_order.max() < TINY
+    return Claim(
+        "Moved so that h = h(n), the shafts balance it completely over the whole speed range.",
+        Verdict.CONFIRMED if complete else Verdict.PARTLY,
+        f"h(n) alone leaves {variable.first_order.min():.0f} to {variable.first_order.max():.0f} N m, the "
+        "cosine; "
+        f"h(n) and e(n) leave {tiny(both.first_order.max())}. It takes {low:.0f} mm at 850 rpm and "
+        f"{high:.0f} mm at "
+        f"5600 rpm, and holds at one load: set for full load, they leave {left:.0f} N m at load 0 and 4500 "
+        "rpm, "
+        f"where no shafts at all leave {without:.0f}.",
+    )
+
+
+def inertia_alone(found: Balance) -> Claim:
+    """Designed for the inertia only."""
+    i = found.tuning_index
+    none, alone, fixed, both = (
+        found.residual(name) for name in ("none", "inertia-only", "fixed-h", "fixed-h-e")
+    )
+    better = alone.first_order[i] > fixed.first_order[i]
+    return Claim(
+        "A balancer must be designed for the reaction torque of inertia and gas together.",
+        Verdict.CONFIRMED if better else Verdict.REFUTED,
+        f"First order at 4500 rpm: {none.first_order[i]:.1f} N m without shafts, {alone.first_order[i]:.1f} "
+        "with an "
+        f"arm for the inertia alone, {fixed.first_order[i]:.1f} with h for both, "
+        f"{tiny(both.first_order[i])} with h "
+        "and e.",
+    )
+
+
+def all_orders(found: Balance) -> Claim:
+    """Not in [B]: what the mounts feel."""
+    i = found.tuning_index
+    none, fixed, both = (found.residual(name) for name in ("none", "fixed-h", "fixed-h-e"))
+    gain = fixed.moment[i] / none.moment[i]
+    return Claim(
+        "(Not in [B].) With its first order gone the reaction torque is small.",
+        Verdict.REFUTED if both.moment[i] > 0.5 * none.moment[i] else Verdict.CONFIRMED,
+        f"Largest alternating moment at 4500 rpm with all orders: {none.moment[i]:.0f} N m without shafts, "
+        f"{fixed.moment[i]:.0f} with h ({100 * (gain - 1):+.0f} %), {both.moment[i]:.0f} with h and e: the "
+        "second "
+        f"order alone is {abs(VAZ.torque_harmonics(TUNING * RPM)[4]):.0f} N m.",
+    )

@@ -1,0 +1,225 @@
+"""Balancer shafts: what they do, what the designs leave, and engines that need others."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.softstart.balancing.engines import RPM, engine
+
+from softstart.balancing import BalancerShaft, Counterweights, Engine, Layout, balance
+from softstart.balancing.design import arm, free_force, two_shafts
+from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_series
+from softstart.errors import InputError
+
+VAZ = Engine.load("vaz-11113")
+HALF = Counterweights(0.5, 1.0)
+PHI = np.linspace(0.0, 2.0 * np.pi, 181)
+
+
+def forces_and_moment(shafts, phi, w):
+    """By vectors: each mass on its circle, its force, and place x force about the crank."""
+    force, moment = np.zeros(phi.size, complex), np.zeros(phi.size)
+    for one in shafts:
+        pull = one.imbalance * (one.ratio * w) ** 2 * np.exp(1j * (one.ratio * phi + one.phase))
+        up, side = pull.real, pull.imag
+        force = force + pull
+        moment += one.height * side - one.offset * up
+    return force, moment
+
+
+shafts = st.lists(
+    st.builds(
+        BalancerShaft,
+        st.floats(1e-3, 0.1),
+        st.sampled_from([-3, -2, -1, 1, 2, 3]),
+        st.floats(-4.0, 4.0),
+        st.floats(-0.3, 0.3),
+        st.floats(-0.3, 0.3),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(shafts)
+def test_forces_and_moment_of_shafts(some):
+    force, _, moment = VAZ.shaft_shaking(some)
+    exact_force, exact_moment = forces_and_moment(some, PHI, 1.0)
+    assert force.at(PHI) == pytest.approx(exact_force, abs=1e-13)
+    course = (np.exp(1j * np.outer(PHI, np.arange(moment.size))) @ moment).real
+    assert course == pytest.approx(exact_moment, abs=1e-13)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.sampled_from([(1,), (1, 2)]),
+    st.floats(0.15, 0.3),
+    st.floats(0.05, 0.15),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 6.28),
+)
+def test_the_complete_design_leaves_nothing_of_first_order(order, rod, stroke, load, turn):
+    # throws at any angle to the crank angle 0, so that the phase of the shafts matters too
+    angles = [(turn + 2.0 * math.pi * i) % (4.0 * math.pi) for i in range(len(order))]
+    made = engine(firing_angles=angles, weights=HALF, rod_length=rod, stroke=stroke)
+    w = 3000.0 * RPM
+    pair = two_shafts(made, arm(made, w, load))
+    force = made.crank_shaking[0] + made.shaft_shaking(pair)[0]
+    unit = len(order) * made.masses.reciprocating * made.cylinders.crank.r
+    assert force.largest[1] < 1e-14 * unit * 10
+    left = -made.torque_harmonics(w, load)[2] + w**2 * made.shaft_shaking(pair)[2][1]
+    assert abs(left) < 1e-11 * abs(made.torque_harmonics(w, load)[2])
+
+
+def test_residuals_are_those_of_the_shafts_themselves():
+    found = balance(VAZ, ["4500 rpm"])
+    i = found.tuning_index
+    w = found.tuning_speed
+    for name in ("inertia-only", "fixed-h", "fixed-h-e"):
+        fitted = Engine.from_toml(VAZ.to_toml() + "".join(
+            f"[[shaft]]\nimbalance = {s.imbalance!r}\nratio = -1\nphase = {s.phase!r}\n"
+            f"height = {s.height!r}\noffset = {s.offset!r}\n" for s in found.shafts(name)
+        ))  # fmt: skip
+        own = balance(fitted, ["4500 rpm"]).residual("own-shafts")
+        one = found.residual(name)
+        assert own.first_order[i] == pytest.approx(one.first_order[i], abs=1e-9)
+        assert own.moment[i] == pytest.approx(one.moment[i], rel=1e-12)
+        assert own.all_forces[i] == pytest.approx(one.all_forces[i], rel=1e-12)
+        # and over the crank angle, by vectors
+        force, moment = forces_and_moment(found.shafts(name), PHI, w)
+        fine = moment - VAZ.torque(PHI, w)
+        first = 2.0 * np.mean((fine * np.exp(-1j * PHI))[:-1])
+        assert abs(first) == pytest.approx(one.first_order[i], abs=5e-3)  # 180 samples of the gas torque
+        assert np.abs(force + w**2 * VAZ.crank_shaking[0].up_to(1).at(PHI)).max() < 1e-9
+
+
+def test_designs_as_in_b():
+    found = balance(VAZ)
+    i, w = found.tuning_index, found.tuning_speed
+    fixed, variable, both = (found.residual(name) for name in ("fixed-h", "variable-h", "variable-h-e"))
+    first = VAZ.torque_harmonics(w)[2]
+    a, b = first.real, -first.imag
+    F_b = found.imbalance * w**2
+    assert fixed.height[i] == pytest.approx(b / F_b, rel=1e-13)  # M_b = h F_b equals the sine
+    assert both.offset[i] == pytest.approx(a / F_b, rel=1e-13)
+    assert fixed.first_order[i] == pytest.approx(abs(a), rel=1e-12)
+    assert np.all(both.first_order < 1e-11)
+    assert variable.first_order_sine == pytest.approx(0.0, abs=1e-11)
+    assert fixed.first_order_sine[i] == pytest.approx(0.0, abs=1e-11)
+    assert np.all(np.abs(np.delete(fixed.first_order_sine, i)) > 1e-3)  # complete at one speed only
+    # h(n) falls: its product with n^2 is the sine of the torque
+    assert np.all(np.diff(variable.height) < 0.0)
+
+
+def test_inertia_only_leaves_the_gas():
+    found = balance(VAZ)
+    alone = found.residual("inertia-only")
+    gas = [abs(VAZ.gas_harmonics(float(w))[2]) for w in found.speeds]
+    assert alone.first_order == pytest.approx(gas, rel=1e-12)
+    # h = 2 r B_1: the masses cancel out
+    B_1 = inertia_torque_series(35.5 / 121, 1)[1]
+    assert alone.height == pytest.approx(2.0 * 0.0355 * B_1, rel=1e-12)
+    heavy = balance(Engine.load("vaz-11113", also={"masses.reciprocating": 2.0})).residual("inertia-only")
+    assert heavy.height == pytest.approx(alone.height, rel=1e-12)
+
+
+def test_tuning_speed_and_load_can_be_given():
+    found = balance(VAZ, load=0.5, tuning_speed="3000 rpm")
+    assert found.speeds[found.tuning_index] == pytest.approx(3000.0 * RPM, rel=1e-15)
+    assert found.residual("fixed-h-e").first_order[found.tuning_index] < 1e-11
+    assert found.load == 0.5
+
+
+def test_the_middle_of_the_shafts_counts_not_their_distance():
+    near, far = (replace(VAZ, layout=Layout(400.0, gap)) for gap in (0.0, 0.4))
+    one, other = (made.shaft_shaking(two_shafts(made, 0.03 + 0.01j)) for made in (near, far))
+    assert one[2] == pytest.approx(other[2], abs=1e-18)
+
+
+def test_a_four_cylinder_engine_has_nothing_for_two_shafts_at_crank_speed():
+    made = engine((1, 3, 4, 2))
+    found = balance(made)
+    assert [one.name for one in found.residuals] == ["none"]
+    assert "nothing to balance" in found.note
+    assert free_force(made) == 0.0
+    with pytest.raises(InputError, match="no shafts were designed"):
+        found.shafts("none")
+
+
+def second_order_shafts(made, upper, lower):
+    """Two shafts at twice the crank speed in opposite senses, as of Lanchester and Mitsubishi."""
+    A2 = acceleration_harmonics(made.cylinders.crank.ratio, 2)[2]
+    whole = 4.0 * made.masses.reciprocating * made.cylinders.crank.r * A2
+    return [
+        BalancerShaft(whole / 8.0, 2, math.pi, height=upper, offset=0.1),
+        BalancerShaft(whole / 8.0, -2, math.pi, height=lower, offset=-0.1),
+    ]
+
+
+def test_lanchester_balances_the_second_order_force_of_a_four_cylinder_engine():
+    bare = engine((1, 3, 4, 2))
+    made = engine((1, 3, 4, 2), shafts=second_order_shafts(bare, 0.0, 0.0))
+    force = made.crank_shaking[0] + made.shaft_shaking()[0]
+    assert bare.crank_shaking[0].largest[2] > 1e-3
+    assert force.largest[2] < 1e-15
+    assert np.abs(made.shaft_shaking()[2]).max() < 1e-15  # offsets to either side, equal forces: no moment
+    own = balance(made).residual("own-shafts")
+    assert own.all_forces.max() < 0.05 * balance(bare).residual("none").all_forces.max()  # fourth order
+
+
+def test_shafts_at_two_heights_balance_the_second_order_torque_at_a_speed():
+    # Mitsubishi: one shaft above the other; the sine of the second order at one speed, the force at all
+    bare = engine((1, 3, 4, 2))
+    w = 3000.0 * RPM
+    unit = (bare.shaft_shaking(second_order_shafts(bare, 0.5, -0.5))[2][2] * w**2).imag
+    torque = bare.torque_harmonics(w)[4].imag
+    distance = torque / unit
+    made = engine((1, 3, 4, 2), shafts=second_order_shafts(bare, 0.5 * distance, -0.5 * distance))
+    left = -made.torque_harmonics(w)[4] + w**2 * made.shaft_shaking()[2][2]
+    assert left.imag == pytest.approx(0.0, abs=1e-10 * abs(torque))
+    force = made.crank_shaking[0] + made.shaft_shaking()[0]
+    assert force.largest[2] < 1e-15
+
+
+def test_speed_fluctuation_by_the_energy():
+    w = 2000.0 * RPM
+    phi = np.linspace(0.0, 4.0 * np.pi, 20001)
+    torque = VAZ.torque(phi, w)
+    step = phi[1] - phi[0]
+    excess = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * step)])
+    excess -= excess[-1] * phi / phi[-1]
+    expected = np.ptp(excess) / (VAZ.masses.inertia * w**2)
+    assert VAZ.speed_fluctuation(w) == pytest.approx(expected, rel=1e-4)  # 24 orders
+    assert engine().speed_fluctuation(w) is None
+
+
+def test_bad_arguments_are_refused():
+    for arguments, says in (
+        ({"speeds": ["4500 Hz"]}, "Hz is a frequency"),
+        ({"speeds": [-1.0]}, "must be above 0"),
+        ({"tuning_speed": 0.0}, "must be above 0"),
+        ({"load": 2.0}, "from 0 to 1"),
+    ):
+        with pytest.raises(InputError, match=says):
+            balance(VAZ, **arguments)
+    with pytest.raises(InputError, match="none, inertia-only"):
+        balance(VAZ).residual("some")
+
+
+def test_figures_show_the_residuals():
+    found = balance(VAZ)
+    figures = found.figures()
+    assert set(figures) == {"torque", "residual", "forces"}
+    moment = figures["residual"].axes[0]
+    drawn = {line.get_label(): line.get_ydata() for line in moment.get_lines()}
+    for one in found.residuals:
+        assert drawn[one.name] == pytest.approx(one.first_order, rel=1e-15, abs=1e-15)
+    course = {line.get_label(): line.get_ydata() for line in figures["torque"].axes[0].get_lines()}
+    phi = np.linspace(0.0, 4.0 * np.pi, 1441)
+    assert course["both"] == pytest.approx(VAZ.torque(phi, found.tuning_speed), rel=1e-12)
+    assert found.plot().axes[0].get_ylabel() == moment.get_ylabel()
+    assert len(balance(engine((1, 3, 4, 2))).figures()["residual"].axes) == 2

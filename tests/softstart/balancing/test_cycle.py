@@ -1,0 +1,226 @@
+"""The pressure: against an integration of the first law, by its work, and as measured."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from tests.softstart.balancing.engines import RPM, engine
+
+from softstart.balancing import Cylinders, MeasuredCycle, SimpleCycle
+from softstart.balancing.work import shape_work
+from softstart.errors import InputError
+
+ONE = Cylinders(0.08, 0.084, 0.14, firing_angles=(0.0,))
+W = 300.0
+
+
+def volume(cycle, theta):
+    return ONE.displacement / (cycle.compression_ratio - 1.0) + ONE.stroke_volume(theta)
+
+
+def pressure(cycle, theta, load=1.0):
+    theta = np.atleast_1d(np.asarray(theta, dtype=float))
+    return cycle.weights(ONE, W, load) @ cycle.shapes(ONE, theta) + cycle.crankcase_pressure
+
+
+cycles = st.builds(
+    SimpleCycle,
+    st.floats(6.0, 18.0),
+    st.floats(8e5, 2e6),
+    intake_pressure=st.floats(0.8e5, 1.5e5),
+    combustion_start=st.floats(0.0, 0.6),
+    combustion_duration=st.floats(0.5, 1.6),
+    vibe_exponent=st.floats(0.5, 4.0),
+    compression_exponent=st.floats(1.25, 1.38),
+    expansion_exponent=st.floats(1.2, 1.38),
+    exhaust_opening=st.floats(1.7, 3.1),
+    blowdown=st.floats(0.0, 2.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("m", "start", "duration", "opening"), [(2.0, 0.3, 1.0, 2.4), (0.5, 0.1, 0.8, 2.0), (4.0, 0.6, 1.6, 3.0)]
+)
+def test_burning_obeys_the_first_law(m, start, duration, opening):
+    # dp = [(n - 1) Q dx - n p dV]/V, integrated with nothing of the module but Q and the first pressure
+    cycle = SimpleCycle(
+        10.0,
+        9e5,
+        vibe_exponent=m,
+        combustion_start=start,
+        combustion_duration=duration,
+        exhaust_opening=opening,
+    )
+    n, Q, log = cycle.expansion_exponent, cycle.heat(ONE, W), math.log(1000.0)
+
+    def rate(psi, p):
+        tau = min(max((psi + start) / duration, 0.0), 1.0)
+        dx = log * (m + 1.0) * tau**m * 1e-3 ** (tau ** (m + 1.0)) / duration / (1.0 - 1e-3) * (tau < 1.0)
+        sine, cosine = math.sin(psi), math.cos(psi)
+        q = math.sqrt(1.0 - (0.3 * sine) ** 2)
+        stroke = 0.042 * (1.0 - cosine) + 0.14 * (1.0 - q)
+        V = ONE.area * (0.084 / 9.0 + stroke)
+        dV = ONE.area * 0.042 * sine * (1.0 + 0.3 * cosine / q)
+        return ((n - 1.0) * Q * dx - n * p * dV) / V
+
+    first = float(pressure(cycle, -start % (4 * math.pi))[0])
+    middle = duration - start  # the rate has a jump there
+    exact = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-3}
+    burning = solve_ivp(rate, (-start, middle), [first], **exact)
+    expanding = solve_ivp(rate, (middle, opening), burning.y[:, -1], **exact)
+    there = pressure(cycle, np.array([middle, opening]))
+    assert there == pytest.approx([burning.y[0, -1], expanding.y[0, -1]], rel=3e-9)  # of the integration
+
+
+@settings(max_examples=8, deadline=None)
+@given(cycles, st.floats(0.0, 1.0))
+def test_mean_torque_is_the_indicated_work(cycle, load):
+    # int p dV by a quadrature of its own against 4 pi times the mean torque
+    x, weights = np.polynomial.legendre.leggauss(40)
+    work = 0.0
+    for low, high in pairwise(sorted({0.0, *cycle.breaks(), 4.0 * math.pi})):
+        half = 0.5 * (high - low) / 6
+        for i in range(6):
+            theta = low + half * (2 * i + 1 + x)
+            dV = -ONE.area * ONE.crank.slope(theta)
+            work += half * float(np.sum(weights * pressure(cycle, theta, load) * dV))
+    made = engine(bore=0.08, stroke=0.084, rod_length=0.14, gas=cycle)
+    mean = made.gas_harmonics(W, load)[0].real
+    scale = cycle.heat(ONE, W)
+    assert 4.0 * math.pi * mean == pytest.approx(made.indicated_work(W, load), abs=1e-13 * scale)
+    assert made.indicated_work(W, load) == pytest.approx(work, abs=1e-12 * scale)
+
+
+def test_compression_and_gas_exchange_are_what_was_asked_for():
+    cycle = SimpleCycle(10.0, "9 bar", intake_pressure="0.95 bar", combustion_start="5 deg")
+    theta = np.radians([400.0, 540.0, 600.0, 700.0])
+    v = volume(cycle, theta)
+    assert pressure(cycle, theta)[:2] == pytest.approx([0.95e5, 0.95e5], rel=1e-13)
+    expected = 0.95e5 * (v[1] / v[2:]) ** 1.32
+    assert pressure(cycle, theta)[2:] == pytest.approx(expected, rel=1e-13)
+    assert pressure(cycle, np.radians([250.0, 350.0])) == pytest.approx([1.1e5, 1.1e5], rel=1e-13)
+
+
+def test_mean_pressure_follows_its_table_over_the_speeds():
+    cycle = SimpleCycle(9.9, ("8 bar", "10 bar"), speeds=("1000 rpm", "3000 rpm"))
+    for rpm, bar in ((500.0, 8.0), (1000.0, 8.0), (1500.0, 8.5), (3000.0, 10.0), (4000.0, 10.0)):
+        work = cycle.weights(ONE, rpm * RPM, 1.0) @ shape_work(cycle, ONE)
+        assert work / ONE.displacement == pytest.approx(1e5 * bar, rel=1e-12)
+
+
+def test_load_scales_intake_and_heat():
+    cycle = SimpleCycle(9.9, "9 bar", intake_pressure="0.9 bar", idle_pressure="0.3 bar")
+    full, half, none = (cycle.weights(ONE, W, load) for load in (1.0, 0.5, 0.0))
+    assert [full[0], half[0], none[0]] == pytest.approx([0.9e5, 0.6e5, 0.3e5], rel=1e-14)
+    assert [half[2] / full[2], none[2] / full[2]] == pytest.approx([2 / 3, 1 / 3], rel=1e-14)
+
+
+# measured ----------------------------------------------------------------------------------------------
+
+
+def sampled(cycle, step=0.5, first=-360.0):
+    angles = np.radians(np.arange(first, first + 720.0, step))
+    return MeasuredCycle(tuple(angles), tuple(pressure(cycle, angles)), cycle.crankcase_pressure)
+
+
+def test_a_measured_cycle_of_the_simple_one_gives_its_harmonics():
+    cycle = SimpleCycle(9.9, "9 bar", exhaust_opening="130 deg")
+    exact = engine((1, 2), gas=cycle, bore=0.08).gas_harmonics(W)
+    errors = []
+    for step in (2.0, 1.0, 0.5):
+        found = engine((1, 2), gas=sampled(cycle, step), bore=0.08).gas_harmonics(W)
+        errors.append(float(np.abs(found - exact)[:12].max()))
+    assert errors[-1] < 5e-5 * abs(exact[2])
+    assert errors[1] < 0.4 * errors[0]  # straight lines between: second order
+    assert errors[2] < 0.4 * errors[1]
+
+
+def test_where_a_measured_cycle_begins_does_not_matter():
+    cycle = SimpleCycle(9.9, "9 bar")
+    one, other = (engine(gas=sampled(cycle, 1.0, first)).gas_harmonics(W) for first in (-360.0, 0.0))
+    assert one == pytest.approx(other, abs=1e-10 * abs(one).max())
+
+
+def test_a_csv_file_is_read_with_its_units(tmp_path):
+    path = tmp_path / "indicator.csv"
+    angles = np.arange(-360.0, 361.0, 20.0)
+    lines = [f"{a},{1.0 + 0.01 * abs(a % 720)}" for a in angles]
+    lines[-1] = f"360,{lines[0].split(',')[1]}"
+    path.write_text("angle [deg],pressure [bar]\n" + "\n".join(lines) + "\n")
+    found = MeasuredCycle.from_csv(path)
+    assert found.angles[0] == pytest.approx(-2.0 * math.pi)
+    assert found.pressures[1] == pytest.approx(1e5 * (1.0 + 0.01 * 380.0))
+
+
+CSV = {
+    "no header": ("0,1\n20,1\n", "names both columns with units"),
+    "wrong names": ("a [deg],p [bar]\n0,1\n", "names both columns with units"),
+    "wrong unit": ("angle [deg],pressure [N]\n0,1\n", "N is a force, not a pressure"),
+    "no number": ("angle [deg],pressure [bar]\n0,1\n20,one\n", 'row 3, "20,one": this is no number'),
+    "a column short": ("angle [deg],pressure [bar]\n0\n", "there are 1 values in it, and 2 are needed"),
+    "empty": ("", "names both columns with units"),
+    "header alone": ("angle [deg],pressure [bar]\n", "there are no values below the first line"),
+    "few": ("angle [deg],pressure [bar]\n0,1\n20,1\n", "a cycle needs at least 24"),
+}
+
+
+@pytest.mark.parametrize("kind", CSV)
+def test_a_bad_csv_file_is_refused_in_one_sentence(kind, tmp_path):
+    text, says = CSV[kind]
+    path = tmp_path / "indicator.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        MeasuredCycle.from_csv(path)
+    (sentence,) = caught.value.sentences
+    assert sentence.startswith(f'"{path}": ')
+    assert says in sentence
+    with pytest.raises(InputError, match="there is no such file"):
+        MeasuredCycle.from_csv(tmp_path / "nowhere.csv")
+
+
+def test_bad_measured_angles_and_pressures_are_refused():
+    even = np.radians(np.arange(0.0, 720.0, 10.0))
+    flat = np.full(even.size, 1e5)
+    swapped = even.copy()
+    swapped[5], swapped[6] = even[6], even[5]
+    for angles, pressures, says in (
+        (swapped, flat, "must be above the one before"),
+        (even * 2.0, flat, "a cycle has 720 deg"),
+        (even[:40], flat[:40], "there is nothing over 330 deg"),
+        (even, -flat, "an absolute pressure is above 0"),
+        (even, flat[:-1], "pressures for"),
+        (np.append(even, even[0] + 4 * math.pi), np.append(flat, 2e5), "their pressures differ"),
+    ):
+        with pytest.raises(InputError, match=says):
+            MeasuredCycle(tuple(angles), tuple(pressures))
+
+
+BAD = {
+    "compression_ratio": ({"compression_ratio": 1.0}, "must be above 1"),
+    "exponent": ({"expansion_exponent": 0.9}, "must be above 1"),
+    "idle": ({"idle_pressure": 2e5}, "must not be above intake_pressure"),
+    "several pressures": ({"mean_indicated_pressure": (8e5, 9e5)}, "need as many speeds"),
+    "speeds too many": ({"speeds": (1.0, 2.0)}, "2 speeds for 1 mean"),
+    "falling": ({"mean_indicated_pressure": (8e5, 9e5), "speeds": (2.0, 1.0)}, "above the one before"),
+    "late": ({"combustion_duration": "200 deg"}, "the combustion lasts to 185 deg"),
+    "early": ({"combustion_start": "180 deg"}, "begins in the compression"),
+    "exhaust": ({"exhaust_opening": "190 deg"}, "when the expansion ends"),
+    "blowdown": ({"blowdown": "300 deg"}, "ends after the exhaust stroke"),
+    "unit": ({"intake_pressure": "1 N"}, "N is a force, not a pressure"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_an_impossible_cycle_is_refused(kind):
+    change, says = BAD[kind]
+    with pytest.raises(InputError, match=says):
+        SimpleCycle(**({"compression_ratio": 9.0, "mean_indicated_pressure": 9e5} | change))
+
+
+def test_a_mean_pressure_below_that_without_heat_is_refused():
+    with pytest.raises(InputError, match="does more work without any heat"):
+        engine(gas=SimpleCycle(9.0, "0.01 bar", intake_pressure="3 bar"))

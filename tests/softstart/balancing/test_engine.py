@@ -1,0 +1,160 @@
+"""Engines from files and from Python: what is read, what is refused, what drives a chain."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.softstart.balancing.engines import RPM, engine
+
+from softstart import Engine, InputError, PeriodicTorque
+from softstart.balancing import BalancerShaft, Cylinders, Layout, MeasuredCycle, Operation
+from softstart.balancing.writing import indicator_csv
+
+VAZ = Engine.load("vaz-11113")
+GOOD = VAZ.to_toml()
+
+
+def test_shipped_engine_says_what_is_assumed():
+    assert VAZ.source.startswith("[B]")
+    assert {"masses.reciprocating", "cylinders.bore", "cycle.compression_ratio"} <= set(VAZ.assumed)
+    assert "balancer.tuning_speed" not in VAZ.assumed  # printed
+    mine = Engine.load("vaz-11113", also={"masses.reciprocating": "0.6 kg"})
+    assert set(VAZ.assumed) - set(mine.assumed) == {"masses.reciprocating"}
+
+
+def test_engines_are_values():
+    assert Engine.from_toml(GOOD) == VAZ
+    assert hash(Engine.from_toml(GOOD)) == hash(VAZ)
+    assert replace(VAZ, name="other") != VAZ
+    with pytest.raises(AttributeError):
+        VAZ.name = "other"
+    four = engine((1, 3, 4, 2), shafts=[BalancerShaft(0.01, 2, height=0.1), BalancerShaft(0.01, -2)])
+    assert Engine.from_toml(four.to_toml()) == four
+
+
+def test_a_measured_pressure_is_read_beside_the_file(tmp_path):
+    angles = np.radians(np.arange(-360.0, 360.0, 5.0))
+    gas = MeasuredCycle(tuple(angles), tuple(VAZ.pressure(np.mod(angles, 4 * np.pi), 300.0)))
+    made = replace(VAZ, gas=gas)
+    (tmp_path / "indicator.csv").write_text(indicator_csv(gas))
+    (tmp_path / "mine.toml").write_text(made.to_toml())
+    assert Engine.load(tmp_path / "mine.toml") == made
+    with pytest.raises(InputError, match="a measured pressure is that of the load"):
+        replace(made, operation=Operation(100.0, 500.0, 0.5))
+    with pytest.raises(InputError, match="a measured pressure is that of the load"):
+        made.gas_harmonics(300.0, 0.5)
+    (tmp_path / "indicator.csv").unlink()
+    with pytest.raises(InputError, match="there is no such file"):
+        Engine.load(tmp_path / "mine.toml")
+
+
+BAD = {
+    "rod": ("cylinders.rod_length", "30 mm", "[cylinders] rod_length = 0.03 m: the rod must be longer"),
+    "unit": ("cylinders.bore", "82 N", "N is a force, not a length"),
+    "firing": ("cylinders.firing_angles", ["0 deg", "720 deg"], "from 0 to below 720 deg"),
+    "order": ("cylinders.firing_order", [1, 2], "both are given"),
+    "mass": ("masses.reciprocating", -1, "must be above 0"),
+    "share": ("counterweights.reciprocating_share", 1.5, "from 0 to 1"),
+    "speeds": ("operation.highest_speed", "500 rpm", "must be above lowest_speed"),
+    "frequency": ("operation.highest_speed", "50 Hz", "Hz is a frequency"),
+    "load": ("operation.load", 2, "from 0 to 1"),
+    "tuning": ("balancer.tuning_speed", 0, "must be above 0"),
+    "key": ("masses.reciprocatin", 1, "did you mean masses.reciprocating?"),
+    "assumed": ("assumed", "mass.*", "did you mean masses.*?"),
+    "cycle": ("cycle.compression_ratio", 0.5, "[cycle] compression_ratio = 0.5: it must be above 1"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_each_mistake_has_its_sentence(kind):
+    key, value, says = BAD[kind]
+    with pytest.raises(InputError) as caught:
+        Engine.from_toml(GOOD, also={key: value})
+    (sentence,) = caught.value.sentences
+    assert says in sentence
+    assert sentence.endswith((".", "?"))
+
+
+def test_all_mistakes_are_told_at_once():
+    text = GOOD + "[[shaft]]\nimbalance = 0.01\nratio = 0.5\n"
+    wrong = {"cylinders.rod_length": "30 mm", "operation.highest_speed": "500 rpm", "assumed": "masss.*"}
+    with pytest.raises(InputError) as caught:
+        Engine.from_toml(text, where="my.toml", also=wrong)
+    said = caught.value.sentences
+    assert len(said) == 4
+    assert all(sentence.startswith("my.toml: ") for sentence in said)
+    assert any("[shaft] 1, ratio = 0.5: a balancer shaft turns a whole number" in s for s in said)
+
+
+def test_one_source_of_the_pressure():
+    neither = GOOD[: GOOD.index("[cycle]")] + GOOD[GOOD.index("[operation]") :]
+    with pytest.raises(InputError, match="neither is there"):
+        Engine.from_toml(neither.replace(", cycle", ", indicator").replace(_assumed(GOOD), 'assumed = ""'))
+    with pytest.raises(InputError, match="both are there"):
+        Engine.from_toml(GOOD + '[indicator]\nfile = "x.csv"\n')
+
+
+def _assumed(text):
+    return next(line for line in text.splitlines() if line.startswith("assumed"))
+
+
+def test_firing_order_and_angles():
+    with pytest.raises(InputError, match="each cylinder from 1 to 4 is named once"):
+        Cylinders(0.08, 0.08, 0.13, firing_order=(1, 3, 3, 2))
+    with pytest.raises(InputError, match="neither is given"):
+        Cylinders(0.08, 0.08, 0.13)
+    with pytest.raises(InputError, match="orders up to 24"):
+        engine(shafts=[BalancerShaft(0.01, 30)])
+
+
+def test_shipped_name_misspelt():
+    with pytest.raises(InputError, match=r"did you mean vaz-11113\?"):
+        Engine.load("vaz-1111")
+
+
+# the torque for a chain --------------------------------------------------------------------------------
+
+
+def test_torque_of_time_is_the_torque_over_the_crank_angle():
+    made = engine((1, 3, 4, 2), bore=0.08)
+    w = 200.0
+    t = np.linspace(0.0, 0.2, 301)
+    torque = made.torque_of_time(w, orders=24)
+    exact = made.torque(w * t, w)
+    assert torque.mean == pytest.approx(made.indicated_work(w) / (4.0 * math.pi), rel=1e-13)
+    assert np.abs(torque.at(t) - exact).max() < 0.01 * np.ptp(exact)  # what is beyond order 24
+    errors = [np.abs(made.torque_of_time(w, orders=n).at(t) - exact).max() for n in (4, 8, 16, 24)]
+    assert errors == sorted(errors, reverse=True)
+    assert torque.orders.tolist() == list(range(2, 25, 2))  # the others cancel
+    assert torque.frequencies == pytest.approx(w * torque.orders)
+    assert engine((1,)).torque_of_time(w).orders[0] == 0.5
+
+
+def test_a_periodic_torque_repeats_and_has_its_mean():
+    torque = VAZ.torque_of_time(3000.0 * RPM)
+    period = 2.0 * math.pi / torque.speed
+    t = np.linspace(0.0, period, 400, endpoint=False)
+    assert torque.at(t) == pytest.approx(torque.at(t + 7.0 * period), rel=1e-9)
+    assert torque.at(t).mean() == pytest.approx(torque.mean, rel=1e-12)
+    power = np.mean((torque.at(t) - torque.mean) ** 2)
+    assert power == pytest.approx(0.5 * np.sum(torque.amplitudes**2), rel=1e-12)  # Parseval
+    assert torque.at(0.1).shape == ()
+    assert PeriodicTorque(**torque.summary()).at(0.01) == torque.at(0.01)
+
+
+def test_bad_periodic_torques_are_refused():
+    for arguments, says in (
+        ((0.0, [1.0], [1.0], [], 10.0), "give as many of each"),
+        ((0.0, [1.0], [1.0], [0.0], 0.0), "above 0 rad/s"),
+        ((0.0, [0.0], [1.0], [0.0], 10.0), "belongs into mean"),
+        ((math.nan, [1.0], [1.0], [0.0], 10.0), "finite"),
+    ):
+        with pytest.raises(InputError, match=says):
+            PeriodicTorque(*arguments)
+    with pytest.raises(InputError, match="from order"):
+        VAZ.torque_of_time(100.0, orders=0.1)
+
+
+def test_a_layout_without_a_spacing():
+    assert Layout("4500 rpm").spacing == 0.0

@@ -1,0 +1,116 @@
+"""The exact crank drive, and its harmonics in two independent ways."""
+
+from fractions import Fraction
+from itertools import pairwise
+from math import comb
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart.balancing.slider_crank import (
+    SliderCrank,
+    acceleration_harmonics,
+    acceleration_series,
+    inertia_torque_harmonics,
+    inertia_torque_series,
+)
+
+PHI = np.linspace(0.0, 2.0 * np.pi, 97)
+ratios = st.floats(0.02, 0.9)
+
+
+def complex_step(function, phi):
+    """Derivative without differences: the imaginary part of f(phi + i h)/h."""
+    return function(phi + 1e-30j).imag / 1e-30
+
+
+def height(crank, phi):
+    return crank.r * np.cos(phi) + np.sqrt(crank.rod**2 - (crank.r * np.sin(phi)) ** 2)
+
+
+@settings(max_examples=30, deadline=None)
+@given(ratios, st.floats(1e-3, 10.0))
+def test_derivatives_are_those_of_the_height(ratio, r):
+    crank = SliderCrank(r, r / ratio)
+    slope = complex_step(lambda phi: height(crank, phi), PHI)
+    assert crank.height(PHI) == pytest.approx(height(crank, PHI), rel=1e-14)
+    assert crank.slope(PHI) == pytest.approx(slope, abs=1e-13 * r)
+
+    def slope_of(phi):
+        q = np.sqrt(1.0 - (ratio * np.sin(phi)) ** 2)
+        return -r * np.sin(phi) - r * ratio * np.sin(phi) * np.cos(phi) / q
+
+    assert crank.curvature(PHI) == pytest.approx(complex_step(slope_of, PHI), abs=1e-11 * r)
+
+
+def test_dead_centres_and_the_mass_on_a_long_rod():
+    crank = SliderCrank(0.04, 0.14)
+    assert crank.height(0.0) - crank.height(np.pi) == pytest.approx(0.08, rel=1e-15)
+    assert crank.curvature(0.0) == pytest.approx(-0.04 * (1 + 2 / 7), rel=1e-14)
+    assert crank.curvature(np.pi) == pytest.approx(0.04 * (1 - 2 / 7), rel=1e-13)
+    harmonic = SliderCrank(0.04, 1e6)
+    assert harmonic.curvature(PHI) == pytest.approx(-0.04 * np.cos(PHI), abs=1e-8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(ratios)
+def test_power_series_and_fft_agree(ratio):
+    assert acceleration_series(ratio, 24) == pytest.approx(acceleration_harmonics(ratio, 24), abs=1e-12)
+    assert inertia_torque_series(ratio, 24) == pytest.approx(inertia_torque_harmonics(ratio, 24), abs=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.02, 0.5))
+def test_the_harmonics_make_up_the_exact_course(ratio):
+    crank = SliderCrank(ratio, 1.0)
+    q = np.arange(61)
+    force = np.cos(np.outer(PHI, q)) @ np.array(acceleration_harmonics(ratio, 60))
+    assert force == pytest.approx(-crank.curvature(PHI) / ratio, abs=1e-12)
+    torque = np.sin(np.outer(PHI, q)) @ np.array(inertia_torque_harmonics(ratio, 60))
+    assert torque == pytest.approx(-crank.slope(PHI) * crank.curvature(PHI) / ratio**2, abs=1e-12)
+
+
+def rod_coefficients(terms):
+    """c_0, c_2 .. of sqrt(1 - x^2 sin^2), each a polynomial in x^2, in exact fractions."""
+    found = [[Fraction(0)] * (terms + 1) for _ in range(terms + 1)]
+    binomial = Fraction(1)
+    for j in range(terms + 1):
+        for i in range(j + 1):
+            size = Fraction(comb(2 * j, j - i), 4**j) * (1 if i == 0 else 2) * (-1) ** i
+            found[i][j] += binomial * (-1) ** j * size
+        binomial *= (Fraction(1, 2) - j) / (j + 1)
+    return found
+
+
+def test_textbook_coefficients():
+    # A_2 = x + x^3/4 + 15 x^5/128, A_4 = -(x^3/4 + 3 x^5/16), A_6 = 9 x^5/128 of the acceleration, from the
+    # exact expansion in fractions: A_2i = 4 i^2 c_2i/x
+    rod = rod_coefficients(3)
+    assert [4 * rod[1][j] for j in (1, 2, 3)] == [1, Fraction(1, 4), Fraction(15, 128)]
+    assert [16 * rod[2][j] for j in (2, 3)] == [Fraction(-1, 4), Fraction(-3, 16)]
+    assert 36 * rod[3][3] == Fraction(9, 128)
+    x = 0.01
+    A = acceleration_harmonics(x, 6)
+    assert A[1] == 1.0
+    assert A[2] == pytest.approx(x + x**3 / 4 + 15 * x**5 / 128, rel=1e-12)
+    assert A[4] == pytest.approx(-(x**3) / 4 - 3 * x**5 / 16, abs=1e-14)
+    B = inertia_torque_series(0.1, 4)
+    x = 0.1  # the next terms are of x^7, x^6, x^7, x^6
+    assert B[1] == pytest.approx(x / 4 + x**3 / 16 + 15 * x**5 / 512, abs=3 * x**7)
+    assert B[2] == pytest.approx(-1 / 2 - x**4 / 32, abs=3 * x**6)
+    assert B[3] == pytest.approx(-3 * x / 4 - 9 * x**3 / 32 - 81 * x**5 / 512, abs=3 * x**7)
+    assert B[4] == pytest.approx(-(x**2) / 4 - x**4 / 8, abs=3 * x**6)
+
+
+def test_fft_converges_exponentially_with_the_samples():
+    ratio = 0.3
+    crank = SliderCrank(ratio, 1.0)
+    exact = inertia_torque_series(ratio, 4)
+    errors = []
+    for n in (8, 12, 16, 20):
+        phi = 2.0 * np.pi * np.arange(n) / n
+        torque = -crank.slope(phi) * crank.curvature(phi) / ratio**2
+        errors.append(float(np.abs(-2.0 / n * np.fft.rfft(torque).imag[:5] - exact).max()))
+    assert all(later < 0.02 * earlier for earlier, later in pairwise(errors))

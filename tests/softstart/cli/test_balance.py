@@ -1,0 +1,137 @@
+"""`softstart balance`: the tables, the JSON, the files, and bad input."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+from softstart import Engine, balance
+
+RPM = math.pi / 30.0
+FILES = {
+    "report.md",
+    "engine.toml",
+    "orders.csv",
+    "residuals.csv",
+    "torque.csv",
+    *(f"{stem}.{ending}" for stem in ("torque", "residual", "forces") for ending in ("svg", "png")),
+}
+
+
+def test_json_is_the_summary(run):
+    code, out, err = run("balance", "--json", "--speed", "4500rpm", "--speed", "1000 rpm")
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    found = balance(Engine.load("vaz-11113"), ["4500 rpm", "1000 rpm"])
+    assert told == json.loads(json.dumps(found.summary()))
+    by_name = {one["name"]: one for one in told["designs"]}
+    assert [row["speed"] / RPM for row in by_name["none"]["speeds"]] == pytest.approx([4500.0, 1000.0])
+    assert by_name["variable-h-e"]["largest_first_order_moment"] < 1e-9
+    assert "masses.reciprocating" in told["assumed"]
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_the_tables_are_shown_and_fit(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    code, out, err = run("balance", "--speed", "4500rpm")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= int(width)
+    assert not any(line != line.rstrip() for line in lines)
+    flat = " ".join(out.split())
+    for words in ("VAZ-11113", "bore 82 mm*", "* assumed", "fixed-h-e", "constant speed", "inertia-only"):
+        assert words in flat
+
+
+def test_changes_are_no_longer_assumed_and_count(run):
+    pressures = 'cycle.mean_indicated_pressure=["7 bar", "8 bar", "7 bar"]'
+    changes = [
+        "masses.reciprocating=0.5 kg",
+        pressures,
+        "balancer.tuning_speed=3200rpm",
+        "operation.load=0.5",
+    ]
+    code, out, _ = run("balance", "--json", *(word for change in changes for word in ("--set", change)))
+    assert code == 0
+    told = json.loads(out)
+    assert not {"masses.reciprocating", "cycle.mean_indicated_pressure"} & set(told["assumed"])
+    assert told["imbalance"] == pytest.approx(0.5 * 0.0355, rel=1e-12)
+    assert told["load"] == 0.5
+    full = Engine.load("vaz-11113", also={"cycle.mean_indicated_pressure": ["7 bar", "8 bar", "7 bar"]})
+    work = full.indicated_work(3200 * RPM, 1.0) / full.displacement
+    assert work == pytest.approx(8e5, rel=1e-12)
+    assert told["tuning_speed"] == pytest.approx(3200 * RPM)
+
+
+def test_the_files(run, place):
+    code, out, err = run("balance", "--out", "deep/oka")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1].startswith("Written to deep/oka: ")
+    folder = place / "deep" / "oka"
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert (folder / "torque.png").read_bytes().startswith(b"\x89PNG")
+    report = (folder / "report.md").read_text("utf-8")
+    assert {part.split(")")[0] for part in report.split("](")[1:]} <= FILES
+    assert "softstart balance --out deep/oka" in report
+    assert Engine.load(folder / "engine.toml") == Engine.load("vaz-11113")
+    with (folder / "torque.csv").open(encoding="utf-8") as stream:
+        rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]])
+    engine = Engine.load("vaz-11113")
+    assert rows[:, 1] == pytest.approx(engine.gas_torque(np.radians(rows[:, 0]), 4500 * RPM), rel=1e-12)
+
+
+def test_an_engine_with_a_measured_pressure_and_without_a_free_force(run, place):
+    engine = Engine.load("vaz-11113")
+    angles = np.arange(-360.0, 360.0, 2.0)
+    bars = 1e-5 * engine.pressure(np.radians(angles % 720.0), 4500 * RPM)
+    lines = [f"{a:g},{p!r}" for a, p in zip(angles.tolist(), bars.tolist(), strict=True)]
+    (place / "p.csv").write_text("angle [deg],pressure [bar]\n" + "\n".join(lines))
+    text = engine.to_toml()
+    begin, end = text.index("[cycle]"), text.index("[operation]")
+    text = text[:begin] + '[indicator]\nfile = "p.csv"\n' + text[end:]
+    text = text.replace("firing_angles = [0.0, 6.283185307179586]", "firing_order = [1, 3, 4, 2]")
+    keep = ", ".join(key for key in engine.assumed if not key.startswith("cycle"))
+    text = text.replace(", ".join(engine.assumed), keep)
+    (place / "four.toml").write_text(text)
+    code, out, err = run("balance", "four.toml", "--out", "four")
+    assert (code, err) == (0, "")
+    assert "nothing to balance" in " ".join(out.split())
+    assert "measured, 360 points" in out
+    assert Engine.load(place / "four" / "engine.toml") == Engine.load(place / "four.toml")
+
+
+ONE_SENTENCE = {
+    "engine": (["vaz-1111"], ["did you mean vaz-11113?"]),
+    "folder": (["folder"], ["this is a folder"]),
+    "empty": (["empty.toml"], ["it is empty"]),
+    "speed": (["--speed", "50 Hz"], ["--speed", "Hz is a frequency"]),
+    "speed below 0": (["--speed", "-1"], ['--speed = "-1"', "above 0"]),
+    "no value": (["--set", "masses.rotating"], ["write a key, an equals sign and a value"]),
+    "twice": (["--set", "masses.rotating=1", "--set", "masses.rotating=2"], ["given twice"]),
+    "key": (["--set", "masses.rotatin=1"], ["did you mean masses.rotating?"]),
+    "value": (["--set", "cylinders.bore=82 N"], ["N is a force, not a length"]),
+    "output": (["--out", "good.toml"], ["is a file, not a folder"]),
+}
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind, run, nothing_left):
+    arguments, says = ONE_SENTENCE[kind]
+    code, out, err = run("balance", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("softstart: ")
+    assert err.count("\n") == 1
+    for words in says:
+        assert words in err
+    nothing_left()
+
+
+def test_all_mistakes_are_told_at_once(run):
+    code, _, err = run(
+        "balance", "--speed", "50 Hz", "--set", "cylinders.bore=1 N", "--set", "masses.rotating=-1"
+    )
+    assert code == 2
+    for words in ("--speed", "cylinders", "rotating"):
+        assert words in err
