@@ -1,0 +1,72 @@
+"""`softstart study wear`: a short life against single starts and single optima."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softstart import optimize, simulate
+from softstart.study import find_study
+from softstart_studies.tuned_alike import CRANE
+from softstart_studies.wear import Extent, Wear, live, present
+
+PART = Extent(
+    life=(0.5, 1.0),
+    scheduled=(0.5, 1.0),
+    restarts=1,
+    generations=3,
+    controllers=("ramp", "current-limit-feedback"),
+    front_points=5,
+)
+NEW = CRANE.replace(load_kind="reactive")
+
+
+@pytest.fixture(scope="module")
+def life():
+    return live(PART, lambda text: None)
+
+
+def test_defaults_are_those_of_the_new_drive(life):
+    for name, ways in life.courses.items():
+        for gap, k in zip(life.gaps, ways["defaults"].k_dyn, strict=True):
+            assert simulate(NEW.replace(gap=gap), name, fitted_to=NEW).k_dyn == k
+
+
+def test_fixed_gains_are_those_of_the_schedule_at_the_new_gap(life):
+    for ways in life.courses.values():
+        assert ways["fixed"].k_dyn[0] == pytest.approx(ways["scheduled"].k_dyn[0], rel=1e-12)
+        # at a cell of the schedule it is in time, or at least no worse than the defaults
+        late = ways["scheduled"].start_time > life.bound
+        better = ways["scheduled"].k_dyn <= ways["defaults"].k_dyn * (1 + 1e-9)
+        slower = ways["defaults"].start_time > life.bound
+        assert np.all(late | better | slower)
+
+
+def test_the_front_between_its_points_is_the_optimum_to_half_a_percent(life):
+    front = life.fronts[0]
+    time = float(np.sqrt(front.start_times[1] * front.start_times[2]))
+    best = optimize(NEW.replace(torque_lag=0.0), time, terminal="reached").k_dyn
+    assert front.at(time) == pytest.approx(best, rel=5e-3)
+    assert np.isnan(front.at(0.5 * front.start_times[0]))
+    assert np.all(np.diff(front.k_dyn) <= 1e-9)
+
+
+def test_no_start_is_gentler_than_the_optimum_in_its_time(life):
+    for ways in life.courses.values():
+        for course in ways.values():
+            ratio = life.ratio(course)
+            assert np.all(ratio[np.isfinite(ratio)] > 0.99)  # half a percent of interpolation, and rounding
+
+
+def test_tables_claims_and_figures(life):
+    result = present(life, lambda text: None)
+    assert len(result.tables[0].rows) == 2 * 4
+    assert len(result.claims) == 3
+    assert set(result.figures) == set(Wear.pictures)
+    panel = result.figures["wear-life"].axes[0]
+    lines = {line.get_label(): line for line in panel.lines}
+    assert np.array_equal(lines["scheduled"].get_ydata(), life.courses["ramp"]["scheduled"].k_dyn)
+
+
+def test_the_study_is_registered():
+    assert isinstance(find_study("wear"), Wear)
