@@ -62,7 +62,8 @@ def compare(
     """Start a drive under several controllers and compare them.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. A controller is a name (see: softstart controllers) or path/to/file.py:Class.
+    of the literature is taken. A controller is a name (see: softstart controllers), path/to/file.py:Class,
+    or a file of tuned gains.
     """
     mistakes = Mistakes()
     names: Sequence[str] = controller_names()

@@ -40,7 +40,10 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 @click.command(cls=Command)
 @drive_argument()
 @controller_option(
-    "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
+    "--controller",
+    "NAME",
+    "A controller's name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).",
+    required=True,
 )
 @param_option("KEY=VALUE", "Set a parameter of the controller, as time='200 ms'. May be repeated.")
 @set_option

@@ -65,7 +65,7 @@ class Workers:
             return
         try:
             pool = self._pool()
-            with _deaf_to_interruption():  # what is started here inherits it
+            with _deaf_to_interruption(), _one_thread_each():  # what is started here inherits both
                 places: dict[Future[Any], int] = {
                     pool.submit(_do, work, item): index for index, item in enumerate(items)
                 }
@@ -107,6 +107,20 @@ def _deaf_to_interruption() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Workers share the processors already; threads of a linear algebra library in them would only wait."""
+    name = "OPENBLAS_NUM_THREADS"
+    if name in os.environ:
+        yield
+        return
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[name]
 
 
 def count_of(workers: int | None, trials: Trials) -> int:
