@@ -27,6 +27,7 @@ layers: $(VENV)/.installed-dev
 benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-starts --out results/benchmark-starts
 	$(BIN)/softstart study benchmark-optima --out results/benchmark-optima
+	$(BIN)/softstart study benchmark-sweeps --out results/benchmark-sweeps
 
 clean:
 	rm -rf $(VENV) results

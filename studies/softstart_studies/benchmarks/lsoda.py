@@ -34,8 +34,6 @@ def sampled_plan(problem: Problem) -> Plan:
     initial, full, time, period = problem.initial, problem.full, problem.time, problem.period
 
     def plan(t: float, stage: int) -> tuple[float, float]:
-        if t >= time:
-            return full, NEVER_ASKED
         k = math.floor(t / period + 1e-6)
         if k * period >= time:
             return full, NEVER_ASKED

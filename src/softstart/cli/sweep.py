@@ -1,0 +1,227 @@
+"""`softstart sweep`: the starts of a whole grid, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from softstart.cli.folder import output_folder
+from softstart.cli.options import (
+    DEFAULT_DRIVE,
+    Mistakes,
+    check_name,
+    command_line,
+    controller_option,
+    drive_argument,
+    json_option,
+    out_option,
+    param_option,
+    read_drive,
+    read_params,
+    read_until,
+    set_option,
+    until_option,
+)
+from softstart.cli.usage import Command
+from softstart.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+    from softstart.drive import Drive
+    from softstart.sweeping.progress import Progress
+
+RESULTS = "sweep.zarr"
+AT_MOST = 4.0  # times a second, that the line of progress changes
+
+
+@click.command(cls=Command)
+@drive_argument(default=DEFAULT_DRIVE)
+@controller_option(
+    "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp."
+)
+@click.option(
+    "--axis",
+    "axes",
+    metavar="KEY=VALUES",
+    multiple=True,
+    required=True,
+    help="An axis of the grid: a parameter of the drive, as shaft.gap=0.25:4:100 (from:to:count, with :log "
+    "behind in equal ratios) or load.kind=active,reactive, or of the controller, as controller.torque='10 "
+    "N*m,20 N*m'. To be repeated.",
+)
+@param_option("KEY=VALUE", "A parameter of the controller, the same for all starts. May be repeated.")
+@set_option
+@until_option
+@click.option(
+    "--figures", metavar="A,B,...", help="Figures to keep, as k_dyn,start_time; the status always is."
+)
+@click.option("--workers", metavar="N", help="Processes on this machine. By default one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead.")
+@click.option("--chunk", metavar="N", help="Most starts that are computed and written at a time.")
+@click.option("--netcdf", metavar="FILE", help="Also write the finished results as netCDF.")
+@json_option
+@out_option(
+    f"Write the results chunk by chunk into DIR/{RESULTS}, and figure, table and report.md beside it: the "
+    "same command goes on where an earlier one ended. Without it the results are only summed up."
+)
+def sweep(
+    *,
+    drive: str,
+    controller: str | None,
+    axes: tuple[str, ...],
+    params: tuple[str, ...],
+    settings: tuple[str, ...],
+    until: str | None,
+    figures: str | None,
+    workers: str | None,
+    scheduler: str | None,
+    chunk: str | None,
+    netcdf: str | None,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Simulate every start of a grid of drives and controllers, of any size.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. The results are a Zarr folder that xarray opens.
+    """
+    mistakes = Mistakes()
+    one: Drive | None = None
+    values: dict[str, str] = {}
+    asked: dict[str, Any] = {"scheduler": scheduler, "netcdf": netcdf}
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    with mistakes.noted():
+        if controller is not None:
+            check_name(controller, "--controller")
+        elif not any(text.partition("=")[0].strip() == "controller" for text in axes):
+            raise InputError(
+                "--controller is missing: name one, or make an axis of several, as controller=direct,ramp."
+            )
+    with mistakes.noted():
+        values = read_params(params)
+    with mistakes.noted():
+        asked["until"] = read_until(until)
+    for option, text in (("workers", workers), ("chunk", chunk)):
+        with mistakes.noted():
+            asked[option] = _count(text, f"--{option}")
+    if figures is not None:
+        asked["figures"] = [name.strip() for name in figures.split(",")]
+    mistakes.settle()
+    assert one is not None
+
+    begin = time.monotonic()
+    with output_folder(out) as folder, _kept(out) as to, _as_options():
+        results, last = _computed(one, controller, values, axes, asked, to)
+        from softstart.cli.running import working
+        from softstart.sweeping.summary import summarise
+
+        with working("summing up ..."):
+            summary = summarise(results)
+            if folder is not None:
+                from softstart.cli.sweep_report import write_sweep
+
+                write_sweep(results, summary, one, folder, command_line())
+
+    from softstart.cli.show import console, print_json
+    from softstart.cli.sweep_text import axis_summary, show
+
+    if as_json:
+        print_json(
+            {
+                "drive": one.name,
+                "controller": controller,
+                "axes": axis_summary(results),
+                **summary.summary(),
+                "seconds": time.monotonic() - begin,
+                "computed": last.done - last.before if last else 0,
+                "results": None if to is None else str(to),
+            }
+        )
+        return
+    show(console(), one, results, summary, last)
+    if out is not None:
+        print(f"\nWritten to {out}: {RESULTS}, report.md, the figure and the table.")
+
+
+def _computed(
+    drive: Drive,
+    controller: str | None,
+    values: dict[str, str],
+    axes: tuple[str, ...],
+    asked: dict[str, Any],
+    to: Path | None,
+) -> tuple[xarray.Dataset, Progress | None]:
+    """The results, and how far it was at the end."""
+    from softstart.cli.running import Attributed, working
+
+    with working("starting the first drive ...") as status, Attributed():
+        from softstart.cli.sweep_axes import read_axes
+        from softstart.sweeping.entry import sweep as compute
+        from softstart.sweeping.maker import Maker
+
+        grid = read_axes(axes, Maker(controller or "", values))
+        last: Progress | None = None
+        shown = 0.0
+
+        def progress(now: Progress) -> None:
+            nonlocal last, shown
+            last = now
+            if status is not None and time.monotonic() - shown > 1.0 / AT_MOST:
+                shown = time.monotonic()
+                status.update(f"{now} ...")
+
+        return compute(drive, controller, grid, parameters=values, to=to, progress=progress, **asked), last
+
+
+@contextmanager
+def _kept(out: str | None) -> Iterator[Path | None]:
+    """The folder of the results in DIR itself: it is there after an interruption too, and that is said."""
+    to = None if out is None else Path(out) / RESULTS
+    try:
+        yield to
+    except KeyboardInterrupt:
+        if to is not None and to.exists():
+            print(f"softstart: finished chunks are kept in {to}; the same command goes on.", file=sys.stderr)
+        raise
+
+
+@contextmanager
+def _as_options() -> Iterator[None]:
+    """Sentences about keywords of `sweep`, as sentences about the options."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
+
+
+def as_option(sentence: str) -> str:
+    """The sentence with the option's name where the keyword's was.
+
+    >>> as_option("to = here/sweep.zarr: it holds ..."), as_option("chunk = 3: ...; leave chunk out to go on")
+    ('--out: here/sweep.zarr: it holds ...', '--chunk = 3: ...; leave --chunk out to go on')
+    """
+    found = re.match(r"(to|netcdf|scheduler|workers|chunk|figures|grid)\b", sentence)
+    if found is None:
+        return sentence
+    word = found[1]
+    if word == "to":
+        return "--out: " + sentence.removeprefix("to = ")
+    option = "--axis" if word == "grid" else f"--{word}"
+    return re.sub(rf"\b{word}(?= =|:|,| out\b)", option, sentence)
+
+
+def _count(text: str | None, option: str) -> int | None:
+    if text is None:
+        return None
+    if text.strip().isascii() and text.strip().isdigit() and int(text) > 0:
+        return int(text)
+    raise InputError(f'{option} = "{text}": give a whole number of 1 or more.')

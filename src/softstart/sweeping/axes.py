@@ -1,0 +1,265 @@
+"""The axes of a sweep: which parameter of the drive or of the controller takes which values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from softstart.drive import PARAMETERS
+from softstart.drive.reading import read_parameter
+from softstart.drive.sentences import Wording, flat_name_meant, refused
+from softstart.errors import InputError
+from softstart.sweeping.maker import Maker, Parameters
+from softstart.units import RefusedError, nearest, show, to_si
+
+Owner = Literal["drive", "parameter", "controller"]
+PREFIX = "controller"
+_BY_PATH = {p.path: p.name for p in PARAMETERS.values()}
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The values that one parameter takes: float64 numbers in `unit`, or texts.
+
+    `owner` "drive": the field `field` of the drive; "parameter": a parameter of the controller;
+    "controller": the controller itself, by name.
+    """
+
+    name: str
+    owner: Owner
+    field: str
+    unit: str
+    meaning: str
+    values: Any
+
+    @property
+    def numeric(self) -> bool:
+        """Whether the values are numbers."""
+        return isinstance(self.values, np.ndarray)
+
+    @property
+    def size(self) -> int:
+        """How many values there are."""
+        return len(self.values)
+
+    def part(self, place: slice) -> Column:
+        """The column with some of its values."""
+        return replace(self, values=self.values[place])
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """A dimension of the grid: one column, or several whose values belong together (samples)."""
+
+    name: str
+    columns: tuple[Column, ...]
+
+    @property
+    def size(self) -> int:
+        """Length of the axis."""
+        return self.columns[0].size
+
+    def part(self, place: slice) -> Axis:
+        """A piece of the axis."""
+        return Axis(self.name, tuple(column.part(place) for column in self.columns))
+
+    @property
+    def paired(self) -> bool:
+        """Whether the axis numbers samples of several parameters."""
+        return any(column.name != self.name for column in self.columns)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values along it are numbers."""
+        return all(column.numeric for column in self.columns)
+
+
+def read_grid(grid: object, maker: Maker) -> tuple[Axis, ...]:
+    """The axes in the order of the grid, or one InputError for all that is wrong with them.
+
+    >>> axes = read_grid({"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, 2]}, Maker("direct"))
+    >>> [(axis.name, axis.columns[0].values.tolist()) for axis in axes]
+    [('load_inertia', [0.07, 0.175]), ('gap', [0.5, 1.0, 2.0])]
+    """
+    if not isinstance(grid, Mapping) or not grid:
+        raise InputError(
+            f'grid = {show(grid)}: give the axes as a mapping of names to values, as {{"gap": [0.5, 1, 2]}}.'
+        )
+    wrong: list[str] = []
+    axes: list[Axis] = []
+    first: dict[str, str] = {}
+    parameters = _parameters(grid, maker, wrong)
+    for key, values in grid.items():
+        pairs = values.items() if isinstance(values, Mapping) else [(key, values)]
+        columns: list[Column] = []
+        for name, given in pairs:
+            try:
+                column = read_column(str(name), given, parameters)
+            except InputError as error:
+                wrong.extend(error.sentences)
+                continue
+            if column.name in first:
+                wrong.append(f"{name}: this is the same as {first[column.name]}; name each parameter once.")
+            first[column.name] = str(name)
+            columns.append(column)
+        if isinstance(values, Mapping):
+            axes += _paired(str(key), columns, len(values), wrong)
+        elif columns:
+            wrong.extend(_repeated(columns[0]))
+            axes.append(Axis(columns[0].name, tuple(columns)))
+    wrong += [
+        f"{axis.name}: a parameter among the samples has the name of this axis; give the axis another one."
+        for axis in axes
+        if axis.paired and axis.name in first
+    ]
+    if wrong:
+        raise InputError(wrong)
+    return tuple(axes)
+
+
+def target_of(key: str) -> tuple[Owner, str] | None:
+    """Whose parameter a key of the grid names, and which; None for an unknown one.
+
+    >>> target_of("load.inertia"), target_of("controller.torque"), target_of("controller")
+    (('drive', 'load_inertia'), ('parameter', 'torque'), ('controller', ''))
+    """
+    if key == PREFIX:
+        return "controller", ""
+    if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
+        return "parameter", key[len(PREFIX) + 1 :]
+    name = _BY_PATH.get(key, key)
+    return ("drive", name) if name in PARAMETERS else None
+
+
+def read_column(key: str, values: object, parameters: Parameters | None) -> Column:
+    """One column; `parameters` are those of the controllers, None where these are not known."""
+    target = target_of(key)
+    if target is None:
+        raise InputError(_unknown(key, parameters))
+    owner, field = target
+    if isinstance(values, str | bytes) or not (isinstance(values, Sequence) or hasattr(values, "__array__")):
+        raise InputError(f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2].")
+    if isinstance(values, range):
+        values = list(values)
+    if owner == "controller":
+        return Column(PREFIX, owner, "", "", "controller", _texts(key, values))
+    if owner == "drive":
+        return _of_drive(key, field, values)
+    if parameters is None:  # the controllers themselves are wrong, which is told elsewhere
+        raise InputError([])
+    if field not in parameters:
+        raise InputError(_no_such_parameter(key, field, parameters))
+    if field in parameters.fixed:
+        raise InputError(f"{key}: the parameter {field} has one value already; leave one of the two out.")
+    known = parameters[field]
+    if known.kind == "object":
+        raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
+    read = _texts(key, values) if known.kind == "text" else _flat(key, to_si(values, known.unit, name=key))
+    return Column(f"{PREFIX}_{field}", owner, field, known.unit, known.meaning or field, read)
+
+
+def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: list[str]) -> Parameters | None:
+    """The parameters that all controllers of the sweep have."""
+    names = grid.get(PREFIX)
+    try:
+        if PREFIX not in grid:
+            return maker.parameters()
+        if maker.given:
+            wrong.append(
+                f"controller = {maker.shown}: the controllers are an axis too; leave one of the two out."
+            )
+        if maker.values:
+            wrong.append(
+                f"parameters = {show(dict(maker.values))}: with several controllers give each parameter as "
+                "an axis, of one value if need be."
+            )
+        listed = [] if isinstance(names, str | bytes) or not isinstance(names, Sequence) else list(names)
+        return maker.common_parameters([name for name in listed if isinstance(name, str)])
+    except InputError as error:
+        wrong.extend(error.sentences)
+        return None
+
+
+def _of_drive(key: str, name: str, values: object) -> Column:
+    parameter = PARAMETERS[name]
+    if not parameter.unit and not parameter.choices:
+        raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
+    wording = Wording(written={name: key})
+    try:
+        if parameter.choices:
+            texts = _texts(key, values)
+            for text in texts:
+                try:
+                    read_parameter(parameter, text)
+                except RefusedError as reason:
+                    raise InputError(refused(wording, name, text, reason)) from None
+            return Column(name, "drive", name, "", parameter.meaning, texts)
+        read = read_parameter(parameter, values)
+    except RefusedError as reason:
+        raise InputError(refused(wording, name, values, reason)) from None
+    return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
+
+
+def _flat(key: str, values: object) -> Any:
+    found = np.array(values, dtype=np.float64)
+    if found.ndim != 1:
+        raise InputError(f"{key}: its values have shape {found.shape}; give them in one row.")
+    return found
+
+
+def _texts(key: str, values: Any) -> tuple[str, ...]:
+    listed = tuple(values)
+    bad = [value for value in listed if not isinstance(value, str) or not value]
+    if bad or not listed:
+        raise InputError(f"{key} = {show(bad[0] if bad else [])}: this axis takes names, in a list.")
+    return listed
+
+
+def _repeated(column: Column) -> list[str]:
+    """An axis names each place once, so that results can be looked up by value."""
+    if not column.numeric:
+        twice = [value for index, value in enumerate(column.values) if value in column.values[:index]]
+    else:
+        ordered = np.sort(column.values)
+        twice = ordered[1:][ordered[1:] == ordered[:-1]].tolist()
+    return [f"{column.name} = {show(twice[0])}: this value is given twice; give each once."] if twice else []
+
+
+def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> list[Axis]:
+    if not name.isidentifier():
+        wrong.append(f"{show(name)}: the name of samples is one word of letters and digits, as sample.")
+    if not count:
+        wrong.append(f"{name}: these samples have no parameter; give some, as {{'gap': [0.5, 0.6]}}.")
+    if len({column.size for column in columns}) > 1:
+        sizes = ", ".join(f"{column.name} has {column.size}" for column in columns)
+        wrong.append(f"{name}: all parameters of samples need equally many values; {sizes}.")
+    wrong += [
+        f"{column.name}: samples are numbers; make an axis of its own of these names."
+        for column in columns
+        if not column.numeric
+    ]
+    return [Axis(name, tuple(columns))] if columns else []
+
+
+def _unknown(key: str, parameters: Parameters | None) -> str:
+    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else list(flat_name_meant(key, []))
+    if not meant:
+        own = [f"{PREFIX}.{name}" for name in parameters or ()]
+        close = nearest(key, [*_BY_PATH, *own, *(parameters or ()), PREFIX])
+        meant = [f"{PREFIX}.{close}" if close in (parameters or ()) else close] if close else []
+    hint = (
+        f"did you mean {' or '.join(meant)}?"
+        if meant
+        else "take a parameter of the drive or controller.NAME."
+    )
+    return f"{key}: there is no such axis; {hint}"
+
+
+def _no_such_parameter(key: str, name: str, parameters: Parameters) -> str:
+    close = nearest(name, list(parameters))
+    there = ", ".join(parameters) or "none"
+    hint = f"did you mean {PREFIX}.{close}?" if close else f"there are {there}."
+    return f"{key}: {parameters.lacking}; {hint}"

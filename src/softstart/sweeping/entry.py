@@ -1,0 +1,232 @@
+"""`sweep`: the starts of a whole grid, however large."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, nullcontext
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softstart.controller.base import Controller
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.sweeping import netcdf as netcdf_file
+from softstart.sweeping.axes import Axis, read_grid
+from softstart.sweeping.checking import check_corners, first_start
+from softstart.sweeping.lock import locked
+from softstart.sweeping.maker import Maker, with_whole_path
+from softstart.sweeping.memory import Memory
+from softstart.sweeping.plan import Plan, checked_chunk, plan_for
+from softstart.sweeping.progress import Told, Watch
+from softstart.sweeping.starts import Question, Task, cut, known_figures
+from softstart.sweeping.store import Folder, open_folder, write_block
+from softstart.sweeping.workers import Dones, checked_workers, computed_by_processes, computed_here
+from softstart.units import nearest, show
+
+if TYPE_CHECKING:
+    import xarray
+
+FIGURES = ("k_dyn", "start_time", "peak_torque", "contacts")
+
+
+def sweep(
+    drive: Drive | str,
+    controller: str | Controller | None,
+    grid: Mapping[str, Any],
+    *,
+    parameters: Mapping[str, object] | None = None,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+    base: Drive | None = None,
+    to: str | os.PathLike[str] | None = None,
+    netcdf: str | os.PathLike[str] | None = None,
+    figures: tuple[str, ...] | list[str] = FIGURES,
+    chunk: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    time_limit: float | None = None,
+    progress: Told | None = None,
+) -> xarray.Dataset:
+    """Simulate every start of a grid; each figure is the same to the bit as that of `simulate`.
+
+    Parameters
+    ----------
+    drive : a Drive, or the name or file of one; it has what the grid does not vary.
+    controller : a name, `path/to/file.py:ClassName` or a Controller; None where controllers are an axis.
+    grid : the axes, in order: values by parameter. A parameter of the drive by name (`gap`) or as in a file
+        (`shaft.gap`), one of the controller as `controller.NAME`, and `controller` itself with names. Values
+        are numbers in SI, strings with units or texts (`load.kind`). A mapping in the place of values is one
+        axis of samples, whose parameters vary together: {"sample": {"gap": [...], "load.inertia": [...]}}.
+    parameters : parameters of the controller that are the same everywhere.
+    until, fitted_to, base, time_limit : as in `simulate`.
+    to : Zarr folder for the results. It is written chunk by chunk; the same call on it goes on where an
+        earlier one ended, however that ended. Without it the results are kept in memory.
+    netcdf : also write the finished results into this netCDF file.
+    figures : those to keep, by name; the status always is.
+    chunk : most starts of a chunk; memory and what an interruption loses go with it.
+    workers : processes of this machine, by default one a processor; 1 computes in this process.
+    scheduler : address of a dask scheduler whose workers compute instead.
+    progress : called with a `Progress` at the beginning and after each chunk.
+
+    Returns
+    -------
+    An xarray.Dataset with a dimension for each axis, called as the parameter is in Python (`load_inertia`,
+    `controller_torque`). Figures of starts that could not be finished are NaN, `status` says why by code.
+    With `to` nothing is read before it is looked at; `xarray.open_zarr(to)` opens it with dask.
+
+    Raises InputError for bad input, an impossible drive anywhere on the grid, or a folder that holds
+    something else; SimulationError for workers that cannot go on. After a KeyboardInterrupt finished chunks
+    are kept.
+
+    >>> from softstart import Drive, sweep
+    >>> found = sweep(Drive.load("crane-4amtkf"), "direct", {"gap": [0.5, 2], "load.inertia": [0.07, 0.175]})
+    >>> found.k_dyn.sel(gap=2, load_inertia=0.175).item().__round__(4)
+    4.8654
+    """
+    if isinstance(drive, str):
+        drive = Drive.load(drive)
+    maker = _maker(controller, parameters)
+    axes = _checked(drive, maker, grid, until, time_limit, fitted_to, base, figures)
+    question = Question(
+        drive, maker, tuple(dict.fromkeys(figures)), _time(until), fitted_to, base, _time(time_limit)
+    )
+    most, count = checked_chunk(chunk), checked_workers(workers)
+    if scheduler is not None and workers is not None:
+        raise InputError("workers, scheduler: a cluster has workers of its own; give one of the two.")
+    target = None if to is None else Path(to)
+    if netcdf is not None:
+        netcdf_file.check_place(Path(netcdf))
+    check_corners(question, axes)
+    single = [not axis.numeric for axis in axes]
+    plan = plan_for([axis.size for axis in axes], single, most)
+    if scheduler is not None or min(count, plan.chunks) > 1:
+        maker.check_travels()
+    first_start(question, axes)
+    with nullcontext() if target is None else locked(target):
+        if target is None:
+            memory = Memory(plan, axes, question)
+            _run(memory, None, plan, axes, question, count, scheduler, progress)
+            results = memory.dataset()
+        else:
+            folder = Folder(target, plan, axes, question, most)
+            plan = folder.plan
+            _run(None, folder, plan, axes, question, count, scheduler, progress)
+            results = open_folder(target)
+        if netcdf is not None:
+            netcdf_file.write_netcdf(Path(netcdf), results, plan, axes, question)
+    return results
+
+
+def _run(
+    memory: Memory | None,
+    folder: Folder | None,
+    plan: Plan,
+    axes: tuple[Axis, ...],
+    question: Question,
+    count: int,
+    scheduler: str | None,
+    progress: Told | None,
+) -> None:
+    """Compute what is not finished, and keep it."""
+    before = 0 if folder is None else folder.finished_starts()
+    watch = Watch(plan.starts, before, progress)
+    if before == plan.starts:
+        return
+    keep_in = "" if folder is None or scheduler is not None else str(folder.path.resolve())
+    tasks = (
+        Task(number, question, cut(axes, plan.place(number)), plan.place(number), keep_in)
+        for number in range(plan.chunks)
+        if folder is None or not folder.finished(number)
+    )
+    with ExitStack() as stack:
+        if folder is not None:
+            stack.callback(folder.sweep_up)
+        done = stack.enter_context(closing(_computed(tasks, min(count, plan.chunks), scheduler, stack)))
+        for task, block in done:
+            if block is not None and memory is not None:
+                memory.keep(task.place, block)
+            elif block is not None and folder is not None:
+                write_block(str(folder.path.resolve()), task.place, block)
+            watch.add(math.prod(task.shape))
+
+
+def _computed(tasks: Iterator[Task], count: int, scheduler: str | None, stack: ExitStack) -> Dones:
+    """The finished chunks, by whoever computes them."""
+    if scheduler is not None:
+        from softstart.sweeping.cluster import computed_by_cluster, connect
+
+        return computed_by_cluster(tasks, stack.enter_context(connect(scheduler)))
+    return computed_by_processes(tasks, count) if count > 1 else computed_here(tasks)
+
+
+def _maker(controller: object, parameters: Mapping[str, object] | None) -> Maker:
+    given = dict(parameters or {})
+    if controller is None:
+        return Maker("", given)
+    if isinstance(controller, Controller):
+        if given:
+            raise InputError(
+                f"parameters {sorted(given)} were given beside a finished controller; give them to it itself."
+            )
+        return Maker(controller)
+    if not isinstance(controller, str) or not controller:
+        raise InputError(
+            f"controller = {controller!r}: a controller is a name, path/to/file.py:ClassName, or a "
+            "Controller object."
+        )
+    return Maker(with_whole_path(controller), given)
+
+
+def _checked(
+    drive: object,
+    maker: Maker,
+    grid: Mapping[str, Any],
+    until: object,
+    time_limit: object,
+    fitted_to: object,
+    base: object,
+    figures: object,
+) -> tuple[Axis, ...]:
+    """The axes, if all input is right in itself; all mistakes at once."""
+    wrong: list[str] = []
+    axes: tuple[Axis, ...] = ()
+    for name, other in (("drive", drive), ("fitted_to", fitted_to), ("base", base)):
+        if not (isinstance(other, Drive) and other.shape == ()) and not (other is None and name != "drive"):
+            shown = f"a Drive with fields of shape {other.shape}" if isinstance(other, Drive) else show(other)
+            wrong.append(f"{name} = {shown}: give one single Drive; what varies goes into the grid.")
+    for name, value in (("until", until), ("time_limit", time_limit)):
+        if value is not None and not (
+            isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf
+        ):
+            wrong.append(f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out.")
+    wrong += _figure_mistakes(figures)
+    if not maker.given and not (isinstance(grid, Mapping) and "controller" in grid):
+        wrong.append("controller = None: name a controller, or make several an axis of the grid.")
+    else:
+        try:
+            axes = read_grid(grid, maker)
+        except InputError as error:
+            wrong.extend(error.sentences)
+    if wrong:
+        raise InputError(wrong)
+    return axes
+
+
+def _figure_mistakes(figures: object) -> list[str]:
+    if isinstance(figures, str) or not isinstance(figures, tuple | list) or not figures:
+        return [f"figures = {show(figures)}: name figures in a list, as ['k_dyn', 'start_time']."]
+    known = list(known_figures())
+    wrong = []
+    for name in figures:
+        if name not in known:
+            near = nearest(name, known) if isinstance(name, str) else None
+            hint = f"did you mean {near}?" if near else f"there are {', '.join(known)}."
+            wrong.append(f"figures = {show(name)}: there is no such figure; {hint}")
+    return wrong
+
+
+def _time(value: float | None) -> float | None:
+    return None if value is None else float(value)

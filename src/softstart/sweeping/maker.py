@@ -1,0 +1,186 @@
+"""The controller of a sweep as something that can be sent to another process: how it is made."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softstart.controller.base import Controller
+from softstart.controller.finding import controller_class, make_controller
+from softstart.controller.gain_files import SUFFIXES
+from softstart.controller.tuned import Tuned
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.units import show
+
+
+class Known(NamedTuple):
+    """What is known of a controller's parameter."""
+
+    unit: str
+    meaning: str
+    kind: str
+
+
+class Parameters(dict[str, Known]):
+    """Parameters by name; `lacking` says that one is not among them, `fixed` names those with one value."""
+
+    lacking = ""
+    fixed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Maker:
+    """A controller by name and parameters, or a finished one; "" where the controllers are an axis.
+
+    >>> Maker("ramp", {"initial": 5.0}).make({"time": "120 ms"}).parameters["time"]
+    0.12
+    """
+
+    given: str | Controller = ""
+    values: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> str:
+        """The controller's name, for a sentence or a title."""
+        if isinstance(self.given, Controller):
+            return self.given.name or type(self.given).__name__
+        return self.given
+
+    def make(self, more: Mapping[str, object], name: str = "") -> Controller:
+        """The controller with further parameters, which may be arrays; `name` where it is from an axis."""
+        if isinstance(self.given, Controller):
+            return replace(self.given, **more) if more else self.given
+        return make_controller(name or self.given, {**self.values, **more})
+
+    def parameters(self) -> Parameters:
+        """Those of its class."""
+        found = _parameters_of(_class_of(self.given), self.shown)
+        found.fixed = tuple(self.values)
+        return found
+
+    def common_parameters(self, names: Sequence[str]) -> Parameters:
+        """Those that all controllers of these names have."""
+        wrong: list[str] = []
+        tables = []
+        for name in names:
+            try:
+                tables.append(_parameters_of(_class_of(name), name))
+            except InputError as error:
+                wrong.extend(error.sentences)
+        if wrong:
+            raise InputError(wrong)
+        shared = Parameters(
+            {
+                name: known
+                for name, known in (tables[0] if tables else {}).items()
+                if all(
+                    name in table and (table[name].unit, table[name].kind) == (known.unit, known.kind)
+                    for table in tables
+                )
+            }
+        )
+        if len(tables) > 1:
+            shared.lacking = f"not all of {', '.join(names)} have this parameter"
+        return shared
+
+    def about(self) -> Any:
+        """What it is, as plain data: two makers of the same data make controllers that answer alike."""
+        if isinstance(self.given, Controller):
+            return _digested(self.given)
+        values = {name: _digested(value) for name, value in self.values.items()}
+        return {**about_name(self.given), "parameters": values}
+
+    def check_travels(self) -> None:
+        """Raise InputError for a controller that no other process can load."""
+        if not isinstance(self.given, Controller):
+            return
+        cls = type(self.given)
+        try:
+            there = cls.__module__ != "__main__" and not cls.__module__.startswith("softstart_loose_")
+            if there and type(pickle.loads(pickle.dumps(self.given))) is cls:
+                return
+        except (pickle.PicklingError, AttributeError, TypeError, ImportError):
+            pass
+        raise InputError(
+            f"controller = {self.shown}: another process cannot load this object of class "
+            f"{cls.__qualname__}; give it as path/to/file.py:ClassName with parameters, or say workers=1."
+        )
+
+
+def with_whole_path(name: str) -> str:
+    """The name of a controller with the whole path of its file, so that it is found from anywhere.
+
+    >>> with_whole_path("ramp")
+    'ramp'
+    """
+    path, rest = _split(name)
+    return name if path is None else f"{path.resolve()}{rest}"
+
+
+def about_name(name: str) -> dict[str, str]:
+    """A controller's name as plain data, with a fingerprint of the file that it leads to, if it does."""
+    path, rest = _split(name)
+    return {"name": name} if path is None else {"name": f"{path.name}{rest}", "file": _of_file(path)}
+
+
+def _split(name: str) -> tuple[Path | None, str]:
+    """The file that a name begins with, and what follows."""
+    if name.lower().endswith(SUFFIXES):
+        return Path(name), ""
+    end = name.index(".py") + 3 if ".py" in name else 0
+    return (Path(name[:end]), name[end:]) if end else (None, name)
+
+
+def _class_of(given: str | Controller) -> type[Controller]:
+    if isinstance(given, str) and not given.lower().endswith(SUFFIXES):
+        return controller_class(given)
+    return type(make_controller(given))
+
+
+def _parameters_of(cls: type[Controller], shown: str) -> Parameters:
+    found = Parameters()
+    if not issubclass(cls, Tuned):  # whose fields are the gains that stand in its file
+        for f in fields(cls):
+            about = f.metadata
+            found[f.name] = Known(
+                about.get("unit", ""), about.get("meaning", ""), about.get("kind", "quantity")
+            )
+    found.lacking = f"the controller {shown} has no such parameter"
+    return found
+
+
+def _digested(value: object) -> Any:
+    """A value as plain data that tells it from others, with a fingerprint of what is long."""
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    if isinstance(value, str | Path):
+        path = Path(value)
+        return [path.name, _of_file(path)] if path.suffix and path.is_file() else str(value)
+    if isinstance(value, Drive):
+        return value.to_toml()
+    if isinstance(value, np.ndarray):
+        return [list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
+    if isinstance(value, list | tuple):
+        return [_digested(one) for one in value]
+    if is_dataclass(value):
+        cls = type(value)
+        content = {f.name: _digested(getattr(value, f.name)) for f in fields(value)}
+        return {"class": f"{cls.__module__}.{cls.__qualname__}", **content}
+    try:
+        return hashlib.sha256(pickle.dumps(value)).hexdigest()
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return show(value)
+
+
+def _of_file(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "not readable"

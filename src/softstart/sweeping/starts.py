@@ -1,0 +1,130 @@
+"""The starts of one chunk: everything that is needed to compute them, and computing them, anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from softstart import __version__, metrics
+from softstart.batch import array_starts, figures
+from softstart.controller.base import CompiledController
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.plant import layout as at
+from softstart.status import Status
+from softstart.sweeping.axes import Axis, Column
+from softstart.sweeping.maker import Maker
+
+Block = dict[str, Any]  # figure -> array of the chunk's shape
+CODES = {status.name: code for code, status in enumerate(Status)}
+
+
+@cache
+def known_figures() -> dict[str, tuple[str, str]]:
+    """Names of the figures of a start, with unit and meaning.
+
+    >>> known_figures()["start_time"]
+    ('s', 'first instant at which the load has its target speed')
+    """
+    found = figures(np.zeros((1, at.N_X)), 1.0)
+    return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is the same for all starts of a sweep. `fitted_to` and `base` as in `simulate`."""
+
+    drive: Drive
+    maker: Maker
+    figures: tuple[str, ...]
+    until: float | None = None
+    fitted_to: Drive | None = None
+    base: Drive | None = None
+    time_limit: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A chunk: the question and those values of the axes that are its own. Small, and sent to anyone.
+
+    `keep_in` is the folder into which whoever computes the chunk writes it; without one it is handed back.
+    """
+
+    number: int
+    question: Question
+    axes: tuple[Axis, ...]
+    place: tuple[slice, ...]
+    keep_in: str = ""
+    version: str = __version__
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the results."""
+        return tuple(axis.size for axis in self.axes)
+
+
+def cut(axes: tuple[Axis, ...], place: tuple[slice, ...]) -> tuple[Axis, ...]:
+    """The axes with the values of one part of the grid."""
+    return tuple(axis.part(part) for axis, part in zip(axes, place, strict=True))
+
+
+def compute(task: Task) -> Block:
+    """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
+    if task.version != __version__:
+        raise InputError(
+            f"softstart {task.version} asks and softstart {__version__} is to compute; install one version "
+            "on all machines."
+        )
+    question, shape = task.question, task.shape
+    count = math.prod(shape)
+    changes: dict[str, Any] = {"gap": np.full(count, question.drive.gap)}  # every drive of a chunk is a batch
+    parameters: dict[str, Any] = {}
+    controller = ""
+    for column, values in _spread(task.axes, shape):
+        if column.owner == "drive":
+            changes[column.field] = values
+        elif column.owner == "parameter":
+            parameters[column.field] = values
+        else:
+            controller = values
+    drive = question.drive.replace(**changes)
+    notes = _notes(question, drive, parameters, controller)
+    base = np.broadcast_to(metrics.base_torque(question.base or drive), (count,))
+    found = figures(notes, base, question.until)
+    block: Block = {name: found[name][0].reshape(shape) for name in question.figures if name != "status"}
+    names, which = np.unique(found["status"][0], return_inverse=True)
+    codes = np.array([CODES[name] for name in names.tolist()], dtype=np.int8)
+    return block | {"status": codes[which].reshape(shape)}
+
+
+def _spread(axes: tuple[Axis, ...], shape: tuple[int, ...]) -> Iterator[tuple[Column, Any]]:
+    """Each column with its value for every start; the one text of a column of texts."""
+    for number, axis in enumerate(axes):
+        along = tuple(axis.size if i == number else 1 for i in range(len(shape)))
+        for column in axis.columns:
+            if column.numeric:
+                yield column, np.broadcast_to(column.values.reshape(along), shape).ravel()
+            else:
+                (text,) = column.values
+                yield column, text
+
+
+def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> at.Matrix:
+    maker, fitted_to = question.maker, question.fitted_to
+    made = maker.make(parameters, controller)
+    arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
+    if not arrays or isinstance(made, CompiledController):
+        if arrays and fitted_to is not None:  # its numbers go with arrays of parameters
+            fitted_to = fitted_to.replace(gap=np.full(drive.shape, fitted_to.gap))
+        return array_starts(drive, made, question.until, fitted_to, question.time_limit)
+    rows = []
+    for index, one in enumerate(drive.elements()):
+        own = {name: float(values[index]) for name, values in arrays.items()}
+        made = maker.make({**parameters, **own}, controller)
+        rows.append(array_starts(one, made, question.until, fitted_to, question.time_limit))
+    return np.concatenate(rows)

@@ -1,0 +1,106 @@
+"""`softstart sweep` in processes of its own, watched and killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from softstart.errors import SimulationError
+
+SOFTSTART = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
+GLANCE = 0.02  # s, between looks at the finished chunks
+WEIGHED = 0.25  # s, between looks at the memory, which take some processor time themselves
+PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What a command and all its processes took: s of the clock, s of processor time, MiB at most."""
+
+    wall: float
+    cpu: float
+    memory: float | None
+
+
+def run(arguments: Sequence[str]) -> Ended:
+    """A command to its end; SimulationError with its last words if it fails."""
+    begin = time.perf_counter()
+    child = begun(arguments)
+    memory = weighed = 0.0
+    while True:
+        pid, code, used = os.wait4(child.pid, os.WNOHANG)
+        if pid:
+            break
+        if (now := time.monotonic()) - weighed > WEIGHED:
+            weighed = now
+            memory = max(memory, _memory_of_tree(child.pid))
+        time.sleep(GLANCE)
+    wall = time.perf_counter() - begin
+    child.returncode = os.waitstatus_to_exitcode(code)
+    said = _last_words(child)
+    if child.returncode:
+        raise SimulationError(f"benchmark: softstart sweep ended with {child.returncode}: {said}")
+    return Ended(wall, used.ru_utime + used.ru_stime, memory or None)
+
+
+def killed_at(arguments: Sequence[str], results: Path, chunks: int) -> dict[str, int]:
+    """Begin a command, kill it once so many chunks are finished; the finished ones with their times."""
+    child = begun(arguments)
+    while len(finished(results)) < chunks:
+        if child.poll() is not None:
+            raise SimulationError(f"benchmark: softstart sweep ended too early: {_last_words(child)}")
+        time.sleep(GLANCE)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    _last_words(child)
+    return finished(results)
+
+
+def begun(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+    """A command that runs."""
+    return subprocess.Popen([*SOFTSTART, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def finished(results: Path) -> dict[str, int]:
+    """The finished chunks in a folder of results, and when each was written."""
+    home = results / "status" / "c"
+    return {
+        str(path.relative_to(home)): path.stat().st_mtime_ns
+        for path in home.rglob("*")
+        if path.name.isdigit() and path.is_file()
+    }
+
+
+def _last_words(child: subprocess.Popen[bytes]) -> str:
+    if child.stderr is None:
+        return ""
+    with child.stderr as stream:
+        lines = stream.read().decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else "without a word"
+
+
+def _memory_of_tree(root: int) -> float:
+    """Resident memory of a process and all it started, MiB; what they share counts for each. 0 if unknown."""
+    parents: dict[int, int] = {}
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            parents[int(path.name)] = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+        except (OSError, ValueError):
+            continue  # it is gone
+    tree, grown = {root}, True
+    while grown:
+        more = {pid for pid, parent in parents.items() if parent in tree} - tree
+        tree, grown = tree | more, bool(more)
+    pages = 0
+    for pid in tree:
+        try:
+            pages += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        except (OSError, ValueError):
+            continue
+    return pages * PAGE / 2**20

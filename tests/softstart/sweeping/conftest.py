@@ -1,0 +1,99 @@
+"""Sweeps in processes of their own, which can be killed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+LONG = (
+    "from softstart import sweep\n"
+    "import sys, numpy as np\n"
+    "sweep('crane-4amtkf', 'current-limit-feedback', GRID, to=sys.argv[1], chunk=CHUNK,\n"
+    "      workers=int(sys.argv[2]), progress=lambda now: print(now.done, flush=True))\n"
+)
+
+
+class Sweeping:
+    """A long sweep: 12,000 sampled starts in 60 chunks, a second or two of one processor."""
+
+    chunk = 200
+
+    def __init__(self) -> None:
+        import numpy as np
+
+        self.grid = {
+            "load.kind": ["active", "reactive"],
+            "gap": np.linspace(0.25, 4.0, 60),
+            "load_inertia": np.linspace(0.07, 0.35, 100),
+        }
+        self.chunks = 60
+        self.code = LONG.replace("CHUNK", str(self.chunk)).replace(
+            "GRID",
+            "{'load.kind': ['active', 'reactive'], 'gap': np.linspace(0.25, 4.0, 60),"
+            " 'load_inertia': np.linspace(0.07, 0.35, 100)}",
+        )
+
+    def begin(self, folder: Path, workers: int) -> subprocess.Popen[str]:
+        """Start it."""
+        return subprocess.Popen(
+            [sys.executable, "-W", "error", "-c", self.code, str(folder), str(workers)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    @staticmethod
+    def finished(folder: Path) -> dict[str, int]:
+        """The finished chunks, and when each was written."""
+        home = folder / "status" / "c"
+        return {
+            str(path.relative_to(home)): path.stat().st_mtime_ns
+            for path in home.rglob("*")
+            if path.is_file() and path.name.isdigit()
+        }
+
+    def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
+        """Until so many chunks are finished."""
+        deadline = time.monotonic() + 120
+        while len(self.finished(folder)) < chunks:
+            assert process.poll() is None, process.communicate()
+            assert time.monotonic() < deadline
+            time.sleep(0.005)
+
+
+@pytest.fixture(scope="package")
+def sweeping():
+    return Sweeping()
+
+
+@pytest.fixture(scope="package")
+def uninterrupted(sweeping):
+    """What the long sweep finds if nothing happens to it."""
+    from softstart import sweep
+
+    return sweep("crane-4amtkf", "current-limit-feedback", sweeping.grid, workers=1)
+
+
+def alive(pid: int) -> bool:
+    """Whether there is such a process, and it runs."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def children(pid: int) -> list[int]:
+    """The processes that a process has started."""
+    found = []
+    for path in Path("/proc").iterdir():
+        if path.name.isdigit():
+            try:
+                parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+            except OSError:
+                continue
+            if parent == pid:
+                found.append(int(path.name))
+    return found

@@ -1,0 +1,143 @@
+"""Axes read, and every mistake in them told at once, with the name that was meant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softstart import Drive, InputError, sweep
+from softstart.sweeping.axes import read_grid
+from softstart.sweeping.maker import Maker
+
+CRANE = Drive.load("crane-4amtkf")
+
+
+def test_names_and_units():
+    axes = read_grid(
+        {
+            "load.inertia": ["700 kg*cm^2", 0.175],
+            "gap": np.array([0.5, 2.0]),
+            "controller.time": ("120 ms", 0.2),
+            "load_kind": ["reactive", "active"],
+            "controller_period": range(1, 3),
+        },
+        Maker("ramp"),
+    )
+    assert [axis.name for axis in axes] == [
+        "load_inertia", "gap", "controller_time", "load_kind", "controller_period",
+    ]  # fmt: skip
+    assert [list(axis.columns[0].values) for axis in axes] == [
+        [0.07, 0.175], [0.5, 2.0], [0.12, 0.2], ["reactive", "active"], [1.0, 2.0],
+    ]  # fmt: skip
+    assert [axis.columns[0].unit for axis in axes] == ["kg*m^2", "rad", "s", "", "s"]
+
+
+ONE_SENTENCE = {
+    "no grid": ({}, "direct", "mapping of names to values"),
+    "not a grid": ([1, 2], "direct", "mapping of names to values"),
+    "unknown": ({"gapp": [1]}, "direct", "gapp: there is no such axis; did you mean gap?"),
+    "a symbol": ({"J2": [1]}, "direct", "did you mean load_inertia?"),
+    "two meanings": ({"inertia": [1]}, "direct", "did you mean motor_inertia or load_inertia?"),
+    "a bare parameter": ({"full_torque": [1]}, "ramp", "did you mean controller.full_torque?"),
+    "nothing near": ({"zzz": [1]}, "direct", "controller.NAME"),
+    "no such parameter": (
+        {"controller.tim": [1]}, "ramp", "ramp has no such parameter; did you mean controller.time?"
+    ),
+    "one value": ({"gap": 0.5}, "direct", "gap = 0.5: give the values of this axis in a list"),
+    "a text": ({"gap": "0.5"}, "direct", "in a list"),
+    "empty": ({"gap": []}, "direct", "gap = []: an empty list holds no value"),
+    "two rows": ({"gap": [[1, 2], [3, 4]]}, "direct", "shape (2, 2)"),
+    "negative": ({"gap": [0.5, -1]}, "direct", "gap[1] = -1.0: the total angular gap must be 0 or more"),
+    "wrong unit": ({"load.inertia": ["1 N"]}, "direct", 'load.inertia[0] = "1 N"'),
+    "not finite": ({"gap": [np.nan]}, "direct", "gap"),
+    "twice": ({"gap": [0.5, 1, 0.5]}, "direct", "gap = 0.5: this value is given twice"),
+    "same axis": ({"gap": [1], "shaft.gap": [2]}, "direct", "shaft.gap: this is the same as gap"),
+    "kind": ({"load.kind": ["activ"]}, "direct", 'did you mean "active"?'),
+    "a kind that is a number": ({"load.kind": [1]}, "direct", "takes names"),
+    "the drive's name": ({"name": ["a"]}, "direct", "changes no start"),
+    "controller and axis": ({"controller": ["direct"]}, "ramp", "controllers are an axis too"),
+    "no controller": ({"gap": [1]}, None, "controller = None"),
+    "unknown in the axis": ({"controller": ["direct", "rmp"]}, None, 'did you mean "ramp"?'),
+    "not shared": (
+        {"controller": ["direct", "ramp"], "controller.time": [1]}, None,
+        "controller.time: not all of direct, ramp have this parameter",
+    ),
+    "samples of two lengths": ({"sample": {"gap": [1], "damping": [1, 2]}}, "direct", "gap has 1, damp"),
+    "samples of texts": ({"sample": {"load.kind": ["active"]}}, "direct", "samples are numbers"),
+    "no samples": ({"sample": {}}, "direct", "no parameter"),
+    "samples called like a parameter": ({"gap": {"gap": [1], "damping": [2]}}, "direct", "another one"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ONE_SENTENCE)
+def test_one_clear_sentence(kind):
+    grid, controller, says = ONE_SENTENCE[kind]
+    with pytest.raises(InputError) as caught:
+        sweep(CRANE, controller, grid, workers=1)
+    assert len(caught.value.sentences) == 1
+    assert says in caught.value.sentences[0]
+    assert caught.value.sentences[0].endswith((".", "?"))
+
+
+def test_all_mistakes_at_once():
+    with pytest.raises(InputError) as caught:
+        sweep(
+            CRANE,
+            "ramp",
+            {"gapp": [1], "load.inertia": [-1.0], "controller.tme": [1], "stiffness": ["soft"]},
+            figures=["k_dym"],
+            until=-1.0,
+            base=CRANE.replace(gap=[1.0, 2.0]),
+        )
+    told = "\n".join(caught.value.sentences)
+    assert len(caught.value.sentences) == 7
+    for words in (
+        "gapp",
+        "load.inertia",
+        "controller.tme",
+        "stiffness",
+        "did you mean k_dyn?",
+        "until",
+        "base",
+    ):
+        assert words in told
+
+
+def test_a_parameter_is_fixed_or_an_axis():
+    with pytest.raises(InputError, match=r"controller\.time: the parameter time has one value already"):
+        sweep(CRANE, "ramp", {"controller.time": [0.1]}, parameters={"time": 0.2})
+    with pytest.raises(InputError, match="with several controllers"):
+        sweep(CRANE, None, {"controller": ["ramp", "direct"]}, parameters={"time": 0.2})
+
+
+IMPOSSIBLE = {
+    "one axis": ({"load.torque": [5, 70]}, "starting_torque = 62 N.m: .* load_torque = 70 N"),
+    "two axes": (
+        {"starting_torque": [10, 60], "load.torque": [5, 12], "maximum_torque": [80]},
+        "starting_torque = 10 N.m: .* load_torque = 12 N",
+    ),
+    "a kind": ({"load.kind": ["active", "reactive"], "load.torque": [1, -1]}, "load_torque = -1 N"),
+    "limit below": ({"maximum_torque": [70, 61]}, "maximum_torque = 61 N"),
+    "speeds": ({"start.target_speed": [20, 60], "initial_load_speed": [0, 30]}, "initial_load_speed = 30"),
+    "samples": ({"sample": {"starting_torque": [10, 60], "load_torque": [3, 60], "maximum_torque": [70, 71]}},
+                r"starting_torque\[1\] = 60"),
+    "a controller's": ({"controller.time": [0.1, -0.1]}, "time = -0.1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", IMPOSSIBLE)
+def test_an_impossible_corner_is_found_before_anything_is_computed(kind, tmp_path):
+    grid, says = IMPOSSIBLE[kind]
+    with pytest.raises(InputError, match=says) as caught:
+        sweep(CRANE, "ramp", grid, to=tmp_path / "never")
+    assert len(caught.value.sentences) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_samples_may_be_possible_where_a_full_grid_is_not():
+    found = sweep(
+        CRANE, "direct", {"sample": {"starting_torque": [10, 60], "load_torque": [3, 12]}}, workers=1
+    )
+    assert found.status.values.tolist() == [0, 0]
+    with pytest.raises(InputError, match="load_torque = 12"):
+        sweep(CRANE, "direct", {"starting_torque": [10, 60], "load_torque": [3, 12]})

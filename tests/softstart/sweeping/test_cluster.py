@@ -1,0 +1,118 @@
+"""A sweep on a dask cluster: a real scheduler and workers in processes of their own, one of them killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from softstart import Drive, InputError, SimulationError, sweep
+from softstart.sweeping import cluster as room
+
+pytest.importorskip("distributed")
+CRANE = Drive.load("crane-4amtkf")
+
+
+class Cluster:
+    """A scheduler on a free port, and workers of one thread each."""
+
+    def __init__(self, folder):
+        self.folder, self.processes = folder, []
+        self.log = (folder / "log").open("w")
+        self._dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", "scheduler.json")
+
+    def _dask(self, *arguments):
+        command = [sys.executable, "-m", "dask", *arguments, "--dashboard-address", "127.0.0.1:0"]
+        self.processes.append(subprocess.Popen(command, stdout=self.log, stderr=self.log, cwd=self.folder))
+
+    def address(self):
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            try:
+                return json.loads((self.folder / "scheduler.json").read_text())["address"]
+            except (OSError, ValueError):
+                time.sleep(0.02)
+        raise AssertionError((self.folder / "log").read_text())
+
+    def add_worker(self):
+        self._dask("worker", self.address(), "--nthreads", "1", "--no-nanny", "--local-directory", "work")
+
+    def close(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+        self.log.close()
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    (tmp_path / "cluster").mkdir()
+    made = Cluster(tmp_path / "cluster")
+    yield made
+    made.close()
+
+
+@pytest.mark.slow
+def test_two_workers_of_which_one_is_killed_find_the_same(
+    cluster, sweeping, uninterrupted, tmp_path, monkeypatch
+):
+    address = cluster.address()
+    with monkeypatch.context() as patched:
+        patched.setattr(room, "PATIENCE", 1.0)
+        with pytest.raises(InputError, match="it has no worker; start some"):
+            sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, scheduler=address)
+
+    cluster.add_worker()
+    cluster.add_worker()
+    killed = []
+
+    def kill(now):
+        if now.done >= 2000 and not killed:
+            killed.append(cluster.processes[1].pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    found = sweep(
+        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=tmp_path / "a", scheduler=address,
+        chunk=sweeping.chunk, progress=kill,
+    )  # fmt: skip
+    assert killed
+    assert found.drop_attrs().identical(uninterrupted.drop_attrs())
+    assert len(sweeping.finished(tmp_path / "a")) == sweeping.chunks
+
+    # what a chunk raises comes through as it is, and another folder's sweep goes on on the cluster
+    (tmp_path / "mine.py").write_text(
+        "from softstart import Command, PlainController\n"
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class Fails(PlainController):\n"
+        "    share: float = 1.0\n"
+        "    def step(self, measured, state):\n"
+        "        return Command(62.0 / self.share, measured.time + 0.01)\n"
+    )
+    with pytest.raises(SimulationError, match=r"controller Fails failed .*float division by zero"):
+        sweep(
+            CRANE, f"{tmp_path / 'mine.py'}:Fails", {"controller.share": [1.0, 0.0]}, chunk=1,
+            scheduler=address,
+        )  # fmt: skip
+
+
+def test_a_scheduler_that_is_not_there(monkeypatch):
+    monkeypatch.setattr(room, "PATIENCE", 0.5)
+    with pytest.raises(
+        InputError, match=r'scheduler = "tcp://127\.0\.0\.1:9": no dask scheduler answers there'
+    ):
+        sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, scheduler="tcp://127.0.0.1:9")
+    with pytest.raises(InputError, match="no dask scheduler answers there"):
+        sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, scheduler="not an address")
+
+
+def test_without_dask_the_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'softstart\[cluster\]'"):
+        sweep(CRANE, "direct", {"gap": np.array([0.5, 1.0])}, scheduler="tcp://127.0.0.1:9")

@@ -1,0 +1,180 @@
+"""A sweep on disk: killed at any instant it goes on, nothing is lost or repeated, and nobody else writes."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray
+
+from softstart import Drive, InputError, sweep
+from softstart.sweeping.lock import locked
+from softstart.sweeping.store import open_folder
+
+from .conftest import alive, children
+
+CRANE = Drive.load("crane-4amtkf")
+GRID = {"gap": [0.5, 1.0, 2.0], "load_inertia": [0.1, 0.2]}
+OPTIONS = {"workers": 1, "chunk": 2}
+
+
+def test_killed_at_random_instants_it_goes_on(sweeping, uninterrupted, tmp_path):
+    folder = tmp_path / "results"
+    instants = random.Random(7)
+    before: dict[str, int] = {}
+    for workers in (1, 2):
+        process = sweeping.begin(folder, workers)
+        sweeping.wait_for(folder, len(before) + instants.randint(2, 12), process)
+        time.sleep(instants.uniform(0.0, 0.08))
+        helpers = children(process.pid)
+        assert len(helpers) == (workers if workers > 1 else 0)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        deadline = time.monotonic() + 20
+        while any(map(alive, helpers)):  # they end by themselves, their chunk finished
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        after = sweeping.finished(folder)
+        assert len(after) < sweeping.chunks
+        assert before.items() <= after.items()  # nothing was lost, nothing written again
+        before = after
+    told = []
+    found = sweep(
+        "crane-4amtkf", "current-limit-feedback", sweeping.grid, to=folder, workers=1, progress=told.append
+    )
+    assert told[0].done == told[0].before >= sweeping.chunk * len(before)
+    assert [now.done for now in told[1:]] == sorted({now.done for now in told[1:]})
+    assert told[-1].done == told[-1].starts == 12_000
+    assert before.items() <= sweeping.finished(folder).items()
+    assert found.drop_attrs().identical(uninterrupted.drop_attrs())
+    assert not list(folder.rglob("*.partial"))
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
+
+
+def test_a_finished_sweep_is_opened_and_not_computed_again(tmp_path):
+    first = sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")}
+    told = []
+    again = sweep(CRANE, "ramp", GRID, to=str(tmp_path / "a"), progress=told.append)
+    assert again.identical(first)
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a").rglob("*")} == before
+    assert [(now.done, now.before) for now in told] == [(6, 6)]
+
+
+def test_it_is_a_zarr_folder_that_says_what_is_missing(tmp_path):
+    class StoppedError(Exception):
+        pass
+
+    def stop(now):
+        if now.done:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        sweep(CRANE, "ramp", GRID, to=tmp_path / "a", progress=stop, **OPTIONS)
+    begun = xarray.open_zarr(tmp_path / "a")
+    assert begun.status.values.tolist() == [[0, 0], [-1, -1], [-1, -1]]
+    assert np.isnan(begun.k_dyn.values[1:]).all()
+    assert begun.k_dyn.chunks == ((1, 1, 1), (2,))
+    whole = sweep(CRANE, "ramp", GRID, to=tmp_path / "a")
+    memory = sweep(CRANE, "ramp", GRID, **OPTIONS)
+    assert whole.drop_attrs().identical(memory.drop_attrs())
+    assert open_folder(tmp_path / "a").status.attrs["flag_meanings"] == memory.status.attrs["flag_meanings"]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"drive": CRANE.replace(damping=1.0)}, "another drive;"),
+        ({"controller": "s-curve"}, "another controller;"),
+        ({"parameters": {"time": 0.2}}, "another controller;"),
+        ({"grid": {**GRID, "gap": [0.5, 1.0, 2.5]}}, "another axis gap;"),
+        ({"grid": dict(reversed(GRID.items()))}, "another order of the axes;"),
+        ({"grid": {**GRID, "stiffness": [300.0]}}, "another order of the axes and axis stiffness;"),
+        ({"until": 0.5}, "another until;"),
+        ({"base": CRANE}, "another base;"),
+        ({"figures": ["k_dyn"], "time_limit": 9.0}, "another figures and time_limit;"),
+        ({"chunk": 4}, "was begun in chunks of 1 x 2 starts; leave chunk out"),
+    ],
+)  # fmt: skip
+def test_another_sweep_is_refused_and_left_alone(tmp_path, change, says):
+    arguments = {"drive": CRANE, "controller": "ramp", "grid": GRID, "to": tmp_path / "a"}
+    sweep(**arguments, **OPTIONS)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(InputError) as caught:
+        sweep(**{**arguments, **OPTIONS, **change})
+    assert len(caught.value.sentences) == 1
+    assert says in caught.value.sentences[0]
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_controller_from_a_file_that_changed_is_another_one(tmp_path):
+    lines = (
+        "from softstart import Command, PlainController\n"
+        "class Half(PlainController):\n"
+        "    def step(self, measured, state):\n"
+        "        return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.01)\n"
+    )
+    (tmp_path / "mine.py").write_text(lines)
+    name = f"{tmp_path / 'mine.py'}:Half"
+    found = sweep(CRANE, name, {"gap": [0.5, 2.0]}, to=tmp_path / "a", workers=1)
+    assert found.status.values.tolist() == [0, 0]
+    (tmp_path / "mine.py").write_text(lines.replace("31.0", "32.0"))
+    with pytest.raises(InputError, match="another controller"):
+        sweep(CRANE, name, {"gap": [0.5, 2.0]}, to=tmp_path / "a")
+
+
+def test_folders_that_hold_something_else(tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "letter.txt").write_text("dear")
+    (tmp_path / "file").write_text("dear")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds something else than a sweep"):
+        sweep(CRANE, "ramp", GRID, to=tmp_path / "full", **OPTIONS)
+    for place in ("file", "file/below"):
+        with pytest.raises(InputError, match=r"to = .*file"):
+            sweep(CRANE, "ramp", GRID, to=tmp_path / place, **OPTIONS)
+    sweep(CRANE, "ramp", GRID, to=tmp_path / "empty", **OPTIONS)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "file", "full"]
+    with pytest.raises(InputError, match="no sweep in this folder"):
+        open_folder(tmp_path / "full")
+
+
+HOLDER = "import sys, time\nfrom pathlib import Path\nfrom softstart.sweeping.lock import locked\n" \
+    "with locked(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)\n"  # fmt: skip
+
+
+def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
+    folder = tmp_path / "a"
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder)], stdout=subprocess.PIPE, text=True)
+    assert holder.stdout.readline() == "held\n"
+    with pytest.raises(InputError, match=rf"process {holder.pid} on .* is writing this sweep now"):
+        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    assert not folder.exists()
+    holder.kill()
+    holder.communicate()
+    assert (tmp_path / ".a.lock").exists()  # what the dead one left
+    sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    with locked(folder), pytest.raises(InputError, match="is writing this sweep now"):
+        sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+
+
+@pytest.mark.parametrize("to", [None, "a"])
+def test_netcdf_is_the_same(tmp_path, to):
+    grid = {"sample": {"gap": [0.5, 1.0, 2.0], "damping": [0, 1, 2]}, "controller": ["ramp", "direct"]}
+    results = sweep(CRANE, None, grid, to=to and tmp_path / to, netcdf=tmp_path / "a.nc", workers=1, chunk=2)
+    with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as read:
+        assert set(read.coords) == {"sample", "controller", "gap", "damping"} == set(results.coords)
+        for name in results.data_vars:
+            np.testing.assert_array_equal(read[name], results[name])
+            assert read[name].dtype == results[name].dtype
+            assert read[name].attrs["long_name"] == results[name].attrs["long_name"]
+        assert read.controller.values.tolist() == ["ramp", "direct"]
+        assert read.status.attrs["flag_values"].tolist() == results.status.attrs["flag_values"]
+        assert read.gap.attrs["units"] == "rad"
+    assert sorted(path.name for path in tmp_path.iterdir()) == (["a"] if to else []) + ["a.nc"]

@@ -1,0 +1,54 @@
+"""The grid in chunks: every start in one chunk and one only, no chunk larger than asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softstart import InputError
+from softstart.sweeping.plan import Plan, checked_chunk, plan_for
+
+SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
+
+
+@given(SHAPES, st.integers(1, 50), st.integers(0, 15))
+def test_chunks_part_the_grid(shape, most, singles):
+    single = [bool(singles >> i & 1) for i in range(len(shape))]
+    plan = plan_for(shape, single, most)
+    counted = np.zeros(plan.shape, dtype=int)
+    for number in range(plan.chunks):
+        place = plan.place(number)
+        counted[place] += 1
+        assert counted[place].size == plan.size_at(plan.index(number)) <= most
+        assert all(part.stop - part.start == 1 for part, alone in zip(place, single, strict=True) if alone)
+    assert (counted == 1).all()
+
+
+def test_chunks_of_a_grid_beyond_all_memory_are_found_at_once():
+    plan = plan_for([10_000] * 4, [False] * 4)
+    assert plan.starts == 10**16
+    assert math.prod(plan.chunk) <= 16_384
+    last = plan.place(plan.chunks - 1)
+    assert [part.stop for part in last] == [10_000] * 4
+    assert plan.index(plan.chunks - 1) == tuple(count - 1 for count in plan.counts)
+
+
+@given(st.integers(1, 10**12))
+def test_small_grids_have_work_for_many(size):
+    plan = plan_for([size], [False])
+    assert plan.chunk[0] <= 16_384
+    assert plan.chunks >= min(64, size // 1024)
+
+
+def test_the_last_index_is_the_fastest():
+    assert [Plan((2, 4), (1, 2)).place(n)[1].start for n in range(4)] == [0, 2, 0, 2]
+
+
+@pytest.mark.parametrize("chunk", [0, -1, 1.5, True, "many"])
+def test_a_chunk_has_starts(chunk):
+    with pytest.raises(InputError, match=r"chunk = .*whole number of 1 or more"):
+        checked_chunk(chunk)

@@ -1,0 +1,214 @@
+"""Each start of a sweep is that of `simulate`, to the bit, whatever the axes, their order and the chunks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Command, Drive, InputError, PlainController, Status, simulate, sweep
+from softstart.controller import make_controller, parameter, ready_controller_names
+from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.sweeping.starts import known_figures
+
+CRANE = Drive.load("crane-4amtkf").replace(torque_lag="2 ms", damping=0.3)
+FIGURES = tuple(known_figures())
+POOL = {
+    "gap": [0.03, 0.5, 3.1],
+    "load.inertia": ["700 kg*cm^2", 0.2],
+    "stiffness": [222.2, 400.0],
+    "torque_lag": [0.0, 0.003],
+    "encoder_lines": [0, 500],
+    "load.kind": ["reactive", "active"],
+    "contact_law": ["modelica", "no-pull"],
+    "target_speed": [30.0, 61.0],
+}
+
+NAMES = {"load.inertia": "load_inertia", "load.kind": "load_kind", "controller.period": "controller_period"}
+
+
+def same(results, index, one):
+    """Whether the figures there are those of a single start."""
+    for name in FIGURES:
+        if name == "status":
+            assert list(Status)[int(results.status[index])] is one.status
+        elif name in (summary := one.summary()):
+            expected = np.nan if summary[name] is None else summary[name]
+            np.testing.assert_equal(float(results[name][index]), float(expected), err_msg=name)
+
+
+def single(results, index, controller="", **options):
+    """`simulate` at one place of a grid."""
+    place = {
+        str(k): v.item()
+        for k, v in results.isel(dict(zip(results.status.dims, index, strict=True))).coords.items()
+    }
+    controller = place.pop("controller", controller)
+    own = {k.removeprefix("controller_"): place.pop(k) for k in list(place) if k.startswith("controller_")}
+    place.pop("sample", None)
+    return simulate(CRANE.replace(**place), controller, parameters=own, **options)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.data())
+def test_any_axes_in_any_order(data):
+    keys = data.draw(
+        st.lists(
+            st.sampled_from([*POOL, "controller", "controller.period"]), min_size=1, max_size=4, unique=True
+        )
+    )
+    grid = {}
+    for key in keys:
+        values = {"controller": ["ramp", "acceleration-delay"], "controller.period": [0.001, 0.0013]}.get(
+            key, POOL.get(key)
+        )
+        grid[key] = data.draw(st.lists(st.sampled_from(values), min_size=1, unique=True))
+    controller = None if "controller" in grid else "ramp"
+    chunk = data.draw(st.integers(1, 9))
+    results = sweep(CRANE, controller, grid, figures=FIGURES, chunk=chunk, workers=1)
+    assert list(results.status.dims) == [NAMES.get(key, key) for key in grid]
+    whole = sweep(CRANE, controller, grid, figures=FIGURES, workers=1)
+    assert whole.drop_attrs().identical(results.drop_attrs())
+    for index in np.ndindex(results.status.shape):
+        if data.draw(st.booleans()):
+            same(results, index, single(results, index, controller))
+
+
+@pytest.mark.parametrize("name", ready_controller_names())
+@pytest.mark.parametrize("fitted_to", [None, CRANE])
+def test_parameters_of_every_controller_as_axes(name, fitted_to):
+    rng = np.random.default_rng(5)
+    fitted = make_controller(name).fitted(CRANE)
+    for key, value in fitted.parameters.items():
+        if not isinstance(value, float):
+            continue
+        grid = {
+            "gap": rng.uniform(0.01, 4, 3),
+            f"controller.{key}": value * np.array([0.8, 0.93]),
+            "stiffness": [300, 500],
+        }
+        results = sweep(CRANE, name, grid, figures=FIGURES, workers=1, fitted_to=fitted_to)
+        for index in [(0, 0, 1), (2, 1, 0)]:
+            same(results, index, single(results, index, name, fitted_to=fitted_to))
+
+
+def test_samples_vary_together():
+    rng = np.random.default_rng(2)
+    columns = {
+        "gap": rng.uniform(0.1, 1, 5),
+        "load.inertia": rng.uniform(0.1, 0.3, 5),
+        "controller.time": rng.uniform(0.05, 0.2, 5),
+    }
+    results = sweep(
+        CRANE, "ramp", {"sample": columns, "load.kind": ["active", "reactive"]}, figures=FIGURES, chunk=4
+    )
+    assert results.status.dims == ("sample", "load_kind")
+    assert set(results.coords) == {"sample", "load_kind", "gap", "load_inertia", "controller_time"}
+    for index in np.ndindex(5, 2):
+        same(results, index, single(results, index, "ramp"))
+
+
+def test_base_until_and_time_limit_are_those_of_simulate():
+    grid = {"gap": [0.5, 2.0], "load_inertia": [0.1, 0.3]}
+    options = {"until": 0.3, "base": CRANE, "fitted_to": CRANE.replace(gap=1.0)}
+    results = sweep(CRANE, "current-limit-feedback", grid, figures=FIGURES, workers=1, **options)
+    assert results.status.values.tolist() != [[0, 0], [0, 0]]
+    for index in np.ndindex(2, 2):
+        same(results, index, single(results, index, "current-limit-feedback", **options))
+    late = sweep(CRANE, "direct", grid, time_limit=0.05, workers=1)
+    assert {list(Status)[code] for code in late.status.values.ravel()} == {Status.NOT_REACHED}
+
+
+@dataclass(frozen=True)
+class Share(PlainController):
+    """A share of the torque, then all of it, in plain Python."""
+
+    share: float = parameter("1", "share", "one half")
+
+    def defaults(self, drive):
+        return {"share": 0.5}
+
+    def step(self, measured, state):
+        return Command(62.0 * self.share if measured.time < 0.1 else 62.0, measured.time + 0.01)
+
+
+def test_a_plain_controller_as_an_object_with_its_parameter_as_an_axis():
+    grid = {"controller.share": [0.3, 0.5], "gap": [0.5, 2.0]}
+    results = sweep(CRANE, Share(), grid, workers=1, figures=FIGURES)
+    for i, share in enumerate(grid["controller.share"]):
+        for j, gap in enumerate(grid["gap"]):
+            same(results, (i, j), simulate(CRANE.replace(gap=gap), Share(share)))
+    fixed = sweep(CRANE, Share(), {"gap": [0.5, 2.0]}, workers=1)
+    assert fixed.k_dyn.values.tolist() == results.k_dyn.values[1].tolist()
+
+
+def test_tuned_gains_in_the_place_of_a_controller(tmp_path):
+    ramp = make_controller("ramp")
+    times = ("time", "logarithmic", np.array([[0.1, 0.12], [0.2, 0.3]]))
+    tuned = (
+        RobustGains("robust", make_controller("ramp", {"time": 0.12}), CRANE),
+        GainSchedule("schedule", ramp, (0.5, 2.0), (0.1, 0.3), (times,)),
+    )
+    grid = {"gap": [0.3, 0.7, 1.1, 3.0], "load_inertia": [0.1, 0.17]}
+    for gains in tuned:
+        results = sweep(CRANE, gains, grid, workers=1, figures=FIGURES, chunk=3)
+        for index in np.ndindex(4, 2):
+            same(results, index, single(results, index, gains))
+        sweep(CRANE, gains, grid, workers=1, to=tmp_path / gains.label)
+        with pytest.raises(InputError, match="has no such parameter"):
+            sweep(CRANE, gains, {"controller.time": [0.1, 0.2]}, workers=1)
+    other = RobustGains("robust", make_controller("ramp", {"time": 0.12}), CRANE.replace(gap=1.0))
+    with pytest.raises(InputError, match="another controller"):
+        sweep(CRANE, other, grid, workers=1, to=tmp_path / "robust")
+
+
+def test_starts_that_fail_are_nan_with_a_status():
+    results = sweep(CRANE, "ramp", {"controller.period": [0.001, 1e-9]}, workers=1, chunk=1)
+    assert list(Status)[int(results.status[1])] is Status.TOO_MANY_EVENTS
+    assert np.isnan(results.k_dyn[1])
+    meanings = results.status.attrs["flag_meanings"].split()
+    assert meanings[results.status.attrs["flag_values"].index(int(results.status[1]))] == "too_many_events"
+
+
+def test_labels():
+    results = sweep(CRANE, "direct", {"load.inertia": [0.1, 0.2]}, figures=["start_time"], workers=1)
+    assert list(results.data_vars) == ["start_time", "status"]
+    assert results.start_time.attrs["units"] == "s"
+    assert results.load_inertia.attrs["units"] == "kg*m^2"
+    assert results.load_inertia.attrs["long_name"]
+    assert results.status.dtype == np.int8
+    assert (
+        float(results.sel(load_inertia=0.2).start_time)
+        == simulate(CRANE.replace(load_inertia=0.2), "direct").start_time
+    )
+
+
+@pytest.mark.parametrize("wrong", [
+    {"workers": 0}, {"workers": 1.5}, {"workers": "two"}, {"chunk": 0}, {"figures": "k_dyn"}, {"figures": []},
+    {"figures": ["k_dyn", 3]}, {"until": 0.0}, {"time_limit": float("nan")}, {"base": "crane-4amtkf"},
+    {"fitted_to": CRANE.replace(gap=[1, 2])}, {"scheduler": "tcp://127.0.0.1:1", "workers": 2},
+    {"netcdf": "no/such/folder/out.nc"}, {"netcdf": "."},
+])  # fmt: skip
+def test_options_that_cannot_be_are_refused_in_one_sentence(wrong):
+    with pytest.raises(InputError) as caught:
+        sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, **wrong)
+    assert len(caught.value.sentences) == 1
+    assert next(iter(wrong)) in caught.value.sentences[0]
+
+
+def test_a_grid_beyond_memory_needs_a_folder():
+    with pytest.raises(InputError, match=r"1,000,000,000 starts are too many .*to=FOLDER"):
+        sweep(
+            CRANE, "direct", {"gap": np.linspace(0, 1, 100_000), "stiffness": np.linspace(100, 500, 10_000)}
+        )
+    with pytest.raises(InputError, match="controller"):
+        sweep(CRANE, "direct", {"gap": [1.0]}, parameters={"tork": 1})
+    with pytest.raises(InputError, match="finished controller"):
+        sweep(CRANE, Share(), {"gap": [1.0]}, parameters={"share": 1})
+    with pytest.raises(InputError, match="controller = 7"):
+        sweep(CRANE, 7, {"gap": [1.0]})
+    with pytest.raises(InputError, match="drive"):
+        sweep(CRANE.replace(gap=[1.0, 2.0]), "direct", {"stiffness": [1.0]})

@@ -1,0 +1,133 @@
+"""What a sweep is summed up to, against numpy, and its pictures."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Drive, Status, simulate, sweep
+from softstart.figures import save_figure
+from softstart.sweeping.pictures import sweep_figure
+from softstart.sweeping.progress import Progress, Watch
+from softstart.sweeping.summary import spread, summarise
+
+CRANE = Drive.load("crane-4amtkf")
+NUMBERS = st.lists(st.floats(-1e300, 1e300) | st.just(np.nan), min_size=1, max_size=40)
+
+
+@settings(max_examples=40, deadline=None)
+@given(NUMBERS, st.integers(1, 10), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=4, unique=True))
+def test_quantiles_are_exact_in_any_pieces(values, size, shares):
+    whole = np.array(values) + 0.0
+    found = spread(lambda: iter(np.split(whole, range(size, len(whole), size))), shares)
+    good = whole[~np.isnan(whole)]
+    assert found.count == good.size
+    if not good.size:
+        assert np.isnan([found.least, found.most, *found.quantiles.values()]).all()
+        return
+    assert (found.least, found.most) == (good.min(), good.max())
+    for share, value in found.quantiles.items():
+        below = np.count_nonzero(good < value)
+        upto = np.count_nonzero(good <= value)
+        assert below < max(share * good.size, 1e-9) + 1e-9 * good.size or below == 0
+        assert upto >= share * good.size - 1e-9 * good.size
+        assert value in good
+
+
+def test_quantiles_of_many_are_those_of_numpy():
+    rng = np.random.default_rng(3)
+    values = np.concatenate(
+        [rng.normal(size=50_000), -np.exp(rng.normal(0, 40, 50_000)), [0.0, -0.0, 5e-324]]
+    )
+    shares = [0.0, 0.001, 0.05, 0.5, 0.95, 1.0]
+    found = spread(lambda: iter(np.array_split(values, 7)), shares)
+    np.testing.assert_array_equal(
+        list(found.quantiles.values()), np.quantile(values, shares, method="inverted_cdf")
+    )
+
+
+def test_the_worst_case_and_how_starts_ended():
+    grid = {"gap": [0.5, 3.0, 2.0], "controller": ["ramp", "direct"], "load_inertia": [0.3, 0.1]}
+    results = sweep(CRANE, None, grid, workers=1, chunk=2)
+    summary = summarise(results)
+    worst = max(
+        (simulate(CRANE.replace(gap=gap, load_inertia=J2), name).k_dyn, gap, name, J2)
+        for gap in grid["gap"] for name in grid["controller"] for J2 in grid["load_inertia"]
+    )  # fmt: skip
+    assert summary.spreads["k_dyn"].most == worst[0]
+    assert summary.worst == {"gap": worst[1], "controller": worst[2], "load_inertia": worst[3]}
+    assert summary.statuses == {"REACHED": 12}
+    late = summarise(
+        sweep(CRANE, "direct", {"gap": [0.5, 2.0]}, until=0.1, workers=1, figures=["start_time"])
+    )
+    assert late.statuses == {Status.STOPPED_EARLY.name: 2}
+    assert (late.share_reached, late.judged, late.worst) == (0.0, "start_time", {})
+
+
+def test_progress_tells_rate_and_time_left():
+    told: list[Progress] = []
+    watch = Watch(1000, 400, told.append)
+    watch.add(300)
+    assert [(now.done, now.before, now.starts) for now in told] == [(400, 400, 1000), (700, 400, 1000)]
+    assert np.isnan(told[0].left)
+    assert told[1].left == pytest.approx(300 / told[1].rate)
+    assert str(told[0]) == "400 of 1,000 starts (40 %)"
+
+
+def results_over(controller="direct", /, **axes):
+    return sweep(CRANE, controller, {key.replace("__", "."): value for key, value in axes.items()}, workers=1)
+
+
+def test_two_axes_are_a_map(tmp_path):
+    results = results_over(gap=np.geomspace(4, 0.2, 9), load__inertia=np.linspace(0.07, 0.35, 7))
+    figure = sweep_figure(results)
+    panel = figure.axes[0]
+    mesh = panel.collections[0]
+    # rows in the order of the axis whatever that of the grid, every start in its place
+    drawn = mesh.get_array().reshape(9, 7)
+    np.testing.assert_array_equal(drawn, results.k_dyn.values[::-1])
+    assert (panel.get_xscale(), panel.get_yscale()) == ("linear", "log")
+    assert panel.get_xlabel() == "load inertia J2, kg m2"
+    assert panel.get_ylabel() == "gap, rad"
+    (marker,) = panel.lines
+    worst = results.k_dyn.where(results.k_dyn == results.k_dyn.max(), drop=True)
+    assert marker.get_xydata().tolist() == [[float(worst.load_inertia[0]), float(worst.gap[0])]]
+    svg, png = save_figure(figure, tmp_path, "map")
+    assert svg.read_text().startswith("<?xml")
+    assert struct.unpack(">II", png.read_bytes()[16:24])[0] > 800
+
+
+def test_a_few_further_values_are_panels_and_many_become_their_largest():
+    axes = {"gap": np.linspace(0.1, 3, 6), "load__inertia": np.linspace(0.1, 0.3, 5)}
+    panels = sweep_figure(results_over(None, **axes, controller=["direct", "ramp"]))
+    assert [one.get_title(loc="left") for one in panels.axes[:2]] == ["direct", "ramp"]
+    many = results_over(**axes, stiffness=[100, 200, 300, 400], damping=[0.0, 1.0])
+    figure = sweep_figure(many)
+    drawn = figure.axes[0].collections[0].get_array().reshape(6, 5)
+    np.testing.assert_array_equal(drawn, many.k_dyn.max(["stiffness", "damping"]).values)
+    assert figure.axes[0].get_title(loc="left") == "largest over stiffness, damping"
+
+
+def test_one_axis_makes_curves():
+    results = results_over(None, gap=[2.0, 0.5, 1.0], controller=["direct", "ramp"])
+    (panel, *_) = sweep_figure(results).axes
+    lines = panel.lines[:2]
+    for line, name in zip(lines, ("direct", "ramp"), strict=True):
+        assert line.get_label() == name
+        np.testing.assert_array_equal(
+            line.get_ydata(), results.k_dyn.sel(controller=name, gap=[0.5, 1.0, 2.0])
+        )
+    assert sweep_figure(results_over(None, controller=["direct", "ramp"])) is None
+
+
+def test_starts_without_a_figure_leave_a_hole():
+    results = sweep(
+        CRANE, "ramp", {"gap": [0.5, 1.0, 2.0], "controller.period": [0.001, 0.002, 1e-9]}, workers=1
+    )
+    figure = sweep_figure(results)
+    assert np.ma.getmaskarray(figure.axes[0].collections[0].get_array()).reshape(3, 3)[:, 0].all()
+    assert "grey: no figure" in figure.get_suptitle()
