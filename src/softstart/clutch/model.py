@@ -1,0 +1,267 @@
+"""`Clutch`: a slipping clutch whose driving side turns at constant speed, a shaft and a load behind it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Self, cast
+
+import numpy as np
+
+from softstart.clutch import library
+from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
+from softstart.clutch.parameters import PARAMETERS, TABLES, WHAT
+from softstart.errors import InputError
+from softstart.input_tables import Table, read_document, read_table, text_of
+from softstart.units import nearest, show
+
+__all__ = ["Clutch"]
+
+ABOVE = 1.0 + 1e-9  # a table may lie above MM by rounding
+
+
+@dataclass(frozen=True)
+class Clutch:
+    """All that an engagement depends on, in SI; see [C] (1). Numbers, or text with a unit.
+
+    `clutch_inertia` IM, `clutch_torque` MM, `drive_speed` w0, `engagement_time` tM, `stiffness` cp and
+    `damping` of the shaft, `gap`, `load_inertia` Ic, `load_torque` Mc. A load is "active" (acts always, may
+    turn the load back) or "reactive" (friction: holds the load at rest). `law` is linear, quadratic-concave,
+    quadratic-convex, exponential (with `time_constant`) or "table" (`law_times`, `law_torques`). Raises
+    InputError for everything that is wrong.
+
+    >>> clutch = Clutch.load("paper-c")
+    >>> round(clutch.clutch_torque, 3), round(clutch.mean_torque / clutch.clutch_torque, 6)
+    (588.399, 0.888889)
+    >>> clutch.replace(stiffness=-1, law="linaer")
+    Traceback (most recent call last):
+    softstart.errors.InputError: stiffness = -1: the stiffness cp of the shaft must be above 0.
+    law = "linaer": the engagement law is "linear" or ... or "table"; did you mean "linear"?
+    """
+
+    clutch_inertia: float
+    clutch_torque: float
+    drive_speed: float
+    engagement_time: float
+    stiffness: float
+    load_inertia: float
+    load_torque: float
+    lining_area: float | None = None
+    damping: float = 0.0
+    gap: float = 0.0
+    load_kind: str = "active"
+    law: str = "linear"
+    time_constant: float = 1.0
+    law_times: tuple[float, ...] | None = None
+    law_torques: tuple[float, ...] | None = None
+    name: str = "unnamed clutch"
+    source: str = "not given"
+
+    def __post_init__(self) -> None:
+        given = {p.name: getattr(self, p.name) for p in PARAMETERS}
+        table = Table("", tuple(dataclasses.replace(p.field, key=p.name) for p in PARAMETERS))
+        values = read_table(given, table)
+        for name, value in values.items():
+            object.__setattr__(self, name, tuple(value.tolist()) if isinstance(value, np.ndarray) else value)
+        wrong = self._mistakes()
+        if wrong:
+            raise InputError(wrong)
+
+    # making one -------------------------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, clutch: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
+        """A shipped clutch by its name, or the TOML file at this path; `also` as in `from_toml`.
+
+        >>> Clutch.load("paper-d")
+        Traceback (most recent call last):
+        softstart.errors.InputError: "paper-d": there is no such file, and no shipped clutch of this name;
+        did you mean paper-c?
+        """
+        if isinstance(clutch, str) and clutch in library.names():
+            return cls.from_toml(library.text(clutch), where=clutch, also=also)
+        if not Path(clutch).exists():
+            meant = nearest(Path(clutch).name.removesuffix(".toml"), library.names())
+            hint = (
+                f"did you mean {meant}?" if meant else f"shipped clutches are {', '.join(library.names())}."
+            )
+            raise InputError(
+                f"{show(os.fspath(clutch))}: there is no such file, and no shipped clutch of this name; "
+                f"{hint}"
+            )
+        return cls.from_toml(text_of(clutch, WHAT), where=os.fspath(clutch), also=also)
+
+    @classmethod
+    def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
+        """A clutch from the tables [clutch], [shaft], [load] and [law] of a text.
+
+        `where` is put before each sentence; `also` holds changes by path, as {"load.torque": "100 N*m"}.
+        """
+        found = read_document(text, TABLES, WHAT, where=where, also=also)
+        values = {
+            p.name: found[p.table][p.field.key]
+            for p in PARAMETERS
+            if found[p.table] is not None and p.field.key in found[p.table]
+        }
+        try:
+            return cls(**values)
+        except InputError as error:
+            before = f"{where}: " if where else ""
+            raise InputError([f"{before}{sentence}" for sentence in error.sentences]) from None
+
+    def replace(self, **changes: Any) -> Self:
+        """A clutch with some parameters changed, checked like a new one."""
+        known = [p.name for p in PARAMETERS]
+        strays = [
+            f"{name} = {show(value)}: a clutch has no such parameter; "
+            + (f"did you mean {near}?" if (near := nearest(name, known)) else f"it has {', '.join(known)}.")
+            for name, value in changes.items()
+            if name not in known
+        ]
+        if strays:
+            raise InputError(strays)
+        return dataclasses.replace(self, **changes)
+
+    def with_table(self, times: Sequence[float], torques: Sequence[float]) -> Self:
+        """The clutch with a law of its own: friction torques (N m) at instants (s), straight lines "
+        "between.
+        """
+        return self.replace(law="table", law_times=list(times), law_torques=list(torques))
+
+    # what follows from it ---------------------------------------------------------------------------------
+
+    @cached_property
+    def friction(self) -> Law:
+        """The friction torque over time."""
+        if self.law == "table":
+            assert self.law_times is not None
+            assert self.law_torques is not None
+            return table_law(self.law_times, self.law_torques)
+        return shaped_law(
+            cast("LawKind", self.law), self.clutch_torque, self.engagement_time, self.time_constant
+        )
+
+    @property
+    def mean_torque(self) -> float:
+        """(MM Ic + Mc IM)/(IM + Ic): shaft torque in N m about which the shaft swings while the clutch "
+        "slips.
+        """
+        IM, Ic = self.clutch_inertia, self.load_inertia
+        return (self.clutch_torque * Ic + self.load_torque * IM) / (IM + Ic)
+
+    @property
+    def B(self) -> float:
+        """Elastic frequency of the slipping clutch, rad/s: B^2 = cp (1/IM + 1/Ic), [C] (4)."""
+        return math.sqrt(self.stiffness * (1.0 / self.clutch_inertia + 1.0 / self.load_inertia))
+
+    @property
+    def locked_frequency(self) -> float:
+        """Elastic frequency once the clutch has locked, rad/s: sqrt(cp/Ic)."""
+        return math.sqrt(self.stiffness / self.load_inertia)
+
+    @property
+    def rigid_slip_time(self) -> float:
+        """Slip time in s on a rigid shaft, if behind tM: w0 (IM + Ic) = integral of M - Mc."""
+        law, needed = self.friction, self.drive_speed * (self.clutch_inertia + self.load_inertia)
+        t, given = 0.0, 0.0
+        for piece, end in zip(law.pieces[:-1], law.starts[1:], strict=True):
+            s = end - piece.start
+            gained = (piece.a - self.load_torque + (piece.b / 2.0 + piece.q * s / 3.0) * s) * s
+            if piece.e:
+                gained += piece.e * (piece.T * math.expm1(s / piece.T) - s)
+            given, t = given + gained, end
+        return t + (needed - given) / (law.held - self.load_torque)
+
+    def summary(self) -> dict[str, Any]:
+        """The parameters as plain data, for JSON."""
+        return {p.name: getattr(self, p.name) for p in PARAMETERS}
+
+    def to_toml(self) -> str:
+        """The clutch as a file that `load` reads, in SI.
+
+        >>> clutch = Clutch.load("tractor-pto")
+        >>> Clutch.from_toml(clutch.to_toml()) == clutch
+        True
+        """
+        lines: list[str] = []
+        table = ""
+        for p in PARAMETERS:
+            value = getattr(self, p.name)
+            if value is None:
+                continue
+            if p.table != table:
+                table = p.table
+                lines += ["", f"[{table}]"]
+            if isinstance(value, str):
+                lines.append(f"{p.field.key} = {json.dumps(value, ensure_ascii=False)}")
+            else:
+                shown = list(value) if isinstance(value, tuple) else value
+                lines.append(f"{p.field.key} = {shown!r}  # {p.field.unit}: {p.field.meaning}")
+        return "\n".join(lines) + "\n"
+
+    # checks -----------------------------------------------------------------------------------------------
+
+    def _mistakes(self) -> list[str]:
+        """What single values do not show."""
+        wrong = []
+        held = self.clutch_torque
+        if self.law == "table":
+            wrong = list(self._table_mistakes())
+            if not wrong and self.law_torques is not None:
+                held = self.law_torques[-1]
+        elif self.law_times is not None or self.law_torques is not None:
+            kinds = ", ".join(LAWS)
+            wrong.append(
+                f'law = "{self.law}": only the law "table" has law_times and law_torques; write law = '
+                f'"table", or leave them out for {kinds}.'
+            )
+        if self.time_constant == 0.0:
+            wrong.append(
+                "time_constant = 0: the time constant of the exponential law must not be 0; [C] has 1 s."
+            )
+        elif self.law == "exponential" and abs(self.engagement_time / self.time_constant) > 500.0:
+            wrong.append(
+                f"time_constant = {self.time_constant:g}: engagement_time is more than 500 of these, which "
+                f"is a "
+                "step and no law; give a longer time constant."
+            )
+        if not held > self.load_torque:
+            wrong.append(
+                f"load_torque = {self.load_torque:g}: the clutch holds {held:g} N m and cannot bring this "
+                f"load to "
+                "speed; give a smaller load torque or a larger friction torque."
+            )
+        return wrong
+
+    def _table_mistakes(self) -> list[str]:
+        times, torques = self.law_times, self.law_torques
+        if times is None or torques is None:
+            missing = "law_times" if times is None else "law_torques"
+            return [f'law = "table": {missing} is missing; give instants in s and friction torques in N m.']
+        if len(times) != len(torques):
+            return [
+                f"law_torques has {len(torques)} values and law_times {len(times)}: give a torque for each "
+                f"instant."
+            ]
+        wrong = []
+        if times[0] != 0.0:
+            wrong.append(f"law_times[0] = {times[0]:g}: a table begins at 0 s.")
+        for i, (before, after) in enumerate(pairwise(times), start=1):
+            if after < before:
+                wrong.append(f"law_times[{i}] = {after:g}: the instants must not go back; sort them.")
+                break
+        most = max(torques)
+        if most > self.clutch_torque * ABOVE:
+            wrong.append(
+                f"law_torques[{torques.index(most)}] = {most:g}: more than the engaged clutch has, "
+                f"clutch_torque = "
+                f"{self.clutch_torque:g} N m; lower the table or raise clutch_torque."
+            )
+        return wrong

@@ -1,0 +1,144 @@
+"""Engagements against an independent integrator, over drawn clutches; energy closes in all of them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from tests.softstart.clutch.clutch_oracle import integrate
+
+from softstart.clutch import Clutch, engage
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*array to a scalar.*:DeprecationWarning")
+
+
+@st.composite
+def clutches(draw):
+    IM, ratio = draw(st.floats(0.05, 2.0)), draw(st.floats(0.3, 8.0))
+    MM = draw(st.floats(20.0, 200.0))
+    Ic = IM * ratio
+    B = draw(st.floats(3.0, 25.0))  # with tM near 1 s: half a period to four
+    cp = B**2 / (1.0 / IM + 1.0 / Ic)
+    Mc = MM * draw(st.sampled_from((0.0, 1.0))) * draw(st.floats(0.05, 0.7))
+    seconds = draw(st.floats(0.4, 2.5))
+    kind = draw(st.sampled_from(("linear", "quadratic-concave", "quadratic-convex", "exponential", "table")))
+    law = {"law": kind}
+    if kind == "exponential":
+        law["time_constant"] = draw(st.sampled_from((-0.5, 0.3, 1.0)))
+    if kind == "table":
+        shares = draw(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=5))
+        law["law_times"] = np.linspace(0.0, 1.5, len(shares) + 1).tolist()
+        law["law_torques"] = [MM * one for one in (*shares, 1.0)]
+    zeta = draw(st.sampled_from((0.0, 0.02, 0.3)))
+    return Clutch(
+        clutch_inertia=IM, load_inertia=Ic, clutch_torque=MM, load_torque=Mc, stiffness=cp,
+        drive_speed=(MM - Mc) * seconds / (IM + Ic), engagement_time=draw(st.floats(0.3, 1.2)),
+        damping=2.0 * zeta * cp / B, gap=draw(st.sampled_from((0.0, 0.0, 0.3, 1.5))) * MM / cp,
+        load_kind=draw(st.sampled_from(("active", "reactive"))), **law,
+    )  # fmt: skip
+
+
+@settings(
+    max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck),
+    phases=(Phase.explicit, Phase.generate),
+)  # fmt: skip
+@given(clutches())
+def test_drawn_clutches(clutch):
+    run = engage(clutch)
+    assert run.energy.residual < 1e-11
+    other = integrate(clutch, run.end_time)
+    # 3e-12 a step, some dozens of spans; an impact multiplies what is off by a few
+    assert run.peak_torque == pytest.approx(other.peak, rel=1e-7)
+    assert run.friction_work == pytest.approx(other.work, rel=1e-7)
+    if math.isnan(run.slip_time):
+        assert math.isnan(other.slip_time)
+    else:
+        assert run.slip_time == pytest.approx(other.slip_time, rel=1e-7)
+    last = run.at(run.end_time)
+    w0 = clutch.drive_speed
+    assert float(last["wM"][0]) == pytest.approx(other.end[1], abs=1e-6 * w0)
+    assert float(last["wc"][0]) == pytest.approx(other.end[2], abs=1e-6 * w0)
+
+
+BASE = {
+    "clutch_inertia": 0.2, "load_inertia": 1.0, "clutch_torque": 100.0, "load_torque": 30.0,
+    "stiffness": 80.0, "drive_speed": 60.0, "engagement_time": 0.4,
+}  # fmt: skip
+
+
+def dipping(low, load_torque, **more):
+    """Engaged, then let go for a while, then engaged again: the locked clutch slips again."""
+    base = Clutch(**{**BASE, "load_torque": load_torque, **more})
+    start = engage(base).slip_time
+    times = [0.0, 0.4, start + 0.1, start + 0.3, start + 0.9, start + 1.1]
+    return base.with_table(times, [0.0, 100.0, 100.0, low, low, 100.0]), start
+
+
+@pytest.mark.parametrize("kind", ["active", "reactive"])
+@pytest.mark.parametrize("gap", [0.0, 0.5])
+def test_a_clutch_let_go_slips_again_and_locks_again(kind, gap):
+    clutch, start = dipping(10.0, 30.0, load_kind=kind, gap=gap, damping=0.5)
+    run = engage(clutch, until=start + 4.0)
+    assert [phase.kind for phase in run.phases][:3] == ["slip", "locked", "slip"]
+    other = integrate(clutch, start + 4.0)
+    assert other.reslips >= 1
+    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
+    assert run.peak_torque == pytest.approx(other.peak, rel=1e-8)
+    assert run.energy.residual < 1e-12
+
+
+def test_a_swinging_load_drives_the_clutch_side_past_the_driving_side():
+    clutch, start = dipping(3.0, 0.0)
+    run = engage(clutch, until=start + 3.0)
+    faster = run.at(run.t)["wM"].max()
+    assert faster > 60.0 * (1.0 + 1e-3)  # slip in the other direction
+    other = integrate(clutch, start + 3.0)
+    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
+    assert all(phase.friction_work >= 0.0 for phase in run.phases)
+
+
+def test_locked_means_locked_within_what_the_clutch_can_hold():
+    run = engage(Clutch.load("paper-c"), until=8.0)
+    t = np.linspace(run.slip_time + 1e-9, 8.0, 4001)
+    traces = run.at(t)
+    assert np.abs(traces["slip"]).max() == 0.0
+    assert np.all(np.abs(traces["T"]) <= traces["M"])
+    assert traces["F"] == pytest.approx(traces["T"])
+
+
+def test_without_damping_a_clutch_slips_again_in_each_period_ever_less():
+    clutch = Clutch.load("paper-c").replace(law="quadratic-convex")
+    run = engage(clutch, until=20.0)
+    again = [phase.friction_work for phase in run.phases[2:] if phase.kind == "slip"]
+    assert len(again) >= 5
+    assert all(later < earlier for earlier, later in pairwise(again))
+    assert run.locked_peak_torque <= clutch.clutch_torque * (1.0 + 1e-12) or run.peak_time < run.slip_time
+
+
+def test_a_clutch_let_go_to_nothing_slips_at_once_and_only_once():
+    # friction falls 3700 N m/s to zero: rounding of the instant is worth more than the torque's own
+    clutch = Clutch(
+        clutch_inertia=0.12, load_inertia=5.85, clutch_torque=221.0, load_torque=45.0, stiffness=0.352,
+        damping=0.138, drive_speed=0.43, engagement_time=0.294, load_kind="reactive",
+        law="table", law_times=[0, 0.0587, 0.1175, 0.1762, 0.235], law_torques=[0, 221.0, 221.0, 0, 221.0],
+    )  # fmt: skip
+    run = engage(clutch, until=1.0)
+    other = integrate(clutch, 1.0)
+    assert run.friction_work == pytest.approx(other.work, rel=1e-8)
+    assert sum(event.name == "slips again" for event in run.events) == 1
+
+
+def test_a_damped_impact_makes_a_locked_clutch_slip_at_once():
+    clutch = Clutch(
+        clutch_inertia=2.6e-3, load_inertia=9.8e-4, clutch_torque=2.58, load_torque=0.0, stiffness=0.119,
+        damping=0.0254, drive_speed=133.7, engagement_time=0.0675, gap=80.0, law="quadratic-concave",
+    )  # fmt: skip
+    run = engage(clutch)
+    names = [event.name for event in run.events]
+    assert names[:3] == ["locked", "contact", "slips again"]
+    assert run.events[1].t == run.events[2].t
+    assert run.friction_work == pytest.approx(integrate(clutch, run.end_time).work, rel=1e-8)

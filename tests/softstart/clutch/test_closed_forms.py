@@ -1,0 +1,156 @@
+"""Closed forms, limits and scaling of an engagement."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from softstart.clutch import LAWS, Clutch, engage
+from softstart.clutch.closed_forms import linear_torque, pulse_and_pause, two_steps
+from softstart.clutch.laws import shaped_law, table_law
+
+PAPER = Clutch.load("paper-c")
+
+
+@pytest.mark.parametrize("load_torque", [0.0, 196.133])
+def test_linear_law_is_the_closed_form(load_torque):
+    clutch = PAPER.replace(load_torque=load_torque)
+    run = engage(clutch)
+    t = np.linspace(0.0, run.slip_time, 2001)
+    assert run.at(t)["T"] == pytest.approx(linear_torque(clutch, t), abs=1e-11 * clutch.clutch_torque)
+
+
+def test_linear_law_without_load_peaks_where_the_closed_form_does():
+    clutch = PAPER.replace(load_torque=0.0)
+    # behind tM: kappa MM (1 + amplitude), amplitude = |2 sin(B tM/2)|/(B tM)
+    kappa, B = clutch.load_inertia / (clutch.load_inertia + clutch.clutch_inertia), clutch.B
+    peak = kappa * clutch.clutch_torque * (1.0 + abs(2.0 * math.sin(0.5 * B)) / B)
+    assert engage(clutch).peak_torque == pytest.approx(peak, rel=1e-14)
+
+
+def test_a_step_doubles_the_mean_torque():
+    clutch = PAPER.with_table([0.0, 1.0], [PAPER.clutch_torque] * 2).replace(load_torque=0.0)
+    run = engage(clutch)
+    assert run.peak_torque == pytest.approx(2.0 * clutch.mean_torque, rel=1e-14)
+
+
+def test_without_load_and_with_a_stiff_shaft_friction_takes_what_the_masses_get():
+    # L = I w0^2/2 whatever the law: the classical result, here up to what the oscillation keeps
+    for law in LAWS:
+        clutch = PAPER.replace(law=law, load_torque=0.0, stiffness=PAPER.stiffness * 1e4)
+        inertia = clutch.clutch_inertia + clutch.load_inertia
+        run = engage(clutch, until=3.5)
+        assert run.slip_work == pytest.approx(0.5 * inertia * clutch.drive_speed**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_stiff_shaft_slips_as_long_as_a_rigid_one(law):
+    errors = []
+    for stiffer in (1e2, 1e4):
+        clutch = PAPER.replace(law=law, stiffness=PAPER.stiffness * stiffer)
+        run = engage(clutch, until=1.01 * clutch.rigid_slip_time)
+        errors.append(abs(run.slip_time - clutch.rigid_slip_time))
+    assert errors[0] < 0.1
+    assert errors[1] < 0.02
+    assert errors[1] < errors[0] + 1e-12
+
+
+def test_a_light_clutch_side_hands_the_friction_torque_on():
+    clutch = PAPER.replace(clutch_inertia=1e-5 * PAPER.load_inertia)
+    run = engage(clutch, until=3.0)
+    t = np.linspace(0.05, 0.95, 50)
+    traces = run.at(t)
+    # the ripple is the slope of the law over the frequency: MM/(B tM)
+    assert np.abs(traces["T"] - traces["M"]).max() < 2.0 * clutch.clutch_torque / clutch.B
+    assert run.peak_ratio == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("law", [pulse_and_pause, two_steps])
+def test_two_laws_bring_the_shaft_to_rest_at_its_mean_torque(law):
+    run = engage(PAPER.with_table(*law(PAPER)))
+    assert run.slip_peak_torque == pytest.approx(PAPER.mean_torque, rel=1e-12)
+    t = np.linspace(0.5, run.slip_time, 200)
+    assert run.at(t)["T"] == pytest.approx(np.full(200, PAPER.mean_torque), rel=1e-12)
+    assert run.locked_peak_torque == pytest.approx(PAPER.mean_torque, rel=1e-12)
+
+
+def test_units_do_not_matter():
+    in_si = Clutch(
+        clutch_inertia=0.980665, clutch_torque=588.399, drive_speed=230.0, engagement_time=1.0,
+        stiffness=49.03325, load_inertia=4.903325, load_torque=196.133,
+    )  # fmt: skip
+    one, other = engage(PAPER), engage(in_si)
+    assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-14)
+    assert one.slip_work == pytest.approx(other.slip_work, rel=1e-14)
+    # a kgf m taken as an N m: all inertias, torques and stiffnesses by one factor
+    scaled = PAPER.replace(**{
+        name: getattr(PAPER, name) / 9.80665
+        for name in ("clutch_inertia", "clutch_torque", "stiffness", "load_inertia", "load_torque")
+    })  # fmt: skip
+    run = engage(scaled)
+    assert run.slip_time == pytest.approx(one.slip_time, rel=1e-13)
+    assert run.peak_torque * 9.80665 == pytest.approx(one.peak_torque, rel=1e-13)
+    assert run.slip_work * 9.80665 == pytest.approx(one.slip_work, rel=1e-13)
+
+
+def test_time_scales():
+    # time by 2: speeds halve, stiffness and torque fall to a quarter with the inertias kept
+    slow = PAPER.replace(
+        engagement_time=2.0, drive_speed=115.0, stiffness=PAPER.stiffness / 4,
+        clutch_torque=PAPER.clutch_torque / 4, load_torque=PAPER.load_torque / 4,
+    )  # fmt: skip
+    run, first = engage(slow), engage(PAPER)
+    assert run.slip_time == pytest.approx(2.0 * first.slip_time, rel=1e-13)
+    assert run.slip_work == pytest.approx(first.slip_work / 4, rel=1e-13)
+
+
+def test_a_law_and_its_fine_table_agree():
+    law = shaped_law("exponential", 588.399, 1.0)
+    t = np.linspace(0.0, 1.0, 201)
+    table = PAPER.with_table(t.tolist(), np.minimum(law.torque(t), 588.399).tolist())
+    exact = engage(PAPER.replace(law="exponential"))
+    # chords of e^t lie above it by at most h^2/8 of the slope's rate
+    assert engage(table).slip_work == pytest.approx(exact.slip_work, rel=2e-6)
+
+
+def test_a_table_of_the_linear_law_is_the_linear_law():
+    cut = PAPER.with_table([0.0, 0.3, 1.0], [0.0, 0.3 * PAPER.clutch_torque, PAPER.clutch_torque])
+    one, other = engage(PAPER), engage(cut)
+    assert one.slip_work == pytest.approx(other.slip_work, rel=1e-13)
+    assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_series_of_a_law_are_its_values(kind):
+    law = shaped_law(kind, 60.0, 0.8, 0.5)
+    assert law.torque([0.0, 0.8, 3.0]).tolist() == pytest.approx([0.0, 60.0, 60.0])
+    series = np.array(law.pieces[0].series(0.3, 24))
+    later = float(series @ 0.2 ** np.arange(25))
+    assert later == pytest.approx(float(law.torque(0.5)), rel=1e-14)
+
+
+def test_a_table_ends_where_it_stops_changing():
+    assert table_law([0.0, 1.0, 2.0, 3.0], [0.0, 5.0, 5.0, 5.0]).engaged_at == 1.0
+
+
+def test_peaks_are_located_and_the_grid_does_not_matter():
+    run = engage(PAPER.replace(gap=0.5, damping=2.0))
+    fine = np.linspace(0.0, run.end_time, 200_001)
+    on_grid = np.abs(np.concatenate([run.at(part)["T"] for part in np.array_split(fine[::50], 4)])).max()
+    assert on_grid <= run.peak_torque * (1.0 + 1e-14)
+    assert float(np.abs(run.at(run.peak_time)["T"])[0]) == pytest.approx(run.peak_torque, rel=1e-12)
+
+
+def test_the_same_engagement_gives_the_same_bits():
+    one, other = engage(Clutch.load("tractor-pto")), engage(Clutch.load("tractor-pto"))
+    assert (one.peak_torque, one.friction_work, one.slip_time) == (
+        other.peak_torque, other.friction_work, other.slip_time
+    )  # fmt: skip
+
+
+def test_lining_heat_is_work_over_area():
+    run = engage(Clutch.load("tractor-pto"))
+    assert run.lining_heat == run.friction_work / 0.06
+    assert math.isnan(engage(PAPER).lining_heat)

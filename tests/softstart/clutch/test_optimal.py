@@ -1,0 +1,197 @@
+"""Optimal engagement laws: what is proved lies below every law, what is found above it and near it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softstart.clutch import LAWS, Clutch, engage, optimize_engagement
+from softstart.clutch.closed_forms import pulse_and_pause, two_steps
+from softstart.clutch.optimal.cells import least_over_ends
+from softstart.clutch.optimal.collocation import collocated
+from softstart.clutch.optimal.program import Program
+from softstart.clutch.optimal.slip import Slip
+from softstart.clutch.optimal.solving import CLOSE, Search
+from softstart.errors import InputError, SimulationError
+
+PAPER = Clutch.load("paper-c")
+SLIP = Slip.of(PAPER)
+CLASSES = ("any", "nondecreasing")
+STEPS = 120
+
+
+@pytest.fixture(scope="module")
+def fronts():
+    return {name: optimize_engagement(PAPER, 3, law_class=name) for name in CLASSES}
+
+
+@pytest.fixture(scope="module")
+def searches():
+    made = {name: Search(PAPER, name, STEPS) for name in CLASSES}
+    for search in made.values():
+        search.least_work(1.15 * SLIP.Tm)
+    return made
+
+
+def random_laws(count, nondecreasing, seed=7):
+    """Laws on a grid of their own: anything, bang-bang, and near to the best."""
+    random = np.random.default_rng(seed)
+    edges = np.linspace(0.0, SLIP.tM, 38)
+    for i in range(count):
+        shares = random.random(37) ** random.choice([0.3, 1.0, 3.0])
+        if i % 3 == 1:
+            shares = np.round(shares)
+        if i % 3 == 2:
+            best = np.where((edges[:-1] > 0.12) & (edges[:-1] < 0.28), 0.0, 1.0)
+            shares = np.clip(best + 0.1 * random.standard_normal(37), 0.0, 1.0)
+        yield edges, (np.sort(shares) if nondecreasing else shares) * SLIP.MM
+
+
+# what is proved --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law_class", CLASSES)
+def test_every_cut_holds_for_every_law(law_class):
+    program = Program(SLIP, law_class == "nondecreasing", STEPS)
+    ends = [[0.0, 0.0, 180.0], [30.0, -20.0, 175.0], [-50.0, 60.0, 190.0], [0.0, 0.0, 215.0]]
+    cuts = [
+        program.solve(np.array(end), P * SLIP.Tm).cut
+        for end, P in zip(ends, (1.0, 1.2, 1.4, 1.1), strict=True)
+    ]
+    t = np.linspace(0.0, SLIP.tM, 1501)
+    for edges, M in random_laws(60, law_class == "nondecreasing"):
+        matrix, free = SLIP.ends_by(edges)
+        *end, A = (matrix @ M + free).tolist()
+        P = float((SLIP.torque_by(t, edges) @ M + SLIP.torque_without(t)).max()) * (
+            1.0 + 1e-4
+        )  # above the grid's
+        for cut in cuts:
+            assert cut.y @ np.array(end) - P * cut.slope + cut.k - 1e-9 * SLIP.w0 <= A
+
+
+def test_the_least_over_ends_is_no_more_than_at_any_end():
+    program = Program(SLIP, False, STEPS)
+    cuts = [program.solve(np.array([0.0, 0.0, D]), 1.2 * SLIP.Tm).cut for D in (165.0, 175.0, 190.0)]
+    P = 1.3 * SLIP.Tm
+    least = least_over_ends(SLIP, cuts, P, 1.0)
+    random = np.random.default_rng(3)
+    r, angle = (P - SLIP.Tm) * np.sqrt(random.random(4000)), 2.0 * np.pi * random.random(4000)
+    s, p, q = 1.5 + 2.0 * random.random(4000), r * np.cos(angle), r * np.sin(angle)
+    a, b, D = SLIP.start_of_end(s, p, q)
+    A = np.max([a * c.y[0] + b * c.y[1] + D * c.y[2] + c.k - P * c.slope for c in cuts], axis=0)
+    earlier = np.linspace(0.0, SLIP.period, 400)[1:]
+    per = SLIP.kappa * SLIP.B / SLIP.cp
+    before = SLIP.g * earlier + per * (
+        q[:, None] - p[:, None] * np.sin(SLIP.B * earlier) - q[:, None] * np.cos(SLIP.B * earlier)
+    )
+    works = SLIP.work(A, s, p, q)[before.min(axis=1) >= 0.0]
+    assert works.size > 1000
+    assert works.min() >= least.bound
+
+
+@pytest.mark.parametrize("law_class", CLASSES)
+def test_no_engaged_law_lies_below_its_bound(law_class, searches):
+    search = searches[law_class]
+    tried = 0
+    for edges, M in random_laws(9, law_class == "nondecreasing", seed=11):
+        table = np.repeat(edges, 2)[1:-1].tolist(), np.repeat(M, 2).tolist()
+        run = engage(PAPER.with_table([*table[0], SLIP.tM], [*table[1], SLIP.MM]))
+        if run.slip_time - SLIP.tM >= SLIP.period:
+            tried += 1
+            assert run.slip_peak_torque >= SLIP.Tm
+            assert run.slip_work >= search.work_bound(run.slip_peak_torque)
+    assert tried >= 6
+
+
+def test_energy_gives_the_work_of_every_law():
+    # the formula on which all of this stands, against the simulation's integral of M (w0 - wM)
+    for edges, M in random_laws(3, False, seed=5):
+        table = [*np.repeat(edges, 2)[1:-1].tolist(), SLIP.tM], [*np.repeat(M, 2).tolist(), SLIP.MM]
+        run = engage(PAPER.with_table(*table))
+        matrix, free = SLIP.ends_by(edges)
+        A = float(matrix[3] @ M + free[3])
+        end = run.at(run.slip_time * (1.0 - 1e-15))
+        q = SLIP.cp * float(end["v"][0]) / SLIP.B
+        s = np.array(run.slip_time - SLIP.tM)
+        claimed = float(SLIP.work(np.array(A), s, np.array(float(end["T"][0]) - SLIP.Tm), np.array(q)))
+        assert claimed == pytest.approx(run.slip_work, rel=1e-11)
+
+
+# what is found ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law_class", CLASSES)
+def test_bound_and_optimum_and_known_laws_are_in_order(law_class, fronts):
+    front = fronts[law_class]
+    works = [point.slip_work for point in front.points]
+    assert works == sorted(works, reverse=True)
+    for point in front.points:
+        assert point.work_bound <= point.slip_work <= point.work_bound * (1.0 + 1.5 * CLOSE)
+        assert point.run.energy.residual < 1e-12
+        assert max(point.torques) <= SLIP.MM
+        assert min(point.torques) >= 0.0
+        if law_class == "nondecreasing":
+            assert np.all(np.diff(point.torques) >= -1e-9 * SLIP.MM)
+    assert {law.name for law in front.laws} == set(LAWS)
+    for law in front.laws:
+        assert law.work_bound <= law.least_work <= law.run.slip_work
+        assert law.peak_bound <= law.least_peak * (1.0 + 1e-12)
+        assert law.least_peak <= law.run.slip_peak_torque
+
+
+def test_a_freer_class_costs_no_more(fronts):
+    for free, rising in zip(fronts["any"].points, fronts["nondecreasing"].points, strict=True):
+        assert free.work_bound <= rising.slip_work
+        assert free.slip_work <= rising.slip_work
+
+
+@pytest.mark.parametrize(("law_class", "law"), [("any", pulse_and_pause), ("nondecreasing", two_steps)])
+def test_simple_laws_lie_between_bound_and_optimum_on_a_grid(law_class, law, fronts):
+    run = engage(PAPER.with_table(*law(PAPER)))
+    first = fronts[law_class].points[0]
+    assert first.peak_torque == pytest.approx(SLIP.Tm, rel=1e-9)
+    assert first.work_bound <= run.slip_work <= first.slip_work * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("law_class", CLASSES)
+def test_collocation_finds_the_same(law_class, fronts):
+    point = fronts[law_class].points[1]
+    other = collocated(PAPER, point.peak_torque, law_class, intervals=40, after=30)
+    assert other.slip_work >= point.work_bound * (1.0 - 1e-4)  # its peak is kept at its points only
+    assert other.slip_work == pytest.approx(point.slip_work, rel=1e-3)
+
+
+def test_another_clutch_with_a_table_of_its_own():
+    clutch = Clutch(
+        clutch_inertia=0.4, load_inertia=1.0, clutch_torque=100.0, load_torque=10.0,
+        stiffness=200.0, drive_speed=150.0, engagement_time=0.6,
+        law="table", law_times=[0, 0.2, 0.5], law_torques=[0, 70, 100],
+    )  # fmt: skip
+    front = optimize_engagement(clutch, 2, steps=100)
+    assert [law.name for law in front.laws] == [*LAWS, "table"]
+    for law in front.laws:
+        assert law.work_bound <= law.least_work * (1.0 + 1e-12)
+        assert law.least_work <= law.run.slip_work * (1.0 + 5.0 * CLOSE)
+
+
+# what is refused -------------------------------------------------------------------------------------------
+
+
+def test_what_the_optimum_does_not_cover_is_refused_at_once():
+    with pytest.raises(InputError) as caught:
+        optimize_engagement(PAPER.replace(gap=0.1, damping=1.0, load_kind="reactive"))
+    assert [one.split(" = ")[0] for one in caught.value.sentences] == ["gap", "damping", "load_kind"]
+    with pytest.raises(InputError, match="engagement_time = 4: with full torque"):
+        optimize_engagement(PAPER.replace(engagement_time=4.0))
+
+
+def test_bad_questions_are_refused():
+    with pytest.raises(InputError) as caught:
+        optimize_engagement(PAPER, 0, law_class="nondecresing")
+    assert [one.split(" = ")[0] for one in caught.value.sentences] == ["points", "law_class"]
+    assert 'did you mean "nondecreasing"?' in caught.value.sentences[1]
+
+
+def test_an_impossible_peak_has_no_law():
+    with pytest.raises(SimulationError, match="No law with a peak"):
+        Search(PAPER, "any", 20).least_work(0.9 * SLIP.Tm)
