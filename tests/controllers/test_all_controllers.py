@@ -24,10 +24,19 @@ ALL = (
     "reduced-first-stage",
     "reduced-two-stage",
     "s-curve",
+    "pulse-coast-hold",
     "shaped",
     "state-feedback",
 )
-SAMPLED = ("acceleration-delay", "current-limit-feedback", "ramp", "s-curve", "shaped", "state-feedback")
+SAMPLED = (
+    "acceleration-delay",
+    "current-limit-feedback",
+    "ramp",
+    "s-curve",
+    "pulse-coast-hold",
+    "shaped",
+    "state-feedback",
+)
 DRIVES = [Drive.load(name) for name in names()]
 
 

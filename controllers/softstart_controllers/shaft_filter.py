@@ -1,0 +1,211 @@
+"""Motor, shaft and load from motor angle and motor torque alone: two Kalman filters.
+
+Compiled steps must not allocate, so each filter keeps its numbers in consecutive slots of a vector `m` that
+the caller owns; `i` or `x` is the place of its first slot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.plant.jit import compiled
+
+Vector = NDArray[np.float64]
+
+# The motor turning free: phi1, w1, 1/J1 and their covariances, from place i on.
+ANGLE, SPEED, INVERSE, P00, P01, P02, P11, P12, P22, FREE_SIZE = range(10)
+
+# The shaft in contact: phi1, w1, z (twist beyond the gap), w2, 1/J2, from place x on; then their 5 x 5
+# covariances, then two 5 x 5 matrices to work in.
+PHI1, W1, Z, W2, B, N = range(6)
+COVARIANCE = N
+_F, _G = N + N * N, N + 2 * N * N
+SHAFT_SIZE = N + 3 * N * N
+
+
+@compiled
+def free_predict(m: Vector, i: int, u: float, early: float, h: float, noise: float) -> None:
+    """The free motor h later: w1' = u/J1, under the mean torque u, which acts `early` (see `contact.lean`).
+
+    1/J1 is an unknown of its own, which the pulse reveals; `noise` (rad^2/s^2) is what the torque measured
+    may be wrong by, as variance of w1.
+
+    >>> m = np.zeros(FREE_SIZE)
+    >>> m[INVERSE] = 2.0
+    >>> free_predict(m, 0, 3.0, 0.0, 0.5, 0.0)
+    >>> m[:3].tolist()
+    [0.75, 3.0, 2.0]
+    """
+    g = u * h
+    f = 0.5 * g * h + early * h * h
+    m[i + ANGLE] += h * m[i + SPEED] + f * m[i + INVERSE]
+    m[i + SPEED] += g * m[i + INVERSE]
+    p00, p01, p02 = m[i + P00], m[i + P01], m[i + P02]
+    p11, p12, p22 = m[i + P11], m[i + P12], m[i + P22]
+    row00, row01, row02 = p00 + h * p01 + f * p02, p01 + h * p11 + f * p12, p02 + h * p12 + f * p22
+    row11, row12 = p11 + g * p12, p12 + g * p22
+    m[i + P00] = row00 + h * row01 + f * row02 + noise * h * h / 3.0
+    m[i + P01] = row01 + g * row02 + 0.5 * noise * h
+    m[i + P02] = row02
+    m[i + P11] = row11 + g * row12 + noise
+    m[i + P12] = row12
+
+
+@compiled
+def free_update(m: Vector, i: int, angle: float, variance: float) -> None:
+    """Correct by the encoder's angle, whose error has this variance in rad^2."""
+    p00, p01, p02 = m[i + P00], m[i + P01], m[i + P02]
+    total = p00 + variance
+    k0, k1, k2 = p00 / total, p01 / total, p02 / total
+    error = angle - m[i + ANGLE]
+    m[i + ANGLE] += k0 * error
+    m[i + SPEED] += k1 * error
+    m[i + INVERSE] += k2 * error
+    m[i + P00] = (1.0 - k0) * p00
+    m[i + P01] = (1.0 - k0) * p01
+    m[i + P02] = (1.0 - k0) * p02
+    m[i + P11] -= k1 * p01
+    m[i + P12] -= k1 * p02
+    m[i + P22] -= k2 * p02
+
+
+@compiled
+def load_acceleration(T: float, w2: float, b: float, Mc: float, reactive: float) -> float:
+    """w2' under the shaft torque T, b = 1/J2; a reactive load at rest stays there while T <= Mc.
+
+    >>> load_acceleration(5.0, 0.0, 2.0, 7.0, 0.0), load_acceleration(5.0, 0.0, 2.0, 7.0, 1.0)
+    (-4.0, 0.0)
+    """
+    if reactive == 0.0 or w2 > 0.0:
+        return b * (T - Mc)
+    if w2 < 0.0:
+        return b * (T + Mc)
+    return b * max(T - Mc, 0.0)
+
+
+@compiled
+def shaft(z: float, rate: float, c: float, d: float) -> float:
+    """T = max(0, c z + d z') in contact, 0 with the gap open.
+
+    >>> shaft(0.1, 2.0, 50.0, 0.5), shaft(-0.1, 2.0, 50.0, 0.5), shaft(0.1, -20.0, 50.0, 0.5)
+    (6.0, 0.0, 0.0)
+    """
+    return max(0.0, c * z + d * rate) if z >= 0.0 else 0.0
+
+
+@compiled
+def move(
+    w1: float, z: float, w2: float, b: float, u: float, h: float, a: float, c: float, d: float, Mc: float,
+    reactive: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Way of the motor, w1, z and w2 a time h later under the constant motor torque u (Runge-Kutta, order 4).
+
+    a = 1/J1 and b = 1/J2: w1' = a (u - T), z' = w1 - w2, w2' as in `load_acceleration`.
+
+    >>> way, w1, z, w2 = move(1.0, 0.0, 0.0, 2.0, 0.0, 0.01, 2.0, 50.0, 0.0, 0.0, 0.0)
+    >>> round(z, 7), round(float(np.sin(0.01 * 200**0.5)) / 200**0.5, 7)
+    (0.0099667, 0.0099667)
+    """
+    half = 0.5 * h
+    T = shaft(z, w1 - w2, c, d)
+    f1, g1, r1 = a * (u - T), load_acceleration(T, w2, b, Mc, reactive), w1 - w2
+    x, y, way = w1 + half * f1, w2 + half * g1, z + half * r1
+    T = shaft(way, x - y, c, d)
+    f2, g2, r2 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    x, y, way = w1 + half * f2, w2 + half * g2, z + half * r2
+    T = shaft(way, x - y, c, d)
+    f3, g3, r3 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    x, y, way = w1 + h * f3, w2 + h * g3, z + h * r3
+    T = shaft(way, x - y, c, d)
+    f4, g4, r4 = a * (u - T), load_acceleration(T, y, b, Mc, reactive), x - y
+    after = w2 + h / 6.0 * (g1 + 2.0 * (g2 + g3) + g4)
+    if reactive != 0.0 and w2 > 0.0 and after < 0.0:  # friction stops it
+        after = 0.0
+    return (
+        h * w1 + h * h / 6.0 * (f1 + f2 + f3),
+        w1 + h / 6.0 * (f1 + 2.0 * (f2 + f3) + f4),
+        z + h / 6.0 * (r1 + 2.0 * (r2 + r3) + r4),
+        after,
+    )
+
+
+@compiled
+def shaft_predict(
+    m: Vector, x: int, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
+    reactive: float, speed_noise: float, twist_noise: float, load_noise: float,
+) -> None:  # fmt: skip
+    """The shaft in contact h later, by `move`; the covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
+
+    A is the Jacobian at the middle of the sample, with dT = c dz + d (dw1 - dw2):
+
+        dphi1' = dw1,  dw1' = -a dT,  dz' = dw1 - dw2,  dw2' = b dT + (T - Mc) db,  db' = 0
+
+    The noises are the variances that the sample adds to w1, z and w2.
+    """
+    F, G, P = x + _F, x + _G, x + COVARIANCE
+    b = m[x + B]
+    _, w1, z, w2 = move(m[x + W1], m[x + Z], m[x + W2], b, u, 0.5 * h, a, c, d, Mc, reactive)
+    T = shaft(z, w1 - w2, c, d)
+    in_contact = 1.0 if T > 0.0 else 0.0
+    moves = 0.0 if reactive != 0.0 and w2 == 0.0 and Mc >= T else 1.0
+    on_w1 = -h * a * in_contact
+    on_w2 = h * b * in_contact * moves
+    by_b = h * load_acceleration(T, w2, 1.0, Mc, reactive) * moves
+    for j in range(N):  # F = 1 + h A (1 + h A/2 (1 + h A/3)), a column at a time
+        f0 = f1 = f2 = f3 = 0.0
+        f4 = 1.0 if j == B else 0.0
+        for share in (3.0, 2.0, 1.0):
+            f0 += 1.0 if j == PHI1 else 0.0
+            f1 += 1.0 if j == W1 else 0.0
+            f2 += 1.0 if j == Z else 0.0
+            f3 += 1.0 if j == W2 else 0.0
+            dT = c * f2 + d * (f1 - f3)
+            f0, f1, f2, f3 = (
+                h * f1 / share,
+                on_w1 * dT / share,
+                h * (f1 - f3) / share,
+                (on_w2 * dT + by_b * f4) / share,
+            )
+        m[F + PHI1 * N + j] = f0 + (1.0 if j == PHI1 else 0.0)
+        m[F + W1 * N + j] = f1 + (1.0 if j == W1 else 0.0)
+        m[F + Z * N + j] = f2 + (1.0 if j == Z else 0.0)
+        m[F + W2 * N + j] = f3 + (1.0 if j == W2 else 0.0)
+        m[F + B * N + j] = f4
+    for i in range(N):  # G = F P
+        for j in range(N):
+            total = 0.0
+            for k in range(N):
+                total += m[F + N * i + k] * m[P + N * k + j]
+            m[G + N * i + j] = total
+    for i in range(N):  # P = G F'
+        for j in range(i, N):
+            total = 0.0
+            for k in range(N):
+                total += m[G + N * i + k] * m[F + N * j + k]
+            m[P + N * i + j] = total
+            m[P + N * j + i] = total
+    m[P + (N + 1) * W1] += speed_noise
+    m[P + (N + 1) * Z] += twist_noise
+    m[P + (N + 1) * W2] += load_noise
+    way, w1, z, w2 = move(m[x + W1], m[x + Z], m[x + W2], b, u, h, a, c, d, Mc, reactive)
+    m[x + PHI1] += way + a * early * h * h
+    m[x + W1] = w1
+    m[x + Z] = z + a * early * h * h
+    m[x + W2] = w2
+
+
+@compiled
+def shaft_update(m: Vector, x: int, angle: float, variance: float, least: float, most: float) -> None:
+    """Correct by the encoder's angle; 1/J2 stays between `least` and `most`."""
+    P, K = x + COVARIANCE, x + _F
+    total = m[P] + variance
+    error = angle - m[x + PHI1]
+    for i in range(N):
+        m[K + i] = m[P + N * i] / total
+        m[K + N + i] = m[P + i]
+    for i in range(N):
+        m[x + i] += m[K + i] * error
+        for j in range(N):
+            m[P + N * i + j] -= m[K + i] * m[K + N + j]
+    m[x + B] = min(max(m[x + B], least), most)
