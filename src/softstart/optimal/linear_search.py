@@ -295,9 +295,14 @@ def cut(answer: Answer, wanted: NDArray[np.bool_]) -> Vector:
 
 
 def assemble(problem: Problem, answer: Answer) -> TorqueProfile:
-    """The gap part that arrives with v, and the contact part, as one profile up to t_f."""
+    """The gap part that arrives with v, and the contact part, as one profile up to t_f.
+
+    HiGHS keeps the limits of the torque to its own tolerance only; the profile keeps them exactly.
+    """
     pieces = entry_of(problem).pieces(answer.te, answer.v)
     lengths = [max(duration, 0.0) for duration, _ in pieces] + np.diff(answer.edges).tolist()
-    levels = [torque for _, torque in pieces] + answer.u.tolist()
+    levels = [torque for _, torque in pieces] + np.clip(
+        answer.u, problem.lowest_torque, problem.highest_torque
+    ).tolist()
     times = np.concatenate([[0.0], np.cumsum(lengths)])
     return TorqueProfile.steps(times, levels)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softstart import Drive
+from softstart import Drive, optimize
 from softstart.errors import InputError
 from softstart.optimal import linear_search, pulse_coast_hold
 from softstart.optimal.certificate import _Dual, _Envelope
@@ -115,3 +115,12 @@ def test_where_a_finer_grid_has_no_answer_the_last_one_stands(monkeypatch: pytes
     assert found is not None
     assert len(calls) > 2
     assert found.edges.size == calls[0]
+
+
+def test_the_profile_keeps_the_limits_that_the_solver_keeps_to_its_tolerance_only():
+    """Here HiGHS answers with Ms + 6e-6 N m; the profile that was checked has to stay within Ms."""
+    drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, gap=2.0, load_inertia=0.1225)
+    best = optimize(drive, 0.2527, terminal="reached")
+    assert best.method == "lp"
+    assert best.profile.torque.max() <= drive.Ms
+    assert best.k_dyn_lower_bound <= best.k_dyn <= 1.001 * best.k_dyn_lower_bound
