@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from dataclasses import dataclass
 
-from softstart import Drive, simulate
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from softstart import Drive
 from softstart.controller import make_controller, ready_controller_names
+from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, OptimumError
+from softstart.optimal.shortest import shortest_start_time
 from softstart.optimal.solving import optimize
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
 from softstart.tuning.solving import tune
+
+Vector = NDArray[np.float64]
 
 TARGET = 60.0  # rad/s
 LAG = 0.002  # s, of the torque of an inverter
@@ -35,33 +43,53 @@ def tuned(
     names: Sequence[str],
     gaps: Sequence[float],
     inertias: Sequence[float],
-    start_time: str,
     restarts: int,
     generations: int,
     progress: Progress,
 ) -> dict[str, Tuning]:
-    """All of them tuned alike: the same grid, bound, effort and seed."""
+    """All of them tuned alike: the same grid, effort and seed, and no start slower than with the defaults."""
     found = {}
     for number, name in enumerate(names, start=1):
         head = f"{name} ({number} of {len(names)})"
         found[name] = tune(
-            drive, name, gaps, inertias, start_time=start_time, certified=False, restarts=restarts,
-            generations=generations, progress=lambda text, head=head: progress(f"{head}: {text}"),  # type: ignore[misc]
+            drive, name, gaps, inertias, certified=False, restarts=restarts, generations=generations,
+            progress=lambda text, head=head: progress(f"{head}: {text}"),  # type: ignore[misc]
         )  # fmt: skip
     return found
 
 
-@cache
-def direct_time(drive: Drive) -> float:
-    """Start time of constant torque in s."""
-    return float(simulate(drive, "direct").start_time)
+@dataclass(frozen=True)
+class Front:
+    """The least K_dyn of one drive at some start times (s), rising; between them it is interpolated."""
+
+    start_times: Vector
+    k_dyn: Vector
+
+    def at(self, start_time: float) -> float:
+        """By a monotone cubic in the logarithms (PCHIP); NaN outside."""
+        if not self.start_times.size or not self.start_times[0] <= start_time <= self.start_times[-1]:
+            return math.nan
+        if self.start_times.size == 1:
+            return float(self.k_dyn[0])
+        curve = PchipInterpolator(np.log(self.start_times), np.log(self.k_dyn))
+        return float(np.exp(curve(math.log(start_time))))
 
 
-@cache
-def least(drive: Drive, start_time: float) -> tuple[float, float]:
-    """Least K_dyn in this start time and its lower bound, without lag; NaN where there is no such start."""
-    try:
-        best = optimize(drive.replace(torque_lag=0.0), start_time, terminal="reached")
-    except (InfeasibleError, OptimumError):
-        return math.nan, math.nan
-    return best.k_dyn, best.k_dyn_lower_bound
+def front(drive: Drive, times: Sequence[float], points: int) -> Front:
+    """Optima from the quickest of these times that a start with one contact allows to the slowest.
+
+    The optimum is that of a torque without lag, terminal `reached`: a yardstick no controller can pass.
+    """
+    ideal = drive.replace(torque_lag=0.0)
+    slowest, quickest = float(np.nanmax(times)), float(np.nanmin(times))
+    quickest = max(quickest, shortest_start_time(Problem(ideal, 1.0, "reached")))
+    if not quickest < slowest:
+        return Front(np.zeros(0), np.zeros(0))
+    found = []
+    for time in np.geomspace(quickest * (1.0 + 1e-6), slowest, points).tolist():
+        try:
+            found.append((time, optimize(ideal, time, terminal="reached").k_dyn))
+        except (InfeasibleError, OptimumError):
+            continue
+    solved = np.array(found).reshape(-1, 2)
+    return Front(solved[:, 0], solved[:, 1])

@@ -8,7 +8,7 @@ import pytest
 from softstart import simulate
 from softstart.study import Verdict, find_study
 from softstart_studies.gaps_and_inertias import Extent, GapsAndInertias, grids, present
-from softstart_studies.tuned_alike import CRANE, direct_time, tuned_controllers
+from softstart_studies.tuned_alike import CRANE, tuned_controllers
 
 PART = Extent(
     gaps=(0.5, 2.0),
@@ -17,6 +17,7 @@ PART = Extent(
     generations=3,
     controllers=("ramp", "acceleration-delay"),
     kinds=("reactive",),
+    front_points=3,
 )
 
 
@@ -32,15 +33,14 @@ def test_every_cell_is_a_start_that_can_be_repeated(grid, name):
     for i, gap in enumerate(PART.gaps):
         for j, ratio in enumerate(PART.inertias):
             drive = CRANE.replace(load_kind="reactive", gap=gap, load_inertia=ratio * CRANE.J1)
-            assert grid.bound[i, j] == pytest.approx(1.5 * direct_time(drive), rel=1e-12)
             run = simulate(drive, tuning.scheduled)
             assert grid.values(name, "k_dyn")[i, j] == pytest.approx(run.k_dyn, rel=1e-12)
-            assert grid.in_time(name)[i, j] == (run.start_time <= grid.bound[i, j])
-            # what is in time cannot be gentler than the certified bound allows
-            if grid.in_time(name)[i, j]:
-                assert run.k_dyn >= grid.optimum_bound[i, j] * (1.0 - 1e-9)
+            assert run.start_time <= simulate(drive, name).start_time * (1.0 + 1e-12)
             robust = simulate(drive, tuning.robust.controller)
             assert grid.values(name, "robust.k_dyn")[i, j] == pytest.approx(robust.k_dyn, rel=1e-12)
+            # no start is gentler than the optimum in its own time (1 %: three optima, interpolated)
+            over = grid.ratio(name)[i, j]
+            assert np.isnan(over) or over > 0.99
 
 
 def test_the_rule_holds_and_is_said(grid):
@@ -56,7 +56,6 @@ def test_a_worse_cell_would_be_found(grid):
     before = table["k_dyn"].values.copy()
     try:
         table["k_dyn"].values[0, 0] = 2.0 * table["k_dyn_default"].values[0, 0]
-        table["excess"].values[0, 0] = table["excess_default"].values[0, 0]
         assert not grid.never_worse("ramp")
     finally:
         table["k_dyn"].values[...] = before
@@ -64,15 +63,15 @@ def test_a_worse_cell_would_be_found(grid):
 
 def test_tables_and_maps_hold_every_cell(grid):
     result = present([grid], lambda text: None)
-    cells = next(t for t in result.tables if "tuned for the cell" in t.title)
+    cells = next(t for t in result.tables if t.title == "reactive load, tuned: K_dyn")
     assert [(row[0], row[1]) for row in cells.rows] == [(0.5, 2.0), (0.5, 5.0), (2.0, 2.0), (2.0, 5.0)]
     column = cells.columns.index("ramp")
-    shown = [float(row[column].strip("()")) for row in cells.rows]
+    shown = [row[column] for row in cells.rows]
     assert shown == pytest.approx(grid.values("ramp", "k_dyn").ravel(), abs=5e-4)
     figure = result.figures["gaps-and-inertias-reactive-cells"]
     drawn = [ax.get_title(loc="left") for ax in figure.axes if ax.images]
-    assert drawn == ["optimum", "ramp", "acceleration-delay"]
-    assert np.array_equal(figure.axes[1].images[0].get_array(), grid.values("ramp", "k_dyn"))
+    assert drawn == ["ramp", "acceleration-delay"]
+    assert np.array_equal(figure.axes[0].images[0].get_array(), grid.ratio("ramp"), equal_nan=True)
 
 
 def test_the_study_is_registered_and_covers_all_tunable_controllers():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart_studies.gaps_and_inertias.extent import Extent
-from softstart_studies.tuned_alike import CRANE, direct_time, least, tuned, tuned_controllers
+from softstart_studies.tuned_alike import CRANE, Front, front, tuned, tuned_controllers
 
 Map = NDArray[np.float64]  # one row a gap, one column a load inertia
 BETTER = 1e-9
@@ -19,14 +19,12 @@ BETTER = 1e-9
 
 @dataclass(frozen=True)
 class Grid:
-    """One kind of load: all tunings, and the optimum of each cell within the same bound."""
+    """One kind of load: all tunings, and the optima of each cell."""
 
     kind: str
     extent: Extent
     tunings: dict[str, Tuning]
-    bound: Map  # s
-    optimum: Map
-    optimum_bound: Map  # the certified lower bound
+    fronts: list[list[Front]]
 
     def core(self) -> Any:
         """The cells for which spreads are named, as a mask."""
@@ -44,20 +42,23 @@ class Grid:
         source = tuning.robust.cells if table == "robust" else tuning.schedule
         return np.asarray(source[variable], dtype=np.float64)
 
-    def in_time(self, name: str, what: str = "") -> Any:
-        """Where the bound on the start time is kept: `what` is "", "robust." or their "_default"."""
-        return self.values(name, f"{what}excess") <= 0.0
+    def ratio(self, name: str, prefix: str = "", suffix: str = "") -> Map:
+        """K_dyn over the least K_dyn of any start in the same time; NaN where there is no such start."""
+        k, times = (self.values(name, f"{prefix}{what}{suffix}") for what in ("k_dyn", "start_time"))
+        least = [
+            [front.at(time) for front, time in zip(row, own, strict=True)]
+            for row, own in zip(self.fronts, times, strict=True)
+        ]
+        return np.asarray(k / np.array(least))
 
-    def defaults_in_time(self, name: str) -> Any:
-        """Where the defaults keep the bound."""
-        return self.values(name, "excess_default") <= 0.0
+    def late(self, name: str, prefix: str = "") -> Any:
+        """Where a start is slower than with the defaults."""
+        return self.values(name, f"{prefix}excess") > 0.0
 
     def never_worse(self, name: str) -> bool:
-        """Whether every cell is at least as good as with the defaults: first in time, then in K_dyn."""
-        late, late_default = self.values(name, "excess"), self.values(name, "excess_default")
+        """Whether every cell is at least as gentle and as quick as with the defaults."""
         k, k_default = self.values(name, "k_dyn"), self.values(name, "k_dyn_default")
-        same = np.abs(late - late_default) <= BETTER
-        return bool(np.all((late < late_default) | (same & (k <= k_default * (1.0 + BETTER)))))
+        return bool(np.all(~self.late(name) & (k <= k_default * (1.0 + BETTER))))
 
 
 def grids(extent: Extent, progress: Progress) -> list[Grid]:
@@ -68,18 +69,25 @@ def grids(extent: Extent, progress: Progress) -> list[Grid]:
         drive = CRANE.replace(load_kind=kind, name=f"Crane of [G], {kind} load")
         inertias = [ratio * float(drive.J1) for ratio in extent.inertias]
         told = _prefixed(progress, kind)
-        tunings = tuned(
-            drive, names, extent.gaps, inertias, extent.start_time, extent.restarts, extent.generations, told
-        )
-        cells = [[drive.replace(gap=gap, load_inertia=J2) for J2 in inertias] for gap in extent.gaps]
-        multiple = float(extent.start_time.rstrip("x"))
-        bound = np.array([[multiple * direct_time(cell) for cell in row] for row in cells])
-        best = []
-        for row, times in zip(cells, bound, strict=True):
-            told(f"optima at gap {row[0].gap:g} rad")
-            best.append([least(cell, float(time)) for cell, time in zip(row, times, strict=True)])
-        both = np.array(best)
-        found.append(Grid(kind, extent, tunings, bound, both[..., 0], both[..., 1]))
+        tunings = tuned(drive, names, extent.gaps, inertias, extent.restarts, extent.generations, told)
+        grid = Grid(kind, extent, tunings, [])
+        for i, gap in enumerate(extent.gaps):
+            row = []
+            for j, J2 in enumerate(inertias):
+                told(f"optima at gap {gap:g} rad, J2 = {extent.inertias[j]:g} J1")
+                times = [
+                    float(grid.values(name, what)[i, j])
+                    for name in names
+                    for what in (
+                        "start_time_default",
+                        "start_time",
+                        "robust.start_time_default",
+                        "robust.start_time",
+                    )
+                ]
+                row.append(front(drive.replace(gap=gap, load_inertia=J2), times, extent.front_points))
+            grid.fronts.append(row)
+        found.append(grid)
     return found
 
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from softstart import Controller, Drive, simulate
 from softstart.controller import make_controller
-from softstart.optimal.problem import Problem
-from softstart.optimal.shortest import shortest_start_time
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
-from softstart_studies.tuned_alike import CRANE, direct_time, least, tuned, tuned_controllers
+from softstart_studies.tuned_alike import CRANE, Front, front, tuned, tuned_controllers
 
 Vector = NDArray[np.float64]
 NEW = 0.5  # rad, [G]; the widest gap of [G], 2 rad, is half way through this life
@@ -25,13 +21,12 @@ NEW = 0.5  # rad, [G]; the widest gap of [G], 2 rad, is half way through this li
 
 @dataclass(frozen=True)
 class Extent:
-    """The life, where the schedule has its cells, the bound on the start time, the effort."""
+    """The life, where the schedule has its cells, the effort."""
 
     life: tuple[float, ...] = tuple(np.geomspace(NEW, 8 * NEW, 7).tolist())
     scheduled: tuple[float, ...] = (NEW, 2 * NEW, 4 * NEW, 8 * NEW)
-    start_time: str = "1.5x"  # of that of direct with the same gap
-    restarts: int = 3
-    generations: int = 40
+    restarts: int = 2
+    generations: int = 20
     controllers: tuple[str, ...] | None = None  # None: all that can be tuned
     front_points: int = 8  # optima from the quickest to the slowest start of each gap; between, interpolated
 
@@ -48,42 +43,24 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Front:
-    """The least K_dyn of one gap at some start times (s), rising; between them it is interpolated."""
-
-    start_times: Vector
-    k_dyn: Vector
-
-    def at(self, start_time: float) -> float:
-        """By a monotone cubic in the logarithms (PCHIP); NaN outside."""
-        if not self.start_times.size or not self.start_times[0] <= start_time <= self.start_times[-1]:
-            return math.nan
-        if self.start_times.size == 1:
-            return float(self.k_dyn[0])
-        curve = PchipInterpolator(np.log(self.start_times), np.log(self.k_dyn))
-        return float(np.exp(curve(math.log(start_time))))
-
-
-@dataclass(frozen=True)
 class Life:
     """All courses, by controller and way of setting up.
 
     *Defaults*: set up for the new drive, nothing tuned. *Fixed*: tuned for the new drive. *One set*: tuned
     for the worst case over the life, set up for the new drive. *Scheduled*: tuned for several gaps and
-    interpolated by the gap that somebody has measured.
+    interpolated by the gap that somebody has measured. None may be slower than the defaults
+    where it was tuned.
     """
 
     extent: Extent
     gaps: Vector
-    bound: Vector  # s
     direct: Course
-    optimum: Vector  # least K_dyn within the bound
     courses: Mapping[str, Mapping[str, Course]]
     fronts: Sequence[Front]
 
     def ratio(self, course: Course) -> Vector:
         """K_dyn over the least K_dyn of any start in the same time; NaN where there is no such start."""
-        least = [front.at(time) for front, time in zip(self.fronts, course.start_time, strict=True)]
+        least = [one.at(time) for one, time in zip(self.fronts, course.start_time, strict=True)]
         return np.asarray(course.k_dyn / np.array(least))
 
 
@@ -92,9 +69,8 @@ def live(extent: Extent, progress: Progress) -> Life:
     drive = CRANE.replace(load_kind="reactive", name="Crane of [G], reactive load")
     names = extent.controllers or tuned_controllers()
     tunings = tuned(
-        drive, names, extent.scheduled, [float(drive.J2)], extent.start_time, extent.restarts,
-        extent.generations, progress,
-    )  # fmt: skip
+        drive, names, extent.scheduled, [float(drive.J2)], extent.restarts, extent.generations, progress
+    )
     gaps = np.array(extent.life)
     worn = drive.replace(gap=gaps)
     courses = {}
@@ -107,27 +83,13 @@ def live(extent: Extent, progress: Progress) -> Life:
             "scheduled": (tuning.scheduled, None),
         }
         courses[name] = {way: _course(worn, made, own) for way, (made, own) in ways.items()}
-    multiple = float(extent.start_time.rstrip("x"))
-    bound = np.array([multiple * direct_time(one) for one in worn.elements()])
     fronts = []
     for i, one in enumerate(worn.elements()):
         progress(f"optima at gap {one.gap:.3g} rad")
         own = [course.start_time[i] for ways in courses.values() for course in ways.values()]
-        fronts.append(_front(one, [*own, bound[i]], extent.front_points))
-    best = [front.at(float(time)) for front, time in zip(fronts, bound, strict=True)]
+        fronts.append(front(one, own, extent.front_points))
     direct = _course(worn, make_controller("direct"), None)
-    return Life(extent, gaps, bound, direct, np.array(best), courses, fronts)
-
-
-def _front(drive: Drive, times: list[float], points: int) -> Front:
-    """Optima from the quickest of the times that any start with one contact allows to the slowest."""
-    slowest, quickest = float(np.nanmax(times)), float(np.nanmin(times))
-    quickest = max(quickest, shortest_start_time(Problem(drive.replace(torque_lag=0.0), 1.0, "reached")))
-    if quickest >= slowest:
-        return Front(np.zeros(0), np.zeros(0))
-    found = [(t, least(drive, float(t))[0]) for t in np.geomspace(quickest * (1.0 + 1e-6), slowest, points)]
-    solved = np.array([(t, k) for t, k in found if math.isfinite(k)]).reshape(-1, 2)
-    return Front(solved[:, 0], solved[:, 1])
+    return Life(extent, gaps, direct, courses, fronts)
 
 
 def _fixed(tuning: Tuning) -> Controller:

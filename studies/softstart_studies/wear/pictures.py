@@ -18,9 +18,7 @@ MOST = 6.0  # K_dyn shown at the most
 
 def life_figure(found: Life) -> Figure:
     """K_dyn over the gap, a panel a controller, a line a way of setting up."""
-    return _panels(
-        found, lambda one: one.k_dyn, "$K_{dyn}$", "dotted: direct; grey: optimum in the time allowed"
-    )
+    return _panels(found, lambda one: one.k_dyn, "$K_{dyn}$", "dotted: direct")
 
 
 def ratio_figure(found: Life) -> Figure:
@@ -38,7 +36,6 @@ def _panels(found: Life, pick: Any, label: str, note: str) -> Figure:
         for index, (name, ways) in enumerate(found.courses.items()):
             panel = axes[index // ACROSS, index % ACROSS]
             if absolute:
-                panel.plot(found.gaps, found.optimum, color=GREY, lw=2.2, alpha=0.6)
                 panel.plot(found.gaps, found.direct.k_dyn, color=GREY, lw=1.0, ls=":")
             for number, way in enumerate(WAYS):
                 panel.plot(found.gaps, pick(ways[way]), color=COLOURS[number], ls=DASHES[number], label=way)

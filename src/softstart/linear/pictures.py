@@ -1,0 +1,137 @@
+"""The figure of a linear view: Bode and Nyquist diagrams of the loop, and the harmonic balance in the gap."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.linear.harmonic_balance import Outside, frequency_grid
+from softstart.linear.response import at_points, frequencies, poles
+from softstart.linear.telling import delay_text, gain_text, phase_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from softstart.linear.margins import Margins
+    from softstart.linear.view import LinearView
+
+GREY = "#666666"
+SMALL = 9.5
+DECADES = 2.0  # shown below the elastic frequency
+WIDEST = 3.0  # of the plane about -1
+DEEPEST, HIGHEST = 1e-3, 1e3  # of |L|
+MARKED = 100.0  # gain margins up to which a crossing is marked
+
+
+def linear_figure(view: LinearView) -> Any:
+    """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
+    assert view.own_loop is not None
+    assert view.margins is not None
+    assert view.outside is not None
+    loop, period = view.own_loop.broken, view.period
+    w = frequencies(period, poles(loop))
+    w = w[w >= float(view.drive.Omega) * 10.0**-DECADES]
+    L = at_points(loop, np.exp(1j * w * period))[:, 0, 0]
+    with drawing():
+        figure, panels = new_figure(2, 2, (10.5, 7.4))
+        (size, plane), (phase, gap) = panels
+        _magnitude(size, w, L, view.margins)
+        _phase(phase, w, L, view.margins)
+        _mark_elastic((size, phase), float(view.drive.Omega))
+        _nyquist(plane, L, view.margins)
+        _harmonic_balance(gap, view, view.outside)
+        figure.suptitle(f"{view.drive.name}: loop of {view.name} in contact", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _headed(axes: Axes, title: str, across: str, up: str) -> None:
+    axes.set_title(title, loc="left", fontsize=SMALL)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+
+
+def _mark_elastic(panels: tuple[Axes, ...], Omega: float) -> None:
+    for index, axes in enumerate(panels):
+        label = "elastic frequency" if index == 0 else None
+        axes.axvline(Omega, color=GREY, lw=0.9, ls=":", label=label)
+    panels[0].legend(loc="upper left")
+
+
+def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+    axes.loglog(w, np.abs(L), color=COLOURS[0])
+    axes.axhline(1.0, color=GREY, lw=0.8)
+    for index, one in enumerate(one for one in m.phase_crossovers if one.margin < MARKED):
+        axes.plot([one.frequency] * 2, [1.0 / one.margin, 1.0], color=COLOURS[1], lw=1.8,
+                  label="to -1 at -180 degrees" if index == 0 else None)  # fmt: skip
+        axes.plot([one.frequency], [1.0 / one.margin], "o", ms=4.5, color=COLOURS[1])
+    top = float(np.quantile(np.abs(L), 0.98))
+    axes.set_ylim(max(DEEPEST, 0.5 * float(np.abs(L).min())), min(max(10.0, 3.0 * top), HIGHEST))
+    axes.set_xlim(w[0], w[-1])
+    _headed(axes, f"gain margin {gain_text(m)}", "frequency, rad/s", "|L|")
+
+
+def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
+    degrees = np.degrees(np.angle(L))
+    jumps = np.abs(np.diff(degrees)) > 170.0
+    shown = degrees.copy()
+    shown[1:][jumps] = math.nan
+    axes.semilogx(w, shown, color=COLOURS[0])
+    for one in m.gain_crossovers:
+        at = math.degrees(one.margin)
+        bound = -180.0 if at > 0.0 else 180.0
+        axes.plot([one.frequency] * 2, [bound, bound + at], color=COLOURS[2], lw=1.8)
+        axes.plot([one.frequency], [bound + at], "o", ms=4.5, color=COLOURS[2])
+        axes.annotate(f"{abs(at):.0f}", (one.frequency, bound + 0.5 * at), xytext=(5, 0),
+                      textcoords="offset points", va="center", color=COLOURS[2])  # fmt: skip
+    axes.set_yticks(range(-180, 181, 60))
+    axes.set_ylim(-190.0, 190.0)
+    axes.set_xlim(w[0], w[-1])
+    _headed(
+        axes, f"phase margin {phase_text(m)}, delay margin {delay_text(m)}", "frequency, rad/s",
+        "phase of L, degrees",
+    )  # fmt: skip
+
+
+def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
+    turn = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 200))
+    axes.plot(turn.real, turn.imag, color=GREY, lw=0.8, ls=":", label="|L| = 1")
+    near = -1.0 + m.modulus_margin * turn
+    label = f"nearest to -1: {m.modulus_margin:.3g}"
+    axes.plot(near.real, near.imag, color=COLOURS[1], lw=1.0, ls=DASHES[1], label=label)
+    axes.plot(L.real, L.imag, color=COLOURS[0], label="L")
+    axes.plot(L.real, -L.imag, color=COLOURS[0], lw=0.7, alpha=0.6)
+    axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(-WIDEST, WIDEST)
+    axes.set_ylim(-0.8 * WIDEST, 0.8 * WIDEST)
+    axes.legend(loc="upper right")
+    _headed(axes, f"Nyquist diagram; sensitivity at most {m.sensitivity_peak:.3g}", "Re L", "Im L")
+
+
+def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
+    w = frequency_grid(outside)
+    M = outside.contact(w)
+    reach = max([WIDEST, *(1.5 / _n(outside, one.cycle.frequency) for one in view.cycles)])
+    shown = np.where(np.abs(M) < 3.0 * reach, M, math.nan)
+    axes.plot(shown.real, shown.imag, color=COLOURS[0], label="M = (c + jwd) G")
+    axes.plot([-3.0 * reach, -1.0], [0.0, 0.0], color=COLOURS[3], lw=1.6, label="-1/n of the gap")
+    axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])
+    for one in view.cycles:
+        look: dict[str, Any] = {"mfc": COLOURS[1] if one.cycle.stable else "none", "color": COLOURS[1]}
+        axes.plot([-1.0 / _n(outside, one.cycle.frequency)], [0.0], "o", ms=6, **look)
+        axes.annotate(f"{one.cycle.frequency:.3g} rad/s", (-1.0 / _n(outside, one.cycle.frequency), 0.0),
+                      xytext=(0, 8), textcoords="offset points", ha="center")  # fmt: skip
+    axes.set_xlim(-reach, 0.4 * reach)
+    axes.set_ylim(-0.7 * reach, 0.7 * reach)
+    axes.legend(loc="lower left")
+    count = len(view.cycles)
+    told = "no limit cycle foretold" if count == 0 else f"{count} limit cycle{'s' * (count > 1)} foretold"
+    _headed(axes, f"Gap as describing function n: {told}", "Re M", "Im M")
+
+
+def _n(outside: Outside, frequency: float) -> float:
+    """The share of the shaft that the balance asks for."""
+    return -1.0 / float(outside.contact(np.array([frequency]))[0].real)

@@ -1,0 +1,196 @@
+"""A start on the exact plant, kept sample by sample, from any of which it can be gone on with.
+
+The encoder is taken as infinitely fine and the torque as measured without noise: a linear view has no steps.
+Where the drive has an encoder its speed is still the difference of two angles over a sample, as on the drive.
+"""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.drive import Drive
+from softstart.engine import Book
+from softstart.errors import InputError, SimulationError
+from softstart.plant import layout as at
+from softstart.plant import start as kernel
+from softstart.plant.advance import advance
+from softstart.plant.vector import plant_vector
+
+Vector = NDArray[np.float64]
+FAR = 1e9  # target speeds: never reached
+
+Answer = tuple[float, float, float, Vector]  # demand N m, when to be asked again s, slope N m/s, new state
+Step = Callable[[Vector, Vector], Answer]
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One asking: the plant just before it (`x`, `m`), what was measured, the state then, the answer."""
+
+    x: Vector
+    m: Vector
+    measured: Vector
+    state: Vector
+    demand: float
+    ask_again: float
+    slope: float
+
+    @property
+    def time(self) -> float:
+        """When, s."""
+        return float(self.x[at.TIME])
+
+    @property
+    def pressing(self) -> bool:
+        """The driving flank presses and the load moves, so that the plant is linear."""
+        return bool(self.x[at.SIDE] == 1.0 and self.x[at.LOAD] != 0.0 and self.x[at.DOUBLED] == 0.0)
+
+    def elsewhere(self, moves: dict[int, float], state: Vector | None = None) -> Sample:
+        """The same instant with numbers of the plant added to (by index of `x`), and another state."""
+        x = self.x.copy()
+        for index, by in moves.items():
+            x[index] += by
+        return replace(self, x=x, m=_forgotten(self.m), state=self.state if state is None else state)
+
+
+def _forgotten(m: Vector) -> Vector:
+    """Without what the kernel remembers of the last contact, which no longer holds."""
+    m = m.copy()
+    m[at.MEMO_V] = math.nan
+    m[at.MEMO_DONE] = 0.0
+    return m
+
+
+@dataclass(frozen=True, eq=False)
+class SampledStart:
+    """A drive and a controller that is set up, ready to run."""
+
+    drive: Drive
+    controller: Controller
+    step: Step
+    p: Vector
+    first_state: Vector
+
+    @classmethod
+    def of(cls, drive: Drive, controller: Controller, fitted_to: Drive | None = None) -> SampledStart:
+        """The controller set up for this (or that) drive; no rounding or noise, the target speed far away."""
+        fitted, own = controller.set_up(fitted_to or drive)
+        p = plant_vector(drive)[0].copy()
+        p[at.TARGET] *= FAR
+        p[at.ENCODER] = 0.0
+        p[at.TORQUE_NOISE] = 0.0
+        if isinstance(fitted, CompiledController):
+            return cls(drive, fitted, _compiled(fitted, own), p, np.zeros(fitted.state_size))
+        if isinstance(fitted, PlainController):
+            first = np.array(fitted.initial_state, dtype=np.float64)
+            return cls(drive, fitted, _plain(fitted), p, first)
+        raise InputError(
+            f"controller = {type(fitted).__name__}: derive it from PlainController or CompiledController."
+        )
+
+    @property
+    def sees(self) -> int:
+        """What the controller has declared to see."""
+        return int(self.controller.sensors)
+
+    @property
+    def differencing(self) -> bool:
+        """Whether the speed is the difference of two encoder angles."""
+        return float(self.drive.encoder_lines) > 0.0
+
+    def samples(self, until: float) -> Iterator[Sample]:
+        """The start from its beginning."""
+        book = Book(self.sees, recording=False)
+        kernel.begin(self.p, book.x, until, book.events)
+        book.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        yield from self._going_on(book, self.first_state)
+
+    def from_sample(self, sample: Sample, until: float, book: Book | None = None) -> Iterator[Sample]:
+        """The start from a sample on, whose plant or state may have been changed; `book` may record."""
+        book = book or Book(self.sees, recording=False)
+        book.x[:] = sample.x
+        book.x[[at.N_SEGMENTS, at.N_EVENTS, at.N_STAGES]] = 0.0
+        book.x[at.T_END] = until
+        book.m[:] = sample.m
+        yield from self._going_on(book, sample.state)
+
+    def _going_on(self, book: Book, state: Vector) -> Iterator[Sample]:
+        while True:
+            reason = advance(self.p, book.x, book.m, book.segments, book.events, book.stages)
+            if reason == at.BUFFER_FULL:
+                book.grow()
+                continue
+            if reason == at.ENDED:
+                return
+            if reason != at.ASK:
+                raise SimulationError(f"{self._name}: the start was given up at t = {book.x[at.TIME]:.6g} s.")
+            x, m = book.x.copy(), book.m.copy()
+            measured = self._measured(book)
+            demand, ask_again, slope, after = self.step(measured, state)
+            yield Sample(x, m, measured, state, demand, ask_again, slope)
+            if kernel.obey(self.p, book.x, book.m, demand, ask_again, slope) != at.ASK:
+                raise SimulationError(
+                    f"{self._name}: at t = {book.x[at.TIME]:.6g} s the controller's answer was no command "
+                    f"(torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
+                )
+            state = after
+
+    def _measured(self, book: Book) -> Vector:
+        before, when = book.x[at.SAMPLE_ANGLE], book.x[at.SAMPLE_TIME]
+        kernel.measure(self.p, book.x, self.sees, book.measured)
+        measured = book.measured.copy()
+        now = measured[kernel.M_TIME]
+        if self.differencing and book.x[at.ASKED] != 0.0 and now > when:
+            measured[kernel.M_MOTOR_SPEED] = (measured[kernel.M_MOTOR_ANGLE] - before) / (now - when)
+        return measured
+
+    @property
+    def _name(self) -> str:
+        return f"{self.drive.name}, controller {self.controller.name or type(self.controller).__name__}"
+
+
+def _compiled(controller: CompiledController, own: Drive) -> Step:
+    numbers = np.array(controller.vector(own), dtype=np.float64).ravel()
+    size = controller.state_size
+    lines = type(controller).kernel
+
+    def step(measured: Vector, state: Vector) -> Answer:
+        command = np.zeros(kernel.NEW_STATE + size)
+        lines(numbers, measured, state.copy(), command)
+        torque, ask_again, slope = command[: kernel.NEW_STATE].tolist()
+        return torque, ask_again, slope, command[kernel.NEW_STATE :]
+
+    return step
+
+
+def _plain(controller: PlainController) -> Step:
+    name = type(controller).__name__
+
+    def step(measured: Vector, state: Vector) -> Answer:
+        try:
+            answer = controller.step(Measured(*measured.tolist()), tuple(state.tolist()))
+        except (Exception, SystemExit) as error:  # the user's own code may fail in any way
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            raise SimulationError(
+                f"The start was given up: the controller {name} failed at t = "
+                f"{measured[kernel.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
+                f"({type(error).__name__}: {error})."
+            ) from error
+        try:
+            after = np.array(answer[2], dtype=np.float64).ravel()
+            slope = float(answer[3]) if len(answer) > 3 else 0.0
+            return float(answer[0]), float(answer[1]), slope, after
+        except (TypeError, IndexError, ValueError):
+            raise InputError(
+                f"controller {name}: its step answered {answer!r}; "
+                "answer with Command(torque, ask_again, state, slope)."
+            ) from None
+
+    return step

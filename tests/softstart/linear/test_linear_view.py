@@ -1,0 +1,295 @@
+"""The linear view of controllers that run: known laws, known loops, and what the exact plant says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI, loop_of
+
+from softstart import Command, Drive, InputError, PlainController, Sensor, SimulationError, linear_view
+from softstart.linear.differences import Smoothness, derivative
+from softstart.linear.operating_point import course, torque
+from softstart.linear.response import at_points
+from softstart.linear.sampled_start import Sample, SampledStart
+from softstart.plant import layout as at
+
+
+def test_the_law_of_a_linear_controller_is_found():
+    view = loop_of(FREE, Filtered())
+    law, known = view.point.law, Filtered
+    assert view.point.states == (2, 3)  # not the counter, not the mode
+    size = view.point.derivative.scales[[2, 3]]
+    for found, said in (
+        (law.A, np.reshape(known.A, (2, 2))),
+        (law.B, np.reshape(known.B, (2, 3))),
+        (law.C, np.reshape(known.C, (1, 2))),
+        (law.D, np.reshape(known.D, (1, 3))),
+    ):
+        assert np.max(np.abs(found - said)) < 1e-9 * max(1.0, np.max(size))
+    assert view.controller_system.ninputs == 3
+    assert view.controller_system.dt == pytest.approx(0.001)
+
+
+def test_a_proportional_speed_loop_has_its_closed_form():
+    # w1/u = 1/((J1 + J2) s) + J2/(J1 (J1 + J2)) s/(s^2 + Omega^2), each part held over a sample
+    kp, h = 0.8, 0.001
+    view = loop_of(FREE, SpeedPI(kp))
+    J1, J2, Omega = FREE.J1, FREE.J2, FREE.Omega
+    z = np.exp(1j * np.linspace(0.002, 3.1, 200)) * 1.001
+    rigid = h / ((J1 + J2) * (z - 1.0))
+    elastic = math.sin(Omega * h) / Omega * (z - 1.0) / (z * z - 2.0 * math.cos(Omega * h) * z + 1.0)
+    known = kp * (rigid + J2 / (J1 * (J1 + J2)) * elastic)
+    found = at_points(view.own_loop.broken, z)[:, 0, 0]
+    assert np.max(np.abs(found / known - 1.0)) < 1e-9
+    assert view.own_loop.broken.A.shape[0] == 3
+    assert view.loop(z[0]) == pytest.approx(known[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("drive", "controller"),
+    [
+        (CRANE, "current-limit-feedback"),
+        (CRANE.replace(torque_lag=0.002), "current-limit-feedback"),
+        (FREE.replace(torque_lag=0.02, computing_delay=0.0134, damping=2.0), SpeedPI(2.0, 5.0)),
+        (FREE.replace(damping=1.0, encoder_lines=4096), SpeedPI(1.0, 8.0)),
+    ],
+)
+def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controller):
+    """A displacement in contact, under the controller itself, against the closed loop's modes alone."""
+    view = loop_of(drive, controller)
+    assert view.point.mismatch < 1e-6
+    start, sample, h = SampledStart.of(drive, view.controller), view.point.sample, view.period
+    twist = 1e-4 * sample.x[at.THETA]
+    count = 12
+
+    def torques(moves):
+        rows = start.from_sample(sample.elsewhere(moves), sample.time + (count - 0.5) * h)
+        return np.array([torque(start, one) for one in rows])
+
+    response = (torques({at.THETA: twist}) - torques({at.THETA: -twist})) / (2.0 * twist)
+    assert response.size == count
+    # the modes with their delays span all responses: the exact one must lie among them
+    from softstart.linear.operating_point import closed
+    from softstart.linear.sampled_plant import in_contact, sampled
+
+    plant = sampled(
+        in_contact(drive), h, float(drive.computing_delay), (1, 2, 3), float(drive.encoder_lines) > 0.0
+    )
+    whole, _ = closed(plant, view.point.law)
+    read = np.concatenate([plant.rows["T"][0], np.zeros(len(view.point.states))])
+    first = np.concatenate([(plant.rows["phi1"] + plant.rows["z"])[0], np.zeros(len(view.point.states))])
+    foretold = np.array([read @ np.linalg.matrix_power(whole, k) @ first for k in range(count)])
+    assert np.max(np.abs(response - foretold)) < 1e-5 * np.max(np.abs(response))
+    # and every mode shown is an eigenvalue of that closed loop
+    poles = np.linalg.eigvals(whole)
+    for mode in view.modes:
+        assert np.min(np.abs(poles - mode.value)) < 1e-6
+
+
+def test_the_least_damped_mode_is_what_rings_on():
+    """Long after a displacement only the slowest swinging mode is left: its decay and frequency, measured."""
+    drive = FREE.replace(damping=0.6)
+    view = loop_of(drive, SpeedPI(0.05))
+    mode = view.elastic_mode
+    start, sample, h = SampledStart.of(drive, view.controller), view.point.sample, view.period
+    twist, count = 1e-4 * sample.x[at.THETA], 400
+    ends = []
+    for side in (twist, -twist):
+        rows = start.from_sample(sample.elsewhere({at.THETA: side}), sample.time + (count - 0.5) * h)
+        ends.append(np.array([torque(start, one) for one in rows]))
+    ring = (ends[0] - ends[1]) / (2.0 * twist)
+    assert ring.size == count
+    # a sampled ring obeys y[k+2] = 2 Re z y[k+1] - |z|^2 y[k]; the slow turning is differenced away
+    slow = [one.value.real for one in view.modes if one.value.imag == 0.0]
+    for pole in slow:
+        ring = ring[1:] - pole * ring[:-1]
+    left = np.column_stack([ring[1:-1], ring[:-2]])[20:]
+    (twice_real, minus_square), *_ = np.linalg.lstsq(left, ring[2:][20:], rcond=None)
+    assert twice_real == pytest.approx(2.0 * mode.value.real, rel=1e-6)
+    assert -minus_square == pytest.approx(abs(mode.value) ** 2, rel=1e-6)
+
+
+def test_current_limit_feedback_damps_as_its_page_says():
+    """Without lag: damping near the 0.7 asked for; the loop gain is 1 at Omega (zeta + sqrt(zeta^2 + 1))."""
+    view = loop_of(CRANE, "current-limit-feedback")
+    zeta, Omega = view.controller.damping_ratio, CRANE.Omega
+    assert zeta == pytest.approx(0.7)
+    assert view.elastic_mode.damping_ratio == pytest.approx(zeta, rel=0.05)
+    upper = max(one.frequency for one in view.margins.gain_crossovers)
+    assert upper == pytest.approx(Omega * (zeta + math.sqrt(zeta**2 + 1.0)), rel=0.01)
+    assert math.degrees(view.phase_margin) > 80.0
+
+
+@pytest.mark.parametrize("lag", [0.002, 0.004, 0.006])
+def test_current_limit_feedback_keeps_thirty_degrees_behind_a_lag(lag):
+    """The phase margin promised is kept, with room; behind a long lag the damping is not that asked for."""
+    view = loop_of(CRANE.replace(torque_lag=lag), "current-limit-feedback")
+    assert view.stable
+    assert math.degrees(view.phase_margin) > 30.0
+    if lag > 0.003:
+        assert view.elastic_mode.damping_ratio < 0.75 * view.controller.damping_ratio
+
+
+def test_other_drives_under_the_same_controller():
+    view = linear_view(CRANE, "current-limit-feedback", limit_cycles=False)
+    names = [one.name for one in view.variations]
+    assert names == ["J2 x 0.4", "J2 x 1", "J2 x 2.5", "c x 0.9", "c x 1.1"]
+    same = view.variations[1].margins
+    assert same.phase_margin == pytest.approx(view.phase_margin, rel=1e-9)
+    assert same.gain_margin == pytest.approx(view.gain_margin, rel=1e-9)
+    alone = linear_view(
+        CRANE.replace(load_inertia=2.5 * CRANE.J2), view.controller, fitted_to=CRANE, limit_cycles=False
+    )
+    assert alone.phase_margin == pytest.approx(view.variations[2].margins.phase_margin, rel=1e-5)
+
+
+def test_the_same_view_twice():
+    first, second = (loop_of(CRANE, "current-limit-feedback").summary() for _ in range(2))
+    assert first == second
+
+
+@pytest.mark.parametrize("name", ["ramp", "s-curve", "acceleration-delay"])
+def test_open_loop_is_said(name):
+    view = linear_view(CRANE, name)
+    assert view.kind == "open loop"
+    assert view.margins is None
+    assert "acts open loop" in view.conclusion
+    assert "margins do not apply" in view.conclusion
+    with pytest.raises(InputError, match="acts open loop"):
+        view.plot()
+    with pytest.raises(InputError, match="acts open loop"):
+        _ = view.loop
+
+
+@pytest.mark.parametrize("name", ["direct", "reduced-first-stage", "reduced-two-stage"])
+def test_events_are_said(name):
+    view = linear_view(CRANE, name)
+    assert view.kind == "events"
+    assert "margins do not apply" in view.conclusion
+    assert view.summary()["kind"] == "events"
+
+
+class Sloping(PlainController):
+    """Puts its feedback into the slope of the demand."""
+
+    name = "sloping"
+
+    def step(self, measured: object, state: tuple[float, ...]) -> Command:
+        speed = measured.motor_speed
+        return Command(30.0 - 0.1 * speed, measured.time + 0.001, (), -5.0 * speed)
+
+
+class Hasty(PlainController):
+    """Asks again the sooner the faster it turns."""
+
+    name = "hasty"
+    sensors = Sensor.LOAD_SPEED
+
+    def step(self, measured: object, state: tuple[float, ...]) -> Command:
+        wait = 0.001 * (1.0 + 1e-9 * measured.load_speed)
+        return Command(30.0 - 0.1 * measured.load_speed, measured.time + wait)
+
+
+@pytest.mark.parametrize("controller", [Sloping(), Hasty()])
+def test_feedback_that_is_no_sampled_loop_is_said(controller):
+    view = linear_view(FREE, controller)
+    assert view.kind == "events"
+    assert "slope of its demand" in view.conclusion
+
+
+class LoadSpeed(PlainController):
+    """Feeds back what only special sensors see."""
+
+    name = "load-speed"
+    sensors = Sensor.LOAD_SPEED | Sensor.SHAFT_TORQUE
+
+    def step(self, measured: object, state: tuple[float, ...]) -> Command:
+        demand = 0.3 * (60.0 - measured.load_speed) - 0.2 * measured.shaft_torque
+        return Command(demand, measured.time + 0.001)
+
+
+def test_declared_sensors_are_inputs():
+    view = loop_of(FREE, LoadSpeed())
+    assert view.controller_system.input_labels[3:] == ["shaft_torque", "load_speed"]
+    D = view.controller_system.D[0]
+    assert pytest.approx([0.0, 0.0, 0.0, -0.2, -0.3], abs=1e-10) == D
+
+
+class Broken(PlainController):
+    def step(self, measured: object, state: tuple[float, ...]) -> Command:
+        raise ZeroDivisionError("no")
+
+
+def test_bad_input():
+    batch = CRANE.replace(gap=[0.5, 1.0])
+    with pytest.raises(InputError, match=r"batch of shape \(2,\).*take one of its elements"):
+        linear_view(batch, "ramp")
+    with pytest.raises(InputError, match="rampp"):
+        linear_view(CRANE, "rampp")
+    with pytest.raises(InputError, match="give a Drive"):
+        linear_view(5, "ramp")  # type: ignore[arg-type]
+    with pytest.raises(InputError) as caught:
+        linear_view(CRANE, "ramp", inertias=[0.0, 2.0], stiffnesses=[-1.0, math.nan])
+    assert len(caught.value.sentences) == 3
+    with pytest.raises(SimulationError, match="failed at t = 0 s"):
+        linear_view(CRANE, Broken())
+
+
+def sample(state, measured=()):
+    x = np.zeros(at.N_X)
+    full = np.full(7, np.nan)
+    full[0] = 0.0
+    full[1 : 1 + len(measured)] = measured
+    return Sample(x, np.zeros(at.N_M), full, np.array(state, dtype=float), 0.0, 0.001, 0.0)
+
+
+def test_what_is_not_smooth_is_named():
+    def step(measured, state):
+        a, b, c, d = state
+        kept = np.array([a**3, abs(b), 1.0 if c == 0.0 else -1.0, max(d, 0.0) ** 0.5])
+        return a + b + c + d, 0.001, 0.0, kept
+
+    found = derivative(step, sample([2.0, 0.0, 0.0, 0.0]), (), np.ones(4), np.zeros(0), 1.0)
+    assert found.smoothness == (
+        Smoothness.SMOOTH, Smoothness.CORNER, Smoothness.JUMP, Smoothness.ONE_SIDED,
+    )  # fmt: skip
+    assert found.A[0, 0] == pytest.approx(12.0, rel=1e-10)
+    assert abs(found.A[1, 1]) == pytest.approx(1.0)
+    assert found.A[3, 3] == 0.0
+
+
+def test_derivatives_of_a_smooth_step_are_accurate():
+    def step(measured, state):
+        x, y = state[0], measured[1]
+        return math.sin(x) * math.exp(y), 0.001, 0.0, np.array([x * y + x * x])
+
+    found = derivative(step, sample([0.7], [0.4]), (1,), np.ones(1), np.ones(1), 1.0)
+    assert found.C[0, 0] == pytest.approx(math.cos(0.7) * math.exp(0.4), rel=1e-10)
+    assert found.D[0, 0] == pytest.approx(math.sin(0.7) * math.exp(0.4), rel=1e-10)
+    assert found.A[0, 0] == pytest.approx(0.4 + 1.4, rel=1e-10)
+    assert found.B[0, 0] == pytest.approx(0.7, rel=1e-10)
+
+
+def test_the_start_is_the_one_of_simulate():
+    """The kept samples are those of the same start with an encoder without steps."""
+    from softstart import simulate
+
+    drive = CRANE.replace(encoder_lines=0)
+    start = SampledStart.of(drive, linear_view(drive, "ramp").controller)
+    run = course(start)
+    plain = simulate(drive, "ramp", 0.09)
+    at_samples = [one for one in run.samples if one.time < 0.09]
+    times = np.array([one.time for one in at_samples])
+    assert plain.at(times)["theta"] == pytest.approx([one.x[at.THETA] for one in at_samples], abs=1e-12)
+
+
+def test_a_drive_file_by_name_and_the_figure(tmp_path):
+    from softstart.figures import save_figure
+
+    view = linear_view("nordin-servo-60kw", "current-limit-feedback")
+    assert isinstance(view.drive, Drive)
+    for path in save_figure(view.plot(), tmp_path, "linear"):
+        assert path.stat().st_size > 20_000
+    assert view.name in repr(view)

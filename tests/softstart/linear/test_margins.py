@@ -1,0 +1,124 @@
+"""Margins against closed forms, against python-control, and by what they promise: poles on the circle."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI, loop_of
+
+from softstart import Command, PlainController
+from softstart.linear.margins import margins
+from softstart.linear.realisation import System
+from softstart.linear.response import at_points
+
+
+def closed_poles(loop):
+    """Poles of 1 + L = 0, but for the turning as a whole, which a torque loop does not hold (poles at 1)."""
+    poles = np.linalg.eigvals(loop.A - loop.B @ loop.C)
+    return poles[np.abs(poles - 1.0) > 1e-4]
+
+
+def off_the_circle(loop, frequency, period):
+    """How far the closed-loop pole nearest to a point of the circle is from the circle itself."""
+    poles = closed_poles(loop)
+    return abs(abs(poles[np.argmin(np.abs(poles - np.exp(1j * frequency * period)))]) - 1.0)
+
+
+@given(st.floats(0.05, 1.9))
+def test_an_integrator(gain):
+    # L = g/(z - 1): |L| = g/(2 sin(w/2)), phase -90 degrees - w/2, L(-1) = -g/2
+    found = margins(System(*(np.array([[v]]) for v in (1.0, 1.0, gain, 0.0))), 1.0)
+    w = 2.0 * math.asin(0.5 * gain)
+    assert found.gain_margin == pytest.approx(2.0 / gain, rel=1e-9)
+    assert [one.frequency for one in found.gain_crossovers] == pytest.approx([w], rel=1e-9)
+    assert found.phase_margin == pytest.approx(0.5 * math.pi - 0.5 * w, rel=1e-9)
+    assert found.delay_margin == pytest.approx(found.phase_margin / w, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_as_python_control_has_them(seed):
+    rng = np.random.default_rng(seed)
+    poles = [*rng.uniform(0.3, 0.95, 2), 0.9 * np.exp(1j * rng.uniform(0.3, 2.0))]
+    poles = np.array([*poles, np.conj(poles[-1])])
+    whole = control.zpk([rng.uniform(-0.5, 0.5)], poles, 0.05 * rng.uniform(1, 5), dt=0.01)
+    state = control.ss(whole)
+    ours = margins(System(state.A, state.B, state.C, state.D), 0.01)
+    gm, _, sm, w_gm, w_pm, _ = control.stability_margins(whole, returnall=True)
+    for one in ours.gain_crossovers:
+        index = int(np.argmin(np.abs(w_pm - one.frequency)))
+        assert w_pm[index] == pytest.approx(one.frequency, rel=1e-6)
+    assert len(w_pm) == len(ours.gain_crossovers)
+    inside = [k for k, w in zip(gm, w_gm, strict=True) if 0.0 < w < math.pi / 0.01 * (1 - 1e-9)]
+    mine = [one.margin for one in ours.phase_crossovers if one.frequency < math.pi / 0.01 * (1 - 1e-9)]
+    assert sorted(mine) == pytest.approx(sorted(inside), rel=1e-6)
+    assert ours.modulus_margin <= np.min(sm) * (1.0 + 1e-6)
+
+
+LAGGING = FREE.replace(torque_lag=0.02, computing_delay=0.01, damping=2.0)
+
+
+@pytest.fixture(scope="module")
+def views():
+    """Loops with a lag, a delay, an observer, encoder differences."""
+    return [
+        loop_of(LAGGING, SpeedPI(4.0, 20.0)),
+        loop_of(LAGGING.replace(encoder_lines=1024), SpeedPI(2.0, 5.0)),
+        loop_of(CRANE, "current-limit-feedback"),
+        *(loop_of(CRANE.replace(torque_lag=lag), "current-limit-feedback") for lag in (0.0005, 0.001, 0.002)),
+    ]
+
+
+def test_the_gain_margin_puts_a_pole_on_the_circle(views):
+    for view in views:
+        own = view.own_loop
+        crossings = [one for one in view.margins.phase_crossovers if one.margin == view.gain_margin]
+        loop = own.broken_with_gain(view.gain_margin)
+        assert off_the_circle(loop, crossings[0].frequency, view.period) < 1e-8
+        below = closed_poles(own.broken_with_gain(0.98 * view.gain_margin))
+        above = closed_poles(own.broken_with_gain(1.02 * view.gain_margin))
+        assert np.max(np.abs(below)) < 1.0 < np.max(np.abs(above))
+
+
+def test_the_delay_margin_puts_a_pole_on_the_circle(views):
+    for view in views:
+        own, m = view.own_loop, view.margins
+        assert off_the_circle(own.broken_delayed(m.delay_margin), m.delay_frequency, view.period) < 1e-8
+        point = np.array([np.exp(1j * m.delay_frequency * view.period)])
+        assert abs(at_points(own.broken_delayed(m.delay_margin), point)[0, 0, 0] + 1.0) < 1e-7
+        for share in (*np.linspace(0.0, 0.98, 40 if m.delay_margin < 0.02 else 6), 0.999):
+            assert np.max(np.abs(closed_poles(own.broken_delayed(share * m.delay_margin)))) < 1.0
+        assert np.max(np.abs(closed_poles(own.broken_delayed(1.001 * m.delay_margin)))) > 1.0
+
+
+def test_the_modulus_margin_is_the_least_distance(views):
+    for view in views:
+        w = np.geomspace(0.01 * view.drive.Omega, math.pi / view.period, 5_000)
+        L = at_points(view.own_loop.broken, np.exp(1j * w * view.period))[:, 0, 0]
+        nearest = float(np.min(np.abs(1.0 + L)))
+        assert view.modulus_margin <= nearest * (1.0 + 1e-9)
+        assert view.modulus_margin == pytest.approx(nearest, rel=1e-3)
+        assert view.margins.sensitivity_peak == pytest.approx(1.0 / view.modulus_margin)
+
+
+class TorqueOfBefore(PlainController):
+    """Feeds back its own torque of one sample ago, and a little speed."""
+
+    name = "torque-of-before"
+
+    def step(self, measured, state):
+        return Command(10.0 - 0.9 * measured.motor_torque - 0.3 * measured.motor_speed, measured.time + 0.001)
+
+
+def test_no_delay_below_the_margin_does_harm_where_the_loop_jumps():
+    view = loop_of(FREE.replace(damping=1.0), TorqueOfBefore())
+    margin = view.delay_margin
+    inside = [share * margin for share in np.linspace(0.0, 0.999, 60)]
+    inside += [k * view.period for k in range(60) if k * view.period < margin]
+    for delay in inside:
+        assert np.max(np.abs(closed_poles(view.own_loop.broken_delayed(delay)))) < 1.0
+    assert np.max(np.abs(closed_poles(view.own_loop.broken_delayed(margin * (1 + 1e-6))))) > 1.0 - 1e-9

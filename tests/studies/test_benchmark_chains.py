@@ -1,0 +1,43 @@
+"""The benchmark of chains: LSODA and softstart make the same starts. Nothing here is about speed."""
+
+import numpy as np
+import pytest
+
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.study import Verdict
+from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
+from softstart_studies.benchmarks.chains.study import BenchmarkChains, Case, cases, long_chain
+
+SHORT = Chain(
+    [Mass(0.03), Mass(0.01), Mass(0.1, torque=5.0)],
+    [Shaft(900.0, gap=0.05)] * 2,
+    Motor(40.0),
+    target_speed=8.0,
+)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_lsoda_comes_to_the_same_peaks_as_its_tolerance_shrinks(ramp):
+    case = Case(SHORT, ramp)
+    ours = case.ours()
+    coarse, tight = (lsoda_start(case.problem(), tolerance) for tolerance in (1e-6, 1e-12))
+    apart = [np.abs(one.peaks / ours.peak_torques - 1).max() for one in (coarse, tight)]
+    assert apart[1] < 1e-8
+    assert apart[1] < 0.1 * apart[0]
+    assert tight.start_time == pytest.approx(ours.start_time, rel=1e-9)
+
+
+def test_the_torque_is_held_between_samples():
+    problem = Problem(SHORT, 40.0, 0.1, ramp=0.02)
+    assert problem.demand(0.0105) == (pytest.approx(20.0), pytest.approx(0.011))
+    assert problem.demand(0.02) == (40.0, float("inf"))
+
+
+def test_the_study_measures_and_judges():
+    result = BenchmarkChains((Case(SHORT),), passes=1).run(None, lambda text: None)
+    row = result.tables[0].rows[0]
+    assert row[1:4] == (3, 2, "direct")
+    assert row[9] < 1e-7
+    assert result.claims[1].verdict is Verdict.CONFIRMED
+    assert [case.strategy for case in cases()] == ["direct", "ramp, 1 kHz", "direct"]
+    assert float(long_chain().at_motor_shaft().gap.sum()) == pytest.approx(0.35)
