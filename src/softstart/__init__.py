@@ -11,6 +11,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from softstart.balancing import Engine, PeriodicTorque, balance
+    from softstart.chain import (
+        Chain,
+        ChainRun,
+        natural_vibration,
+        reduce_chain,
+        simulate_chain,
+        verify_on_chain,
+    )
+    from softstart.clutch import Clutch, Engagement, EngagementFront, engage, optimize_engagement
     from softstart.comparison import Comparison, compare
     from softstart.controller import (
         Command,
@@ -22,6 +32,7 @@ if TYPE_CHECKING:
     )
     from softstart.drive import Drive
     from softstart.errors import InputError, SimulationError
+    from softstart.linear.view import LinearView, linear_view
     from softstart.optimal.front import Front, pareto
     from softstart.optimal.problem import Problem
     from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
@@ -31,22 +42,37 @@ if TYPE_CHECKING:
     from softstart.run import Run
     from softstart.simulation import simulate
     from softstart.status import Status
+    from softstart.sweeping.entry import sweep
+    from softstart.tuning.outcome import Tuning
+    from softstart.tuning.solving import tune
 
 __version__ = "0.1.0.dev0"
 
 # where each public name lives; loaded when first used, so that `import softstart` is quick
 _HOME = {
+    "Chain": "softstart.chain",
+    "ChainRun": "softstart.chain",
+    "natural_vibration": "softstart.chain",
+    "reduce_chain": "softstart.chain",
+    "simulate_chain": "softstart.chain",
+    "verify_on_chain": "softstart.chain",
+    "Clutch": "softstart.clutch",
     "Command": "softstart.controller",
     "Comparison": "softstart.comparison",
     "CompiledController": "softstart.controller",
     "Controller": "softstart.controller",
     "Drive": "softstart.drive",
+    "Engagement": "softstart.clutch",
+    "EngagementFront": "softstart.clutch",
+    "Engine": "softstart.balancing",
     "Front": "softstart.optimal.front",
     "InfeasibleError": "softstart.optimal.result",
     "InputError": "softstart.errors",
+    "LinearView": "softstart.linear.view",
     "Measured": "softstart.controller",
     "Optimum": "softstart.optimal.result",
     "OptimumError": "softstart.optimal.result",
+    "PeriodicTorque": "softstart.balancing",
     "PlainController": "softstart.controller",
     "Problem": "softstart.optimal.problem",
     "RobustOptimum": "softstart.optimal.robust",
@@ -55,26 +81,41 @@ _HOME = {
     "SimulationError": "softstart.errors",
     "Status": "softstart.status",
     "TorqueProfile": "softstart.profile",
+    "Tuning": "softstart.tuning.outcome",
+    "balance": "softstart.balancing",
     "compare": "softstart.comparison",
+    "engage": "softstart.clutch",
+    "linear_view": "softstart.linear.view",
     "optimize": "softstart.optimal.solving",
+    "optimize_engagement": "softstart.clutch",
     "optimize_robust": "softstart.optimal.robust",
     "pareto": "softstart.optimal.front",
     "simulate": "softstart.simulation",
+    "sweep": "softstart.sweeping.entry",
+    "tune": "softstart.tuning.solving",
     "worth_of_contact_sensor": "softstart.optimal.robust",
 }
 
 __all__ = [
+    "Chain",
+    "ChainRun",
+    "Clutch",
     "Command",
     "Comparison",
     "CompiledController",
     "Controller",
     "Drive",
+    "Engagement",
+    "EngagementFront",
+    "Engine",
     "Front",
     "InfeasibleError",
     "InputError",
+    "LinearView",
     "Measured",
     "Optimum",
     "OptimumError",
+    "PeriodicTorque",
     "PlainController",
     "Problem",
     "RobustOptimum",
@@ -83,11 +124,22 @@ __all__ = [
     "SimulationError",
     "Status",
     "TorqueProfile",
+    "Tuning",
+    "balance",
     "compare",
+    "engage",
+    "linear_view",
+    "natural_vibration",
     "optimize",
+    "optimize_engagement",
     "optimize_robust",
     "pareto",
+    "reduce_chain",
     "simulate",
+    "simulate_chain",
+    "sweep",
+    "tune",
+    "verify_on_chain",
     "worth_of_contact_sensor",
 ]
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import click
 
 from softstart import __version__
+from softstart.cli.balance import balance
+from softstart.cli.clutch import clutch
 from softstart.cli.compare import compare
+from softstart.cli.linear import linear
 from softstart.cli.lists import controllers, drives
 from softstart.cli.optimize import optimize
 from softstart.cli.pareto import pareto
+from softstart.cli.reduce import reduce
 from softstart.cli.simulate import simulate
 from softstart.cli.study import study
+from softstart.cli.sweep import sweep
+from softstart.cli.tune import tune
 from softstart.cli.usage import HELP_NAMES, Commands
 
 GREETING = f"""\
@@ -20,6 +26,8 @@ softstart {__version__}: start a drive with a gap in its transmission gently, an
   softstart drives crane-4amtkf > mine.toml      a drive of your own: change the file, then
   softstart compare mine.toml --out results        compare on it, with figures, traces and a report
   softstart optimize --start-time 1.2x           the gentlest start there can be, as a torque profile
+  softstart tune --controller ramp               its gains for each gap and inertia, and one set for all
+  softstart reduce --verify direct,ramp          a chain of masses as the drive that stands for it
   softstart study                                what the papers claim, confirmed or refuted with numbers
 
 softstart --help lists all commands."""
@@ -48,5 +56,19 @@ def cli(context: click.Context) -> None:
         print(GREETING)
 
 
-for command in (compare, simulate, optimize, pareto, drives, controllers, study):
+for command in (
+    compare,
+    simulate,
+    optimize,
+    pareto,
+    tune,
+    sweep,
+    linear,
+    reduce,
+    clutch,
+    balance,
+    drives,
+    controllers,
+    study,
+):
     cli.add_command(command)

@@ -1,0 +1,55 @@
+"""Chains of masses with gaps and gears [R]: their natural frequencies, their reduction, their motion.
+
+>>> from softstart.chain import Chain, natural_vibration
+>>> natural_vibration(Chain.load("crane-4-mass")).Omega.round(1)
+array([   0. ,  114.6,  618.5, 1630.3])
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from softstart.chain.arrays import ChainArrays
+from softstart.chain.model import Chain, Mass, Motor, Shaft
+
+if TYPE_CHECKING:
+    from softstart.chain.reduction import Reduction, reduce_chain
+    from softstart.chain.run import ChainRun
+    from softstart.chain.simulation import simulate_chain
+    from softstart.chain.verification import Verification, verify_on_chain
+    from softstart.chain.vibration import Vibration, natural_vibration
+
+__all__ = [
+    "Chain",
+    "ChainArrays",
+    "ChainRun",
+    "Mass",
+    "Motor",
+    "Reduction",
+    "Shaft",
+    "Verification",
+    "Vibration",
+    "natural_vibration",
+    "reduce_chain",
+    "simulate_chain",
+    "verify_on_chain",
+]
+
+# loaded when first used: they need compiled code
+_HOME = {
+    "ChainRun": "softstart.chain.run",
+    "Reduction": "softstart.chain.reduction",
+    "Verification": "softstart.chain.verification",
+    "Vibration": "softstart.chain.vibration",
+    "natural_vibration": "softstart.chain.vibration",
+    "reduce_chain": "softstart.chain.reduction",
+    "simulate_chain": "softstart.chain.simulation",
+    "verify_on_chain": "softstart.chain.verification",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'softstart.chain' has no attribute {name!r}")

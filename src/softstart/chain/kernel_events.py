@@ -1,0 +1,316 @@
+"""The event that ends a span: gaps that close and open, damping regimes, friction, the target speed."""
+
+from __future__ import annotations
+
+import math
+
+from softstart.chain import kernel_layout as at
+from softstart.chain.kernel_layout import (
+    BEYOND,
+    BODY_J,
+    CONTACT,
+    DIRECTION,
+    DOUBLED,
+    EVENT_LINE,
+    FIRST,
+    HALF,
+    HELD,
+    HOLD,
+    INFLUENCE,
+    LAW,
+    LOAD_MASS,
+    MASK,
+    MODE,
+    OPEN,
+    PRESSED,
+    REACTIVE,
+    RESTITUTION,
+    RIGID,
+    SIDE,
+    SIZE,
+    SPEED,
+    STUCK,
+    THETA,
+    TORQUE,
+    TWIST,
+    Cube,
+    D,
+    Matrix,
+    Vector,
+)
+from softstart.chain.kernel_modes import REJOINED
+from softstart.chain.kernel_roots import EPS, NONE, crossing, first_root, value
+from softstart.plant.jit import compiled
+from softstart.plant.layout import DEAD_ZONE, MODELICA, START_TIME, TARGET
+
+ROUNDING = 4.0 * EPS
+# impacts that pile up within this share of a span are over: the accumulation time is known
+PILED_UP = 1e-9
+SAME = 1e-12
+
+
+@compiled
+def far(series: Cube, kind: int, row: int, n: int, distance: float) -> bool:
+    """Whether what is in this row cannot change by `distance` within the span."""
+    total = 0.0
+    for o in range(1, n + 1):
+        total += abs(series[kind, row, o])
+    return total * (1.0 + 1e-12) < distance
+
+
+@compiled
+def line_of(f: Vector, series: Cube, kind: int, row: int, n: int, constant: float, factor: float) -> None:
+    """F = constant + factor * the row."""
+    for o in range(n + 1):
+        f[o] = factor * series[kind, row, o]
+    f[0] += constant
+
+
+@compiled
+def flanks(shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, f: Vector, k: int, h: float, n: int,
+           end: float) -> tuple[int, float]:  # fmt: skip
+    """The flank of an open gap that is reached first, or the end of impacts that pile up on one."""
+    half = shafts[k, HALF]
+    theta = shaft[k, THETA]
+    if far(series, TWIST, k, n, half - abs(theta)):
+        return at.NO_EVENT, end
+    a = int(mass[k, FIRST])
+    faint = 1e-14 * h * h * (mass[a, INFLUENCE] + mass[k + 1, INFLUENCE])
+    if shafts[k, RIGID] != 0.0 and shafts[k, RESTITUTION] < 1.0 and abs(theta) == half and half > 0.0:
+        side = math.copysign(1.0, theta)
+        rebound = -side * series[TWIST, k, 1]
+        press = side * series[TWIST, k, 2]
+        if press > faint and 0.0 <= rebound <= PILED_UP * (1.0 - shafts[k, RESTITUTION]) * press:
+            return at.SETTLE, 0.0
+    event = at.NO_EVENT
+    noise = ROUNDING * half
+    for which in range(2):
+        side = 1.0 - 2.0 * which
+        zeros = int(shaft[k, MASK]) if shaft[k, SIDE] == side else 0
+        line_of(f, series, TWIST, k, n, half, -side)
+        s = first_root(f, n, end, zeros, noise, faint)
+        if s < NONE:
+            return at.UNSOLVED, 0.0
+        if s >= 0.0:
+            event = at.UPPER if which == 0 else at.LOWER
+            end = s
+    return event, end
+
+
+@compiled
+def parting(shafts: Matrix, shaft: Matrix, series: Cube, f: Vector, k: int, n: int,
+            end: float) -> tuple[int, float]:  # fmt: skip
+    """The instant at which flanks in contact part, or at which the damping regime changes."""
+    side = shaft[k, SIDE]
+    law = shafts[k, LAW]
+    d = shafts[k, D]
+    rejoined = shaft[k, MASK] == REJOINED
+    zeros = 0 if rejoined else int(shaft[k, MASK])
+    if law == MODELICA and d > 0.0:
+        doubled = shaft[k, MODE] == DOUBLED
+        sign = -side if doubled else side
+        for o in range(n + 1):
+            v = series[SPEED, k, o] - series[SPEED, k + 1, o]
+            f[o] = sign * (shafts[k, at.C] * series[TWIST, k, o] - d * v)
+        f[0] -= sign * shafts[k, at.C] * side * shafts[k, HALF]
+        noise = ROUNDING * shafts[k, at.C] * (abs(shaft[k, THETA]) + shafts[k, HALF])
+        s = first_root(f, n, end, zeros, noise, 0.0)
+        if s < NONE:
+            return at.UNSOLVED, 0.0
+        event = at.NO_EVENT
+        if s >= 0.0:
+            event = at.SWITCH
+            end = s
+        if doubled:
+            return event, end
+        line_of(f, series, TORQUE, k, n, 0.0, side)
+        s = first_root(f, n, end, 1 if rejoined else 0, noise, 0.0)
+        if s < NONE:
+            return at.UNSOLVED, 0.0
+        return (at.EXIT, s) if s >= 0.0 else (event, end)
+    if law != DEAD_ZONE and d > 0.0:
+        if far(series, TORQUE, k, n, side * series[TORQUE, k, 0]):
+            return at.NO_EVENT, end
+        line_of(f, series, TORQUE, k, n, 0.0, side)
+        noise = ROUNDING * shafts[k, at.C] * (abs(shaft[k, THETA]) + shafts[k, HALF])
+    else:
+        if far(series, TWIST, k, n, side * shaft[k, THETA] - shafts[k, HALF]):
+            return at.NO_EVENT, end
+        line_of(f, series, TWIST, k, n, -shafts[k, HALF], side)
+        noise = ROUNDING * shafts[k, HALF]
+    s = first_root(f, n, end, 1 if rejoined else 0, noise, 0.0)
+    if s < NONE:
+        return at.UNSOLVED, 0.0
+    return (at.EXIT, s) if s >= 0.0 else (at.NO_EVENT, end)
+
+
+@compiled
+def returning(shafts: Matrix, shaft: Matrix, series: Cube, f: Vector, k: int, n: int,
+              end: float) -> tuple[int, float]:  # fmt: skip
+    """From overlapping flanks without torque: the torque comes back, or they part."""
+    side = shaft[k, SIDE]
+    for o in range(n + 1):
+        v = series[SPEED, k, o] - series[SPEED, k + 1, o]
+        f[o] = -side * (shafts[k, at.C] * series[TWIST, k, o] + shafts[k, D] * v)
+    f[0] += shafts[k, at.C] * shafts[k, HALF]
+    noise = ROUNDING * shafts[k, at.C] * (abs(shaft[k, THETA]) + shafts[k, HALF])
+    event = at.NO_EVENT
+    s = first_root(f, n, end, int(shaft[k, MASK]), noise, 0.0)
+    if s < NONE:
+        return at.UNSOLVED, 0.0
+    if s >= 0.0:
+        event = at.REJOIN
+        end = s
+    line_of(f, series, TWIST, k, n, -shafts[k, HALF], side)
+    s = first_root(f, n, end, 0, ROUNDING * shafts[k, HALF], 0.0)
+    if s < NONE:
+        return at.UNSOLVED, 0.0
+    return (at.BACK, s) if s >= 0.0 else (event, end)
+
+
+@compiled
+def releasing(mass: Matrix, shaft: Matrix, series: Cube, f: Vector, k: int, n: int,
+              end: float) -> tuple[int, float]:  # fmt: skip
+    """Rigid flanks part when they would have to pull."""
+    side = shaft[k, SIDE]
+    if far(series, TORQUE, k, n, side * series[TORQUE, k, 0]):
+        return at.NO_EVENT, end
+    line_of(f, series, TORQUE, k, n, 0.0, side)
+    noise = 1e-14 * mass[int(mass[k, FIRST]), SIZE]
+    s = first_root(f, n, end, 0, noise, noise)
+    if s < NONE:
+        return at.UNSOLVED, 0.0
+    return (at.RELEASE, s) if s >= 0.0 else (at.NO_EVENT, end)
+
+
+@compiled
+def friction(masses: Matrix, mass: Matrix, series: Cube, f: Vector, i: int, h: float, n: int,
+             end: float) -> tuple[int, float]:  # fmt: skip
+    """Breakaway or stop of the body that begins with mass i."""
+    if mass[i, HOLD] == 0.0:
+        return at.NO_EVENT, end
+    noise = ROUNDING * (mass[i, SIZE] + mass[i, HOLD])
+    event = at.NO_EVENT
+    if mass[i, STUCK] != 0.0:
+        if far(series, HELD, i, n, mass[i, HOLD] - abs(series[HELD, i, 0])):
+            return event, end
+        for which in range(2):
+            line_of(f, series, HELD, i, n, mass[i, HOLD], -1.0 + 2.0 * which)
+            s = first_root(f, n, end, 0, noise, noise)
+            if s < NONE:
+                return at.UNSOLVED, 0.0
+            if s >= 0.0:
+                event = at.BREAK_FORWARD if which == 0 else at.BREAK_BACK
+                end = s
+        return event, end
+    j = i
+    while masses[j, REACTIVE] == 0.0:
+        j += 1
+    direction = mass[j, DIRECTION]
+    if far(series, SPEED, i, n, direction * mass[i, at.W]):
+        return event, end
+    line_of(f, series, SPEED, i, n, 0.0, direction)
+    faint = 1e-14 * h * (mass[i, SIZE] + mass[i, HOLD]) / mass[i, BODY_J]
+    s = first_root(f, n, end, 0, 0.0, faint)
+    if s < NONE:
+        return at.UNSOLVED, 0.0
+    return (at.STOP, s) if s >= 0.0 else (event, end)
+
+
+@compiled
+def next_event(p: Vector, x: Vector, place: Vector, masses: Matrix, shafts: Matrix, mass: Matrix,
+               shaft: Matrix, series: Cube, lines: Matrix, h: float, n: int,
+               ) -> tuple[int, int, float]:  # fmt: skip
+    """The first event of the span, on which shaft or mass, and where on [0, 1]."""
+    found = at.NO_EVENT
+    where = 0
+    end = 1.0
+    f = lines[EVENT_LINE]
+    for k in range(shafts.shape[0]):
+        mode = shaft[k, MODE]
+        event = at.NO_EVENT
+        if mode == OPEN:
+            event, s = flanks(shafts, mass, shaft, series, f, k, h, n, end)
+        elif mode in (CONTACT, DOUBLED):
+            event, s = parting(shafts, shaft, series, f, k, n, end)
+        elif mode == BEYOND:
+            event, s = returning(shafts, shaft, series, f, k, n, end)
+        elif mode == PRESSED:
+            event, s = releasing(mass, shaft, series, f, k, n, end)
+        if event != at.NO_EVENT:
+            if event == at.UNSOLVED:
+                return event, k, 0.0
+            found, where, end = event, k, s
+    for i in range(masses.shape[0]):
+        if int(mass[i, FIRST]) == i:
+            event, s = friction(masses, mass, series, f, i, h, n, end)
+            if event != at.NO_EVENT:
+                if event == at.UNSOLVED:
+                    return event, i, 0.0
+                found, where, end = event, i, s
+    i = int(place[LOAD_MASS])
+    short = p[TARGET] - mass[i, at.W]
+    if math.isnan(x[START_TIME]) and not far(series, SPEED, i, n, short):
+        line_of(f, series, SPEED, i, n, p[TARGET], -1.0)
+        s = first_root(f, n, end, 0, ROUNDING * p[TARGET], 0.0)
+        if s < NONE:
+            return at.UNSOLVED, i, 0.0
+        if s >= 0.0:
+            found, where, end = at.REACHED, i, s
+    return found, where, end
+
+
+@compiled
+def keep_peak(shaft: Matrix, k: int, torque: float, time: float) -> None:
+    """Note a candidate for the largest |T|; of those equal but for rounding the first has the time."""
+    largest = abs(shaft[k, at.PEAK])
+    if abs(torque) > largest:
+        if abs(torque) > largest * (1.0 + SAME):
+            shaft[k, at.PEAK_TIME] = time
+        shaft[k, at.PEAK] = torque
+
+
+@compiled
+def peak_within(shaft: Matrix, series: Cube, lines: Matrix, k: int, n: int, end: float, t: float,
+                h: float) -> bool:  # fmt: skip
+    """Note the largest |T| of shaft k up to `end` if it is above the largest so far; False if it is lost."""
+    f = lines[EVENT_LINE]
+    g = lines[at.SPARE]
+    total = 0.0
+    for o in range(1, n + 1):
+        total += abs(series[TORQUE, k, o])
+    first = series[TORQUE, k, 0]
+    if abs(first) + total <= abs(shaft[k, at.PEAK]):
+        return True
+    for o in range(n + 1):
+        g[o] = series[TORQUE, k, o]
+    last = value(g, n, end)
+    keep_peak(shaft, k, first, t)
+    keep_peak(shaft, k, last, t + end * h)
+    for which in range(2):
+        sign = 1.0 - 2.0 * which
+        begin = 0.0
+        while True:
+            # where it rises above the largest so far
+            for o in range(n + 1):
+                f[o] = -sign * g[o]
+            f[0] += abs(shaft[k, at.PEAK]) * (1.0 + ROUNDING)
+            above = first_root(f, n, end, 0, 0.0, 0.0) if begin == 0.0 else crossing(f, 0, n, begin, end)
+            if above < NONE:
+                return False
+            if above < 0.0:
+                break
+            # and the extreme behind it
+            for o in range(n):
+                f[o] = sign * (o + 1.0) * g[o + 1]
+            f[n] = 0.0
+            top = crossing(f, 0, n - 1, above, end)
+            if top < NONE:
+                return False
+            if top < 0.0:
+                break  # it rises to the end, which is noted
+            if sign * value(g, n, top) <= abs(shaft[k, at.PEAK]):
+                break
+            keep_peak(shaft, k, value(g, n, top), t + top * h)
+            begin = top
+    return True

@@ -1,0 +1,295 @@
+"""A chain: masses in a row, joined by shafts that may hold a gap and a gear; a motor on one of the masses.
+
+Every quantity of a file is on its own shaft. `Chain.brought_to` brings them to one shaft, where gears are
+gone; `Chain.at_motor_shaft` gives the same as arrays, which is what the simulation and the natural
+frequencies work with.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self, cast
+
+from softstart.chain import files
+from softstart.chain.arrays import ChainArrays, arrays_at
+from softstart.chain.elements import Mass, Motor, Quantity, Shaft, motor_mistakes, shaft_mistakes
+from softstart.chain.tables import START, TABLES
+from softstart.chain.writing import toml_of
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.input_tables import read_document, read_table
+from softstart.units import nearest, show
+
+__all__ = ["Chain", "Mass", "Motor", "Shaft"]
+
+
+@dataclass(frozen=True, init=False)
+class Chain:
+    """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
+
+    `motor` (None for a chain that is only analysed) acts on the mass it names, else on the first. `load_mass`
+    names the mass that is to reach `target_speed`, else it is the last; that speed is in rad/s *at the motor
+    shaft*, as in a `Drive`, and follows the rated speed of the motor. Masses without a name are called
+    "mass 1" and so on. `assumed` says which values are assumed; it goes with every output.
+
+    >>> chain = Chain([Mass(0.035), Mass(0.7)], [Shaft(368.465, gap="0.5 rad", ratio=2)], Motor(62))
+    >>> chain.brought_to("motor").masses[1].inertia
+    0.175
+    """
+
+    masses: tuple[Mass, ...]
+    shafts: tuple[Shaft, ...]
+    motor: Motor | None
+    load_mass: str
+    target_speed: float | None
+    name: str
+    source: str
+    assumed: str
+
+    def __init__(
+        self,
+        masses: Iterable[Mass],
+        shafts: Iterable[Shaft],
+        motor: Motor | None = None,
+        *,
+        load_mass: str = "",
+        target_speed: Quantity | None = None,
+        name: str = "unnamed chain",
+        source: str = "",
+        assumed: str = "",
+    ) -> None:
+        numbered = enumerate(masses, start=1)
+        masses = tuple(mass if mass.name else replace(mass, name=f"mass {i}") for i, mass in numbered)
+        shafts = tuple(shafts)
+        if target_speed is not None:
+            target_speed = read_table({"target_speed": target_speed}, START)["target_speed"]
+        elif motor is not None:
+            target_speed = motor.rated_speed
+        if masses:
+            load_mass = load_mass or masses[-1].name
+            if motor is not None and not motor.mass:
+                motor = replace(motor, mass=masses[0].name)
+        wrong = _mistakes(masses, shafts, motor, load_mass)
+        if wrong:
+            raise InputError(wrong)
+        put = object.__setattr__
+        put(self, "masses", masses)
+        put(self, "shafts", shafts)
+        put(self, "motor", motor)
+        put(self, "load_mass", load_mass)
+        put(self, "target_speed", target_speed)
+        put(self, "name", name)
+        put(self, "source", source)
+        put(self, "assumed", assumed)
+
+    # ---- where chains come from --------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, chain: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
+        """A chain from its TOML file, or a shipped one by its name; `also` as in `from_toml`.
+
+        >>> len(Chain.load("crane-4-mass").masses)
+        4
+        """
+        text, where = files.find(chain)
+        return cls.from_toml(text, where=where, also=also)
+
+    @classmethod
+    def from_toml(cls, text: str, *, where: str = "", also: Mapping[str, object] | None = None) -> Self:
+        """A chain from TOML text; `also` holds changes as typed, {"mass[2].inertia": "0.7 kg*m^2"}.
+
+        >>> chain = Chain.load("tractor-like")
+        >>> Chain.from_toml(chain.to_toml()) == chain
+        True
+        """
+        found = read_document(text, TABLES, "a chain file", where=where, also=also)
+        rows = [("[shaft] " + str(i), shaft_mistakes(row)) for i, row in enumerate(found["shaft"], start=1)]
+        if found["motor"] is not None:
+            rows.append(("[motor]", motor_mistakes(found["motor"])))
+        before = f"{where}: " if where else ""
+        wrong = [f"{before}{place}, {sentence}" for place, sentences in rows for sentence in sentences]
+        if wrong:
+            raise InputError(wrong)
+        motor = None if found["motor"] is None else Motor(**found["motor"])
+        start: dict[str, Any] = found["start"] or {}
+        try:
+            return cls(
+                [Mass(**row) for row in found["mass"]],
+                [Shaft(**row) for row in found["shaft"]],
+                motor,
+                load_mass=start.get("load", ""),
+                target_speed=start.get("target_speed"),
+                **found[""],
+            )
+        except InputError as error:
+            raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
+
+    @classmethod
+    def from_drive(cls, drive: Drive) -> Self:
+        """The chain of two masses that a single drive is.
+
+        >>> drive = Drive.load("crane-4amtkf")
+        >>> Chain.from_drive(drive).at_motor_shaft().c
+        array([368.465])
+        """
+        if drive.shape != ():
+            raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
+        of_motor = {key: getattr(drive, key) for key in Motor.__dataclass_fields__ if key != "mass"}
+        rotor = Mass(
+            cast("float", drive.J1), name="motor", initial_speed=cast("float", drive.initial_motor_speed)
+        )
+        load = Mass(
+            cast("float", drive.J2),
+            name="load",
+            torque=cast("float", drive.Mc),
+            kind=drive.load_kind,
+            initial_speed=cast("float", drive.initial_load_speed),
+        )
+        shaft = Shaft(
+            cast("float", drive.c),
+            damping=cast("float", drive.d),
+            gap=cast("float", drive.gap),
+            contact_law=drive.contact_law,
+            start_position=cast("float", drive.start_position),
+        )
+        return cls(
+            (rotor, load),
+            (shaft,),
+            Motor(**of_motor),
+            target_speed=cast("float", drive.target_speed),
+            name=drive.name,
+            source=drive.source,
+        )
+
+    def to_toml(self) -> str:
+        """The chain as TOML text in SI, which `from_toml` reads back to an equal chain."""
+        return toml_of(self)
+
+    # ---- places ------------------------------------------------------------------------------------------
+
+    def index(self, place: str | int) -> int:
+        """The index of a mass named by its name, or of the motor's mass where no mass is called "motor".
+
+        >>> Chain.load("crane-4-mass").index("motor")
+        0
+        """
+        if isinstance(place, int):
+            if 0 <= place < len(self.masses):
+                return place
+            raise InputError(f"mass {place}: the chain has the masses 0 to {len(self.masses) - 1}.")
+        names = [mass.name for mass in self.masses]
+        if place in names:
+            return names.index(place)
+        if place == "motor":
+            return 0 if self.motor is None else names.index(self.motor.mass)
+        raise InputError(f"{show(place)}: {_no_such(place, names)}")
+
+    @property
+    def motor_index(self) -> int:
+        """The index of the mass on which the motor acts; the first where there is no motor."""
+        return 0 if self.motor is None else self.index(self.motor.mass)
+
+    @property
+    def load_index(self) -> int:
+        """The index of the mass that is to reach the target speed."""
+        return self.index(self.load_mass)
+
+    def speed_ratios(self, reference: str | int = "motor") -> tuple[float, ...]:
+        """The speed of each mass's shaft over that of the reference: `i` of [R], table 1.
+
+        >>> Chain([Mass(1), Mass(1)], [Shaft(1, ratio=4)]).speed_ratios("mass 1")
+        (1.0, 0.25)
+        """
+        speeds = [1.0]
+        for shaft in self.shafts:
+            speeds.append(speeds[-1] / shaft.ratio)
+        of_reference = speeds[self.index(reference)]
+        return tuple(speed / of_reference for speed in speeds)
+
+    # ---- the chain at one shaft --------------------------------------------------------------------------
+
+    def brought_to(self, reference: str | int = "motor") -> Self:
+        """The same chain with every quantity at the shaft of one mass: all ratios are 1 then.
+
+        With `i` the speed of a shaft over that of the reference: inertias, dampings and stiffnesses times
+        `i^2`, torques times `i`, gaps, angles and speeds over `i`. Natural frequencies, energies and powers
+        stay what they are. The motor's data and the target speed are at the motor's shaft before and after:
+        a chain with a motor on another shaft than the reference loses it.
+
+        >>> chain = Chain([Mass(1), Mass(4)], [Shaft(8, gap=0.1, ratio=2, side="after")])
+        >>> there = chain.brought_to("mass 1")
+        >>> there.masses[1].inertia, there.shafts[0].stiffness, there.shafts[0].gap
+        (1.0, 2.0, 0.2)
+        """
+        at = arrays_at(self, self.index(reference))
+        columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, strict=True)
+        masses = [
+            replace(m, inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
+            for m, J, d, Mc, w0 in columns
+        ]
+        rows = zip(self.shafts, at.c, at.d, at.gap, at.theta0, strict=True)
+        shafts = [
+            replace(
+                s,
+                stiffness=float(c),
+                damping=float(d),
+                gap=float(gap),
+                start_position=float(theta0),
+                ratio=1.0,
+                side="before",
+            )
+            for s, c, d, gap, theta0 in rows
+        ]
+        here = at.speed_ratio[self.motor_index] == 1.0
+        return replace(
+            self,
+            masses=tuple(masses),
+            shafts=tuple(shafts),
+            motor=self.motor if here else None,
+            target_speed=self.target_speed if here else None,
+        )
+
+    def at_motor_shaft(self) -> ChainArrays:
+        """The chain as arrays at the shaft of the motor's mass (of the first, where there is no motor).
+
+        >>> Chain.load("crane-4-mass").at_motor_shaft().J.shape
+        (4,)
+        """
+        return self._at_motor_shaft
+
+    @cached_property
+    def _at_motor_shaft(self) -> ChainArrays:
+        return arrays_at(self, self.motor_index)
+
+
+def _no_such(place: str, names: list[str]) -> str:
+    meant = nearest(place, names)
+    hint = f"did you mean {show(meant)}?" if meant else f"its masses are {', '.join(map(show, names))}."
+    return f"the chain has no mass of this name; {hint}"
+
+
+def _mistakes(
+    masses: tuple[Mass, ...], shafts: tuple[Shaft, ...], motor: Motor | None, load_mass: str
+) -> list[str]:
+    """What the parts of a chain say against one another."""
+    wrong = []
+    if len(masses) < 2:
+        wrong.append(f"mass: a chain has at least 2 masses, and there are {len(masses)}.")
+    elif len(shafts) != len(masses) - 1:
+        wrong.append(
+            f"shaft: {len(masses)} masses in a row are joined by {len(masses) - 1} shafts, and there are "
+            f"{len(shafts)}."
+        )
+    names = [mass.name for mass in masses]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        wrong.append(
+            f"mass name = {show(name)}: {names.count(name)} masses have this name; give each its own."
+        )
+    if names and load_mass not in names:
+        wrong.append(f"load = {show(load_mass)}: {_no_such(load_mass, names)}")
+    if names and motor is not None and motor.mass not in names:
+        wrong.append(f"[motor] mass = {show(motor.mass)}: {_no_such(motor.mass, names)}")
+    return wrong

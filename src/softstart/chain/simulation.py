@@ -1,0 +1,233 @@
+"""One start of a whole chain under a controller: `simulate_chain`."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Mapping
+from numbers import Integral, Real
+
+import numpy as np
+
+from softstart.balancing.periodic_torque import PeriodicTorque
+from softstart.chain import kernel_layout as at
+from softstart.chain import kernel_start as kernel
+from softstart.chain.kernel_input import Numbers, numbers
+from softstart.chain.model import Chain
+from softstart.chain.reduction import reduce_chain
+from softstart.chain.run import ChainRun
+from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.controller.finding import make_controller
+from softstart.drive import Drive
+from softstart.errors import InputError, SimulationError
+from softstart.plant import layout as plant
+from softstart.plant import start as sensing
+from softstart.status import Status, status_of
+
+__all__ = ["MAX_EVENTS", "drive_of", "simulate_chain"]
+
+MAX_EVENTS = 1_000_000
+FIRST_ROWS = 256
+
+
+def simulate_chain(
+    chain: Chain | str,
+    controller: str | Controller | None,
+    until: float | None = None,
+    *,
+    fitted_to: Drive | None = None,
+    parameters: Mapping[str, object] | None = None,
+    base: Drive | None = None,
+    time_limit: float | None = None,
+    max_events: int = MAX_EVENTS,
+    excitation: Mapping[str | int, PeriodicTorque] | None = None,
+) -> ChainRun:
+    """Simulate the start of a chain under a controller, exactly.
+
+    Between two events the chain is linear: its Taylor series are summed to the last digit, and events are
+    certified first roots of them. A shaft without a gap is a spring that pulls too. Rigid gaps close by
+    impacts, angular momentum kept; those that pile up are followed to their known end, when the flanks press.
+
+    Parameters
+    ----------
+    chain : a Chain, or the name or file of one.
+    controller : a name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
+    until : end of the run in s; by default one elastic period after the load mass has its target speed.
+    fitted_to : the drive from which the controller's own defaults are derived: by default the modal reduction
+        of the chain to two masses, whatever its error.
+    parameters : parameters of a controller given by name.
+    base : the drive whose mean torque K_dyn refers to, if not that one.
+    time_limit : s, after which a start that has not reached its target speed is given up as not reached.
+    max_events : cap on the events and on the control instants; going over it is an error, not a result.
+    excitation : periodic torques by the names (or indices) of the masses on which they act, each at the speed
+        of its own shaft.
+
+    Raises InputError for bad input and SimulationError for a start that cannot be finished.
+
+    >>> run = simulate_chain("crane-4-mass", "direct")
+    >>> round(run.k_dyn, 3), round(run.start_time, 4)
+    (6.299, 0.3708)
+    """
+    if isinstance(chain, str):
+        chain = Chain.load(chain)
+    until = _time("until", until, "leave it out to run to the start time")
+    time_limit = _time("time_limit", time_limit, "leave it out for a hundred times a stiff chain's start")
+    if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
+        raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
+    for name, other in (("fitted_to", fitted_to), ("base", base)):
+        if other is not None and not (isinstance(other, Drive) and other.shape == ()):
+            raise InputError(f"{name} = {other!r}: give a single Drive.")
+    given = numbers(chain, excitation, time_limit, int(max_events))
+    _check_end(chain, controller, until, given)
+    fitted = None
+    book = _Book(given)
+    end = math.inf if until is None else until
+    if controller is None:
+        kernel.begin(book.x, book.m, given.place, given.masses, given.shafts, book.mass, book.shaft, end)
+        book.x[plant.ASK_AT] = math.inf
+        reason = _go_on(given, book)
+    else:
+        made = make_controller(controller, parameters)
+        fitted_to = fitted_to or drive_of(chain)
+        fitted, own = made.set_up(fitted_to)
+        reason = _run(fitted, own, given, book, end)
+    status = status_of(reason, not math.isnan(book.x[plant.START_TIME]), until is not None)
+    if not status.finished:
+        remedy = ""
+        if status is Status.TOO_MANY_EVENTS:
+            remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
+        raise SimulationError(
+            f"{status.value}{remedy} Chain {chain.name}, t = {book.x[plant.TIME]:.6g} s, "
+            f"{int(book.x[plant.EVENTS])} events."
+        )
+    return ChainRun(
+        chain, fitted, base or fitted_to, status, given, book.x.copy(), book.mass.copy(), book.shaft.copy(),
+        book.segments[: int(book.x[plant.N_SEGMENTS])].copy(),
+        book.events[: int(book.x[plant.N_EVENTS])].copy(),
+    )  # fmt: skip
+
+
+def drive_of(chain: Chain) -> Drive:
+    """The two-mass drive for which a controller is set up where none is named: the modal reduction."""
+    try:
+        return reduce_chain(chain, 2, method="modal", force=True).to_drive()
+    except InputError as error:
+        sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
+        raise InputError(sentences) from None
+
+
+class _Book:
+    """State, scratch and growing records of one start."""
+
+    def __init__(self, given: Numbers) -> None:
+        self.x, self.m, self.mass, self.shaft, self.series, self.lines = given.scratch()
+        self.segments = np.zeros((FIRST_ROWS, at.row_width(given.count)))
+        self.events = np.zeros((FIRST_ROWS + 4 * given.count, at.N_EVENT))
+
+    def grow(self) -> None:
+        """Twice the room for whatever is nearly full."""
+        if self.x[plant.N_SEGMENTS] >= self.segments.shape[0]:
+            self.segments = np.concatenate([self.segments, np.zeros_like(self.segments)])
+        else:
+            self.events = np.concatenate([self.events, np.zeros_like(self.events)])
+
+
+def _go_on(given: Numbers, book: _Book) -> int:
+    """To the next control instant or to the end."""
+    while True:
+        reason: int = kernel.advance(
+            given.p, book.x, book.m, given.place, given.masses, given.shafts, given.tones, book.mass,
+            book.shaft, book.series, book.lines, book.segments, book.events,
+        )  # fmt: skip
+        if reason != plant.BUFFER_FULL:
+            return reason
+        book.grow()
+
+
+def _run(controller: Controller, drive: Drive, given: Numbers, book: _Book, until: float) -> int:
+    x, m = book.x, book.m
+    kernel.begin(x, m, given.place, given.masses, given.shafts, book.mass, book.shaft, until)
+    x[plant.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
+    sees = int(controller.sensors)
+    measured = np.zeros(sensing.N_MEASURED)
+    if isinstance(controller, CompiledController):
+        own = np.array(controller.vector(drive), dtype=np.float64).ravel()
+        size = controller.state_size
+        command = np.zeros(sensing.NEW_STATE + size)
+        of_controller = np.zeros(size)
+        while True:
+            reason: int = kernel.run(
+                type(controller).kernel, given.p, own, sees, x, m, measured, of_controller, command,
+                given.place, given.masses, given.shafts, given.tones, book.mass, book.shaft, book.series,
+                book.lines, book.segments, book.events,
+            )  # fmt: skip
+            if reason != plant.BUFFER_FULL:
+                return reason
+            book.grow()
+    if not isinstance(controller, PlainController):
+        raise InputError(
+            f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
+        )
+    state = tuple(controller.initial_state)
+    while True:
+        reason = _go_on(given, book)
+        if reason != plant.ASK:
+            return reason
+        kernel.look(
+            given.p, x, m, sees, given.place, given.masses, given.shafts, given.tones, book.mass, book.shaft,
+            book.series, book.lines, measured,
+        )  # fmt: skip
+        torque, ask_again, state, slope = _answer(controller, Measured(*measured.tolist()), state)
+        taken: int = sensing.obey(given.p, x, m, torque, ask_again, slope)
+        if taken != plant.ASK:
+            return taken
+
+
+def _answer(
+    controller: PlainController, measured: Measured, state: tuple[float, ...]
+) -> tuple[float, float, tuple[float, ...], float]:
+    """What a plain controller answers; the user's own code may fail in any way."""
+    try:
+        answer = controller.step(measured, state)
+    except (Exception, SystemExit) as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        raise SimulationError(
+            f"The start was given up: the controller {type(controller).__name__} failed at "
+            f"t = {measured.time:.6g} s in {place.filename}, line {place.lineno} "
+            f"({type(error).__name__}: {error})."
+        ) from error
+    try:
+        slope = float(answer[3]) if len(answer) > 3 else 0.0
+        return float(answer[0]), float(answer[1]), tuple(answer[2]), slope
+    except (TypeError, IndexError, ValueError):
+        raise InputError(
+            f"controller {type(controller).__name__}: its step answered {answer!r}; "
+            "answer with Command(torque, ask_again, state, slope)."
+        ) from None
+
+
+def _check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
+    """A run needs an end."""
+    if controller is not None and chain.motor is None:
+        raise InputError(
+            "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
+        )
+    if until is not None or given.p[plant.TIME_LIMIT] < math.inf:
+        return
+    if controller is None or chain.target_speed is None:
+        raise InputError(
+            "until is missing: without motor and target speed nothing else ends the run; give it in s."
+        )
+    raise InputError(
+        f"starting_torque: it is not above the load torques, {given.masses[:, at.MC].sum():.6g} N*m at the "
+        "motor shaft, so the load may never reach its target speed; give until or time_limit."
+    )
+
+
+def _time(name: str, value: object, remedy: str) -> float | None:
+    """A time above 0 s, or None."""
+    if value is None:
+        return None
+    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
+        return float(value)
+    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")

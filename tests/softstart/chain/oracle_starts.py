@@ -1,0 +1,130 @@
+"""Starts of chains, given both to the kernel and to the oracle."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from tests.oracle_torque import TorquePath
+from tests.softstart.chain.chain_oracle import ChainOracle, Given
+from tests.softstart.plant.pieces import Pieces
+
+from softstart.balancing.periodic_torque import PeriodicTorque
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.run import ChainRun
+from softstart.chain.simulation import simulate_chain
+from softstart.drive import Drive
+
+NAMES = {
+    "gap closed": "closed",
+    "gap opened": "opened",
+    "load starts": "load-starts",
+    "load stops": "load-stops",
+    "target speed reached": "target",
+    "impact": "impact",
+}
+ANY_DRIVE = Drive.load("crane-4amtkf")  # the pieces take nothing from it
+
+
+def random_chain(rng: np.random.Generator, count: int, rigid: bool = False) -> dict[str, Any]:
+    """Keywords of `both` for a chain of `count` masses, a few periods of its fastest mode long."""
+    J = 10 ** rng.uniform(-0.6, 0.6, count)
+    c = 10 ** rng.uniform(2, 3.5, count - 1)
+    rate = math.sqrt(2 * np.max((np.append(c, 0) + np.append(0, c)) / J))
+    torque = float(rng.uniform(5, 50))
+    twist = torque / c
+    gap = twist * 10 ** rng.uniform(-1, 1, count - 1) * (rng.random(count - 1) < 0.8)
+    damped = rng.random(count - 1) < 0.6
+    law = [str(rng.choice(["no-pull", "dead-zone", "modelica"])) for _ in range(count - 1)]
+    restitution = np.full(count - 1, math.nan)
+    if rigid:
+        k = int(rng.integers(count - 1))
+        gap[k] = max(gap[k], twist[k])
+        restitution[k] = rng.uniform(0.6, 1.0)
+    t_end = 2 * math.pi / rate * float(rng.uniform(2, 6))
+    tones = []
+    if rng.random() < 0.5:
+        tones = [
+            (int(rng.integers(count)), float(rate * rng.uniform(0.05, 0.6)), 0.3 * torque, -0.2 * torque)
+        ]
+    return {
+        "J": J,
+        "c": c,
+        "d": np.where(
+            damped & np.isnan(restitution), 2 * rng.uniform(0, 0.6, count - 1) * np.sqrt(c * J.min()), 0.0
+        ),
+        "gap": gap,
+        "law": law,
+        "restitution": restitution,
+        "theta0": gap * rng.uniform(-0.45, 0.45, count - 1),
+        "w0": np.where(rng.random(count) < 0.5, 0.0, rng.normal(size=count)),
+        "Mc": torque * rng.uniform(0, 0.5, count) * (rng.random(count) < 0.6),
+        "reactive": rng.random(count) < 0.5,
+        "ground": np.where(rng.random(count) < 0.3, rng.uniform(0, 1.0, count), 0.0),
+        "tones": tones,
+        "pieces": [(0.0, torque), (0.4 * t_end, torque * float(rng.uniform(-0.5, 1.0)))],
+        "lag": 0.0 if rng.random() < 0.5 else 0.05 * t_end,
+        "rate": math.inf if rng.random() < 0.5 else 8 * torque / t_end,
+        "motor": int(rng.integers(count)),
+        "t_end": t_end,
+        "target": float(rng.uniform(0.1, 1.0)),
+    }
+
+
+def both(
+    J: np.ndarray, c: np.ndarray, d: np.ndarray, gap: np.ndarray, law: list[str], restitution: np.ndarray,
+    theta0: np.ndarray, w0: np.ndarray, Mc: np.ndarray, reactive: np.ndarray, ground: np.ndarray,
+    tones: list[tuple[int, float, float, float]], pieces: list[tuple[float, float]], lag: float, rate: float,
+    motor: int, t_end: float, target: float, rtol: float = 1e-12,
+) -> tuple[ChainRun, ChainOracle]:  # fmt: skip
+    """The same start by the kernel and by the oracle."""
+    reactive = reactive & (Mc > 0)
+    target = max(target, float(w0[-1]) + 1e-2)
+    largest = max(*(abs(u) for _, u in pieces), 1.0)
+    chain = Chain(
+        [
+            Mass(float(J[i]), torque=float(Mc[i]), kind="reactive" if reactive[i] else "active",
+                 damping=float(ground[i]), initial_speed=float(w0[i]))
+            for i in range(J.size)
+        ],
+        [
+            Shaft(gap=float(gap[k]), restitution=float(restitution[k]), start_position=float(theta0[k]))
+            if restitution[k] == restitution[k]
+            else Shaft(float(c[k]), damping=float(d[k]), gap=float(gap[k]), contact_law=law[k],  # type: ignore[arg-type]
+                       start_position=float(theta0[k]))
+            for k in range(c.size)
+        ],
+        Motor(largest, mass=f"mass {motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate),
+        target_speed=target,
+    )  # fmt: skip
+    excitation: dict[str | int, PeriodicTorque] = {
+        i: PeriodicTorque(0.0, [1.0], [cosine], [sine], speed=omega)  # type: ignore[arg-type]
+        for i, omega, cosine, sine in tones
+    }
+    controller = Pieces(pieces=tuple(pieces), end=math.inf)
+    run = simulate_chain(chain, controller, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
+    given = Given(
+        J, Mc, reactive, w0, c, d, gap, law, theta0, ground, np.zeros(J.size), tones, restitution, motor
+    )
+    path = TorquePath(list(pieces), lag, rate, 0.0, t_end)
+    return run, ChainOracle(given, path, target, rtol).go()
+
+
+def differences(run: ChainRun, oracle: ChainOracle) -> dict[str, float]:
+    """Largest differences in units of what occurs."""
+    last = run.at(run.end_time)
+    speeds = np.abs(run.w).max()
+    twists = np.abs(run.twist).max()
+    torques = max(np.abs(oracle.peaks).max(), 1e-3)
+    same = [(NAMES[e.kind], e.place) for e in run.events] == [(kind, k) for _, kind, k in oracle.events]
+    found = {
+        "w": float(np.abs(last["w"] - oracle.w).max() / speeds),
+        "twist": float(np.abs(last["twist"] - oracle.theta).max() / twists),
+        "peak": float(np.abs(run.peak_torques - np.abs(oracle.peaks)).max() / torques),
+        "events": 0.0 if same else math.inf,
+    }
+    if same and run.events:
+        times = np.array([[e.time, when] for e, (when, _, _) in zip(run.events, oracle.events, strict=True)])
+        found["times"] = float(np.abs(times[:, 0] - times[:, 1]).max() / run.end_time)
+    return found

@@ -1,0 +1,250 @@
+"""The chain itself: files, mistakes, and bringing it to a shaft."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError
+from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
+from softstart.chain.files import names
+
+BASE = """
+[[mass]]
+name = "rotor"
+inertia = 1
+
+[[shaft]]
+stiffness = "2 kN*m/rad"
+gap = "1 deg"
+
+[[mass]]
+name = "drum"
+inertia = 4
+"""
+
+positive = st.floats(1e-3, 1e3)
+
+
+@st.composite
+def chains(draw: st.DrawFn) -> Chain:
+    n = draw(st.integers(2, 7))
+    masses = [
+        Mass(
+            draw(positive),
+            damping=draw(st.floats(0.0, 10.0)),
+            torque=draw(st.floats(-5.0, 5.0)),
+            kind=draw(st.sampled_from(["active", "reactive"])),
+            initial_speed=draw(st.floats(-3.0, 3.0)),
+        )
+        for _ in range(n)
+    ]
+    shafts = [
+        Shaft(
+            draw(positive),
+            damping=draw(st.floats(0.0, 10.0)),
+            gap=draw(st.floats(0.0, 1.0)),
+            ratio=draw(st.floats(0.1, 20.0)),
+            side=draw(st.sampled_from(["before", "after"])),
+            start_position=draw(st.floats(-0.1, 0.1)),
+        )
+        for _ in range(n - 1)
+    ]
+    return Chain(masses, shafts, Motor(62.0, mass=f"mass {draw(st.integers(1, n))}"), target_speed=10.0)
+
+
+@given(chains(), st.data())
+@settings(max_examples=60, deadline=None)
+def test_frequencies_do_not_depend_on_the_reference_shaft(chain: Chain, data: st.DataObject) -> None:
+    there = chain.brought_to(data.draw(st.integers(0, len(chain.masses) - 1)))
+    np.testing.assert_allclose(natural_vibration(there).Omega, natural_vibration(chain).Omega, rtol=1e-12)
+
+
+@given(chains(), st.data())
+@settings(max_examples=60, deadline=None)
+def test_energy_and_power_do_not_depend_on_the_reference_shaft(chain: Chain, data: st.DataObject) -> None:
+    """Kinetic energy, power of the loads, elastic energy at the same angles: formed on own shafts."""
+    k = data.draw(st.integers(0, len(chain.masses) - 1))
+    there = chain.brought_to(k)
+    kinetic = [sum(m.inertia * m.initial_speed**2 for m in one.masses) for one in (chain, there)]
+    power = [sum(m.torque * m.initial_speed for m in one.masses) for one in (chain, there)]
+    assert kinetic[1] == pytest.approx(kinetic[0], rel=1e-11)
+    assert power[1] == pytest.approx(power[0], rel=1e-11, abs=1e-11)
+    i = np.array(chain.speed_ratios(k))
+    angles = np.array([mass.initial_speed for mass in chain.masses])  # any angles on own shafts
+    for j, shaft in enumerate(chain.shafts):
+        before, after = angles[j], angles[j + 1]
+        twist = before - after * shaft.ratio if shaft.side == "before" else before / shaft.ratio - after
+        brought = angles[j] / i[j] - angles[j + 1] / i[j + 1]
+        assert there.shafts[j].stiffness * brought**2 == pytest.approx(
+            shaft.stiffness * twist**2, rel=1e-9, abs=1e-12
+        )
+        assert there.shafts[j].gap * np.sqrt(there.shafts[j].stiffness) == pytest.approx(
+            shaft.gap * np.sqrt(shaft.stiffness), rel=1e-11
+        )
+
+
+@given(chains())
+@settings(max_examples=40, deadline=None)
+def test_a_chain_survives_its_file_a_pickle_and_the_way_there_and_back(chain: Chain) -> None:
+    assert Chain.from_toml(chain.to_toml()) == chain
+    copy = pickle.loads(pickle.dumps(chain))
+    assert copy == chain
+    assert hash(copy) == hash(chain)
+    twice = chain.brought_to(0).brought_to(len(chain.masses) - 1)
+    assert twice.masses == chain.brought_to(0).masses  # ratios are 1 there: nothing is left to bring
+
+
+def test_the_motor_keeps_its_shaft_only() -> None:
+    chain = Chain.load("crane-4-mass")
+    assert chain.brought_to("motor").motor == chain.motor
+    assert chain.brought_to("motor").target_speed == chain.target_speed
+    assert chain.brought_to("crane").motor is None
+    assert chain.brought_to("crane").masses[0].inertia == pytest.approx(0.031 * 400)
+
+
+def test_arrays_are_the_chain_at_the_motor_shaft() -> None:
+    chain = Chain.load("crane-4-mass")
+    arrays = chain.at_motor_shaft()
+    np.testing.assert_allclose(arrays.J, [0.031, 0.002, 0.004, 0.173], rtol=1e-14)
+    np.testing.assert_allclose(arrays.c, [4000, 1000, 682.5], rtol=1e-14)
+    np.testing.assert_allclose(arrays.gap, [0.1, 0.2, 0.2], rtol=1e-14)
+    np.testing.assert_allclose(arrays.Mc, [0, 0, 0, 7.16], rtol=1e-14)
+    assert (arrays.motor, arrays.load) == (0, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        arrays.J[0] = 1.0
+
+
+def test_a_drive_as_a_chain_has_its_numbers() -> None:
+    drive = Drive.load("servo-60kw-nordin") if "servo-60kw-nordin" in _drives() else Drive.load(_drives()[-1])
+    arrays = Chain.from_drive(drive).at_motor_shaft()
+    assert [arrays.J[0], arrays.J[1], arrays.c[0], arrays.d[0], arrays.gap[0], arrays.Mc[1]] == [
+        drive.J1, drive.J2, drive.c, drive.d, drive.gap, drive.Mc,
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="batch"):
+        Chain.from_drive(drive.replace(gap=[0.1, 0.2]))
+
+
+def _drives() -> tuple[str, ...]:
+    from softstart.drive import library
+
+    return library.names()
+
+
+def test_backlash_on_a_diameter_is_the_angle_of_the_paper() -> None:
+    """[R]: 0.2 mm on about 185 mm are about 0.002 rad."""
+    shaft = Shaft(1.0, backlash="0.2 mm", diameter="185 mm")
+    assert shaft.gap == pytest.approx(2 * 0.2 / 185, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", names())
+def test_shipped_chains_say_what_is_assumed(name: str) -> None:
+    chain = Chain.load(name)
+    assert chain.assumed
+    assert chain.source
+    assert natural_vibration(chain).summary()["assumed"] == chain.assumed
+
+
+def test_all_mistakes_of_a_file_are_told_at_once() -> None:
+    text = """
+[[mass]]
+inertia = -1
+[[shaft]]
+stifness = 5
+gap = "1 m"
+ratio = 0
+[[mass]]
+inertia = 1
+king = "active"
+[motor]
+starting_torque = "6 N"
+"""
+    with pytest.raises(InputError) as caught:
+        Chain.from_toml(text, where="bad.toml")
+    said = str(caught.value)
+    for piece in (
+        "[mass] 1, inertia = -1: the inertia on its own shaft must be above 0",
+        "did you mean stiffness?",
+        'gap = "1 m": m is a length',
+        "ratio = 0",
+        "did you mean kind?",
+        "N is a force, not a torque",
+    ):
+        assert piece in said
+    assert all(sentence.startswith("bad.toml: ") for sentence in caught.value.sentences)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("[[shaft]]\n", "stiffness is missing"),
+        ("[[shaft]]\nstiffness = 5\nrestitution = 0.5\n", "a gap that closes on a spring has no impact"),
+        ("[[shaft]]\nrestitution = 0.5\ngap = 0.1\ndamping = 1\n", "a rigid joint has no damping"),
+        ("[[shaft]]\nstiffness = inf\ngap = 0.1\n", "restitution is missing"),
+        ("[[shaft]]\nstiffness = 5\ngap = 0.1\nbacklash = '1 mm'\n", "both give the gap"),
+        ("[[shaft]]\nstiffness = 5\nbacklash = '1 mm'\n", "diameter is missing"),
+        ("[[shaft]]\nstiffness = 5\nefficiency = 0\n", "efficiency of the gear must be above 0"),
+        ("[[shaft]]\nrestitution = 1\ngap = 0.1\nstart_position = 0.2\n", "lets the twist lie between"),
+    ],
+)
+def test_what_a_shaft_says_against_itself(change: str, reason: str) -> None:
+    text = BASE.replace('[[shaft]]\nstiffness = "2 kN*m/rad"\ngap = "1 deg"\n', change)
+    with pytest.raises(InputError, match="shaft] 1") as caught:
+        Chain.from_toml(text)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        ("[motor]\nmass = 'rotr'\nstarting_torque = 5", "did you mean"),
+        ("[motor]\nstarting_torque = 5\nmaximum_torque = 4", "at least the starting torque"),
+        ("[start]\nload = 'hook'", "its masses are"),
+        ("[[mass]]\ninertia = 1", "joined by 2 shafts, and there are 1"),
+        ("[[shaft]]\nstiffness = 1\n[[mass]]\nname = 'drum'\ninertia = 1", "2 masses have this name"),
+    ],
+)
+def test_what_the_parts_say_against_one_another(more: str, reason: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Chain.from_toml(BASE + more)
+    assert reason in str(caught.value)
+
+
+def test_changes_as_typed() -> None:
+    changed = Chain.from_toml(BASE, also={"mass[2].inertia": "7", "shaft[1].gap": "2 deg"})
+    assert changed.masses[1].inertia == 7.0
+    assert changed.shafts[0].gap == pytest.approx(np.radians(2.0))
+    with pytest.raises(InputError, match="N from 1 to 2"):
+        Chain.from_toml(BASE, also={"mass[3].inertia": "7"})
+
+
+def test_names_and_places() -> None:
+    chain = Chain([Mass(1), Mass(2, name="drum")], [Shaft(1)])
+    assert [mass.name for mass in chain.masses] == ["mass 1", "drum"]
+    assert chain.index("motor") == 0
+    assert chain.load_mass == "drum"
+    with pytest.raises(InputError, match="did you mean"):
+        chain.index("drun")
+    with pytest.raises(InputError, match="0 to 1"):
+        chain.index(2)
+    with pytest.raises(InputError, match="at least 2 masses"):
+        Chain([Mass(1)], [])
+
+
+def test_replacing_keeps_the_checks() -> None:
+    chain = Chain.load("crane-4-mass")
+    with pytest.raises(InputError, match="above 0"):
+        replace(chain.masses[0], inertia=-1.0)
+    assert replace(chain, name="other").masses == chain.masses
+
+
+def test_there_is_no_such_chain(tmp_path: object) -> None:
+    with pytest.raises(InputError, match="did you mean tractor-like"):
+        Chain.load("tractor-liek")
+    with pytest.raises(InputError, match="folder"):
+        Chain.load(str(tmp_path))

@@ -1,0 +1,318 @@
+"""The exact start of a chain: two masses are the two-mass plant, and what must be kept is kept."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.polynomial.legendre import leggauss
+from tests.softstart.plant.pieces import Pieces
+
+from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
+from softstart.balancing.periodic_torque import PeriodicTorque
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.backbone import backbone
+from softstart.chain.run import ChainRun
+from softstart.chain.simulation import simulate_chain
+
+CRANE = Drive.load("crane-4amtkf")
+# what can differ between a drive and another, each with the two-mass plant's own closed forms
+DRIVES = {
+    "undamped": {},
+    "reactive": {"load_kind": "reactive"},
+    "damped": {"damping": 0.3},
+    "dead-zone": {"damping": 0.3, "contact_law": "dead-zone"},
+    "modelica": {"damping": 2.0, "contact_law": "modelica"},
+    "modelica, reactive": {"damping": 0.5, "contact_law": "modelica", "load_kind": "reactive"},
+    "overdamped": {"damping": 20.0},
+    "lag and rate": {"torque_lag": 0.002, "torque_rate": 5000.0},
+    "dead time and noise": {"computing_delay": 0.0017, "torque_noise": 0.5, "encoder_lines": 256},
+    "from overlap": {"start_position": 0.27, "initial_load_speed": 5.0, "load_kind": "reactive"},
+}
+CONTROLLERS = ("direct", "ramp", "current-limit-feedback", "reduced-two-stage")
+
+
+def same_as_plant(run: ChainRun, plant: Run) -> None:
+    assert run.k_dyn == pytest.approx(plant.k_dyn, rel=1e-10)
+    if run.peak_time != pytest.approx(plant.peak_time, abs=1e-10):  # one of several that are equal
+        assert abs(plant.at(run.peak_time)["T"]) == pytest.approx(plant.peak_torque, rel=1e-10)
+    assert run.start_time == pytest.approx(plant.start_time, rel=1e-10, nan_ok=True)
+    assert run.status is plant.status
+    assert [e.kind for e in run.events] == [e.kind for e in plant.events]
+    assert [e.time for e in run.events] == pytest.approx([e.time for e in plant.events], abs=1e-10)
+    times = np.linspace(0.0, min(run.end_time, plant.end_time), 200)
+    here, there = run.at(times), plant.at(times)
+    scale = {"w": 100.0, "phi": 10.0, "T": plant.peak_torque, "u": 62.0}
+    assert here["w"][:, 0] == pytest.approx(there["w1"], abs=1e-10 * scale["w"])
+    assert here["w"][:, 1] == pytest.approx(there["w2"], abs=1e-10 * scale["w"])
+    assert here["twist"][:, 0] == pytest.approx(there["theta"], abs=1e-10)
+    assert here["u"] == pytest.approx(there["u"], abs=1e-10 * scale["u"])
+    assert here["phi"][:, 1] == pytest.approx(there["phi2"], abs=1e-10 * scale["phi"])
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("kind", DRIVES)
+def test_two_masses_are_the_two_mass_plant(kind, controller):
+    drive = CRANE.replace(**DRIVES[kind])
+    run = simulate_chain(Chain.from_drive(drive), controller, fitted_to=drive)
+    same_as_plant(run, simulate(drive, controller))
+    assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
+
+
+def test_the_shaft_torque_the_load_speed_and_the_stage_are_seen():
+    class Seeing(PlainController):
+        name = "seeing"
+
+        @property
+        def sensors(self):
+            from softstart.controller.base import Sensor
+
+            return Sensor.STAGE | Sensor.SHAFT_TORQUE | Sensor.LOAD_SPEED
+
+        def step(self, measured, state):
+            torque = 60.0 - 0.1 * measured.shaft_torque - 0.2 * measured.load_speed + 0.5 * measured.stage
+            return Command(torque, measured.time + 0.003)
+
+    run = simulate_chain(Chain.from_drive(CRANE), Seeing(), fitted_to=CRANE)
+    same_as_plant(run, simulate(CRANE, Seeing()))
+
+
+def test_plain_and_compiled_controllers_agree_to_the_bit():
+    chain = Chain.load("crane-4-mass")
+    from softstart.controller.finding import make_controller
+
+    made = make_controller("ramp", None)
+    compiled = simulate_chain(chain, made, 0.15, fitted_to=CRANE)
+    plain = simulate_chain(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
+    assert np.array_equal(compiled.segments, plain.segments)
+    assert np.array_equal(compiled.event_rows, plain.event_rows)
+
+
+def test_the_motor_may_sit_at_the_other_end():
+    chain = Chain.load("crane-4-mass")
+    forward = simulate_chain(chain, "direct", fitted_to=CRANE)
+    turned = Chain(
+        reversed(chain.brought_to("motor").masses),
+        reversed(chain.brought_to("motor").shafts),
+        chain.motor,
+        load_mass=chain.load_mass,
+    )
+    back = simulate_chain(turned, "direct", fitted_to=CRANE)
+    assert back.k_dyn == pytest.approx(forward.k_dyn, rel=1e-9)
+    assert back.start_time == pytest.approx(forward.start_time, rel=1e-10)
+    assert back.peak_torques[::-1] == pytest.approx(forward.peak_torques, rel=1e-9)
+
+
+def test_gears_change_nothing_but_the_shaft_on_which_things_are_said():
+    geared = Chain.load("crane-4-mass")
+    plain = geared.brought_to("motor")
+    a, b = (simulate_chain(chain, "ramp", fitted_to=CRANE) for chain in (geared, plain))
+    assert a.k_dyn == pytest.approx(b.k_dyn, rel=1e-12)
+    hum = PeriodicTorque(0.0, [1.0], [30.0], [0.0], speed=50.0)
+    hummed = simulate_chain(geared, "ramp", fitted_to=CRANE, excitation={"crane": hum})
+    ratio = geared.speed_ratios()[3]
+    slow = PeriodicTorque(0.0, [1.0], [30.0 * ratio], [0.0], speed=50.0)
+    same = simulate_chain(plain, "ramp", fitted_to=CRANE, excitation={"crane": slow})
+    assert hummed.peak_torque == pytest.approx(same.peak_torque, rel=1e-12)
+    assert hummed.peak_torque != pytest.approx(a.peak_torque, rel=1e-6)
+
+
+# ---- what must be kept --------------------------------------------------------------------------------
+
+
+def free_chain(gap: float = 0.03, damping: float = 0.0, law: str = "no-pull") -> Chain:
+    """Five masses thrown against each other; nothing acts from outside."""
+    speeds = (3.0, -1.0, 0.5, -2.0, 1.0)
+    inertias = (0.3, 0.1, 0.5, 0.05, 0.8)
+    shaft = Shaft(150.0, gap=gap, damping=damping, contact_law=law)
+    return Chain([Mass(J, initial_speed=w) for J, w in zip(inertias, speeds, strict=True)], [shaft] * 4)
+
+
+@pytest.mark.parametrize("law", ["no-pull", "dead-zone", "modelica"])
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_momentum_and_energy_without_torque(damping, law):
+    chain = free_chain(damping=damping, law=law)
+    run = simulate_chain(chain, None, 3.0)
+    J = chain.at_motor_shaft().J
+    moment = run.w @ J
+    assert moment == pytest.approx(moment[0], abs=1e-12 * float(J @ np.abs(run.w[0])))
+    start = 0.5 * float(J @ run.w[0] ** 2)
+    assert len(run.events) > 40
+    assert run.energy.kinetic + run.energy.elastic + run.energy.shafts == pytest.approx(
+        0.0, abs=1e-11 * start
+    )
+    if damping == 0.0:
+        c, half = chain.at_motor_shaft().c, 0.5 * chain.at_motor_shaft().gap
+        z = np.maximum(np.abs(run.twist) - half, 0.0)
+        total = 0.5 * run.w**2 @ J + 0.5 * z**2 @ c
+        assert total == pytest.approx(start, rel=1e-11)
+    else:
+        assert run.energy.shafts > 0.1 * start
+
+
+def test_the_backbone_of_two_masses():
+    """T = 2 pi/Omega + 2 gap/v, whatever the amplitude."""
+    J1, J2, c, gap = 0.3, 0.7, 50.0, 0.4
+    Omega = math.sqrt(c * (1 / J1 + 1 / J2))
+    for amplitude in (0.01, 0.1, 1.0):
+        v = Omega * amplitude
+        masses = Mass(J1, initial_speed=v * J2 / (J1 + J2)), Mass(J2, initial_speed=-v * J1 / (J1 + J2))
+        run = simulate_chain(
+            Chain(masses, [Shaft(c, gap=gap)]), None, 8.0 * (2 * math.pi / Omega + 2 * gap / v)
+        )
+        closed = [e.time for e in run.events if e.kind == "gap closed" and e.value > 0]
+        periods = np.diff(closed)
+        assert periods.size > 5
+        assert periods == pytest.approx(2 * math.pi / float(backbone(J1, J2, c, gap, amplitude)), rel=1e-12)
+        assert run.peak_torques[0] == pytest.approx(c * amplitude, rel=1e-13)
+
+
+def test_a_spring_without_a_gap_pulls_too():
+    """Modes superpose: the free vibration of two joined masses is a cosine, at any instant."""
+    J1, J2, c = 2.0, 3.0, 40.0
+    Omega = math.sqrt(c * (1 / J1 + 1 / J2))
+    run = simulate_chain(Chain([Mass(J1), Mass(J2)], [Shaft(c, start_position=0.1)]), None, 7.0)
+    times = np.linspace(0.0, 7.0, 50)
+    assert run.at(times)["T"][:, 0] == pytest.approx(4.0 * np.cos(Omega * times), abs=1e-12 * 4.0)
+    assert run.peak_torques[0] == pytest.approx(4.0, rel=1e-14)
+
+
+def test_forced_vibration_is_that_of_the_formula():
+    """A damped oscillator driven by a harmonic, against a wall that its inertia is: exact steady state."""
+    J, c, d, omega = 0.2, 80.0, 1.5, 17.0
+    chain = Chain([Mass(J), Mass(1e14)], [Shaft(c, damping=d)])
+    hum = PeriodicTorque(0.0, [1.0], [3.0], [2.0], speed=omega)
+    run = simulate_chain(chain, None, 30.0, excitation={"mass 1": hum})
+    times = np.linspace(25.0, 30.0, 40)
+    answer = (3.0 - 2.0j) / (c - J * omega**2 + 1j * omega * d)
+    assert run.at(times)["twist"][:, 0] == pytest.approx(
+        (answer * np.exp(1j * omega * times)).real, abs=1e-11 * abs(answer)
+    )
+    assert abs(run.energy.residual) < 1e-12 * (abs(run.energy.exciting) + run.energy.shafts)
+
+
+def test_work_of_exciting_torques_by_quadrature():
+    chain = free_chain(damping=0.3)
+    hum = PeriodicTorque(0.7, [0.5, 2.0], [0.3, -0.1], [0.2, 0.4], speed=30.0)
+    run = simulate_chain(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
+    nodes, weights = leggauss(8)
+    starts, ends = run.segments[:, 0], run.segments[:, 1]
+    half = 0.5 * (ends - starts)
+    times = starts[:, None] + half[:, None] * (1.0 + nodes)
+    w = run.at(times)["w"]
+    work = np.sum(half[:, None] * weights * hum.at(times) * (w[..., 0] + w[..., 2]))
+    assert run.energy.exciting == pytest.approx(work, rel=1e-9)
+    assert abs(run.energy.residual) < 1e-12 * abs(run.energy.exciting)
+
+
+def test_peaks_are_not_below_a_fine_grid_and_are_taken():
+    run = simulate_chain("crane-4-mass", "direct", 0.2, fitted_to=CRANE)
+    fine = np.abs(run.at(np.linspace(0.0, 0.2, 20_001))["T"]).max(axis=0)
+    assert np.all(fine <= run.peak_torques * (1 + 1e-13))
+    assert run.peak_torques == pytest.approx(fine, rel=1e-4)  # (1630 rad/s * 5e-6 s)^2/2 = 3e-5
+    for k, when in enumerate(run.peak_times):
+        assert abs(run.at(when)["T"][k]) == pytest.approx(run.peak_torques[k], rel=1e-12)
+
+
+# ---- loads that stick ---------------------------------------------------------------------------------
+
+
+def test_a_stuck_mass_in_the_middle_holds_the_chain_behind_it():
+    """Until the torque of the first shaft is above its friction; then exactly at that instant it moves."""
+    c, hold, rate = 100.0, 5.0, 20.0
+    chain = Chain(
+        [Mass(1e-3), Mass(1.0, torque=hold, kind="reactive"), Mass(2.0)],
+        [Shaft(c, damping=2.0), Shaft(c)],
+        Motor(50.0, torque_rate=rate),
+        target_speed=1.0,
+    )
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 50.0),)), fitted_to=CRANE)
+    starts = next(e for e in run.events if e.kind == "load starts")
+    before = run.at(np.linspace(0.0, starts.time * (1 - 1e-9), 20))
+    assert np.all(before["w"][:, 1:] == 0.0)
+    assert np.all(before["T"][:, 1] == 0.0)
+    assert run.at(np.nextafter(starts.time, 0.0))["T"][0] == pytest.approx(hold, rel=1e-12)
+    assert starts.place == 1
+    assert run.status.name == "REACHED"
+
+
+def test_friction_stops_a_coasting_chain_and_holds_it():
+    masses = [Mass(1.0, torque=2.0, kind="reactive", initial_speed=3.0), Mass(0.5, initial_speed=3.0)]
+    run = simulate_chain(Chain(masses, [Shaft(400.0, damping=3.0)]), None, 6.0)
+    assert run.w[-1] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert run.w[-1][0] == 0.0
+    assert sum(e.kind == "load stops" for e in run.events) == 1 + sum(
+        e.kind == "load starts" for e in run.events
+    )
+    lost = 0.5 * 1.5 * 9.0
+    assert run.energy.load + run.energy.shafts == pytest.approx(lost, rel=1e-9)
+
+
+# ---- refusals -----------------------------------------------------------------------------------------
+
+
+def two(**shaft) -> Chain:
+    return Chain([Mass(1.0), Mass(1.0)], [Shaft(10.0, **shaft)], Motor(5.0), target_speed=10.0)
+
+
+@pytest.mark.parametrize(
+    ("chain", "arguments", "said"),
+    [
+        (two(efficiency=0.9), {"controller": "direct"}, "no losses in gears"),
+        (
+            Chain([Mass(1), Mass(1)], [Shaft(1)]),
+            {"controller": "direct", "until": 1.0},
+            r"\[motor\] is missing",
+        ),
+        (Chain([Mass(1), Mass(1)], [Shaft(1)]), {"controller": None}, "until is missing"),
+        (two(), {"controller": "direct", "until": -1.0}, "until = -1.0"),
+        (two(), {"controller": "direct", "max_events": 0}, "max_events = 0"),
+        (two(), {"controller": "direct", "fitted_to": 3}, "fitted_to = 3"),
+        (two(), {"controller": "direct", "excitation": {"mas 1": None}}, "mass 1"),
+        (
+            Chain([Mass(1, initial_speed=1), Mass(1), Mass(1)], [Shaft("inf"), Shaft(1)]),
+            {"controller": None, "until": 1.0},
+            "start with one speed",
+        ),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence(chain, arguments, said):
+    with pytest.raises(InputError, match=said):
+        simulate_chain(chain, **arguments)
+
+
+def test_a_load_that_cannot_be_moved_needs_an_end():
+    chain = Chain([Mass(1.0), Mass(1.0, torque=9.0)], [Shaft(10.0)], Motor(5.0), target_speed=10.0)
+    with pytest.raises(InputError, match="not above the load torques"):
+        simulate_chain(chain, "direct", fitted_to=CRANE)
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 5.0),)), fitted_to=CRANE, time_limit=1.0)
+    assert run.status.name == "NOT_REACHED"
+
+
+def test_too_many_events_are_an_error():
+    with pytest.raises(SimulationError, match="That is 20"):
+        simulate_chain("crane-4-mass", "direct", fitted_to=CRANE, max_events=20)
+
+
+def test_a_controller_that_fails_is_named():
+    class Broken(PlainController):
+        name = "broken"
+
+        def step(self, measured, state):
+            return 1 / 0
+
+    with pytest.raises(SimulationError, match="Broken failed at t = 0 s"):
+        simulate_chain("crane-4-mass", Broken())
+
+
+def test_the_summary_is_plain_data_and_the_figure_draws():
+    import json
+
+    run = simulate_chain("crane-4-mass", "direct", fitted_to=CRANE, until=0.1)
+    told = json.loads(json.dumps(run.summary()))
+    assert told["peak_torques"] == run.peak_torques.tolist()
+    assert told["assumed"] == run.chain.assumed
+    assert len(run.plot().axes) == 3
+    with pytest.raises(ValueError, match="within the run"):
+        run.at(0.2)

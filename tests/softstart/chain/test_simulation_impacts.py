@@ -1,0 +1,213 @@
+"""Rigid gaps: impacts, their accumulation, and flanks that press until they would have to pull."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.softstart.plant.pieces import Pieces
+
+from softstart import Drive
+from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.simulation import simulate_chain
+
+CRANE = Drive.load("crane-4amtkf")  # what the pieces are set up for: they take nothing from it
+
+
+def around(run, when: float):
+    """Speeds just before and at an event."""
+    return run.at(np.nextafter(when, 0.0))["w"], run.at(when)["w"]
+
+
+@given(
+    J=st.lists(st.floats(0.01, 10.0), min_size=3, max_size=3),
+    w=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3),
+    restitution=st.floats(0.05, 1.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_momentum_is_kept_and_energy_lost_by_the_restitution(J, w, restitution):
+    """Three free masses: each impact keeps momentum to 1e-12 and loses (1 - e^2) of the relative energy."""
+    shafts = [Shaft(gap=0.2, restitution=restitution), Shaft(gap=0.3, restitution=restitution)]
+    chain = Chain([Mass(J[i], initial_speed=w[i]) for i in range(3)], shafts)
+    run = simulate_chain(chain, None, 1.0)
+    inertia = np.array(J)
+    scale = float(inertia @ np.abs(run.w).max(axis=0)) + 1e-300
+    times = np.array([event.time for event in run.events])
+    for event in [e for e in run.events if e.kind == "impact"]:
+        if np.sum(np.abs(times - event.time) < 1e-9) > 1:
+            continue  # another one at the same instant: no state lies between them
+        before, after = around(run, event.time)
+        k = event.place
+        assert float(inertia @ (after - before)) == pytest.approx(0.0, abs=1e-12 * scale)
+        v, rebound = before[k] - before[k + 1], after[k] - after[k + 1]
+        assert rebound == pytest.approx(-restitution * v, abs=1e-13 * np.abs(run.w).max())
+        reduced = J[k] * J[k + 1] / (J[k] + J[k + 1])
+        lost = 0.5 * float(inertia @ (before**2 - after**2))
+        energy = 0.5 * float(inertia @ before**2)
+        assert lost == pytest.approx(0.5 * (1 - restitution**2) * reduced * v**2, abs=1e-12 * energy)
+        assert event.value == pytest.approx(lost, abs=1e-12 * energy)
+        assert abs(event.impulse) == pytest.approx((1 + restitution) * reduced * abs(v), rel=1e-9)
+    assert abs(run.energy.residual) <= 1e-13 * (0.5 * float(inertia @ np.square(w)) + 1e-300)
+
+
+def bounced(restitution: float):
+    """Three equal masses: the first meets the second, which bounces between it and the third."""
+    masses = [Mass(1.0, initial_speed=1.0), Mass(1.0), Mass(1.0, initial_speed=-1.0)]
+    shafts = [Shaft(gap=0.2, restitution=restitution), Shaft(gap=0.21, restitution=restitution)]
+    return simulate_chain(Chain(masses, shafts), None, 2.0)
+
+
+def test_three_masses_collapse_below_the_known_restitution():
+    """Equal masses have infinitely many impacts in a finite time if e < 7 - 4 sqrt(3), else a few."""
+    limit = 7.0 - 4.0 * math.sqrt(3.0)
+    for restitution in (0.5 * limit, 0.9 * limit, 0.99 * limit):
+        run = bounced(restitution)
+        assert "impacts over, flanks press" in [e.kind for e in run.events]
+        w = run.at(run.end_time)["w"]
+        assert w == pytest.approx(float(np.mean([1.0, 0.0, -1.0])), abs=1e-7)
+        assert float(w.sum()) == pytest.approx(0.0, abs=1e-14)
+        assert run.energy.impacts == pytest.approx(1.0, rel=1e-12)
+    for restitution in (1.01 * limit, 1.1 * limit, 0.5, 1.0):
+        run = bounced(restitution)
+        assert {e.kind for e in run.events} == {"impact"}
+        assert len(run.events) < 100
+
+
+def pressed(restitution: float, until: float, torque: float = 3.0):
+    """A mass of 1 driven through half a gap of 0.2 rad against one of 2: it bounces to rest on it."""
+    chain = Chain(
+        [Mass(1.0), Mass(2.0)], [Shaft(gap=0.2, restitution=restitution)], Motor(torque), target_speed=1e3
+    )
+    return simulate_chain(chain, Pieces(pieces=((0.0, torque),)), until, fitted_to=CRANE)
+
+
+@given(restitution=st.floats(0.0, 0.97))
+@settings(max_examples=20, deadline=None)
+def test_impacts_pile_up_at_the_known_instant(restitution):
+    """First impact at t1 = sqrt(2 s/a), then flights of 2 e^k v/a: the sum is t1 (1 + 2 e/(1 - e))."""
+    first = math.sqrt(2 * 0.1 / 3.0)
+    end = first * (1 + 2 * restitution / (1 - restitution))
+    run = pressed(restitution, end + 1.0)
+    over = [e for e in run.events if e.kind == "impacts over, flanks press"]
+    assert len(over) == 1
+    assert over[0].time == pytest.approx(end, rel=1e-13)
+    last = run.at(run.end_time)
+    assert last["w"] == pytest.approx(3.0 * run.end_time / 3.0, rel=1e-12)
+    assert last["w"][0] == last["w"][1]
+    assert last["twist"][0] == 0.1
+    assert last["T"][0] == pytest.approx(2.0, rel=1e-13)  # what the second mass needs
+    relative = 0.5 * (1.0 * 2.0 / 3.0) * (3.0 * first) ** 2
+    if restitution == 0.0:
+        assert run.energy.impacts == pytest.approx(relative, rel=1e-13)
+    assert abs(run.energy.residual) < 1e-12 * run.energy.motor
+
+
+def test_elastic_impacts_never_end():
+    run = pressed(1.0, 10.0)
+    impacts = [e.time for e in run.events if e.kind == "impact"]
+    first = math.sqrt(2 * 0.1 / 3.0)
+    assert impacts == pytest.approx([first * (1 + 2 * k) for k in range(len(impacts))], rel=1e-12)
+    assert len(impacts) == int((10.0 / first - 1) / 2) + 1
+    assert run.energy.impacts == 0.0
+
+
+def test_pressed_flanks_part_when_they_would_have_to_pull():
+    """A torque that sinks along a line: the flanks part at its zero, where their torque is zero."""
+    chain = Chain(
+        [Mass(1.0), Mass(2.0)],
+        [Shaft(gap=0.2, restitution=0.3)],
+        Motor(3.0, minimum_torque=-3.0, torque_rate=2.0),
+        target_speed=1e3,
+    )
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 3.0), (4.0, -3.0))), 7.0, fitted_to=CRANE)
+    opened = [e for e in run.events if e.kind == "gap opened"]
+    assert [e.time for e in opened] == pytest.approx([5.5], rel=1e-13)
+    assert run.at(5.5 * (1 - 1e-9))["T"][0] == pytest.approx(0.0, abs=1e-7)
+    assert run.at(5.6)["twist"][0] < 0.1
+    # then 1/J of a torque of -2 s: -s^3/3 until the other flank, 0.2 rad away
+    other = next(e for e in run.events if e.time > 5.6 and e.kind == "impact")
+    assert other.time == pytest.approx(5.5 + 0.6 ** (1 / 3), rel=1e-12)
+
+
+def test_a_pressed_body_is_struck_as_one_and_let_go_by_a_blow_that_pulls():
+    """Masses 2 and 3 lie on each other, 2 pushing: blows on 2 from behind and on 3 from ahead press."""
+    masses = [Mass(1.0, initial_speed=4.0), Mass(0.5), Mass(0.7), Mass(0.3, initial_speed=0.0)]
+    shafts = [
+        Shaft(gap=0.2, restitution=0.5),
+        Shaft(gap=0.2, restitution=0.2, start_position=0.1),
+        Shaft(gap=0.4, restitution=1.0),
+    ]
+    chain = Chain(masses, shafts, Motor(1.0, mass="mass 2"), target_speed=1e3)
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 1.0),)), 0.5, fitted_to=CRANE)
+    assert (run.events[0].kind, run.events[0].time) == ("impacts over, flanks press", 0.0)
+    blow = next(e for e in run.events if e.kind == "impact")
+    assert blow.place == 0
+    before, after = around(run, blow.time)
+    assert before[1] == before[2]
+    assert after[1] == after[2]
+    J, v = np.array([1.0, 0.5, 0.7, 0.3]), before[0] - before[1]
+    assert after[1] - before[1] == pytest.approx(1.5 * v / (1 + 1.2), rel=1e-12)
+    assert J @ after == pytest.approx(J @ before, rel=1e-13)
+    # the third mass, in front, meets the fourth: the blow presses 2 on 3 once more
+    second = next(e for e in run.events if e.place == 2 and e.kind == "impact")
+    before, after = around(run, second.time)
+    assert after[1] == after[2]
+    assert J @ after == pytest.approx(J @ before, rel=1e-13)
+    assert abs(run.energy.residual) < 1e-13 * 8.0
+
+
+def test_a_blow_from_behind_opens_pressed_flanks():
+    """1 pushes 2 at no distance; 3 is faster and pulls 2 along: 1 is not taken with it."""
+    masses = [Mass(0.5), Mass(0.7), Mass(2.0, initial_speed=3.0)]
+    shafts = [Shaft(gap=0.2, restitution=0.0, start_position=0.1), Shaft(gap=0.2, restitution=0.5)]
+    chain = Chain(masses, shafts, Motor(1.0), target_speed=1e3)
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 1.0),)), 0.1, fitted_to=CRANE)
+    blow = next(e for e in run.events if e.kind == "impact" and e.place == 1)
+    before, after = around(run, blow.time)
+    assert before[0] == before[1]
+    assert after[0] == pytest.approx(before[0], rel=1e-13)
+    assert after[1] > before[1]
+    assert ("gap opened", 0, blow.time) in [(e.kind, e.place, e.time) for e in run.events]
+
+
+def test_a_rigid_joint_carries_what_moves_the_masses_behind_it():
+    chain = Chain(
+        [Mass(1.0), Mass(2.0), Mass(3.0)], [Shaft("inf"), Shaft(1e3)], Motor(12.0), target_speed=2.0
+    )
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
+    joined = Chain([Mass(3.0), Mass(3.0)], [Shaft(1e3)], Motor(12.0), target_speed=2.0)
+    same = simulate_chain(joined, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
+    assert run.start_time == pytest.approx(same.start_time, rel=1e-13)
+    assert run.peak_torques[1] == pytest.approx(same.peak_torques[0], rel=1e-13)
+    T = run.at(run.t)["T"]
+    assert T[:, 0] == pytest.approx(12.0 - (12.0 - T[:, 1]) / 3.0, rel=1e-12)
+
+
+def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
+    """Two masses with friction 1 and 2 on a rigid joint: they break away at 3 N m, not before."""
+    masses = [
+        Mass(1.0, torque=1.0, kind="reactive"),
+        Mass(2.0, torque=2.0, kind="reactive"),
+        Mass(1.0),
+    ]
+    chain = Chain(masses, [Shaft("inf"), Shaft(100.0)], Motor(6.0, torque_rate=1.0), target_speed=0.5)
+    run = simulate_chain(chain, Pieces(pieces=((0.0, 6.0),)), fitted_to=CRANE)
+    starts = [e for e in run.events if e.kind == "load starts"]
+    assert [(e.place, e.time) for e in starts] == [(0, pytest.approx(3.0)), (1, pytest.approx(3.0))]
+    # friction is shared as it can hold: a third of the motor's torque stays at mass 1
+    assert run.at(1.5)["T"][0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_blow_moves_a_stuck_mass():
+    masses = [Mass(1.0, initial_speed=1.0), Mass(1.0, torque=5.0, kind="reactive")]
+    run = simulate_chain(Chain(masses, [Shaft(gap=0.2, restitution=0.0)]), None, 1.0)
+    kinds = [e.kind for e in run.events]
+    assert kinds[:2] == ["impact", "load starts"]
+    assert kinds[-1] == "load stops" or "load stops" in kinds
+    # they move on as one by 0.5 rad/s, are parted by the friction, and the struck mass stops first
+    stop = next(e for e in run.events if e.kind == "load stops")
+    assert stop.time == pytest.approx(0.1 + 0.5 / 5.0, rel=1e-12) or stop.time > 0.1
+    assert abs(run.energy.residual) < 1e-13

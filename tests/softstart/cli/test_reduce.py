@@ -1,0 +1,151 @@
+"""`softstart reduce`: tables, JSON, files that work, and refusals."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from softstart import Drive
+from softstart.chain import Chain, natural_vibration, reduce_chain
+
+
+def test_json_is_the_summary(run):
+    code, out, err = run("reduce", "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    found = reduce_chain(Chain.load("crane-4-mass"), 2)
+    assert told["frequencies"][0]["error"] == found.frequencies[0].error
+    assert told["steps"][1]["masses"] == ["wheel shaft"]
+    assert told["vibration"]["modes"][0]["Omega"] == 0.0
+    assert told["drive"]["load_inertia"] == found.to_drive().J2
+    assert told["beside"]["method"] == "modal"
+    assert told["assumed"] == found.chain.assumed
+
+
+def test_the_tables_are_shown(run):
+    code, out, err = run("reduce", "tractor-like", "--up-to", "70")
+    assert (code, err) == (0, "")
+    assert "15 masses became 3" in out
+    assert "assumed: every inertia" in out
+    assert "joined 13 first shaft, 14 second shaft" in out
+    assert max(map(len, out.splitlines())) <= 110
+
+
+def test_what_is_written_can_be_used(run, place):
+    code, _, _ = run("reduce", "--set", "shaft[3].gap=0.02", "--out", "found")
+    assert code == 0
+    folder = place / "found"
+    drive = Drive.load(folder / "drive.toml")
+    assert drive.gap == pytest.approx(0.1 + 0.2 + 0.4)
+    chain = Chain.load(folder / "chain.toml")
+    assert chain == Chain.load("crane-4-mass", also={"shaft[3].gap": 0.02})
+    assert natural_vibration(Chain.load(folder / "reduced.toml")).Omega[1] == pytest.approx(drive.Omega)
+    report = (folder / "report.md").read_text()
+    for path in folder.iterdir():
+        if path.suffix in (".csv", ".svg", ".toml"):
+            assert path.name in report, path.name
+    assert "assumed" in report
+    rows = (folder / "holzer.csv").read_text().splitlines()
+    assert len(rows) == 1 + 3 * 4
+    assert (folder / "scheme.svg").read_text().startswith("<svg")
+    assert run("simulate", "found/drive.toml", "--controller", "direct", "--json").code == 0
+
+
+def test_three_masses_give_no_drive(run, place):
+    code, out, _ = run("reduce", "tractor-like", "--up-to", "70", "--out", "found", "--json")
+    assert code == 0
+    assert json.loads(out)["drive"] is None
+    assert not (place / "found" / "drive.toml").exists()
+    assert len(Chain.load(place / "found" / "reduced.toml").masses) == 3
+
+
+def test_refused_with_the_ratio_unless_forced(run, nothing_left):
+    code, out, err = run("reduce", "tractor-like", "--out", "found")
+    assert (code, out) == (2, "")
+    assert "(206.66/69.1286)^2 = 8.94 is below the 10" in err
+    assert "--force" in err
+    nothing_left()
+    assert run("reduce", "tractor-like", "--force", "--json").code == 0
+
+
+def test_the_modal_method_in_json(run):
+    told = json.loads(run("reduce", "tractor-like", "--method", "modal", "--json").out)
+    assert told["reduced"]["node"] == pytest.approx(told["whole"]["node"], rel=1e-12)
+    assert abs(told["frequencies"][0]["error"]) < 1e-14
+
+
+def test_all_mistakes_at_once(run, nothing_left):
+    code, out, err = run(
+        "reduce", "--to", "1", "--method", "modl", "--factor", "-2", "--set", "mass[9].inertia=3",
+        "--set", "shaft[1].gap=5 m",
+    )  # fmt: skip
+    assert (code, out) == (2, "")
+    for piece in ("--to", "did you mean modal?", "--factor", "N from 1 to 4"):
+        assert piece in err
+    nothing_left()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("tractor",), "shipped"),
+        (("good.toml",), "no such table"),
+        (("--to", "3", "--method", "modal"), "--to = 3: the modal method"),
+        (("--to", "9"), "--to = 9: the chain has 4 masses"),
+        (("--up-to", "1"), "--up-to = 1.0: the lowest elastic frequency"),
+        (("--up-to", "18 Hz"), "may count turns or radians"),
+        (("--factor", "0.5"), "--factor = 0.5"),
+        (("--set", "shaft[1].gap=5 m"), "m is a length"),
+        (("--set", "motor.mass=rotr"), "did you mean"),
+    ],
+)
+def test_bad_input_in_one_sentence(run, place, arguments, said):
+    code, out, err = run("reduce", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
+    from softstart import simulate
+    from softstart.chain.simulation import simulate_chain
+
+    code, out, _ = run("reduce", "--verify", "direct,ramp", "--out", "found", "--json")
+    assert code == 0
+    told = json.loads(out, parse_constant=pytest.fail)["verified"]
+    assert [one["controller"] for one in told] == ["direct", "ramp"]
+    drive = reduce_chain(Chain.load("crane-4-mass"), 2).to_drive()
+    for one in told:
+        assert one["k_dyn"] == simulate(drive, one["controller"]).k_dyn
+        whole = simulate_chain("crane-4-mass", one["controller"], fitted_to=drive)
+        assert one["chain_k_dyn"] == whole.k_dyn
+        assert one["chain_start_time"] == whole.start_time
+        assert one["worst_shaft"] == "rotor - pinion"
+        assert one["k_dyn_error"] == pytest.approx(one["k_dyn"] / one["chain_k_dyn"] - 1.0)
+    rows = (place / "found" / "verified.csv").read_text().splitlines()
+    assert len(rows) == 3
+    assert "verified on the chain" in (place / "found" / "report.md").read_text()
+
+
+def test_two_masses_verify_themselves(run, place):
+    """A chain of two masses is its own drive: both starts are one."""
+    text = Chain.from_drive(Drive.load("crane-4amtkf")).to_toml()
+    (place / "two.toml").write_text(text)
+    told = json.loads(run("reduce", "two.toml", "--verify", "direct", "--json").out)["verified"][0]
+    assert told["chain_k_dyn"] == pytest.approx(told["k_dyn"], rel=1e-10)
+    assert told["chain_start_time"] == pytest.approx(told["start_time"], rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--verify", "rampp"), '--verify = "rampp": there is no controller'),
+        (("tractor-like", "--up-to", "70", "--verify", "direct"), "3 are left"),
+    ],
+)
+def test_what_cannot_be_verified(run, nothing_left, arguments, said):
+    code, out, err = run("reduce", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    nothing_left()
