@@ -46,6 +46,8 @@ from softstart.plant.layout import DEAD_ZONE, MODELICA, START_TIME, TARGET
 ROUNDING = 4.0 * EPS
 # impacts that pile up within this share of a span are over: the accumulation time is known
 PILED_UP = 1e-9
+# a flight shorter than this share of a span, as elastic flanks may go on with for ever, has no energy but rounding
+TREMBLING = 1e-7
 SAME = 1e-12
 
 
@@ -76,11 +78,13 @@ def flanks(shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, f: Vector,
         return at.NO_EVENT, end
     a = int(mass[k, FIRST])
     faint = 1e-14 * h * h * (mass[a, INFLUENCE] + mass[k + 1, INFLUENCE])
-    if shafts[k, RIGID] != 0.0 and shafts[k, RESTITUTION] < 1.0 and abs(theta) == half and half > 0.0:
+    if shafts[k, RIGID] != 0.0 and shaft[k, MASK] == 0.0 and abs(theta) == half and half > 0.0:
         side = math.copysign(1.0, theta)
         rebound = -side * series[TWIST, k, 1]
         press = side * series[TWIST, k, 2]
-        if press > faint and 0.0 <= rebound <= PILED_UP * (1.0 - shafts[k, RESTITUTION]) * press:
+        e = shafts[k, RESTITUTION]
+        short = PILED_UP * (1.0 - e) if e < 0.999 else TREMBLING
+        if press > faint and 0.0 <= rebound <= short * press:
             return at.SETTLE, 0.0
     event = at.NO_EVENT
     noise = ROUNDING * half

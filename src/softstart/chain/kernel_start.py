@@ -237,7 +237,8 @@ def advance(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaf
             press = pressing(series, where, n, s, h, 1.0 if event == at.UPPER else -1.0)
         elif event == at.SETTLE:
             ratio = -series[TWIST, where, 1] / series[TWIST, where, 2]
-            rest = h * ratio / (1.0 - shafts[where, at.RESTITUTION])
+            if shafts[where, at.RESTITUTION] < 1.0:
+                rest = h * ratio / (1.0 - shafts[where, at.RESTITUTION])
         of_gap = handle(p, x, place, masses, shafts, mass, shaft, event, where, press, rest, h, events)
         if of_gap and x[ASK_ON_GAP] != 0.0:
             x[ASK_AT] = x[TIME]

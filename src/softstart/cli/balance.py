@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from softstart.cli.folder import output_folder
-from softstart.cli.options import Mistakes, command_line, json_option, out_option
+from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command
 from softstart.errors import InputError
 
@@ -95,31 +94,6 @@ def read_engine(name: str, settings: Sequence[str]) -> Engine:
         changes = read_changes(settings)
     mistakes.settle()
     return Engine.load(name, also=changes)
-
-
-def read_changes(settings: Sequence[str]) -> dict[str, Any]:
-    """`key=value` texts as a mapping: a value is read as in TOML if it is such, else it is text.
-
-    >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
-    {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
-    """
-    found: dict[str, Any] = {}
-    mistakes = Mistakes()
-    for text in settings:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        with mistakes.noted():
-            if not (key and equals and value):
-                raise InputError(
-                    f'--set "{text}": write a key, an equals sign and a value, as operation.load=0.5.'
-                )
-            if key in found:
-                raise InputError(f'--set "{text}": {key} is given twice; keep one of the two.')
-            try:
-                found[key] = tomllib.loads(f"value = {value}")["value"]
-            except tomllib.TOMLDecodeError:
-                found[key] = value
-    mistakes.settle()
-    return found
 
 
 def read_speeds(texts: Sequence[str]) -> list[float] | None:

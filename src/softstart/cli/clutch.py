@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from softstart.cli.balance import read_changes
 from softstart.cli.folder import output_folder
-from softstart.cli.options import Mistakes, command_line, json_option, out_option
+from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError
 

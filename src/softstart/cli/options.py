@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -166,21 +167,47 @@ def read_until(text: str | None) -> float | None:
     return value
 
 
-def read_names(text: str | None) -> list[str] | None:
+def read_changes(settings: Sequence[str]) -> dict[str, Any]:
+    """The texts of --set for a file of tables, `key=value`, as a mapping: a value is read as in TOML if it
+    is such, else it is text.
+
+    >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
+    {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
+    """
+    found: dict[str, Any] = {}
+    mistakes = Mistakes()
+    for text in settings:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        with mistakes.noted():
+            if not (key and equals and value):
+                raise InputError(
+                    f'--set "{text}": write a key, an equals sign and a value, as load.inertia=0.07.'
+                )
+            if key in found:
+                raise InputError(f'--set "{text}": {key} is given twice; keep one of the two.')
+            try:
+                found[key] = tomllib.loads(f"value = {value}")["value"]
+            except tomllib.TOMLDecodeError:
+                found[key] = value
+    mistakes.settle()
+    return found
+
+
+def read_names(text: str | None, option: str = "--controllers") -> list[str] | None:
     """The controllers of a comma-separated list, each known and named once; None if none was given."""
     if text is None:
         return None
     names = [name.strip() for name in text.split(",")]
     if not all(names):
         raise InputError(
-            f'--controllers = "{text}": a name is empty; write names with commas between, as direct,ramp.'
+            f'{option} = "{text}": a name is empty; write names with commas between, as direct,ramp.'
         )
     mistakes = Mistakes()
     for index, name in enumerate(names):
         with mistakes.noted():
-            check_name(name, "--controllers")
+            check_name(name, option)
             if name in names[:index]:
-                raise InputError(f'--controllers = "{text}": {name} is named twice; name it once.')
+                raise InputError(f'{option} = "{text}": {name} is named twice; name it once.')
     mistakes.settle()
     return names
 

@@ -16,6 +16,7 @@ from softstart.cli.options import (
     controller_option,
     json_option,
     out_option,
+    read_changes,
     read_names,
 )
 from softstart.cli.usage import Command
@@ -110,7 +111,7 @@ def reduce(
                 asked[option] = read_positive(text, f"--{option.replace('_', '-')}", unit, meaning)
     names: Sequence[str] | None = None
     with mistakes.noted():
-        names = read_controllers(verify)
+        names = read_names(verify, "--verify")
     mistakes.settle()
     assert one is not None
 
@@ -202,7 +203,6 @@ def makes_drive(found: Reduction) -> bool:
 def read_chain(name: str, settings: Sequence[str]) -> Chain:
     """The chain asked for, with its changes."""
     from softstart.chain import Chain
-    from softstart.cli.balance import read_changes
 
     mistakes = Mistakes()
     changes: dict[str, Any] = {}
@@ -222,11 +222,3 @@ def read_count(text: str) -> int:
     if not text.strip().isdecimal() or int(text) < 2:
         raise InputError(f'--to = "{text}": write a whole number of masses, 2 or more.')
     return int(text)
-
-
-def read_controllers(text: str | None) -> list[str] | None:
-    """The controllers of --verify."""
-    try:
-        return read_names(text)
-    except InputError as error:
-        raise InputError(s.replace("--controllers", "--verify", 1) for s in error.sentences) from None
