@@ -38,17 +38,16 @@ from softstart.chain.kernel_layout import (
     Matrix,
     Vector,
 )
-from softstart.chain.kernel_modes import REJOINED
-from softstart.chain.kernel_roots import EPS, NONE, crossing, first_root, value
+from softstart.chain.kernel_modes import GRAZE, REJOINED
+from softstart.chain.kernel_roots import EPS, NONE, first_root
 from softstart.plant.jit import compiled
 from softstart.plant.layout import DEAD_ZONE, MODELICA, START_TIME, TARGET
 
 ROUNDING = 4.0 * EPS
 # impacts that pile up within this share of a span are over: the accumulation time is known
 PILED_UP = 1e-9
-# a flight shorter than this share of a span, as elastic flanks may go on with for ever, has no energy but rounding
-TREMBLING = 1e-7
-SAME = 1e-12
+# flanks as elastic as this may tremble for ever: once they rise by no more than GRAZE of the gap, they rest
+ELASTIC = 0.999
 
 
 @compiled
@@ -83,9 +82,10 @@ def flanks(shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, f: Vector,
         rebound = -side * series[TWIST, k, 1]
         press = side * series[TWIST, k, 2]
         e = shafts[k, RESTITUTION]
-        short = PILED_UP * (1.0 - e) if e < 0.999 else TREMBLING
-        if press > faint and 0.0 <= rebound <= short * press:
-            return at.SETTLE, 0.0
+        if press > faint and rebound >= 0.0:
+            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * GRAZE * half
+            if flat or rebound <= PILED_UP * (1.0 - e) * press:
+                return at.SETTLE, 0.0
     event = at.NO_EVENT
     noise = ROUNDING * half
     for which in range(2):
@@ -262,59 +262,3 @@ def next_event(p: Vector, x: Vector, place: Vector, masses: Matrix, shafts: Matr
         if s >= 0.0:
             found, where, end = at.REACHED, i, s
     return found, where, end
-
-
-@compiled
-def keep_peak(shaft: Matrix, k: int, torque: float, time: float) -> None:
-    """Note a candidate for the largest |T|; of those equal but for rounding the first has the time."""
-    largest = abs(shaft[k, at.PEAK])
-    if abs(torque) > largest:
-        if abs(torque) > largest * (1.0 + SAME):
-            shaft[k, at.PEAK_TIME] = time
-        shaft[k, at.PEAK] = torque
-
-
-@compiled
-def peak_within(shaft: Matrix, series: Cube, lines: Matrix, k: int, n: int, end: float, t: float,
-                h: float) -> bool:  # fmt: skip
-    """Note the largest |T| of shaft k up to `end` if it is above the largest so far; False if it is lost."""
-    f = lines[EVENT_LINE]
-    g = lines[at.SPARE]
-    total = 0.0
-    for o in range(1, n + 1):
-        total += abs(series[TORQUE, k, o])
-    first = series[TORQUE, k, 0]
-    if abs(first) + total <= abs(shaft[k, at.PEAK]):
-        return True
-    for o in range(n + 1):
-        g[o] = series[TORQUE, k, o]
-    last = value(g, n, end)
-    keep_peak(shaft, k, first, t)
-    keep_peak(shaft, k, last, t + end * h)
-    for which in range(2):
-        sign = 1.0 - 2.0 * which
-        begin = 0.0
-        while True:
-            # where it rises above the largest so far
-            for o in range(n + 1):
-                f[o] = -sign * g[o]
-            f[0] += abs(shaft[k, at.PEAK]) * (1.0 + ROUNDING)
-            above = first_root(f, n, end, 0, 0.0, 0.0) if begin == 0.0 else crossing(f, 0, n, begin, end)
-            if above < NONE:
-                return False
-            if above < 0.0:
-                break
-            # and the extreme behind it
-            for o in range(n):
-                f[o] = sign * (o + 1.0) * g[o + 1]
-            f[n] = 0.0
-            top = crossing(f, 0, n - 1, above, end)
-            if top < NONE:
-                return False
-            if top < 0.0:
-                break  # it rises to the end, which is noted
-            if sign * value(g, n, top) <= abs(shaft[k, at.PEAK]):
-                break
-            keep_peak(shaft, k, value(g, n, top), t + top * h)
-            begin = top
-    return True

@@ -185,6 +185,8 @@ def strike(x: Vector, masses: Matrix, mass: Matrix, shaft: Matrix, k: int, resti
                 if direction != 0.0:
                     note(x, events, x[TIME], at.LOAD_STARTS, i, direction, 0.0)
             mass[i, DIRECTION] = direction
+    for j in range(max(a - 1, 0), min(b + 1, count - 1)):
+        shaft[j, MASK] = 0.0  # speeds have jumped: nothing is zero by its nature any more
     for edge in range(2):
         j = a - 1 if edge == 0 else b
         if 0 <= j < count - 1 and shaft[j, MODE] == PRESSED:
@@ -213,16 +215,13 @@ def meet(x: Vector, masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix,
         at_once = x[TIME] - shaft[k, at.STRUCK] <= 1e-15 * x[TIME]
         shaft[k, at.BLOWS] = shaft[k, at.BLOWS] + 1.0 if at_once else 0.0
         shaft[k, at.STRUCK] = x[TIME]
-        if v <= SLOW * press * h or (shaft[k, at.BLOWS] > COLLAPSE and e < 1.0):
+        if v <= SLOW * abs(press) * h or (shaft[k, at.BLOWS] > COLLAPSE and e < 1.0):
             rest = 0.0
             if press > 0.0 and e < 1.0:
                 rest = 2.0 * max(e * v, -v) / (press * (1.0 - e))
             settle(x, masses, mass, shaft, k, rest, events)
-        elif v > 0.0:
-            strike(x, masses, mass, shaft, k, e, at.IMPACT, x[TIME], events)
         else:
-            x[EVENTS] += 1.0
-            shaft[k, MASK] = 2.0
+            strike(x, masses, mass, shaft, k, e, at.IMPACT, x[TIME], events)
     elif press < 0.0 and v * v <= -4.0 * press * GRAZE * shafts[k, HALF]:
         x[EVENTS] += 1.0
         shaft[k, MASK] = 2.0

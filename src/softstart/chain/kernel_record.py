@@ -18,12 +18,48 @@ from softstart.chain.kernel_layout import (
     Vector,
 )
 from softstart.chain.kernel_roots import value
-from softstart.chain.kernel_start import spread
+from softstart.chain.kernel_series import expand, fastest_rate, join_bodies, orders
 from softstart.plant.jit import compiled
+from softstart.plant.layout import LAG, PHI2, TIME, UA, UB, UE
 
 # the work of the motor, of the exciting torques, against the loads, in damping to the ground and in shafts
 MOTOR_WORK, EXCITING_WORK, LOAD_WORK, GROUND_WORK, SHAFT_WORK = range(5)
 N_WORK = 5
+
+
+@compiled
+def restore(x: Vector, m: Vector, row: Vector, mass: Matrix, shaft: Matrix) -> None:
+    """The state at the start of a recorded span."""
+    x[TIME] = row[at.S_START]
+    m[UA] = row[at.S_UA]
+    m[UB] = row[at.S_UB]
+    m[UE] = row[at.S_UE]
+    x[PHI2] = row[at.S_PHI]
+    j = at.S_MASS
+    for i in range(mass.shape[0]):
+        mass[i, at.W] = row[j]
+        mass[i, DIRECTION] = row[j + 1]
+        j += 2
+    for k in range(shaft.shape[0]):
+        shaft[k, at.THETA] = row[j]
+        shaft[k, at.MODE] = row[j + 1]
+        shaft[k, at.SIDE] = row[j + 2]
+        j += 3
+
+
+@compiled
+def spread(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, tones: Matrix,
+           mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, row: Vector) -> int:  # fmt: skip
+    """The series of a recorded span, over its length; returns how many coefficients."""
+    restore(x, m, row, mass, shaft)
+    join_bodies(masses, mass, shaft)
+    h = row[at.S_END] - row[at.S_START]
+    rate = fastest_rate(masses, shafts, tones, mass, shaft)
+    if m[UE] != 0.0:
+        rate = max(rate, 1.0 / p[LAG])
+    n = min(orders(rate * h), at.ORDERS - 2)
+    expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, h, n)
+    return n
 
 
 @compiled

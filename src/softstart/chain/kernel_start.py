@@ -7,7 +7,7 @@ import math
 from numba import types
 
 from softstart.chain import kernel_layout as at
-from softstart.chain.kernel_events import next_event, peak_within
+from softstart.chain.kernel_events import next_event
 from softstart.chain.kernel_layout import (
     CONTACT,
     DIRECTION,
@@ -18,7 +18,6 @@ from softstart.chain.kernel_layout import (
     MODE,
     MOTOR,
     MOTOR_SHAFT,
-    ORDERS,
     PHI_LINE,
     PRESSED,
     SIDE,
@@ -33,6 +32,7 @@ from softstart.chain.kernel_layout import (
     W,
 )
 from softstart.chain.kernel_modes import begin_modes, handle, path_closed
+from softstart.chain.kernel_peaks import peak_within
 from softstart.chain.kernel_roots import value
 from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
 from softstart.plant.advance import next_in_queue
@@ -305,38 +305,3 @@ def run(  # type: ignore[no-untyped-def]
             return taken
         for i in range(state.shape[0]):
             state[i] = command[NEW_STATE + i]
-
-
-@compiled
-def restore(x: Vector, m: Vector, row: Vector, mass: Matrix, shaft: Matrix) -> None:
-    """The state at the start of a recorded span."""
-    x[TIME] = row[at.S_START]
-    m[UA] = row[at.S_UA]
-    m[UB] = row[at.S_UB]
-    m[UE] = row[at.S_UE]
-    x[PHI2] = row[at.S_PHI]
-    j = at.S_MASS
-    for i in range(mass.shape[0]):
-        mass[i, W] = row[j]
-        mass[i, DIRECTION] = row[j + 1]
-        j += 2
-    for k in range(shaft.shape[0]):
-        shaft[k, THETA] = row[j]
-        shaft[k, MODE] = row[j + 1]
-        shaft[k, SIDE] = row[j + 2]
-        j += 3
-
-
-@compiled
-def spread(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, tones: Matrix,
-           mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, row: Vector) -> int:  # fmt: skip
-    """The series of a recorded span, over its length; returns how many coefficients."""
-    restore(x, m, row, mass, shaft)
-    join_bodies(masses, mass, shaft)
-    h = row[at.S_END] - row[at.S_START]
-    rate = fastest_rate(masses, shafts, tones, mass, shaft)
-    if m[UE] != 0.0:
-        rate = max(rate, 1.0 / p[LAG])
-    n = min(orders(rate * h), ORDERS - 2)
-    expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, h, n)
-    return n

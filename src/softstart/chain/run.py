@@ -164,9 +164,10 @@ class ChainRun:
     @cached_property
     def events(self) -> tuple[ChainEvent, ...]:
         """All events, in order."""
+        rows = self.event_rows[np.argsort(self.event_rows[:, at.E_TIME], kind="stable")]
         return tuple(
             ChainEvent(float(t), EVENT_NAMES[float(kind)], int(place), float(value), float(impulse))
-            for t, kind, place, value, impulse in self.event_rows
+            for t, kind, place, value, impulse in rows
         )
 
     # states --------------------------------------------------------------------------------------------
