@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,16 +9,13 @@ from typing import Any
 from softstart import metrics
 from softstart.chain.model import Chain
 from softstart.chain.run import ChainRun
-from softstart.chain.simulation import MAX_EVENTS, simulate_chain
+from softstart.chain.simulation import simulate_chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
-from softstart.engine import Book, run_one
-from softstart.errors import InputError, SimulationError
-from softstart.plant import layout as plant
-from softstart.plant.vector import plant_vector
+from softstart.errors import InputError
 from softstart.run import Run
-from softstart.status import status_of
+from softstart.simulation import simulate
 
 __all__ = ["Verification", "verify_on_chain"]
 
@@ -30,6 +26,11 @@ class Verification:
 
     drive: Run
     chain: ChainRun
+
+    @property
+    def name(self) -> str:
+        """Name of the controller."""
+        return self.drive.controller.name or type(self.drive.controller).__name__
 
     @property
     def worst_shaft(self) -> int:
@@ -59,7 +60,7 @@ class Verification:
     def summary(self) -> dict[str, Any]:
         """Both side by side, as plain data."""
         return {
-            "controller": self.drive.controller.name or type(self.drive.controller).__name__,
+            "controller": self.name,
             "k_dyn": self.drive.k_dyn,
             "peak_torque": self.drive.peak_torque,
             "start_time": self.drive.start_time,
@@ -93,16 +94,4 @@ def verify_on_chain(
         raise InputError(f"{drive.name}: a batch of shape {drive.shape}; give a single drive.")
     made = make_controller(controller, parameters)
     whole = simulate_chain(chain, made, until, fitted_to=drive, base=drive)
-    return Verification(_on_drive(drive, made, until), whole)
-
-
-def _on_drive(drive: Drive, made: Controller, until: float | None) -> Run:
-    """The start of the drive itself, by the two-mass plant."""
-    fitted, own = made.set_up(drive)
-    p = plant_vector(drive, None, MAX_EVENTS)[0]
-    book = Book(int(fitted.sensors))
-    reason = run_one(fitted, own, p, book, until)
-    status = status_of(reason, not math.isnan(book.x[plant.START_TIME]), until is not None)
-    if not status.finished:
-        raise SimulationError(f"{status.value} Drive {drive.name}, t = {book.x[plant.TIME]:.6g} s.")
-    return Run(drive, fitted, drive, status, p, book.x.copy(), *book.rows())
+    return Verification(simulate(drive, made, until), whole)

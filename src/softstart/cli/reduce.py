@@ -24,6 +24,7 @@ from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain import Chain, Reduction
+    from softstart.chain.verification import Verification
 
 DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")
@@ -115,7 +116,7 @@ def reduce(
     mistakes.settle()
     assert one is not None
 
-    from softstart.cli.reduce_verify import Verified, check, verified
+    from softstart.cli.reduce_verify import check, verified
     from softstart.cli.running import working
 
     with output_folder(out) as folder:
@@ -123,7 +124,7 @@ def reduce(
             found = reduced(one, asked)
             beside = beside_it(found)
         check(found, names)
-        done: list[Verified] = []
+        done: list[Verification] = []
         if names:
             with working("starting the drive and the chain ..."):
                 done = verified(found, names)

@@ -13,11 +13,11 @@ from softstart.cli.report import markdown, markdown_table
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
-    from softstart.cli.reduce_verify import Verified
+    from softstart.chain.verification import Verification
 
 
 def write_reduction(
-    found: Reduction, beside: Reduction | None, done: Sequence[Verified], folder: Path, command: str
+    found: Reduction, beside: Reduction | None, done: Sequence[Verification], folder: Path, command: str
 ) -> None:
     """Scheme, figures, tables, the chain with all changes, what came out, and the report that ties them."""
     from softstart.chain.scheme import scheme_svg

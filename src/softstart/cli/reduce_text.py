@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.chain import Chain, Reduction
+    from softstart.chain.verification import Verification
     from softstart.chain.vibration import Vibration
-    from softstart.cli.reduce_verify import Verified
 
 MOST_MODES = 12
 
@@ -43,7 +43,7 @@ def chain_lines(chain: Chain) -> list[str]:
     return lines
 
 
-def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verified] = ()) -> list[Shown]:
+def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verification] = ()) -> list[Shown]:
     """Frequencies, steps, the two masses of both methods, and the starts on drive and chain."""
     shown = [frequencies_table(found.whole_vibration)]
     if found.steps:
@@ -148,7 +148,7 @@ def two_masses_table(found: Reduction, beside: Reduction | None) -> Shown:
     return Shown("Two masses", ["at the motor shaft", *(name for name, _, _ in columns)], rows, 1)
 
 
-def verified_table(done: Sequence[Verified]) -> Shown:
+def verified_table(done: Sequence[Verification]) -> Shown:
     """The starts on the drive and on the chain; `which` stands in front, after the strategy."""
     from softstart.cli.reduce_verify import columns
 
@@ -184,7 +184,7 @@ def footnotes(found: Reduction) -> list[str]:
 
 
 def show_reduction(
-    to: Console, found: Reduction, beside: Reduction | None, done: Sequence[Verified] = ()
+    to: Console, found: Reduction, beside: Reduction | None, done: Sequence[Verification] = ()
 ) -> None:
     """All of it."""
     from softstart.cli.show import Column, print_table, sentence

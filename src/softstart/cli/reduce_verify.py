@@ -3,81 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from softstart import metrics
 from softstart.cli.options import Mistakes
 from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
-    from softstart.chain.run import ChainRun
-    from softstart.run import Run
+    from softstart.chain.verification import Verification
 
 
-@dataclass(frozen=True)
-class Verified:
-    """One controller, set up for the drive, on the drive and on the chain."""
-
-    name: str
-    drive: Run
-    chain: ChainRun
-
-    @property
-    def worst_shaft(self) -> int:
-        """The shaft between motor and load with the largest torque, in N m at the motor shaft."""
-        arrays = self.chain.chain.at_motor_shaft()
-        first, last = sorted((arrays.motor, arrays.load))
-        return first + int(self.chain.peak_torques[first:last].argmax())
-
-    @property
-    def worst_k_dyn(self) -> float:
-        """Its largest torque over the same mean torque as every K_dyn here."""
-        return float(metrics.k_dyn(float(self.chain.peak_torques[self.worst_shaft]), self.drive.drive))
-
-    @property
-    def worst_place(self) -> str:
-        """Between which masses it is."""
-        masses = self.chain.chain.masses
-        return f"{masses[self.worst_shaft].name} - {masses[self.worst_shaft + 1].name}"
-
-    @property
-    def error(self) -> float:
-        """How far the K_dyn of the drive is from that of the chain's shaft beside the motor, as a share."""
-        return self.drive.k_dyn / self.chain.k_dyn - 1.0
-
-    def summary(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {
-            "controller": self.name,
-            "k_dyn": self.drive.k_dyn,
-            "peak_torque": self.drive.peak_torque,
-            "start_time": self.drive.start_time,
-            "chain_k_dyn": self.chain.k_dyn,
-            "chain_peak_torque": self.chain.peak_torque,
-            "chain_start_time": self.chain.start_time,
-            "k_dyn_error": self.error,
-            "worst_k_dyn": self.worst_k_dyn,
-            "worst_shaft": self.worst_place,
-            "chain": self.chain.summary(),
-        }
-
-
-def verified(found: Reduction, names: Sequence[str]) -> list[Verified]:
+def verified(found: Reduction, names: Sequence[str]) -> list[Verification]:
     """The controllers of these names, set up for the drive, started on the drive and on the chain."""
-    from softstart.chain.simulation import simulate_chain
+    from softstart.chain.verification import verify_on_chain
     from softstart.cli.running import Attributed, make_controllers
-    from softstart.simulation import simulate
 
     drive = found.to_drive()
-    made = make_controllers(names, {}, prefix=True)
     done = []
-    for name, controller in zip(names, made, strict=True):
+    for controller in make_controllers(names, {}, prefix=True):
         with Attributed():
-            run = simulate(drive, controller)
-            whole = simulate_chain(found.chain, controller, fitted_to=drive)
-        done.append(Verified(name, run, whole))
+            done.append(verify_on_chain(found.chain, drive, controller))
     return done
 
 
@@ -103,7 +48,7 @@ def check(found: Reduction, names: Sequence[str] | None) -> None:
     mistakes.settle()
 
 
-def columns(done: Sequence[Verified]) -> dict[str, list[str]]:
+def columns(done: Sequence[Verification]) -> dict[str, list[str]]:
     """The table of them."""
     from softstart.cli.show import column_of, number
 
