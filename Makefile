@@ -28,6 +28,7 @@ benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-starts --out results/benchmark-starts
 	$(BIN)/softstart study benchmark-optima --out results/benchmark-optima
 	$(BIN)/softstart study benchmark-sweeps --out results/benchmark-sweeps
+	$(BIN)/softstart study benchmark-chains --out results/benchmark-chains
 
 clean:
 	rm -rf $(VENV) results
