@@ -16,7 +16,7 @@ PART = Extent(
     restarts=1,
     generations=3,
     controllers=("ramp", "acceleration-delay"),
-    kinds=("reactive",),
+    kinds=("active",),
     front_points=3,
 )
 
@@ -32,7 +32,7 @@ def test_every_cell_is_a_start_that_can_be_repeated(grid, name):
     tuning = grid.tunings[name]
     for i, gap in enumerate(PART.gaps):
         for j, ratio in enumerate(PART.inertias):
-            drive = CRANE.replace(load_kind="reactive", gap=gap, load_inertia=ratio * CRANE.J1)
+            drive = CRANE.replace(gap=gap, load_inertia=ratio * CRANE.J1)
             run = simulate(drive, tuning.scheduled)
             assert grid.values(name, "k_dyn")[i, j] == pytest.approx(run.k_dyn, rel=1e-12)
             assert run.start_time <= simulate(drive, name).start_time * (1.0 + 1e-12)
@@ -63,12 +63,12 @@ def test_a_worse_cell_would_be_found(grid):
 
 def test_tables_and_maps_hold_every_cell(grid):
     result = present([grid], lambda text: None)
-    cells = next(t for t in result.tables if t.title == "reactive load, tuned: K_dyn")
+    cells = next(t for t in result.tables if t.title == "active load, tuned: K_dyn")
     assert [(row[0], row[1]) for row in cells.rows] == [(0.5, 5.0), (2.0, 5.0)]
     column = cells.columns.index("ramp")
     shown = [row[column] for row in cells.rows]
     assert shown == pytest.approx(grid.values("ramp", "k_dyn").ravel(), abs=5e-4)
-    figure = result.figures["gaps-and-inertias-reactive-cells"]
+    figure = result.figures["gaps-and-inertias-active-cells"]
     drawn = [ax.get_title(loc="left") for ax in figure.axes if ax.images]
     assert drawn == ["ramp", "acceleration-delay"]
     assert np.array_equal(figure.axes[0].images[0].get_array(), grid.ratio("ramp"), equal_nan=True)

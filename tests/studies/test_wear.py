@@ -18,7 +18,7 @@ PART = Extent(
     controllers=("ramp", "current-limit-feedback"),
     front_points=4,
 )
-NEW = CRANE.replace(load_kind="reactive")
+NEW = CRANE
 
 
 @pytest.fixture(scope="module")

@@ -23,15 +23,13 @@ class GapsAndInertias(Study):
     """Every controller tuned for each cell of the grid, and with one set for all.
 
     >>> GapsAndInertias.name, len(GapsAndInertias.pictures)
-    ('gaps-and-inertias', 4)
+    ('gaps-and-inertias', 2)
     """
 
     name: ClassVar[str] = "gaps-and-inertias"
     title: ClassVar[str] = "All controllers tuned alike over gaps and load inertias of the crane drive of [G]"
     pictures: ClassVar[tuple[str, ...]] = tuple(
-        f"gaps-and-inertias-{kind}-{which}"
-        for kind in ("reactive", "active")
-        for which in ("cells", "one-set")
+        f"gaps-and-inertias-{kind}-{which}" for kind in Extent().kinds for which in ("cells", "one-set")
     )
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:

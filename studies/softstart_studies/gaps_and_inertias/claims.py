@@ -49,7 +49,7 @@ def nearest(found: Sequence[Grid]) -> Claim:
         said.append(f"{grid.kind} load: {listed}")
     one = len(best) == 1
     return Claim(
-        "With one set of gains, one controller is nearest to the optimum under both kinds of load.",
+        "With one set of gains, one controller is nearest to the optimum on every kind of load tried.",
         Verdict.CONFIRMED if one else Verdict.REFUTED,
         f"Mean over the grid of K_dyn over the least K_dyn of any start in the same time: {'; '.join(said)}.",
     )

@@ -1,6 +1,6 @@
 """What wear does to a start: one drive, its gap from new to worn, under every controller.
 
-The drive is the crane drive of [G] with a reactive load, target speed 60 rad/s, torque lag 2 ms (assumed),
+The drive is the crane drive of [G], target speed 60 rad/s, torque lag 2 ms (assumed),
 encoder of 4096 lines.
 """
 

@@ -66,7 +66,7 @@ class Life:
 
 def live(extent: Extent, progress: Progress) -> Life:
     """All starts of all lives."""
-    drive = CRANE.replace(load_kind="reactive", name="Crane of [G], reactive load")
+    drive = CRANE
     names = extent.controllers or tuned_controllers()
     tunings = tuned(
         drive, names, extent.scheduled, [float(drive.J2)], extent.restarts, extent.generations, progress

@@ -47,6 +47,8 @@ def _panels(found: Life, pick: Any, label: str, note: str) -> Figure:
         if not absolute:
             axes[0, 0].set_yscale("log")
             axes[0, 0].set_yticks([1, 1.2, 1.5, 2, 3, 5], ["1", "1.2", "1.5", "2", "3", "5"])
+            for panel in axes.flat:
+                panel.minorticks_off()
         axes[0, 0].legend(loc="upper left")
         for index in range(len(found.courses), rows * ACROSS):
             axes[index // ACROSS, index % ACROSS].set_axis_off()

@@ -13,7 +13,10 @@ ONE_SENTENCE = {
     "unknown command": (["compre"], ['"compre"', "did you mean softstart compare?"]),
     "command unlike any": (
         ["zzzzzz"],
-        ["there are compare, simulate, optimize, pareto, drives, controllers and study"],
+        [
+            "there are compare, simulate, optimize, pareto, tune, sweep, linear, reduce, clutch, balance, "
+            "drives, controllers and study"
+        ],
     ),
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
     "unknown option before a command": (["--verion"], ["did you mean --version?"]),
