@@ -153,9 +153,9 @@ def find_study(name: str) -> Study:
 
     Raises InputError in one sentence if there is none, or if it cannot be loaded.
 
-    >>> find_study("paper-q")
+    >>> find_study("papper-g")
     Traceback (most recent call last):
-    softstart.errors.InputError: study = "paper-q": there is no study of this name; did you mean "paper-g"?
+    softstart.errors.InputError: study = "papper-g": there is no study of this name; did you mean "paper-g"?
     """
     found = load(GROUP, "study", name, "softstart study --list")
     if not (isinstance(found, type) and issubclass(found, Study)):

@@ -158,7 +158,8 @@ class SimpleCycle(Part):
         found[0, closed] = np.where(burning, expanded, compressed)
         found[2, closed] = (n - 1.0) * heat_integral(self, cylinders, psi[closed]) / volume**n
         if self.blowdown > 0.0:
-            share = np.clip((psi[closed] - self.exhaust_opening) / self.blowdown, 0.0, 1.0)
+            with np.errstate(over="ignore"):  # a blowdown that is all but none
+                share = np.clip((psi[closed] - self.exhaust_opening) / self.blowdown, 0.0, 1.0)
             left = 0.5 * (1.0 + np.cos(math.pi * share))
             found[:3, closed] *= left
             found[1, closed] += 1.0 - left

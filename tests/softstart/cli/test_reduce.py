@@ -23,7 +23,8 @@ def test_json_is_the_summary(run):
     assert told["assumed"] == found.chain.assumed
 
 
-def test_the_tables_are_shown(run):
+def test_the_tables_are_shown(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "110")
     code, out, err = run("reduce", "tractor-like", "--up-to", "70")
     assert (code, err) == (0, "")
     assert "15 masses became 3" in out
