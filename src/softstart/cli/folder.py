@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -124,4 +125,28 @@ def _make_parents_and_rename(stage: Path, target: Path) -> None:
     except BaseException:
         for parent in reversed(made):
             parent.rmdir()
+        raise
+
+
+@contextmanager
+def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
+    """The file `name` in DIR itself that keeps `what`, there after an interruption too, which is said.
+
+    What is wrong with it is told as of --out.
+    """
+    state = None if out is None else Path(out) / name
+    try:
+        yield state
+    except InputError as error:
+        raise InputError(
+            [
+                s.replace("save_to = ", "--out: ", 1).replace("name another file", "give another folder")
+                if s.startswith("save_to = ")
+                else s
+                for s in error.sentences
+            ]
+        ) from error
+    except KeyboardInterrupt:
+        if state is not None and state.exists():
+            print(f"softstart: {what} are kept in {state}; the same command goes on.", file=sys.stderr)
         raise

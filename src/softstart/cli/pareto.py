@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.folder import output_folder
+from softstart.cli.folder import kept_state, output_folder
 from softstart.cli.optimal_options import (
     METHODS,
     Asked,
@@ -39,7 +37,7 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.usage import Command
-from softstart.errors import InputError, SimulationError
+from softstart.errors import SimulationError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -117,7 +115,11 @@ def pareto(
     mistakes.settle()
     assert one is not None
 
-    with no_solution_told(as_json), output_folder(out) as folder, _kept(out) as state:
+    with (
+        no_solution_told(as_json),
+        output_folder(out) as folder,
+        kept_state(out, STATE, "finished points") as state,
+    ):
         front = _computed(one, asked, names, bounds, state)
         if folder is not None and any(point.found for point in front.points):
             from softstart.cli.optimal_report import write_front
@@ -164,29 +166,6 @@ def _computed(
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return compute(drive, times, controllers=made, save_to=state, progress=progress, **bounds)
-
-
-@contextmanager
-def _kept(out: str | None) -> Iterator[Path | None]:
-    """The file of finished points in DIR itself: it is there after an interruption too, and that is said."""
-    state = None if out is None else Path(out) / STATE
-    try:
-        yield state
-    except InputError as error:
-        raise InputError(
-            [
-                s.replace("save_to = ", "--out: ", 1).replace("name another file", "give another folder")
-                if s.startswith("save_to = ")
-                else s
-                for s in error.sentences
-            ]
-        ) from error
-    except KeyboardInterrupt:
-        if state is not None and state.exists():
-            print(
-                f"softstart: finished points are kept in {state}; the same command goes on.", file=sys.stderr
-            )
-        raise
 
 
 def point_columns(front: Front) -> dict[str, list[str]]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.folder import output_folder
+from softstart.cli.folder import kept_state, output_folder
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -148,7 +145,7 @@ def tune(
     mistakes.settle()
     assert one is not None
 
-    with output_folder(out) as folder, _kept(out) as state:
+    with output_folder(out) as folder, kept_state(out, STATE, "finished parts") as state:
         tuning = _computed(one, controller, state, asked)
         if folder is not None:
             from softstart.cli.running import working
@@ -202,26 +199,3 @@ def _share(text: str) -> float:
     from softstart.units import to_si
 
     return float(to_si(text, "1", name="--quantile"))
-
-
-@contextmanager
-def _kept(out: str | None) -> Iterator[Path | None]:
-    """The file of finished parts in DIR itself: it is there after an interruption too, and that is said."""
-    state = None if out is None else Path(out) / STATE
-    try:
-        yield state
-    except InputError as error:
-        raise InputError(
-            [
-                s.replace("save_to = ", "--out: ", 1).replace("name another file", "give another folder")
-                if s.startswith("save_to = ")
-                else s
-                for s in error.sentences
-            ]
-        ) from error
-    except KeyboardInterrupt:
-        if state is not None and state.exists():
-            print(
-                f"softstart: finished parts are kept in {state}; the same command goes on.", file=sys.stderr
-            )
-        raise
