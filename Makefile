@@ -1,12 +1,20 @@
 # softstart: two commands do everything on a machine with Python 3.11+ and make.
-#   make compare   the main job on the crane drive: table, plots, report in results/
-#   make test      the whole test suite
+#   make compare        the main job on the crane drive: table, plots, report in results/
+#   make test           the whole test suite
+#   make serve          the interactive page, in the browser
+# and for those who work on it (CONTRIBUTING.md):
+#   make lint types layers     ruff, mypy, import-linter
+#   make page                  tests of the page in a real browser (needs chromium)
+#   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
+#   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
+#                              whole suite from both, each in an empty folder
+#   make benchmark             speed and optima beside other packages
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: compare test lint types layers benchmark clean
+.PHONY: compare test serve lint types layers page package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
@@ -24,6 +32,29 @@ types: $(VENV)/.installed-dev
 layers: $(VENV)/.installed-dev
 	$(BIN)/lint-imports
 
+serve: $(VENV)/.installed-ui
+	$(BIN)/softstart serve
+
+page: $(VENV)/.installed-page
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page
+
+docs: $(VENV)/.installed-docs
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -b html -n -W --keep-going docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+docs-commands: $(VENV)/.installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n 2 --dist worksteal
+
+package: $(VENV)/.installed-package
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+
+package-check: package
+	$(BIN)/python .ci/package.py dist
+
+package-test: package
+	$(BIN)/python .ci/package.py dist --whole
+
 benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-starts --out results/benchmark-starts
 	$(BIN)/softstart study benchmark-optima --out results/benchmark-optima
@@ -31,7 +62,7 @@ benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-chains --out results/benchmark-chains
 
 clean:
-	rm -rf $(VENV) results
+	rm -rf $(VENV) results dist docs/_build docs/gallery_pages
 
 $(VENV)/.installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "softstart needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
@@ -50,4 +81,20 @@ $(VENV)/.installed-dev: $(VENV)/.installed-test
 
 $(VENV)/.installed-benchmark: $(VENV)/.installed-test
 	$(PIP) install --editable '.[benchmark]'
+	@touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(PIP) install --editable '.[docs]'
+	@touch $@
+
+$(VENV)/.installed-ui: $(VENV)/.installed
+	$(PIP) install --editable '.[ui]'
+	@touch $@
+
+$(VENV)/.installed-page: $(VENV)/.installed-test
+	$(PIP) install --editable '.[page]'
+	@touch $@
+
+$(VENV)/.installed-package: $(VENV)/.installed-test
+	$(PIP) install --editable '.[package]'
 	@touch $@

@@ -2,10 +2,31 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import CompiledController, make_controller, ready_controller_names
+
+PAGE = Path(__file__).parent / "page"
+DOCS = Path(__file__).parent / "docs"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--page`: with the tests in a real browser, which need Chromium and playwright (`make page`).
+
+    `--docs-commands`: run what the pages of the documentation tell to type (`make docs-commands`).
+    """
+    parser.addoption("--page", action="store_true", help="with the tests of the page in Chromium")
+    parser.addoption("--docs-commands", action="store_true", help="with the commands of the documentation")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Without `--page` the tests in a browser are not even imported; the pages' commands likewise."""
+    if collection_path == DOCS and not config.getoption("--docs-commands"):
+        return True
+    return True if collection_path == PAGE and not config.getoption("--page") else None
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -37,6 +37,31 @@ def lean(before: float, after: float, demand: float, mean: float) -> float:
 
 
 @compiled
+def mean_of_ramp(before: float, after: float, reach: float) -> float:
+    """Mean torque of a sample in which it slewed from `before` to `after`, and then stayed there, in N m.
+
+    `reach` is what the slew limiter lets it change in a whole sample.
+
+    >>> mean_of_ramp(40.0, 20.0, 20.0), mean_of_ramp(10.0, 0.0, 20.0), mean_of_ramp(5.0, 5.0, 20.0)
+    (30.0, 2.5, 5.0)
+    """
+    change = after - before
+    return after - 0.5 * change * min(abs(change) / reach, 1.0)
+
+
+@compiled
+def lean_of_ramp(before: float, after: float, reach: float) -> float:
+    """How much earlier than its mean that torque acts, as `lean`, in N m.
+
+    >>> round(lean_of_ramp(40.0, 20.0, 20.0) * 12.0, 9), round(lean_of_ramp(10.0, 0.0, 20.0) * 12.0, 9)
+    (20.0, 10.0)
+    """
+    change = after - before
+    share = min(abs(change) / reach, 1.0)
+    return -change * share * (0.25 - share / 6.0)
+
+
+@compiled
 def deviation(s: float, V: float, slope: float, a: float, c: float, d: float) -> float:
     """How far in rad the motor is behind a free one, s after contact: a int int (c z + d z') ds ds.
 

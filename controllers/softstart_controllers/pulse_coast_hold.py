@@ -175,6 +175,7 @@ class PulseCoastHold(CompiledController):
             h * np.sqrt(drive.c * a) / (2.0 * math.pi * RISE_PERIODS), self.patience,
             (count > COARSE * windup) | ((0.5 * slew + late) * Omega1 > SLOW),
             np.where(slewing, 0.5 / np.asarray(drive.torque_rate), 0.0),
+            np.where(np.isfinite(drive.torque_rate), drive.torque_rate, 0.0),
         )  # fmt: skip
 
 

@@ -16,7 +16,14 @@ from softstart.controller.compiled import (
     Vector,
 )
 from softstart.plant.jit import compiled
-from softstart_controllers.contact import TIME_DEVIATION, lean, take_up, time_since_contact
+from softstart_controllers.contact import (
+    TIME_DEVIATION,
+    lean,
+    lean_of_ramp,
+    mean_of_ramp,
+    take_up,
+    time_since_contact,
+)
 from softstart_controllers.sampled import mean_torque
 
 from softstart_controllers.shaft_filter import (  # isort: skip
@@ -36,8 +43,8 @@ MOST_DELAY = 3.0  # times the delay told and a sample
     P_PERIOD, P_MS, P_MC, P_REACTIVE, P_LOAD_SPEED, P_C, P_D, P_A, P_A_VARIANCE, P_B, P_B_VARIANCE, P_B_LEAST,
     P_B_MOST, P_COAST, P_SHARE, P_DELAY, P_SAMPLES, P_ROUNDING, P_CERTAINTY, P_FREE_NOISE, P_SPEED_NOISE,
     P_TWIST_NOISE, P_LOAD_NOISE, P_DAMPING, P_STIFFENING, P_RISE, P_PATIENCE, P_BLIND,
-    P_SLEW,
-) = range(29)  # fmt: skip
+    P_SLEW, P_RATE,
+) = range(30)  # fmt: skip
 
 # indices of `command`: the new state
 (
@@ -49,28 +56,31 @@ S_SHAFT = S_NOW + FREE_SIZE
 S_ANGLES = S_SHAFT + SHAFT_SIZE
 S_MEANS = S_ANGLES + RING
 S_LEANS = S_MEANS + RING
-STATE_SIZE = S_LEANS + RING - STATE
+S_DOUBTS = S_LEANS + RING
+STATE_SIZE = S_DOUBTS + RING - STATE
 
 # values of S_PHASE, in this order
 PULSE, COAST, CONTACT, HOLD, RAISE = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @compiled
-def free_motion(p: Vector, m: Vector, angle: float, mean: float, early: float) -> None:
+def free_motion(p: Vector, m: Vector, angle: float, mean: float, early: float, doubt: float) -> None:
     """The filter of the free motor goes on a sample, P_SAMPLES behind; from there to now by the torque."""
     h = p[P_PERIOD]
     kept = int(m[S_KEPT])
     if kept == int(p[P_SAMPLES]):
-        free_predict(m, S_FREE, m[S_MEANS], m[S_LEANS], h, p[P_FREE_NOISE])
+        free_predict(m, S_FREE, m[S_MEANS], m[S_LEANS], h, p[P_FREE_NOISE] + m[S_DOUBTS])
         free_update(m, S_FREE, m[S_ANGLES], p[P_ROUNDING])
         kept -= 1
         for i in range(kept):
             m[S_ANGLES + i] = m[S_ANGLES + i + 1]
             m[S_MEANS + i] = m[S_MEANS + i + 1]
             m[S_LEANS + i] = m[S_LEANS + i + 1]
+            m[S_DOUBTS + i] = m[S_DOUBTS + i + 1]
     m[S_ANGLES + kept] = angle
     m[S_MEANS + kept] = mean
     m[S_LEANS + kept] = early
+    m[S_DOUBTS + kept] = doubt
     m[S_KEPT] = kept + 1.0
     free_after(p, m, kept + 1)
 
@@ -81,7 +91,8 @@ def free_after(p: Vector, m: Vector, samples: int) -> None:
     for i in range(FREE_SIZE):
         m[S_NOW + i] = m[S_FREE + i]
     for i in range(samples):
-        free_predict(m, S_NOW, m[S_MEANS + i], m[S_LEANS + i], p[P_PERIOD], p[P_FREE_NOISE])
+        noise = p[P_FREE_NOISE] + m[S_DOUBTS + i]
+        free_predict(m, S_NOW, m[S_MEANS + i], m[S_LEANS + i], p[P_PERIOD], noise)
 
 
 @compiled
@@ -103,7 +114,7 @@ def drift_since(p: Vector, m: Vector, t: float) -> float:
 
 
 @compiled
-def follow(p: Vector, m: Vector, angle: float, mean: float, early: float) -> None:
+def follow(p: Vector, m: Vector, angle: float, mean: float, early: float, doubt: float) -> None:
     """The filter of the shaft goes on a sample."""
     h, a, X = p[P_PERIOD], m[S_FREE + INVERSE], S_SHAFT
     speed = a * h * p[P_SPEED_NOISE]
@@ -120,7 +131,7 @@ def follow(p: Vector, m: Vector, angle: float, mean: float, early: float) -> Non
         p[P_D],
         p[P_MC],
         p[P_REACTIVE],
-        speed * speed,
+        speed * speed + doubt,
         twist * twist,
         load * load,
     )
@@ -157,7 +168,7 @@ def contact(p: Vector, m: Vector, t: float, behind: float, pulsing: bool) -> Non
     first = kept - again
     shaft_update(m, S_SHAFT, m[S_ANGLES + first - 1], p[P_ROUNDING], p[P_B_LEAST], p[P_B_MOST])
     for i in range(first, kept):
-        follow(p, m, m[S_ANGLES + i], m[S_MEANS + i], m[S_LEANS + i])
+        follow(p, m, m[S_ANGLES + i], m[S_MEANS + i], m[S_LEANS + i], m[S_DOUBTS + i])
     m[S_PUSH] = 1.0 if pulsing else 0.0
     m[S_LEVEL] = 0.0
 
@@ -275,9 +286,15 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     else:
         mean = mean_torque(m[S_TORQUE], u, m[S_DEMAND])
         early = lean(m[S_TORQUE], u, m[S_DEMAND], mean)
+        doubt = 0.0
+        if p[P_RATE] > 0.0:  # slewed, lagged or both: one sample does not tell, and the truth may lie outside
+            line = mean_of_ramp(m[S_TORQUE], u, p[P_RATE] * h)
+            doubt = (2.0 * p[P_A] * h * (mean - line)) ** 2
+            if p[P_SLEW] > 0.0:
+                mean, early = line, lean_of_ramp(m[S_TORQUE], u, p[P_RATE] * h)
         if phase < CONTACT:
             m[S_HELD_BACK] += h * (m[S_DEMAND] - mean)
-            free_motion(p, m, angle, mean, early)
+            free_motion(p, m, angle, mean, early, doubt)
             behind = m[S_NOW + ANGLE] - angle
             enough = surely(p, m)
             if behind > enough:
@@ -286,7 +303,7 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
             elif behind < -enough:  # the load pushes the motor: there is no contact to wait for
                 phase = RAISE
         elif phase != RAISE:
-            follow(p, m, angle, mean, early)
+            follow(p, m, angle, mean, early, doubt)
             if m[S_SHAFT + Z] < 0.0 and m[S_SHAFT + W1] < m[S_SHAFT + W2]:
                 opened(p, m, t, u)
                 phase = PULSE if m[S_OPENINGS] <= MOST_OPENINGS else RAISE

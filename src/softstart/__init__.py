@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from softstart.optimal.robust import RobustOptimum, optimize_robust, worth_of_contact_sensor
     from softstart.optimal.solving import optimize
     from softstart.profile import TorqueProfile
+    from softstart.reporting.making import report
+    from softstart.reporting.result import Report
     from softstart.run import Run
     from softstart.simulation import simulate
     from softstart.status import Status
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
     from softstart.tuning.outcome import Tuning
     from softstart.tuning.solving import tune
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.1.0"
 
 # where each public name lives; loaded when first used, so that `import softstart` is quick
 _HOME = {
@@ -75,6 +77,7 @@ _HOME = {
     "PeriodicTorque": "softstart.balancing",
     "PlainController": "softstart.controller",
     "Problem": "softstart.optimal.problem",
+    "Report": "softstart.reporting.result",
     "RobustOptimum": "softstart.optimal.robust",
     "Run": "softstart.run",
     "Sensor": "softstart.controller",
@@ -90,6 +93,7 @@ _HOME = {
     "optimize_engagement": "softstart.clutch",
     "optimize_robust": "softstart.optimal.robust",
     "pareto": "softstart.optimal.front",
+    "report": "softstart.reporting.making",
     "simulate": "softstart.simulation",
     "sweep": "softstart.sweeping.entry",
     "tune": "softstart.tuning.solving",
@@ -118,6 +122,7 @@ __all__ = [
     "PeriodicTorque",
     "PlainController",
     "Problem",
+    "Report",
     "RobustOptimum",
     "Run",
     "Sensor",
@@ -135,6 +140,7 @@ __all__ = [
     "optimize_robust",
     "pareto",
     "reduce_chain",
+    "report",
     "simulate",
     "simulate_chain",
     "sweep",

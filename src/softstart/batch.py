@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     import xarray
 
 MAX_EVENTS = 1_000_000  # events and control instants of one start
+PATIENCE = 0.2  # s
+FIRST_TURN = 32  # starts
 
 # name in the results, column of the kernel's notes, unit, meaning
 _COLUMNS = (
@@ -109,18 +112,31 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
             numbers = numbers[(0,) * (numbers.ndim - 1)]
         numbers = np.array(numbers.reshape(-1, numbers.shape[-1]), order="C")
         size = controller.state_size
-        kernel.run_many(
-            type(controller).kernel, p, numbers, int(controller.sensors),
-            bool(controller.sensors & Sensor.STAGE), np.array([end]), results,
-            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
-            np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
-        )  # fmt: skip
+        for part in _parts(p.shape[0]):
+            kernel.run_many(
+                type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
+                int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
+                results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED),
+                np.zeros(size), np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P),
+                np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+            )  # fmt: skip
         return results
     for row, one in zip(results, p, strict=True):
         book = Book(int(controller.sensors), recording=False)
         book.x[at.STATUS] = run_plain(controller, one, book, end)
         row[:] = book.x
     return results
+
+
+def _parts(count: int) -> Iterator[slice]:
+    """Starts in turns of about PATIENCE: the kernel hears no Ctrl-C, which is taken between two turns."""
+    done, room = 0, FIRST_TURN
+    while done < count:
+        began = time.perf_counter()
+        yield slice(done, min(done + room, count))
+        done += room
+        share = PATIENCE / max(time.perf_counter() - began, 1e-9)
+        room = max(1, int(room * min(share, 4.0)))
 
 
 def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[str, tuple[Any, str, str]]:

@@ -47,6 +47,8 @@ class Row:
 class Comparison:
     """Strategies side by side on one drive, in the order asked for.
 
+    `fitted_to` is the drive for which they are set up, None where that is `drive` itself.
+
     >>> from softstart import Drive, compare
     >>> table = compare(Drive.load("crane-4amtkf"), ["direct", "reduced-first-stage"])
     >>> [row.run.controller.name for row in table.rows]
@@ -57,6 +59,7 @@ class Comparison:
 
     drive: Drive
     rows: tuple[Row, ...]
+    fitted_to: Drive | None = None
 
     @property
     def gentlest(self) -> Row:
@@ -67,7 +70,11 @@ class Comparison:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        return {"drive": self.drive.name, "strategies": [row.summary() for row in self.rows]}
+        return {
+            "drive": self.drive.name,
+            "fitted_to": None if self.fitted_to is None else self.fitted_to.name,
+            "strategies": [row.summary() for row in self.rows],
+        }
 
 
 def compare(
@@ -76,16 +83,23 @@ def compare(
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     until: float | None = None,
+    fitted_to: Drive | None = None,
 ) -> Comparison:
     """Start the drive under each controller and compare.
 
     By default these are all installed ones that run as they are, and those that are given parameters.
-    `parameters` maps a controller's name to its parameters. Raises InputError for bad input.
+    `parameters` maps a controller's name to its parameters. `fitted_to` is the drive for which the
+    controllers are set up, if not `drive`: how they fare on one that is not what they believe. Raises
+    InputError for bad input.
 
     >>> from softstart import compare
     >>> row = compare("crane-4amtkf", ["direct"]).rows[0]
     >>> round(row.run.k_dyn, 3), round(row.k_dyn_worn_gap, 3)
     (3.118, 4.865)
+    >>> believed = row.run.drive.replace(stiffness=0.5 * row.run.drive.stiffness)
+    >>> table = compare("crane-4amtkf", ["shaped", "pulse-coast-hold"], fitted_to=believed)
+    >>> [round(row.run.k_dyn, 3) for row in table.rows]
+    [1.678, 1.274]
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)
@@ -95,6 +109,8 @@ def compare(
         )
     if drive.shape != ():
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
+    if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
+        raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
     if isinstance(controllers, str | Controller):
         controllers = [controllers]
     asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters or {}))
@@ -119,20 +135,22 @@ def compare(
     light = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
     rows = []
     for controller in made:
-        run = simulate(drive, controller, until)
+        run = simulate(drive, controller, until, fitted_to=fitted_to)
         rows.append(
             Row(
                 run,
                 run.start_time - reference,
-                _k_dyn_elsewhere(worn, controller, drive, until),
-                _k_dyn_elsewhere(light, controller, drive, until),
+                _k_dyn_elsewhere(worn, controller, fitted_to or drive, drive, until),
+                _k_dyn_elsewhere(light, controller, fitted_to or drive, drive, until),
             )
         )
-    return Comparison(drive, tuple(rows))
+    return Comparison(drive, tuple(rows), fitted_to)
 
 
-def _k_dyn_elsewhere(other: Drive, controller: Controller, nominal: Drive, until: float | None) -> float:
+def _k_dyn_elsewhere(
+    other: Drive, controller: Controller, fitted_to: Drive, base: Drive, until: float | None
+) -> float:
     try:
-        return simulate(other, controller, until, fitted_to=nominal, base=nominal).k_dyn
+        return simulate(other, controller, until, fitted_to=fitted_to, base=base).k_dyn
     except SimulationError:
         return math.nan

@@ -89,25 +89,31 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
             book.grow()
         elif reason == at.ASK:
             kernel.measure(p, book.x, book.sees, book.measured)
-            try:
-                answer = controller.step(Measured(*book.measured.tolist()), state)
-            except (Exception, SystemExit) as error:  # the user's own code may fail in any way
-                place = traceback.extract_tb(error.__traceback__)[-1]
-                raise SimulationError(
-                    f"The start was given up: the controller {type(controller).__name__} failed at "
-                    f"t = {book.x[at.TIME]:.6g} s in {place.filename}, line {place.lineno} "
-                    f"({type(error).__name__}: {error})."
-                ) from error
-            try:
-                torque, ask_again, state = float(answer[0]), float(answer[1]), tuple(answer[2])
-                slope = float(answer[3]) if len(answer) > 3 else 0.0
-            except (TypeError, IndexError, ValueError):
-                raise InputError(
-                    f"controller {type(controller).__name__}: its step answered {answer!r}; "
-                    "answer with Command(torque, ask_again, state, slope)."
-                ) from None
+            torque, ask_again, state, slope = answer_of(controller, book.measured, state, book.x[at.TIME])
             taken: int = kernel.obey(p, book.x, book.m, torque, ask_again, slope)
             if taken != at.ASK:
                 return taken
         else:
             return reason
+
+
+def answer_of(
+    controller: PlainController, measured: at.Vector, state: tuple[float, ...], time: float
+) -> tuple[float, float, tuple[float, ...], float]:
+    """What a plain controller answers at `time`: torque, when to ask again, its state, slope."""
+    try:
+        answer = controller.step(Measured(*measured.tolist()), state)
+    except (Exception, SystemExit) as error:  # the user's own code may fail in any way
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        raise SimulationError(
+            f"The start was given up: the controller {type(controller).__name__} failed at "
+            f"t = {time:.6g} s in {place.filename}, line {place.lineno} ({type(error).__name__}: {error})."
+        ) from error
+    try:
+        slope = float(answer[3]) if len(answer) > 3 else 0.0
+        return float(answer[0]), float(answer[1]), tuple(answer[2]), slope
+    except (TypeError, IndexError, ValueError):
+        raise InputError(
+            f"controller {type(controller).__name__}: its step answered {answer!r}; "
+            "answer with Command(torque, ask_again, state, slope)."
+        ) from None

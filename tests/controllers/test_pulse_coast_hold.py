@@ -24,7 +24,14 @@ from softstart.metrics import base_torque
 from softstart.optimal.solving import optimize
 from softstart_controllers import pulse_coast_hold_step as stepping
 from softstart_controllers import shaft_filter as sf
-from softstart_controllers.contact import deviation, lean, take_up, time_since_contact
+from softstart_controllers.contact import (
+    deviation,
+    lean,
+    lean_of_ramp,
+    mean_of_ramp,
+    take_up,
+    time_since_contact,
+)
 from softstart_controllers.pulse_coast_hold import PulseCoastHold
 from softstart_controllers.sampled import mean_torque
 
@@ -333,6 +340,36 @@ def test_a_lag_or_dead_time_not_as_told_hardly_matters(kind: Any) -> None:
         assert np.abs(k / as_told - 1.0).max() < 0.01
     dead = started(LAGGING.replace(computing_delay=0.001, **grid), told(kind))["k_dyn"]
     assert (dead / as_told).max() < 1.04
+
+
+def test_a_slew_limit_does_not_look_like_a_contact() -> None:
+    """From 4 kN m/s (the torque takes 15 ms to Ms) to none worth the name, with and without a lag besides.
+
+    One contact each time; K_dyn at most 1.23, the worst where slewing takes a fifth of the elastic period.
+    """
+    grid: dict[str, Any] = {
+        "torque_rate": np.geomspace(4e3, 3e6, 60)[:, None, None],
+        "torque_lag": np.array([0.0, 0.0005, 0.001, 0.002])[None, :, None],
+        "gap": np.array([0.5, 2.0])[None, None, :],
+    }
+    for kind in ("active", "reactive"):
+        starts = simulate(CRANE.replace(load_kind=kind, **grid), PulseCoastHold())
+        assert np.all(starts.contacts == 1)
+        assert float(starts.k_dyn.max()) < 1.25
+        assert float(starts.k_dyn.median()) < 1.0
+
+
+@pytest.mark.parametrize("long", [0.1, 0.5, 0.99, 1.0, 1.7, 3.0])
+def test_moments_of_a_slewing_torque(long: float) -> None:
+    """It slews from 40 N m towards 20 and takes `long` samples for it."""
+    t = (np.arange(200_000) + 0.5) / 200_000  # of the sample
+    u = np.maximum(40.0 - 20.0 * t / long, 20.0)
+    after, reach = max(40.0 - 20.0 / long, 20.0), 20.0 / long
+    mean = float(np.mean(u))
+    assert mean_of_ramp(40.0, after, reach) == pytest.approx(mean, rel=1e-9)
+    assert lean_of_ramp(40.0, after, reach) == pytest.approx(
+        float(np.mean((1.0 - t) * u)) - mean / 2.0, abs=1e-7
+    )
 
 
 # every other drive ---------------------------------------------------------------------------------------

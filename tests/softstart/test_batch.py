@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+import time
+from types import FrameType
+
 import numpy as np
 import pytest
 
 from softstart import Drive, InputError, SimulationError, compare, simulate
+from softstart.batch import array_starts
+from softstart.controller import make_controller
 from softstart.plant.layout import GAP_EVENTS
 
 CRANE = Drive.load("crane-4amtkf")
@@ -31,6 +37,33 @@ def test_fields_broadcast_to_a_grid() -> None:
     assert float(data.k_dyn[1, 1]) == one.k_dyn
     assert float(data.gap[1, 1]) == 2.0
     assert float(data.load_inertia[1, 1]) == 0.1
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no interval timer")
+def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
+    """The kernel hears no signal; a batch of some minutes is given to it in turns, and ends between two."""
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    many = CRANE.replace(gap=np.linspace(0.1, 4.0, 400_000))
+    before = signal.signal(signal.SIGVTALRM, interrupted)
+    spent = time.process_time()
+    try:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            array_starts(many, make_controller("current-limit-feedback"))
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+    assert time.process_time() - spent < 2.0
+
+
+def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    many, ramp = CRANE.replace(gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
+    whole = array_starts(many, ramp)
+    monkeypatch.setattr("softstart.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)])
+    np.testing.assert_array_equal(array_starts(many, ramp), whole)
 
 
 def test_a_list_may_mix_kinds() -> None:

@@ -54,6 +54,31 @@ class Other: pass
 """
 
 
+PLAIN_FIELDS = """
+from dataclasses import dataclass
+from softstart import Command, PlainController
+from softstart.controller import parameter
+@dataclass(frozen=True)
+class Rise(PlainController):
+    rise: float = 0.05
+    wait: float = parameter("s", "time before it")
+    def step(self, measured, state):
+        return Command(62.0)
+"""
+
+
+def test_a_plain_field_has_no_unit_and_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "plain.py"
+    path.write_text(PLAIN_FIELDS, encoding="utf-8")
+    made: Any = make_controller(str(path), {"rise": "0.02", "wait": "20 ms"})
+    assert (made.rise, made.wait) == (0.02, 0.02)
+    for value in ("20 ms", "soon", float("nan")):
+        with pytest.raises(InputError, match=r"rise = .*no unit; give a bare number.*parameter\(unit,"):
+            make_controller(str(path), {"rise": value})
+    with pytest.raises(InputError, match=r"wait = .*m is a length"):
+        make_controller(str(path), {"wait": "20 m"})
+
+
 @pytest.fixture
 def loose(tmp_path: Path) -> Path:
     path = tmp_path / "mine.py"
@@ -85,6 +110,17 @@ def test_wrong_names(loose: Path, name: str, words: str) -> None:
         make_controller(name.format(loose))
     assert len(caught.value.sentences) == 1
     assert words in caught.value.sentences[0]
+
+
+def test_the_module_of_a_file_is_named_by_its_content(loose: Path) -> None:
+    # not by a hash that differs between processes: compiled steps on disk look for their module by name
+    there = loose.parent / "elsewhere" / loose.name
+    there.parent.mkdir()
+    there.write_bytes(loose.read_bytes())
+    name = controller_class(f"{loose}:Mine").__module__
+    assert controller_class(f"{there}:Mine").__module__ == name
+    there.write_text(loose.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
+    assert controller_class(f"{there}:Mine").__module__ != name
 
 
 def test_a_file_that_does_not_run(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, PlainController, simulate
-from softstart.chain import Chain, natural_vibration, reduce_chain
+from softstart.chain import Chain, forced_response, natural_vibration, reduce_chain
 from softstart.chain.backbone import backbone
 from softstart.chain.simulation import simulate_chain
 from softstart.study import Verdict, study_names
@@ -185,3 +185,14 @@ def test_every_claim_of_the_tables_has_its_verdict():
     assert "by choice" in findings.twist_claim().evidence
     assert "paper-r" in study_names()
     assert len(PaperR.pictures) == 4
+
+
+def test_the_public_forced_response_agrees_with_the_study() -> None:
+    """Two integrators, both from rest, where the motion is periodic; the window of the study cuts periods."""
+    chain = free.tractor()
+    cylinders = {mass.name: 50.8 for mass in chain.masses if mass.name.startswith("cylinder")}
+    for w, constant in ((80.0, 0.0), (66.0, 540.0)):
+        found = forced_response(chain, w, cylinders, locking=constant, from_rest=True)
+        assert np.degrees(found.amplitude[0, 0]) == pytest.approx(
+            locked._amplitude(chain, w, constant, 6 * 50.8), rel=5e-4
+        )

@@ -14,6 +14,8 @@ from softstart.chain.arrays import ChainArrays
 from softstart.chain.model import Chain, Mass, Motor, Shaft
 
 if TYPE_CHECKING:
+    from softstart.chain.backbone import Backbone, chain_backbone
+    from softstart.chain.forced import ForcedResponse, forced_response
     from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
     from softstart.chain.simulation import simulate_chain
@@ -21,15 +23,19 @@ if TYPE_CHECKING:
     from softstart.chain.vibration import Vibration, natural_vibration
 
 __all__ = [
+    "Backbone",
     "Chain",
     "ChainArrays",
     "ChainRun",
+    "ForcedResponse",
     "Mass",
     "Motor",
     "Reduction",
     "Shaft",
     "Verification",
     "Vibration",
+    "chain_backbone",
+    "forced_response",
     "natural_vibration",
     "reduce_chain",
     "simulate_chain",
@@ -38,10 +44,14 @@ __all__ = [
 
 # loaded when first used: they need compiled code
 _HOME = {
+    "Backbone": "softstart.chain.backbone",
     "ChainRun": "softstart.chain.run",
+    "ForcedResponse": "softstart.chain.forced",
     "Reduction": "softstart.chain.reduction",
     "Verification": "softstart.chain.verification",
     "Vibration": "softstart.chain.vibration",
+    "chain_backbone": "softstart.chain.backbone",
+    "forced_response": "softstart.chain.forced",
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",

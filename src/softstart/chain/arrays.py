@@ -28,7 +28,8 @@ class ChainArrays:
     `reactive` its kind, `w0` speed at the start, `speed_ratio` the speed of the mass's own shaft over that of
     the reference shaft (`i` of [R]; own speed = speed here * speed_ratio).
     Of the shafts: `c` stiffness (infinite where `rigid`), `d` damping, `gap` total gap, `restitution` (NaN
-    where not rigid), `law` contact laws, `theta0` twist at the start, `efficiency` of its gear.
+    where not rigid), `law` contact laws, `theta0` twist at the start, `efficiency` of its gear and `gear`,
+    the index of the mass at which that sits: it turns with the mass, the shaft lies on its other side.
     `motor` and `load` are the indices of the masses with the motor and with the target speed.
     """
 
@@ -46,6 +47,7 @@ class ChainArrays:
     law: tuple[ContactLaw, ...]
     theta0: Vector
     efficiency: Vector
+    gear: NDArray[np.int64]
     motor: int
     load: int
 
@@ -53,6 +55,16 @@ class ChainArrays:
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+
+    @property
+    def efficiency_from_motor(self) -> Vector:
+        """The share of the motor's power that comes to each mass: the product of the gears on the way."""
+        shares = np.ones(self.J.size)
+        for i in range(self.motor, self.J.size - 1):
+            shares[i + 1] = shares[i] * self.efficiency[i]
+        for i in range(self.motor, 0, -1):
+            shares[i - 1] = shares[i] * self.efficiency[i - 1]
+        return shares
 
 
 def arrays_at(chain: Chain, index: int) -> ChainArrays:
@@ -79,6 +91,7 @@ def arrays_at(chain: Chain, index: int) -> ChainArrays:
         law=tuple(shaft.contact_law for shaft in shafts),
         theta0=np.array([shaft.start_position for shaft in shafts]) / of_shaft,
         efficiency=np.array([shaft.efficiency for shaft in shafts]),
+        gear=np.array([k + (shaft.side == "before") for k, shaft in enumerate(shafts)]),
         motor=chain.motor_index,
         load=chain.load_index,
     )

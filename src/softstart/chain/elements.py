@@ -60,7 +60,9 @@ class Shaft:
     it, at the speed of the mass before (the default), or "after" it. A `stiffness` of infinity is a rigid
     joint: with a gap the masses meet in impacts of the `restitution`, without one they move as one mass. The
     gap may be given as `backlash` on a pitch `diameter`, `gap = 2 backlash/diameter` [R]. `efficiency` is
-    the share of the power that leaves the gear, whichever way it flows.
+    the share of the power that leaves the gear, whichever way it flows: of the torque T of the shaft, brought
+    to the other side, eta T acts there while the shaft drives, and T/eta while it is driven. At rest the gear
+    holds whatever lies between.
 
     >>> Shaft("2 kN*m/rad", backlash="0.2 mm", diameter="185 mm").gap
     0.002162...

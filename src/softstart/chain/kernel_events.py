@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 
 from softstart.chain import kernel_layout as at
+from softstart.chain.kernel_gears import add_grip, turning
 from softstart.chain.kernel_layout import (
     BEYOND,
     BODY_J,
     CONTACT,
     DIRECTION,
     DOUBLED,
+    ETA,
     EVENT_LINE,
     FIRST,
+    GEARS,
     HALF,
     HELD,
     HOLD,
@@ -23,9 +26,10 @@ from softstart.chain.kernel_layout import (
     MODE,
     OPEN,
     PRESSED,
-    REACTIVE,
     RESTITUTION,
     RIGID,
+    RUBBING,
+    RUBS,
     SIDE,
     SIZE,
     SPEED,
@@ -188,18 +192,21 @@ def releasing(mass: Matrix, shaft: Matrix, series: Cube, f: Vector, k: int, n: i
 
 
 @compiled
-def friction(masses: Matrix, mass: Matrix, series: Cube, f: Vector, i: int, h: float, n: int,
-             end: float) -> tuple[int, float]:  # fmt: skip
+def friction(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, f: Vector, i: int,
+             h: float, n: int, end: float) -> tuple[int, float]:  # fmt: skip
     """Breakaway or stop of the body that begins with mass i."""
-    if mass[i, HOLD] == 0.0:
+    if mass[i, RUBBING] == 0.0:
         return at.NO_EVENT, end
     noise = ROUNDING * (mass[i, SIZE] + mass[i, HOLD])
     event = at.NO_EVENT
     if mass[i, STUCK] != 0.0:
-        if far(series, HELD, i, n, mass[i, HOLD] - abs(series[HELD, i, 0])):
+        geared = mass[i, GEARS] != 0.0
+        if not geared and far(series, HELD, i, n, mass[i, HOLD] - abs(series[HELD, i, 0])):
             return event, end
         for which in range(2):
             line_of(f, series, HELD, i, n, mass[i, HOLD], -1.0 + 2.0 * which)
+            if geared:
+                add_grip(shafts, mass, shaft, series, f, i, 1.0 - 2.0 * which, n)
             s = first_root(f, n, end, 0, noise, noise)
             if s < NONE:
                 return at.UNSOLVED, 0.0
@@ -208,7 +215,7 @@ def friction(masses: Matrix, mass: Matrix, series: Cube, f: Vector, i: int, h: f
                 end = s
         return event, end
     j = i
-    while masses[j, REACTIVE] == 0.0:
+    while masses[j, RUBS] == 0.0:
         j += 1
     direction = mass[j, DIRECTION]
     if far(series, SPEED, i, n, direction * mass[i, at.W]):
@@ -245,9 +252,15 @@ def next_event(p: Vector, x: Vector, place: Vector, masses: Matrix, shafts: Matr
             if event == at.UNSOLVED:
                 return event, k, 0.0
             found, where, end = event, k, s
+        if shafts[k, ETA] != 1.0:
+            event, s = turning(shafts, mass, shaft, series, f, k, n, end)
+            if event == at.UNSOLVED:
+                return event, k, 0.0
+            if event != at.NO_EVENT:
+                found, where, end = event, k, s
     for i in range(masses.shape[0]):
         if int(mass[i, FIRST]) == i:
-            event, s = friction(masses, mass, series, f, i, h, n, end)
+            event, s = friction(masses, shafts, mass, shaft, series, f, i, h, n, end)
             if event != at.NO_EVENT:
                 if event == at.UNSOLVED:
                     return event, i, 0.0

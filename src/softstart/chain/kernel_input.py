@@ -71,7 +71,12 @@ def numbers(
     masses = np.zeros((count, at.N_MASSES))
     masses[:, at.J], masses[:, at.GROUND], masses[:, at.MC] = arrays.J, arrays.d_ground, arrays.Mc
     # a reactive load without torque never sticks: it is the same as an active one
-    masses[:, at.REACTIVE] = arrays.reactive & (arrays.Mc > 0.0)
+    reactive = arrays.reactive & (arrays.Mc > 0.0)
+    lossy = arrays.efficiency != 1.0
+    masses[:, at.RUBS] = reactive
+    masses[arrays.gear[lossy], at.RUBS] = 1.0
+    beside = (masses[:, at.RUBS] != 0.0) & ~reactive
+    masses[beside, at.ACTIVE], masses[beside, at.MC] = arrays.Mc[beside], 0.0
     masses[:, at.W_0] = arrays.w0
     shafts = np.zeros((count - 1, at.N_SHAFTS))
     shafts[:, at.C] = np.where(arrays.rigid, 0.0, arrays.c)
@@ -80,6 +85,7 @@ def numbers(
     shafts[:, at.RESTITUTION] = np.nan_to_num(arrays.restitution)
     shafts[:, at.LAW] = [LAWS[law] for law in arrays.law]
     shafts[:, at.THETA_0] = arrays.theta0
+    shafts[:, at.ETA], shafts[:, at.GEAR] = arrays.efficiency, arrays.gear - np.arange(count - 1)
     low, high = sorted((arrays.motor, arrays.load))
     at_motor = arrays.motor if arrays.load > arrays.motor or arrays.motor == 0 else arrays.motor - 1
     place = np.array([arrays.motor, arrays.load, low, high, at_motor], dtype=np.float64)
@@ -90,10 +96,10 @@ def numbers(
 def _refuse(chain: Chain, arrays: ChainArrays) -> None:
     wrong = []
     for k, shaft in enumerate(chain.shafts):
-        if shaft.efficiency != 1.0:
+        if shaft.efficiency != 1.0 and arrays.rigid[k]:
             wrong.append(
-                f"[shaft] {k + 1}, efficiency = {shaft.efficiency}: the simulation has no losses in gears; "
-                "leave it out, and give the loss as a load torque or as damping."
+                f"[shaft] {k + 1}, efficiency = {shaft.efficiency}: the loss of a gear goes with the torque "
+                "of a spring, and this shaft is rigid; give it a stiffness, or leave the efficiency out."
             )
         if arrays.rigid[k] and arrays.gap[k] == 0.0 and arrays.w0[k] != arrays.w0[k + 1]:
             wrong.append(
@@ -125,10 +131,11 @@ def _motor(chain: Chain, arrays: ChainArrays, time_limit: float | None, max_even
     p[plant.DEAD_TIME] = motor.computing_delay
     p[plant.LAG] = motor.torque_lag if motor.torque_lag > 1e-12 * period else 0.0
     if time_limit is None:
-        left = motor.starting_torque - float(arrays.Mc.sum())
+        heavier = 1.0 / arrays.efficiency_from_motor
+        left = motor.starting_torque - float((arrays.Mc * heavier).sum())
         speeds = p[plant.TARGET] + float(np.abs(arrays.w0).sum())
         if left > 0.0:
-            p[plant.TIME_LIMIT] = 100.0 * (float(arrays.J.sum()) * speeds / left + period)
+            p[plant.TIME_LIMIT] = 100.0 * (float((arrays.J * heavier).sum()) * speeds / left + period)
     return p
 
 

@@ -20,12 +20,13 @@ Cube = NDArray[np.float64]
 
 ORDERS: Final = 36  # room for Taylor coefficients
 
-# masses[i]: what is given; MEAN is the constant part of the exciting torques
-J, GROUND, MC, REACTIVE, MEAN, W_0 = range(6)
-N_MASSES: Final = 6
-# shafts[k]: what is given
-C, D, HALF, RIGID, RESTITUTION, LAW, THETA_0 = range(7)
-N_SHAFTS: Final = 7
+# masses[i]: what is given; MEAN is the constant part of the exciting torques. RUBS: friction acts on the
+# mass, of a reactive load (MC) or of a gear with losses; then ACTIVE is its active load torque, else MC is
+J, GROUND, MC, RUBS, MEAN, W_0, ACTIVE = range(7)
+N_MASSES: Final = 7
+# shafts[k]: what is given; ETA: efficiency of its gear, which sits at mass k + GEAR (0 or 1)
+C, D, HALF, RIGID, RESTITUTION, LAW, THETA_0, ETA, GEAR = range(9)
+N_SHAFTS: Final = 9
 # tones[j]: one harmonic of an exciting torque: on which mass, frequency, cosine and sine amplitude
 ON, OMEGA, COSINE, SINE = range(4)
 N_TONES: Final = 4
@@ -33,14 +34,16 @@ N_TONES: Final = 4
 MOTOR, LOAD_MASS, PATH, PATH_END, MOTOR_SHAFT = range(5)
 N_PLACES: Final = 5
 
-# mass[i]: the state. DIRECTION: 0 stuck, +1 or -1 the sign of the speed that a reactive Mc opposes (an active
-# load has +1 always). A body is what moves as one: FIRST is its first mass, where the others are found.
-W, DIRECTION, FIRST, BODY_J, HOLD, STUCK, SIZE, INFLUENCE = range(8)
-N_MASS: Final = 8
+# mass[i]: the state. DIRECTION: 0 stuck, +1 or -1 the sign of the speed that friction opposes (+1 always
+# where nothing rubs). A body is what moves as one: FIRST is its first mass, where the others are found;
+# RUBBING and GEARS count its masses on which friction acts and its gears with losses.
+W, DIRECTION, FIRST, BODY_J, HOLD, STUCK, SIZE, INFLUENCE, RUBBING, GEARS = range(10)
+N_MASS: Final = 10
 # shaft[k]: the state. MASK: how many leading coefficients of the event just fired are zero by its nature;
-# STRUCK: the time of the last impact, BLOWS: how many were at that very instant
-THETA, MODE, SIDE, MASK, PEAK, PEAK_TIME, IMPULSE, STRUCK, BLOWS = range(9)
-N_SHAFT: Final = 9
+# STRUCK: the time of the last impact, BLOWS: how many were at that very instant; SIGN: of the torque, BEFORE
+# and AFTER: the share of it that acts on the mass before and after, not 1 where its gear has losses
+THETA, MODE, SIDE, MASK, PEAK, PEAK_TIME, IMPULSE, STRUCK, BLOWS, SIGN, BEFORE, AFTER = range(12)
+N_SHAFT: Final = 12
 
 # MODE: gap open; spring in contact; the same while `modelica` caps its damping; flanks overlap without
 # torque; rigid flanks that press; a spring without a gap; a rigid joint
@@ -54,23 +57,26 @@ N_SERIES: Final = 5
 U_LINE, PHI_LINE, EVENT_LINE, SPARE = range(4)
 N_LINES: Final = 4
 
-# a recorded span: time and motor, then w and DIRECTION of each mass, then twist, MODE and SIDE of each shaft
+# a recorded span: time and motor, then w and DIRECTION of each mass, then twist, MODE, SIDE and SIGN of
+# each shaft
 S_START, S_END, S_UA, S_UB, S_UE, S_PHI, S_MASS = range(7)
+OF_SHAFT: Final = 4
 # a recorded event: `E_PLACE` is a shaft or a mass; of an impact the loss in J and the impulse in N m s
 E_TIME, E_KIND, E_PLACE, E_VALUE, E_IMPULSE = range(5)
 N_EVENT: Final = 5
 CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED, IMPACT, SETTLED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+GEAR_LETS_GO, GEAR_HOLDS = 8.0, 9.0
 
 # what a span ends with
 (
     NO_EVENT, UPPER, LOWER, REJOIN, BACK, EXIT, SWITCH, SETTLE, RELEASE, BREAK_FORWARD, BREAK_BACK, STOP,
-    REACHED, UNSOLVED,
-) = range(14)  # fmt: skip
+    REACHED, UNSOLVED, TURNED,
+) = range(15)  # fmt: skip
 
 
 def row_width(count: int) -> int:
     """How many numbers a recorded span of `count` masses has."""
-    return S_MASS + 2 * count + 3 * (count - 1)
+    return S_MASS + 2 * count + OF_SHAFT * (count - 1)
 
 
 def _drop_stale_cache() -> None:

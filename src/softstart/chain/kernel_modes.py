@@ -23,10 +23,11 @@ from softstart.chain.kernel_layout import (
     PATH,
     PATH_END,
     PRESSED,
-    REACTIVE,
     RESTITUTION,
     RIGID,
+    RUBS,
     SIDE,
+    SIGN,
     THETA,
     WELDED,
     C,
@@ -96,6 +97,8 @@ def engage(shafts: Matrix, mass: Matrix, shaft: Matrix, k: int, side: float) -> 
     v = side * (mass[k, W] - mass[k + 1, W])
     if shafts[k, LAW] == MODELICA and shafts[k, D] * v > shafts[k, C] * z:
         shaft[k, MODE] = DOUBLED
+    pulls = shafts[k, LAW] == DEAD_ZONE and shafts[k, C] * z + shafts[k, D] * v < 0.0
+    shaft[k, SIGN] = -side if pulls else side
 
 
 @compiled
@@ -103,12 +106,13 @@ def begin_modes(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix) -> 
     """The modes at t = 0."""
     for i in range(masses.shape[0]):
         mass[i, W] = masses[i, at.W_0]
-        mass[i, DIRECTION] = np.sign(mass[i, W]) if masses[i, REACTIVE] != 0.0 else 1.0
+        mass[i, DIRECTION] = np.sign(mass[i, W]) if masses[i, RUBS] != 0.0 else 1.0
     for k in range(shafts.shape[0]):
         theta = shafts[k, at.THETA_0]
         shaft[k, THETA] = theta
         shaft[k, MASK] = 0.0
         shaft[k, SIDE] = 0.0
+        shaft[k, SIGN] = 1.0
         shaft[k, at.PEAK] = 0.0
         shaft[k, at.PEAK_TIME] = 0.0
         shaft[k, at.IMPULSE] = 0.0
@@ -120,6 +124,8 @@ def begin_modes(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix) -> 
                 shaft[k, MODE] = WELDED
         elif shafts[k, HALF] == 0.0:
             shaft[k, MODE] = JOINED
+            torque = shafts[k, C] * theta + shafts[k, D] * (mass[k, W] - mass[k + 1, W])
+            shaft[k, SIGN] = 1.0 if torque >= 0.0 else -1.0
         elif abs(theta) > shafts[k, HALF]:
             side = math.copysign(1.0, theta)
             torque = shafts[k, C] * (abs(theta) - shafts[k, HALF])
@@ -177,13 +183,29 @@ def strike(x: Vector, masses: Matrix, mass: Matrix, shaft: Matrix, k: int, resti
         w_b += impulse / J_b
     for i in range(a, b + 1):
         mass[i, W] = w_a if i <= k else w_b
-        if masses[i, REACTIVE] != 0.0:
+        if masses[i, RUBS] != 0.0:
             direction = np.sign(mass[i, W])
             if direction != mass[i, DIRECTION]:
                 if mass[i, DIRECTION] != 0.0:
-                    note(x, events, x[TIME], at.LOAD_STOPS, i, mass[i, DIRECTION], 0.0)
+                    note(
+                        x,
+                        events,
+                        x[TIME],
+                        at.LOAD_STOPS if masses[i, at.MC] > 0.0 else at.GEAR_HOLDS,
+                        i,
+                        mass[i, DIRECTION],
+                        0.0,
+                    )
                 if direction != 0.0:
-                    note(x, events, x[TIME], at.LOAD_STARTS, i, direction, 0.0)
+                    note(
+                        x,
+                        events,
+                        x[TIME],
+                        at.LOAD_STARTS if masses[i, at.MC] > 0.0 else at.GEAR_LETS_GO,
+                        i,
+                        direction,
+                        0.0,
+                    )
             mass[i, DIRECTION] = direction
     for j in range(max(a - 1, 0), min(b + 1, count - 1)):
         shaft[j, MASK] = 0.0  # speeds have jumped: nothing is zero by its nature any more
@@ -248,11 +270,27 @@ def turn(x: Vector, masses: Matrix, mass: Matrix, i: int, direction: float, even
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
     j = i
     while j < masses.shape[0] and int(mass[j, FIRST]) == i:
-        if masses[j, REACTIVE] != 0.0:
+        if masses[j, RUBS] != 0.0:
             if direction == 0.0:
-                note(x, events, x[TIME], at.LOAD_STOPS, j, mass[j, DIRECTION], 0.0)
+                note(
+                    x,
+                    events,
+                    x[TIME],
+                    at.LOAD_STOPS if masses[j, at.MC] > 0.0 else at.GEAR_HOLDS,
+                    j,
+                    mass[j, DIRECTION],
+                    0.0,
+                )
             else:
-                note(x, events, x[TIME], at.LOAD_STARTS, j, direction, 0.0)
+                note(
+                    x,
+                    events,
+                    x[TIME],
+                    at.LOAD_STARTS if masses[j, at.MC] > 0.0 else at.GEAR_LETS_GO,
+                    j,
+                    direction,
+                    0.0,
+                )
             mass[j, DIRECTION] = direction
         if direction == 0.0:
             mass[j, W] = 0.0
@@ -290,6 +328,10 @@ def handle(p: Vector, x: Vector, place: Vector, masses: Matrix, shafts: Matrix, 
     elif event == at.SWITCH:
         x[EVENTS] += 1.0
         shaft[k, MODE] = CONTACT if shaft[k, MODE] == DOUBLED else DOUBLED
+        shaft[k, MASK] = 1.0
+    elif event == at.TURNED:
+        x[EVENTS] += 1.0
+        shaft[k, SIGN] = -shaft[k, SIGN]
         shaft[k, MASK] = 1.0
     elif event == at.STOP:
         turn(x, masses, mass, k, 0.0, events)

@@ -38,6 +38,8 @@ def peak_within(shaft: Matrix, series: Cube, lines: Matrix, k: int, n: int, end:
     last = value(g, n, end)
     keep_peak(shaft, k, first, t)
     keep_peak(shaft, k, last, t + end * h)
+    if end == 0.0:
+        return True
     for which in range(2):
         sign = 1.0 - 2.0 * which
         begin = 0.0

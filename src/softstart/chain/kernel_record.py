@@ -22,9 +22,9 @@ from softstart.chain.kernel_series import expand, fastest_rate, join_bodies, ord
 from softstart.plant.jit import compiled
 from softstart.plant.layout import LAG, PHI2, TIME, UA, UB, UE
 
-# the work of the motor, of the exciting torques, against the loads, in damping to the ground and in shafts
-MOTOR_WORK, EXCITING_WORK, LOAD_WORK, GROUND_WORK, SHAFT_WORK = range(5)
-N_WORK = 5
+# the work of motor and exciting torques, against the loads, in damping to the ground, in shafts and gears
+MOTOR_WORK, EXCITING_WORK, LOAD_WORK, GROUND_WORK, SHAFT_WORK, GEAR_WORK = range(6)
+N_WORK = 6
 
 
 @compiled
@@ -44,7 +44,8 @@ def restore(x: Vector, m: Vector, row: Vector, mass: Matrix, shaft: Matrix) -> N
         shaft[k, at.THETA] = row[j]
         shaft[k, at.MODE] = row[j + 1]
         shaft[k, at.SIDE] = row[j + 2]
-        j += 3
+        shaft[k, at.SIGN] = row[j + 3]
+        j += at.OF_SHAFT
 
 
 @compiled
@@ -52,7 +53,7 @@ def spread(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaft
            mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, row: Vector) -> int:  # fmt: skip
     """The series of a recorded span, over its length; returns how many coefficients."""
     restore(x, m, row, mass, shaft)
-    join_bodies(masses, mass, shaft)
+    join_bodies(masses, shafts, mass, shaft)
     h = row[at.S_END] - row[at.S_START]
     rate = fastest_rate(masses, shafts, tones, mass, shaft)
     if m[UE] != 0.0:
@@ -120,7 +121,7 @@ def work_of(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaf
             turned = speed[0]
             for o in range(1, n + 1):
                 turned += speed[o] / (o + 1.0)
-            load = h * mass[i, DIRECTION] * masses[i, at.MC] * turned
+            load = h * mass[i, DIRECTION] * masses[i, at.MC] * turned + h * masses[i, at.ACTIVE] * turned
             work[GROUND_WORK] += ground
             work[LOAD_WORK] += load
             exciting += h * product(series[at.OUTSIDE, i], speed, n) + ground + load
@@ -134,3 +135,8 @@ def work_of(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaf
                 lines[at.SPARE, o] = series[SPEED, k, o] - series[SPEED, k + 1, o]
             lines[at.EVENT_LINE, 0] += shafts[k, at.C] * shaft[k, at.SIDE] * shafts[k, at.HALF]
             work[SHAFT_WORK] += h * product(lines[at.EVENT_LINE], lines[at.SPARE], n)
+            if shafts[k, at.ETA] != 1.0:
+                for after in range(2):
+                    lost = 1.0 - shaft[k, at.AFTER] if after == 1 else shaft[k, at.BEFORE] - 1.0
+                    if lost != 0.0:
+                        work[GEAR_WORK] += h * lost * product(series[TORQUE, k], series[SPEED, k + after], n)

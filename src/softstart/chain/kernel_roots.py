@@ -51,7 +51,7 @@ def crossing(f: Vector, low: int, n: int, begin: float, end: float) -> float:
                 return x
             if most == 0.0:
                 return NONE
-            x += max(2.0 * dy / most, 2.0 * math.sqrt(EPS * size / most))
+            x += max(2.0 * dy / most, 2.0 * math.sqrt(EPS * size / most), EPS * end)
         else:
             if most == 0.0:
                 if dy >= 0.0:

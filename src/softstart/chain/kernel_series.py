@@ -12,13 +12,18 @@ from __future__ import annotations
 
 import math
 
+from softstart.chain.kernel_gears import set_gears
 from softstart.chain.kernel_layout import (
+    ACTIVE,
+    AFTER,
+    BEFORE,
     BODY_J,
     CONTACT,
     COSINE,
     DIRECTION,
     DOUBLED,
     FIRST,
+    GEARS,
     GROUND,
     HALF,
     HELD,
@@ -35,7 +40,8 @@ from softstart.chain.kernel_layout import (
     OUTSIDE,
     PHI_LINE,
     PRESSED,
-    REACTIVE,
+    RUBBING,
+    RUBS,
     SIDE,
     SINE,
     SIZE,
@@ -62,8 +68,8 @@ TRUNCATION = 1e-18
 
 
 @compiled
-def join_bodies(masses: Matrix, mass: Matrix, shaft: Matrix) -> None:
-    """Which masses move as one, their inertia, and the friction that can hold them."""
+def join_bodies(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix) -> None:
+    """Which masses move as one, their inertia, the friction that can hold them, what their gears pass on."""
     first = 0
     for i in range(masses.shape[0]):
         if i == 0 or (shaft[i - 1, MODE] != WELDED and shaft[i - 1, MODE] != PRESSED):
@@ -71,12 +77,16 @@ def join_bodies(masses: Matrix, mass: Matrix, shaft: Matrix) -> None:
             mass[i, BODY_J] = 0.0
             mass[i, HOLD] = 0.0
             mass[i, STUCK] = 0.0
+            mass[i, RUBBING] = 0.0
+            mass[i, GEARS] = 0.0
         mass[i, FIRST] = first
         mass[first, BODY_J] += masses[i, J]
-        if masses[i, REACTIVE] != 0.0:
+        if masses[i, RUBS] != 0.0:
+            mass[first, RUBBING] += 1.0
             mass[first, HOLD] += masses[i, MC]
             if mass[i, DIRECTION] == 0.0:
                 mass[first, STUCK] = 1.0
+    set_gears(shafts, mass, shaft)
 
 
 @compiled
@@ -114,6 +124,9 @@ def fastest_rate(masses: Matrix, shafts: Matrix, tones: Matrix, mass: Matrix, sh
             d = shafts[i, D]
         elif mode == DOUBLED:
             c = 2.0 * shafts[i, C]
+        share = max(shaft[i, BEFORE], shaft[i, AFTER])
+        c *= share
+        d *= share
         after = 0.0 if mass[i + 1, STUCK] != 0.0 else 1.0 / mass[i + 1, BODY_J]
         coupling = math.sqrt(c * before_c) * shared
         friction = math.sqrt(d * before_d) * shared
@@ -215,7 +228,7 @@ def expand(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaft
                 if masses[last, GROUND] != 0.0:
                     q -= masses[last, GROUND] * series[SPEED, last, o]
                 if o == 0:
-                    q -= mass[last, DIRECTION] * masses[last, MC]
+                    q -= mass[last, DIRECTION] * masses[last, MC] + masses[last, ACTIVE]
                     size += abs(q)
                 series[OUTSIDE, last, o] = q
                 total += q
@@ -223,28 +236,32 @@ def expand(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaft
                     break
                 last += 1
             if i > 0:
-                total += series[TORQUE, i - 1, o]
+                total += shaft[i - 1, AFTER] * series[TORQUE, i - 1, o]
             if last + 1 < count:
-                total -= series[TORQUE, last, o]
+                total -= shaft[last, BEFORE] * series[TORQUE, last, o]
             stuck = mass[i, STUCK] != 0.0
             held = total if stuck else 0.0
             rise = 0.0 if stuck else total / mass[i, BODY_J]
             series[HELD, i, o] = held
             if o == 0:
                 if i > 0:
-                    size += abs(series[TORQUE, i - 1, 0])
+                    size += shaft[i - 1, AFTER] * abs(series[TORQUE, i - 1, 0])
                 if last + 1 < count:
-                    size += abs(series[TORQUE, last, 0])
+                    size += shaft[last, BEFORE] * abs(series[TORQUE, last, 0])
                 mass[i, SIZE] = size
                 mass[i, INFLUENCE] = size / mass[i, BODY_J]
             for j in range(i, last + 1):
                 series[SPEED, j, o + 1] = rise * share
                 if j < last:  # the joint carries what the masses before it leave
                     carried = series[OUTSIDE, j, o] - masses[j, J] * rise
-                    if stuck and masses[j, REACTIVE] != 0.0:
-                        carried -= held * masses[j, MC] / mass[i, HOLD]
+                    if stuck and masses[j, RUBS] != 0.0:
+                        # what each of several holds is not determined: in proportion, or, with gears, alike
+                        if mass[i, GEARS] == 0.0:
+                            carried -= held * masses[j, MC] / mass[i, HOLD]
+                        else:
+                            carried -= held / mass[i, RUBBING]
                     if j > 0:
-                        carried += series[TORQUE, j - 1, o]
+                        carried += shaft[j - 1, AFTER] * series[TORQUE, j - 1, o]
                     series[TORQUE, j, o] = carried
             i = last + 1
         for k in range(count - 1):

@@ -105,7 +105,7 @@ def begin(x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, m
     x[T_END] = until
     x[START_TIME] = math.nan
     begin_modes(masses, shafts, mass, shaft)
-    join_bodies(masses, mass, shaft)
+    join_bodies(masses, shafts, mass, shaft)
     motor = int(place[MOTOR])
     load = int(place[LOAD_MASS])
     for k in range(min(motor, load), max(motor, load)):  # the load mass begins at the angle 0
@@ -132,7 +132,8 @@ def record(x: Vector, m: Vector, mass: Matrix, shaft: Matrix, h: float, segments
         row[j] = shaft[k, THETA]
         row[j + 1] = shaft[k, MODE]
         row[j + 2] = shaft[k, SIDE]
-        j += 3
+        row[j + 3] = shaft[k, at.SIGN]
+        j += at.OF_SHAFT
     x[N_SEGMENTS] += 1.0
 
 
@@ -198,7 +199,7 @@ def advance(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaf
         cut = m[SLEW_END] < h
         if cut:
             h = m[SLEW_END]
-        join_bodies(masses, mass, shaft)
+        join_bodies(masses, shafts, mass, shaft)
         rate = fastest_rate(masses, shafts, tones, mass, shaft)
         if m[UE] != 0.0:
             rate = max(rate, 1.0 / p[LAG])
@@ -277,7 +278,7 @@ def look(p: Vector, x: Vector, m: Vector, sees: int, place: Vector, masses: Matr
             shaft[k, MODE] == PRESSED or shaft[k, MODE] == WELDED
         ):  # what the joint carries: of a span of no length
             torque_course(p, x, m)
-            join_bodies(masses, mass, shaft)
+            join_bodies(masses, shafts, mass, shaft)
             expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, 0.0, 0)
         sign = 1.0 if motor <= k else -1.0
         measured[M_SHAFT_TORQUE] = sign * torque_now(shafts, mass, shaft, series, k)

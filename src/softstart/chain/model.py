@@ -217,7 +217,8 @@ class Chain:
         With `i` the speed of a shaft over that of the reference: inertias, dampings and stiffnesses times
         `i^2`, torques times `i`, gaps, angles and speeds over `i`. Natural frequencies, energies and powers
         stay what they are. The motor's data and the target speed are at the motor's shaft before and after:
-        a chain with a motor on another shaft than the reference loses it.
+        a chain with a motor on another shaft than the reference loses it. Gears with losses stay where they
+        are.
 
         >>> chain = Chain([Mass(1), Mass(4)], [Shaft(8, gap=0.1, ratio=2, side="after")])
         >>> there = chain.brought_to("mass 1")
@@ -239,7 +240,7 @@ class Chain:
                 gap=float(gap),
                 start_position=float(theta0),
                 ratio=1.0,
-                side="before",
+                side=s.side if s.efficiency < 1.0 else "before",
             )
             for s, c, d, gap, theta0 in rows
         ]

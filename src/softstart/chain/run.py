@@ -35,6 +35,8 @@ EVENT_NAMES = {
     at.TARGET_REACHED: "target speed reached",
     at.IMPACT: "impact",
     at.SETTLED: "impacts over, flanks press",
+    at.GEAR_LETS_GO: "gear lets go",
+    at.GEAR_HOLDS: "gear holds",
 }
 OF_A_SHAFT = frozenset({at.CLOSED, at.OPENED, at.IMPACT, at.SETTLED})
 PLOT_POINTS = 1500
@@ -58,9 +60,10 @@ class ChainEvent(NamedTuple):
 class ChainEnergy:
     """Where the energy went, J; `residual` is what the sum misses and shows the accuracy of the run.
 
-    motor + exciting = kinetic + elastic + load + ground + shafts + impacts + residual, all from the start of
-    the run: work of the motor and of the exciting torques, change of kinetic and elastic energy, work against
-    the load torques, damping to the ground and in the shafts, impacts of rigid flanks.
+    motor + exciting = kinetic + elastic + load + ground + shafts + gears + impacts + residual, all from the
+    start of the run: work of the motor and of the exciting torques, change of kinetic and elastic energy,
+    work against the load torques, damping to the ground and in the shafts, losses of gears (never below 0),
+    impacts of rigid flanks.
     """
 
     motor: float
@@ -70,6 +73,7 @@ class ChainEnergy:
     load: float
     ground: float
     shafts: float
+    gears: float
     impacts: float
     residual: float
 
@@ -248,7 +252,7 @@ class ChainRun:
             given.p, x, m, given.place, given.masses, given.shafts, given.tones, mass, shaft, series, lines,
             self.segments, work,
         )  # fmt: skip
-        motor, exciting, load, ground, shafts = work.tolist()
+        motor, exciting, load, ground, shafts, gears = work.tolist()
         kinetic = 0.5 * float(
             given.masses[:, at.J] @ (self.mass[:, at.W] ** 2 - given.masses[:, at.W_0] ** 2)
         )
@@ -261,14 +265,15 @@ class ChainRun:
         shafts += _stored(given, before) - _stored(given, after)
         struck = np.isin(self.event_rows[:, at.E_KIND], [at.IMPACT, at.SETTLED])
         impacts = float(self.event_rows[struck, at.E_VALUE].sum())
-        residual = motor + exciting - kinetic - elastic - load - ground - shafts - impacts
-        return ChainEnergy(motor, exciting, kinetic, elastic, load, ground, shafts, impacts, residual)
+        residual = motor + exciting - kinetic - elastic - load - ground - shafts - gears - impacts
+        return ChainEnergy(motor, exciting, kinetic, elastic, load, ground, shafts, gears, impacts, residual)
 
     @property
     def _shaft_rows(self) -> Vector:
         """THETA, MODE and SIDE of each shaft at the start of each span."""
         width = at.S_MASS + 2 * self.numbers.count
-        return self.segments[:, width:].reshape(self.segments.shape[0], -1, 3)
+        rows = self.segments[:, width:].reshape(self.segments.shape[0], -1, at.OF_SHAFT)
+        return rows[:, :, :3]
 
     def plot(self) -> Figure:
         """Torques, speeds and twists over time."""

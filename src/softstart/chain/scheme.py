@@ -85,8 +85,9 @@ def _shaft(parts: list[str], x: float, chain: Chain, arrays: ChainArrays, k: int
     compliance = 1.0 / arrays.c
     start = x
     labels = []
-    if shaft.ratio != 1.0 and shaft.side == "after":
-        x = _gear(parts, x, shaft.ratio)
+    geared = shaft.ratio != 1.0 or shaft.efficiency < 1.0
+    if geared and shaft.side == "after":
+        x = _gear(parts, x, shaft.ratio, shaft.efficiency)
     if arrays.rigid[k]:
         parts.append(_line(x, _AXIS, x + _SHORTEST, _AXIS, width=5.0))
         x += _SHORTEST
@@ -99,8 +100,8 @@ def _shaft(parts: list[str], x: float, chain: Chain, arrays: ChainArrays, k: int
         opening = _LEAST_GAP + _GAP * float(arrays.gap[k] / arrays.gap.sum())
         x = _jaws(parts, x, opening)
         labels.append(f"gap {_number(float(arrays.gap[k]))}")
-    if shaft.ratio != 1.0 and shaft.side == "before":
-        x = _gear(parts, x, shaft.ratio)
+    if geared and shaft.side == "before":
+        x = _gear(parts, x, shaft.ratio, shaft.efficiency)
     for i, label in enumerate(labels):
         colour = _RED if label.startswith("gap") else _INK
         parts.append(_text(0.5 * (start + x), _AXIS + 26.0 + 14.0 * i, label, size=10, colour=colour))
@@ -132,7 +133,7 @@ def _jaws(parts: list[str], x: float, opening: float) -> float:
     return end
 
 
-def _gear(parts: list[str], x: float, ratio: float) -> float:
+def _gear(parts: list[str], x: float, ratio: float, efficiency: float) -> float:
     """Two wheels in mesh, seen from the side, the ratio of their heights that of the gear (within limits)."""
     shown = min(max(ratio, 0.25), 4.0)
     first, second = 40.0 / (1.0 + shown), 40.0 * shown / (1.0 + shown)
@@ -144,6 +145,8 @@ def _gear(parts: list[str], x: float, ratio: float) -> float:
             'stroke-width="1.6" stroke-dasharray="2.5 1.5"/>'
         )
     parts.append(_text(x + 13.5, _AXIS + 56.0, f"{_number(ratio)} : 1", size=10, colour=_BLUE))
+    if efficiency < 1.0:
+        parts.append(_text(x + 13.5, _AXIS + 69.0, f"η {efficiency:.3g}", size=10, colour=_BLUE))
     parts.append(_line(x + 21.0, _AXIS, x + 27.0, _AXIS))
     return x + 27.0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Mapping
 from numbers import Integral, Real
 
@@ -16,9 +15,10 @@ from softstart.chain.kernel_input import Numbers, numbers
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.run import ChainRun
-from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
+from softstart.engine import answer_of
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as plant
 from softstart.plant import start as sensing
@@ -45,8 +45,10 @@ def simulate_chain(
     """Simulate the start of a chain under a controller, exactly.
 
     Between two events the chain is linear: its Taylor series are summed to the last digit, and events are
-    certified first roots of them. A shaft without a gap is a spring that pulls too. Rigid gaps close by
-    impacts, angular momentum kept; those that pile up are followed to their known end, when the flanks press.
+    certified first roots of them. A shaft without a gap is a spring that pulls too. A gear with losses passes
+    on its share of the torque in the direction of the power, and holds its mass at rest in between
+    (`softstart.chain.kernel_gears`). Rigid gaps close by impacts, angular momentum kept; those that pile up
+    are followed to their known end, when the flanks press.
 
     Parameters
     ----------
@@ -177,33 +179,10 @@ def _run(controller: Controller, drive: Drive, given: Numbers, book: _Book, unti
             given.p, x, m, sees, given.place, given.masses, given.shafts, given.tones, book.mass, book.shaft,
             book.series, book.lines, measured,
         )  # fmt: skip
-        torque, ask_again, state, slope = _answer(controller, Measured(*measured.tolist()), state)
+        torque, ask_again, state, slope = answer_of(controller, measured, state, x[plant.TIME])
         taken: int = sensing.obey(given.p, x, m, torque, ask_again, slope)
         if taken != plant.ASK:
             return taken
-
-
-def _answer(
-    controller: PlainController, measured: Measured, state: tuple[float, ...]
-) -> tuple[float, float, tuple[float, ...], float]:
-    """What a plain controller answers; the user's own code may fail in any way."""
-    try:
-        answer = controller.step(measured, state)
-    except (Exception, SystemExit) as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        raise SimulationError(
-            f"The start was given up: the controller {type(controller).__name__} failed at "
-            f"t = {measured.time:.6g} s in {place.filename}, line {place.lineno} "
-            f"({type(error).__name__}: {error})."
-        ) from error
-    try:
-        slope = float(answer[3]) if len(answer) > 3 else 0.0
-        return float(answer[0]), float(answer[1]), tuple(answer[2]), slope
-    except (TypeError, IndexError, ValueError):
-        raise InputError(
-            f"controller {type(controller).__name__}: its step answered {answer!r}; "
-            "answer with Command(torque, ask_again, state, slope)."
-        ) from None
 
 
 def _check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
@@ -218,9 +197,12 @@ def _check_end(chain: Chain, controller: object, until: float | None, given: Num
         raise InputError(
             "until is missing: without motor and target speed nothing else ends the run; give it in s."
         )
+    arrays = chain.at_motor_shaft()
+    load = float((arrays.Mc / arrays.efficiency_from_motor).sum())
+    lossy = " and through its gears" if (arrays.efficiency < 1.0).any() else ""
     raise InputError(
-        f"starting_torque: it is not above the load torques, {given.masses[:, at.MC].sum():.6g} N*m at the "
-        "motor shaft, so the load may never reach its target speed; give until or time_limit."
+        f"starting_torque: it is not above the load torques, {load:.6g} N*m at the motor "
+        f"shaft{lossy}, so the load may never reach its target speed; give until or time_limit."
     )
 
 

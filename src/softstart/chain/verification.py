@@ -70,6 +70,7 @@ class Verification:
             "k_dyn_error": self.error,
             "worst_k_dyn": self.worst_k_dyn,
             "worst_shaft": self.worst_place,
+            "gear_losses": self.chain.energy.gears,
             "chain": self.chain.summary(),
         }
 

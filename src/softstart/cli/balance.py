@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
+from softstart.cli.completing import Keys, names_or_files, table_keys
+from softstart.cli.completing import settings as settings_of
 from softstart.cli.folder import output_folder
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command
@@ -19,15 +20,22 @@ if TYPE_CHECKING:
 DEFAULT_ENGINE = "vaz-11113"
 
 
-def _engines(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def _engines() -> Iterable[str]:
     from softstart.balancing.files import names
 
-    found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
-    return found or [CompletionItem(incomplete, type="file")]
+    return names()
+
+
+def _keys() -> Keys:
+    from softstart.balancing.tables import TABLES
+
+    return table_keys(TABLES)
 
 
 @click.command(cls=Command)
-@click.argument("engine", metavar="[ENGINE]", default=DEFAULT_ENGINE, shell_complete=_engines)
+@click.argument(
+    "engine", metavar="[ENGINE]", default=DEFAULT_ENGINE, shell_complete=names_or_files(_engines, ".toml")
+)
 @click.option(
     "--speed",
     "speeds",
@@ -40,6 +48,7 @@ def _engines(ctx: click.Context, param: click.Parameter, incomplete: str) -> lis
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=settings_of(_keys),
     help="Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5. May be "
     "repeated.",
 )

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart import __version__
+from softstart.cli.compare_report import markdown, markdown_table
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import markdown, markdown_table
 
 if TYPE_CHECKING:
     from softstart.balancing import Balance

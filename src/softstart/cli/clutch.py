@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
+from softstart.cli.completing import Keys, names_or_files, table_keys
+from softstart.cli.completing import settings as settings_of
 from softstart.cli.folder import output_folder
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command, did_you_mean
@@ -20,26 +21,32 @@ DEFAULT_CLUTCH = "paper-c"
 DEFAULT_POINTS = 8
 
 
-def _clutches(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def _clutches() -> Iterable[str]:
     from softstart.clutch import library
 
-    found = [CompletionItem(name) for name in library.names() if name.startswith(incomplete)]
-    return found or [CompletionItem(incomplete, type="file")]
+    return library.names()
 
 
-def _laws(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def _laws() -> Iterable[str]:
     from softstart.clutch.laws import LAWS
 
-    found = [CompletionItem(name) for name in LAWS if name.startswith(incomplete)]
-    return found or [CompletionItem(incomplete, type="file")]
+    return LAWS
+
+
+def _keys() -> Keys:
+    from softstart.clutch.parameters import TABLES
+
+    return table_keys(TABLES)
 
 
 @click.command(cls=Command)
-@click.argument("clutch", metavar="[CLUTCH]", default=DEFAULT_CLUTCH, shell_complete=_clutches)
+@click.argument(
+    "clutch", metavar="[CLUTCH]", default=DEFAULT_CLUTCH, shell_complete=names_or_files(_clutches, ".toml")
+)
 @click.option(
     "--law",
     metavar="NAME|FILE",
-    shell_complete=_laws,
+    shell_complete=names_or_files(_laws, ".csv"),
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
     "and friction torque. By default that of the clutch file.",
 )
@@ -48,6 +55,7 @@ def _laws(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[C
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=settings_of(_keys),
     help="Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'. May be "
     "repeated.",
 )

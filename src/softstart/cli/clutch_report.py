@@ -14,8 +14,8 @@ from softstart.cli.clutch_text import (
     law_columns,
     point_columns,
 )
+from softstart.cli.compare_report import markdown, markdown_table
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import markdown, markdown_table
 from softstart.figures import save_figure
 
 if TYPE_CHECKING:

@@ -8,11 +8,14 @@ from softstart import __version__
 from softstart.cli.balance import balance
 from softstart.cli.clutch import clutch
 from softstart.cli.compare import compare
+from softstart.cli.completion import completion
 from softstart.cli.linear import linear
 from softstart.cli.lists import controllers, drives
 from softstart.cli.optimize import optimize
 from softstart.cli.pareto import pareto
 from softstart.cli.reduce import reduce
+from softstart.cli.report import report
+from softstart.cli.serve import serve
 from softstart.cli.simulate import simulate
 from softstart.cli.study import study
 from softstart.cli.sweep import sweep
@@ -20,24 +23,20 @@ from softstart.cli.tune import tune
 from softstart.cli.usage import HELP_NAMES, Commands
 
 GREETING = f"""\
-softstart {__version__}: start a drive with a gap in its transmission gently, and quickly.
+softstart {__version__}: start a drive with a gap in its transmission gently and fast.
 
-  softstart compare                              strategies side by side on the crane drive of the literature
-  softstart drives crane-4amtkf > mine.toml      a drive of your own: change the file, then
-  softstart compare mine.toml --out results        compare on it, with figures, traces and a report
-  softstart optimize --start-time 1.2x           the gentlest start there can be, as a torque profile
-  softstart tune --controller ramp               its gains for each gap and inertia, and one set for all
-  softstart reduce --verify direct,ramp          a chain of masses as the drive that stands for it
-  softstart study                                what the papers claim, confirmed or refuted with numbers
+  softstart compare                      strategies side by side: K_dyn and time
+  softstart optimize --start-time 1.2x   the gentlest start there can be
+  softstart serve                        see it and try it in the browser
 
+For a drive of your own, give its file to any of them:
+softstart drives crane-4amtkf > mine.toml makes one to edit.
 softstart --help lists all commands."""
 
 EPILOG = """\
 Exit codes: 0 done, 2 bad input or usage, 3 no solution, 130 interrupted.
 
-\b
-Completion of names, in bash (also zsh_source, fish_source):
-  eval "$(_SOFTSTART_COMPLETE=bash_source softstart)"
+The Tab key completes names after: eval "$(softstart completion bash)", or zsh, or fish.
 """
 
 
@@ -67,8 +66,11 @@ for command in (
     reduce,
     clutch,
     balance,
+    report,
+    serve,
     drives,
     controllers,
     study,
+    completion,
 ):
     cli.add_command(command)

@@ -16,10 +16,12 @@ from softstart.cli.options import (
     controller_names,
     controller_option,
     drive_argument,
+    fitted_to_option,
     json_option,
     out_option,
     param_option,
     read_drive,
+    read_fitted_to,
     read_names,
     read_params_of,
     read_until,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     "Controllers, with commas between. By default all installed ones that need no parameter.",
 )
 @set_option
+@fitted_to_option
 @param_option(
     "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
 )
@@ -54,6 +57,7 @@ def compare(
     drive: str,
     controllers: str | None,
     settings: tuple[str, ...],
+    fitted_to: str | None,
     params: tuple[str, ...],
     until: str | None,
     as_json: bool,
@@ -74,6 +78,8 @@ def compare(
     with mistakes.noted():
         given = read_params_of(params, names)
     with mistakes.noted():
+        nominal = read_fitted_to(fitted_to)
+    with mistakes.noted():
         end = read_until(until)
     mistakes.settle()
 
@@ -89,9 +95,9 @@ def compare(
             from softstart.comparison import compare as compare_controllers
 
             with Attributed():
-                comparison = compare_controllers(one, made, until=end)
+                comparison = compare_controllers(one, made, until=end, fitted_to=nominal)
         if folder is not None:
-            from softstart.cli.report import write_comparison
+            from softstart.cli.compare_report import write_comparison
 
             with working("drawing the figures ..."):
                 write_comparison(comparison, folder, command_line())
@@ -172,9 +178,10 @@ def footnotes(comparison: Comparison) -> list[str]:
     """What the columns mean, and which starts did not end as they should."""
     run = comparison.rows[0].run
     base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
+    own = "this drive" if comparison.fitted_to is None else f'"{comparison.fitted_to.name}"'
     notes = [
         f"K_dyn = peak shaft torque / {base:.4g} N m, the mean shaft torque under full starting torque. "
-        "K gap x4, K J2 x0.4: the controller set up for this drive, when the gap is 4 times as wide or "
+        f"K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or "
         "the load inertia 0.4 times as large."
     ]
     notes += [
@@ -190,7 +197,7 @@ def _show(to: Console, comparison: Comparison, by_peak: bool) -> None:
     if by_peak:
         rows.sort(key=lambda row: row.run.k_dyn)
     best = [rows.index(comparison.gentlest)]
-    for index, line in enumerate(drive_lines(comparison.drive)):
+    for index, line in enumerate(drive_lines(comparison.drive, comparison.fitted_to)):
         sentence(to, line, "bold" if index == 0 else "")
     to.print()
     columns, cells = columns_and_rows(rows)

@@ -231,7 +231,7 @@ def _show(to: Console, view: LinearView) -> None:
 
 def write_linear(view: LinearView, folder: Path, command: str) -> None:
     """The files of --out."""
-    from softstart.cli.report import drive_table, markdown, markdown_table, provenance
+    from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
 
     parts = [f"# {markdown(view.drive.name)}: loop of {markdown(view.name)}"]
     if view.margins is None:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.completing import controllers as controllers_known
+from softstart.cli.completing import names_or_files
 from softstart.cli.options import Mistakes, check_name, controller_names, drive_names, json_option
 from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Command)
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=names_or_files(drive_names))
 @json_option
 def drives(name: str | None, as_json: bool) -> None:
     """List the shipped drives, or print one as TOML.
@@ -56,7 +58,7 @@ def _values(drive: Any) -> dict[str, Any]:
 
 
 @click.command(cls=Command)
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=controllers_known)
 @json_option
 def controllers(name: str | None, as_json: bool) -> None:
     """List the controllers, or tell the parameters of one.

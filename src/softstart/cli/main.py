@@ -16,6 +16,7 @@ from softstart.errors import InputError, SimulationError
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
+UNHEARD = 0.5  # s after which a stop that nobody handles is repeated
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,13 +31,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     if arguments is None:
         sys.excepthook = _own_mistake
-        signal.signal(signal.SIGTERM, _terminated)
+        signal.signal(signal.SIGTERM, _stop)
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+            signal.signal(signal.SIGINT, _stop)
         _never_fail_on_letters()
     try:
         code = _run(given)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return _say(["interrupted; nothing half-written was left behind."], INTERRUPTED)
+        return _said_interrupted()
+    except SystemError as error:
+        if _is_stop(error):  # it came while compiled code looked at its arguments
+            return _said_interrupted()
+        raise
     except click.UsageError as error:
         return _say([usage_sentence(error)], BAD_INPUT)
     except InputError as error:
@@ -51,7 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _say([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
     except MemoryError:
         return _say(["there is not enough memory for this."], NO_SOLUTION)
+    finally:
+        _stop_is_heard()
     return code
+
+
+def _said_interrupted() -> int:
+    _stop_is_heard()
+    return _say(["interrupted; nothing half-written was left behind."], INTERRUPTED)
 
 
 def _run(arguments: list[str]) -> int:
@@ -97,8 +111,30 @@ def _never_fail_on_letters() -> None:
             reconfigure(errors="replace")
 
 
-def _terminated(number: int, frame: FrameType | None) -> None:
+def _stop(number: int, frame: FrameType | None) -> None:
+    """Ctrl-C or TERM. Where no exception can pass (callbacks of compiled libraries) it is lost: so again."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _stop_again)
+        signal.setitimer(signal.ITIMER_REAL, UNHEARD, UNHEARD)
     raise KeyboardInterrupt
+
+
+def _stop_again(number: int, frame: FrameType | None) -> None:
+    if not _is_stop(sys.exc_info()[1]):  # else it is heard, and cleans up
+        raise KeyboardInterrupt
+
+
+def _is_stop(error: BaseException | None) -> bool:
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _stop_is_heard() -> None:
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def _own_mistake(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:

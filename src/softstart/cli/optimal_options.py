@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from softstart.cli.usage import did_you_mean
 from softstart.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
-    from softstart.drive import Drive
+    pass
 
 METHODS = ("auto", "closed-form", "collocation", "lp")
 OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
@@ -215,19 +214,6 @@ def as_option(sentence: str) -> str:
 
 
 # what comes of them --------------------------------------------------------------------------------------
-
-
-def start_time_of_direct(drive: Drive) -> float:
-    """Start time of the drive under its constant starting torque, s. Raises SimulationError without one."""
-    from softstart.simulation import simulate
-
-    run = simulate(drive, "direct")
-    if math.isnan(run.start_time):
-        raise SimulationError(
-            f"direct does not bring this load to its target speed ({run.status.value[:-1]}); "
-            "give start times in s instead of multiples."
-        )
-    return run.start_time
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import drive_table, markdown, markdown_table, provenance
 
 if TYPE_CHECKING:
     from softstart.optimal.front import Front

@@ -23,7 +23,6 @@ from softstart.cli.optimal_options import (
     read_quantities,
     read_start_time,
     smoothness_option,
-    start_time_of_direct,
     terminal_option,
     torque_speed_option,
 )
@@ -40,6 +39,7 @@ from softstart.cli.options import (
 )
 from softstart.cli.usage import Command
 from softstart.errors import InputError, SimulationError
+from softstart.optimal.direct import start_time_of_direct
 
 if TYPE_CHECKING:
     from softstart.drive import Drive

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from softstart.cli.folder import output_folder
-from softstart.cli.optimal_options import Asked, named_as_options, no_solution_told, start_time_of_direct
+from softstart.cli.optimal_options import Asked, named_as_options, no_solution_told
 from softstart.cli.options import command_line
+from softstart.optimal.direct import start_time_of_direct
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import shlex
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
+from softstart.cli.completing import controllers, drive_keys, files_only, names_or_files, parameters
+from softstart.cli.completing import settings as settings_of
 from softstart.cli.usage import did_you_mean
 from softstart.errors import InputError
 from softstart.plugins import registered
@@ -58,17 +59,6 @@ class Mistakes:
 # the options ---------------------------------------------------------------------------------------------
 
 
-def _starting(names: Callable[[], Iterable[str]]) -> Callable[..., list[CompletionItem]]:
-    """Shell completion from a list of names, after the last comma; files are offered beside them."""
-
-    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        done, comma, begun = incomplete.rpartition(",")
-        found = [CompletionItem(done + comma + name) for name in names() if name.startswith(begun)]
-        return found or [CompletionItem(incomplete, type="file")]
-
-    return complete
-
-
 def drive_names() -> tuple[str, ...]:
     """Names of the shipped drives."""
     from softstart.drive import library
@@ -84,7 +74,7 @@ def controller_names() -> tuple[str, ...]:
 
 def drive_argument(default: str | None = None) -> Decorator:
     """DRIVE: a TOML file or the name of a shipped drive."""
-    complete = _starting(drive_names)
+    complete = names_or_files(drive_names, ".toml")
     if default is None:
         return click.argument("drive", metavar="DRIVE", shell_complete=complete)
     return click.argument("drive", metavar="[DRIVE]", default=default, shell_complete=complete)
@@ -92,9 +82,7 @@ def drive_argument(default: str | None = None) -> Decorator:
 
 def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
     """An option that takes one or more controllers."""
-    return click.option(
-        name, metavar=metavar, required=required, help=text, shell_complete=_starting(controller_names)
-    )
+    return click.option(name, metavar=metavar, required=required, help=text, shell_complete=controllers)
 
 
 set_option = click.option(
@@ -102,12 +90,20 @@ set_option = click.option(
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=settings_of(drive_keys),
     help="Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'. May be repeated.",
 )
 until_option = click.option(
     "--until",
     metavar="TIME",
     help="End of the run, as 0.5 (s) or '500 ms'. By default one elastic period after the start time.",
+)
+fitted_to_option = click.option(
+    "--fitted-to",
+    metavar="DRIVE",
+    shell_complete=names_or_files(drive_names, ".toml"),
+    help="The drive for which the controllers are set up, a file or shipped name, if not the one they run: "
+    "how robust are they? --set changes the drive that runs, not this one.",
 )
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print one JSON object on standard output and nothing else."
@@ -116,16 +112,14 @@ json_option = click.option(
 
 def param_option(metavar: str, text: str) -> Decorator:
     """--param, which differs between one controller and several."""
-    return click.option("--param", "params", metavar=metavar, multiple=True, help=text)
+    return click.option(
+        "--param", "params", metavar=metavar, multiple=True, help=text, shell_complete=parameters
+    )
 
 
 def out_option(text: str) -> Decorator:
     """--out DIR."""
-    return click.option("--out", metavar="DIR", help=text, shell_complete=_directories)
-
-
-def _directories(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    return [CompletionItem(incomplete, type="dir")]
+    return click.option("--out", metavar="DIR", help=text, shell_complete=files_only())
 
 
 def command_line() -> str:
@@ -149,6 +143,16 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
             "one at a time; give one value a key (softstart.simulate in Python takes batches)."
         )
     return drive
+
+
+def read_fitted_to(name: str | None) -> Drive | None:
+    """The drive of --fitted-to, None without it."""
+    if name is None:
+        return None
+    try:
+        return read_drive(name, ())
+    except InputError as error:
+        raise InputError([f"--fitted-to: {sentence}" for sentence in error.sentences]) from error
 
 
 def read_until(text: str | None) -> float | None:
@@ -212,11 +216,15 @@ def read_names(text: str | None, option: str = "--controllers") -> list[str] | N
     return names
 
 
-def check_name(name: str, option: str) -> str:
+def check_name(name: str, option: str, several: str = "") -> str:
     """The name, if it is that of an installed controller or leads to a file that is there.
 
-    Such a file holds Python code, or tuned gains as TOML or CSV.
+    Such a file holds Python code, or tuned gains as TOML or CSV. `several` says what to do with more than one
+    controller, where one is asked for.
     """
+    if several and "," in name and not Path(name.partition(".py")[0] + ".py").is_file():
+        names = ",".join(part.strip() for part in name.split(",") if part.strip())
+        raise InputError(f'{option} = "{name}": give one controller here; {several}{names}.')
     if ".py" in name:
         path = Path(name[: name.index(".py") + 3])
         if not path.is_file():

@@ -20,7 +20,6 @@ from softstart.cli.optimal_options import (
     read_choice,
     read_corners,
     read_start_times,
-    start_time_of_direct,
     terminal_option,
     torque_speed_option,
 )
@@ -38,6 +37,7 @@ from softstart.cli.options import (
 )
 from softstart.cli.usage import Command
 from softstart.errors import SimulationError
+from softstart.optimal.direct import start_time_of_direct
 
 if TYPE_CHECKING:
     from rich.console import Console

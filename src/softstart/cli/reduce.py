@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
+from softstart.cli.completing import Keys, names_or_files, table_keys
+from softstart.cli.completing import settings as settings_of
 from softstart.cli.folder import output_folder
 from softstart.cli.optimal_options import read_choice, read_positive
 from softstart.cli.options import (
@@ -16,8 +17,10 @@ from softstart.cli.options import (
     controller_option,
     json_option,
     out_option,
+    param_option,
     read_changes,
     read_names,
+    read_params_of,
 )
 from softstart.cli.usage import Command
 from softstart.errors import InputError
@@ -30,15 +33,22 @@ DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")
 
 
-def _chains(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def _chains() -> Iterable[str]:
     from softstart.chain.files import names
 
-    found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
-    return found or [CompletionItem(incomplete, type="file")]
+    return names()
+
+
+def _keys() -> Keys:
+    from softstart.chain.tables import TABLES
+
+    return table_keys(TABLES)
 
 
 @click.command(cls=Command)
-@click.argument("chain", metavar="[CHAIN]", default=DEFAULT_CHAIN, shell_complete=_chains)
+@click.argument(
+    "chain", metavar="[CHAIN]", default=DEFAULT_CHAIN, shell_complete=names_or_files(_chains, ".toml")
+)
 @click.option("--to", metavar="N", help="Number of masses to reduce to. By default 2, a drive.")
 @click.option(
     "--up-to",
@@ -63,6 +73,7 @@ def _chains(ctx: click.Context, param: click.Parameter, incomplete: str) -> list
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=settings_of(_keys),
     help="Change a value of the chain, as mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2. May be "
     "repeated.",
 )
@@ -70,6 +81,10 @@ def _chains(ctx: click.Context, param: click.Parameter, incomplete: str) -> list
     "--verify",
     "A,B,...",
     "Controllers to set up for the drive and to start on the drive and on the whole chain.",
+)
+@param_option(
+    "CONTROLLER.KEY=VALUE",
+    "Set a parameter of a controller to verify, as ramp.time='0.2 s'. May be repeated.",
 )
 @json_option
 @out_option(
@@ -85,6 +100,7 @@ def reduce(
     force: bool,
     settings: tuple[str, ...],
     verify: str | None,
+    params: tuple[str, ...],
     as_json: bool,
     out: str | None,
 ) -> None:
@@ -113,10 +129,15 @@ def reduce(
     names: Sequence[str] | None = None
     with mistakes.noted():
         names = read_names(verify, "--verify")
+    given: dict[str, dict[str, Any]] = {}
+    with mistakes.noted():
+        if params and names is None:
+            raise InputError("--param: it sets up a controller of --verify; name that, as --verify ramp.")
+        given = read_params_of(params, names or ())
     mistakes.settle()
     assert one is not None
 
-    from softstart.cli.reduce_verify import check, verified
+    from softstart.cli.reduce_verify import check, verdict, verified
     from softstart.cli.running import working
 
     with output_folder(out) as folder:
@@ -127,7 +148,7 @@ def reduce(
         done: list[Verification] = []
         if names:
             with working("starting the drive and the chain ..."):
-                done = verified(found, names)
+                done = verified(found, names, given)
         if folder is not None:
             from softstart.cli.reduce_report import write_reduction
 
@@ -138,7 +159,8 @@ def reduce(
     from softstart.cli.show import console, print_json
 
     if as_json:
-        print_json({**summary(found, beside), "verified": [one.summary() for one in done]})
+        verification = {"verified": [one.summary() for one in done], "verdict": verdict(done)}
+        print_json({**summary(found, beside), **verification})
         return
     show_reduction(console(), found, beside, done)
     if out is not None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softstart import __version__
+from softstart.cli.compare_report import markdown, markdown_table
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import markdown, markdown_table
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
@@ -23,6 +23,7 @@ def write_reduction(
     from softstart.chain.scheme import scheme_svg
     from softstart.cli.reduce import makes_drive
     from softstart.cli.reduce_text import chain_lines, conclusion, footnotes, tables
+    from softstart.cli.reduce_verify import caution
     from softstart.figures import save_figure
 
     vibration = found.whole_vibration
@@ -57,6 +58,8 @@ def write_reduction(
             f"## {markdown(shown.title)}",
             markdown_table(headings, shown.rows, numbers_from=shown.texts),
         ]
+    if said := caution(done):
+        parts.append(markdown(said))
     parts += [f"![{stem}]({stem}.svg)" for stem in pictures]
     starts = ", [verified.csv](verified.csv)" if done else ""
     parts += [

@@ -187,6 +187,7 @@ def show_reduction(
     to: Console, found: Reduction, beside: Reduction | None, done: Sequence[Verification] = ()
 ) -> None:
     """All of it."""
+    from softstart.cli.reduce_verify import caution
     from softstart.cli.show import Column, print_table, sentence
 
     for index, line in enumerate(chain_lines(found.chain)):
@@ -195,6 +196,8 @@ def show_reduction(
         to.print()
         columns = [Column(name, i >= shown.texts) for i, name in enumerate(shown.headings)]
         print_table(to, columns, shown.rows, title=shown.title)
+    if said := caution(done):
+        sentence(to, said, "bold")
     to.print()
     sentence(to, conclusion(found), "bold")
     for note in footnotes(found):

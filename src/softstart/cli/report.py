@@ -1,140 +1,230 @@
-"""The files of --out: figures, traces, tables and a report that ties them together."""
+"""`softstart report`: one HTML file for a customer."""
 
 from __future__ import annotations
 
-import platform
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from softstart import __version__
-from softstart.cli.folder import file_stem, write_table, write_text
+import click
+
+from softstart.cli.options import (
+    DEFAULT_DRIVE,
+    Mistakes,
+    command_line,
+    controller_names,
+    controller_option,
+    drive_argument,
+    json_option,
+    param_option,
+    read_drive,
+    read_names,
+    read_params_of,
+    set_option,
+)
+from softstart.cli.usage import Command
+from softstart.errors import InputError
 
 if TYPE_CHECKING:
-    from softstart.comparison import Comparison
+    from rich.console import Console
+
     from softstart.drive import Drive
-    from softstart.run import Run
+    from softstart.reporting import Report
 
 
-def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
-    """Everything about a comparison."""
-    from softstart.cli.compare import columns_and_rows, conclusion, footnotes, name_of
-    from softstart.figures import comparison_figure, save_figure, trade_off_figure
+@click.command(cls=Command)
+@drive_argument(default=DEFAULT_DRIVE)
+@click.option(
+    "--out",
+    metavar="FILE",
+    help="The HTML file to write, as report.html. Without it (then give --json) only the numbers are made.",
+)
+@controller_option(
+    "--controllers",
+    "A,B,...",
+    "Strategies to examine, files of tuned gains among them. By default all that need no parameter.",
+)
+@set_option
+@param_option(
+    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
+)
+@click.option(
+    "--resolution",
+    metavar="KEY=STEP,...",
+    help="Steps in which the inverter can be set, as torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,"
+    "share=1%. "
+    "Torque in % of the rated torque or in N*m. By default 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.",
+)
+@click.option(
+    "--slower",
+    metavar="SHARE",
+    help="By how much longer than direct start the recommended one may take, as 15% (the default) or 0.15.",
+)
+@click.option(
+    "--budget",
+    metavar="TIME",
+    help="Time for the search of optima where there is no formula, as 60 (s). By default 20 s; 0 for none.",
+)
+@json_option
+def report(
+    *,
+    drive: str,
+    out: str | None,
+    controllers: str | None,
+    settings: tuple[str, ...],
+    params: tuple[str, ...],
+    resolution: str | None,
+    slower: str | None,
+    budget: str | None,
+    as_json: bool,
+) -> None:
+    """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
 
-    rows = comparison.rows
-    runs = [row.run for row in rows]
-    name = comparison.drive.name
-    pictures = {"comparison": comparison_figure(runs, name)}
-    points = [
-        (name_of(r), r.run.start_time, r.run.k_dyn) for r in rows if r.run.start_time == r.run.start_time
-    ]
-    if points:
-        pictures["trade-off"] = trade_off_figure(points, name)
-    for stem, figure in pictures.items():
-        save_figure(figure, folder, stem)
-    stems: list[str] = []
-    for row in rows:
-        stems.append(file_stem(name_of(row), stems))
-        _write_run(row.run, folder, stems[-1])
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. The report recommends a strategy and gives its parameters, rounded to what the
+    inverter can be set to and started again after rounding.
+    """
+    mistakes = Mistakes()
+    one: Drive | None = None
+    names: Sequence[str] | None = None
+    given: dict[str, dict[str, str]] = {}
+    asked: dict[str, Any] = {}
+    with mistakes.noted():
+        _check_out(out, as_json)
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    with mistakes.noted():
+        names = read_names(controllers)
+    with mistakes.noted():
+        given = read_params_of(params, names or controller_names())
+    if resolution is not None:
+        from softstart.reporting.resolution import Resolution
 
-    summaries = [row.summary() for row in rows]
-    keys = [key for key in summaries[0] if key not in ("parameters", "status_text")]
-    write_text(folder / "drive.toml", comparison.drive.to_toml())
-    write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
+        with mistakes.noted():
+            asked["resolution"] = Resolution.read(resolution, "--resolution")
+    for name, text, read in (("slower", slower, _share), ("budget", budget, _seconds)):
+        if text is not None:
+            with mistakes.noted():
+                asked[name] = read(text)
+    mistakes.settle()
+    assert one is not None
 
-    columns, cells = columns_and_rows(rows)
-    headings = [" ".join(column.heading.split()) for column in columns]
-    parts = [
-        f"# {markdown(name)}: soft-start strategies compared",
-        conclusion(comparison),
-        markdown_table(headings, cells, numbers_from=1),
-        *footnotes(comparison),
-        *(f"![{stem}]({stem}.svg)" for stem in pictures),
-        "## The drive",
-        drive_table(comparison.drive),
-        "## The strategies",
-        *(_strategy(run, stem) for run, stem in zip(runs, stems, strict=True)),
-        provenance(comparison.drive, command),
-    ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    made, page = _made(one, names, given, asked, out is not None)
+    if out is not None:
+        from softstart.export import write_whole
 
+        write_whole(Path(out), lambda stream: stream.write(page))
 
-def write_start(run: Run, folder: Path, command: str) -> None:
-    """Everything about one start."""
-    from softstart.cli.simulate import EVENT_COLUMNS, STAGE_COLUMNS, event_rows, figure_rows, stage_rows
+    from softstart.cli.show import console, print_json
 
-    stem = file_stem(run.controller.name or type(run.controller).__name__)
-    _write_run(run, folder, stem)
-    write_text(folder / "drive.toml", run.drive.to_toml())
-    write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
-    write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
-    summary = {key: value for key, value in run.summary().items() if key != "parameters"}
-    write_table(folder / "figures.csv", list(summary), [list(summary.values())])
-    parts = [
-        f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
-        run.status.value,
-        markdown_table(["figure", "value"], figure_rows(run), numbers_from=1),
-        _strategy(run, stem),
-        "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
-        "## The drive",
-        drive_table(run.drive),
-        provenance(run.drive, command),
-    ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
-
-
-def _write_run(run: Run, folder: Path, stem: str) -> None:
-    from softstart.figures import save_figure
-
-    save_figure(run.plot(), folder, f"run-{stem}")
-    run.to_csv(folder / f"trace-{stem}.csv")
-
-
-def _strategy(run: Run, stem: str) -> str:
-    cls = type(run.controller)
-    values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
-    summary = f": {markdown(cls.summary)}" if cls.summary else ""
-    return (
-        f"### {markdown(stem)}\n\n{markdown(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
-        f"![{stem}](run-{stem}.svg)\n\nTraces: [trace-{stem}.csv](trace-{stem}.csv)"
-    )
-
-
-def drive_table(drive: Drive) -> str:
-    """All parameters of a drive that are set."""
-    from softstart.drive import PARAMETERS
-
-    rows = []
-    for parameter in PARAMETERS.values():
-        value = getattr(drive, parameter.name)
-        if value is not None and value != "" and parameter.name != "name":
-            shown = f"{value:.10g}" if isinstance(value, float) else str(value)
-            unit = "" if parameter.unit == "1" else parameter.unit
-            rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
-    return markdown_table(["key", "symbol", "value", "unit", "meaning"], rows)
+    if as_json:
+        print_json(made.summary())
+    else:
+        _show(console(), made, str(out))
 
 
-def provenance(drive: Drive, command: str) -> str:
-    """What was run, by what, on which input: enough to do it again."""
-    return (
-        "## Where this comes from\n\n"
-        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
-        f"```sh\n{command}\n```\n\n"
-        "on the drive of [drive.toml](drive.toml), which holds all changes:\n\n"
-        f"```toml\n{drive.to_toml()}```"
-    )
+def _made(
+    drive: Drive,
+    names: Sequence[str] | None,
+    given: dict[str, dict[str, str]],
+    asked: dict[str, Any],
+    drawn: bool,
+) -> tuple[Report, str]:
+    """The report and, if it is `drawn`, its page."""
+    from softstart.cli.running import Attributed, make_controllers, working
+
+    with working("starting the drive ...") as status:
+        from softstart.controller import ready_controller_names
+
+        controllers = make_controllers(names or ready_controller_names(given), given, prefix=True)
+        from softstart.reporting import report as make
+
+        def progress(share: float, what: str) -> None:
+            if status is not None:
+                status.update(f"{100.0 * share:.0f} %: {what} ...")
+
+        with Attributed():
+            made = make(drive, controllers=controllers, progress=progress, command=command_line(), **asked)
+        if status is not None:
+            status.update("drawing the figures ...")
+        return made, made.to_html() if drawn else ""
 
 
-def markdown_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None
-) -> str:
-    """A table in Markdown; columns from `numbers_from` on are set to the right."""
-    first = len(headings) if numbers_from is None else numbers_from
-    rule = ["---" if index < first else "---:" for index in range(len(headings))]
-    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
+def _check_out(out: str | None, as_json: bool) -> None:
+    """Whether the file can be written, found before anything is computed."""
+    if out is None:
+        if not as_json:
+            raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
+        return
+    if not out.strip() or "\0" in out:
+        raise InputError(f"--out = {out!r}: this cannot be the name of a file; write one, as report.html.")
+    path = Path(out)
+    try:
+        if path.is_dir():
+            raise InputError(
+                f'--out = "{out}": this is a folder; name a file in it, as {path / "report.html"}.'
+            )
+        with tempfile.TemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+            pass
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(
+            f'--out = "{out}": the file cannot be written there ({reason}); name one in a folder that is '
+            "there and that you may write to."
+        ) from None
 
 
-def markdown(text: str) -> str:
-    """Text that Markdown leaves as it is, within a table too."""
-    flat = " ".join(text.split())
-    return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+def _share(text: str) -> float:
+    """A share, 0 or more.
+
+    >>> _share("15%"), _share("0.15")
+    (0.15, 0.15)
+    """
+    from softstart.units import to_si
+
+    stripped = text.strip()
+    try:
+        if stripped.endswith("%"):
+            value = float(to_si(stripped[:-1], "1", name="--slower")) / 100.0
+        else:
+            value = float(to_si(stripped, "1", name="--slower"))
+    except InputError:
+        value = -1.0
+    if value < 0.0:
+        raise InputError(f'--slower = "{text}": give a share, as 15% or 0.15, 0 or more.')
+    return value
+
+
+def _seconds(text: str) -> float:
+    """A time in s, 0 or more."""
+    from softstart.units import to_si
+
+    value = float(to_si(text, "s", name="--budget"))
+    if value < 0.0:
+        raise InputError(f'--budget = "{text}": give a time, as 20 or "60 s", or 0 for no search.')
+    return value
+
+
+def _show(to: Console, made: Report, out: str) -> None:
+    from softstart.cli.show import drive_lines, sentence
+    from softstart.reporting.answer import answer
+
+    for index, line in enumerate(drive_lines(made.drive)):
+        sentence(to, line, "bold" if index == 0 else "")
+    to.print()
+    sentence(to, answer(made), "bold")
+    for sheet in made.sheets:
+        if sheet.rounded is None:
+            sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")
+            continue
+        sentence(
+            to,
+            f"{sheet.name}: K_dyn {sheet.exact.k_dyn:.4f} exact, {sheet.rounded.k_dyn:.4f} after rounding"
+            + (f", {sheet.worst_k_dyn:.4f} at most half a step off." if sheet.variants else "."),
+            "dim",
+        )
+    for name, reason in made.failed:
+        sentence(to, f"{name} was left out: {reason}", "dim")
+    to.print()
+    sentence(to, f"Written to {out}: open it in a browser, or print it to A4.")

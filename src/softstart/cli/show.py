@@ -181,8 +181,11 @@ def short(value: float) -> str:
     return f"{value:.6g}"
 
 
-def drive_lines(drive: Drive) -> list[str]:
-    """The drive in a few lines: its name, the parameters that matter, and under which laws it starts."""
+def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
+    """The drive in a few lines: its name, the parameters that matter, and under which laws it starts.
+
+    With `fitted_to`, also for which drive the controllers are set up.
+    """
     extra = []
     if drive.d:
         extra.append(f"d = {short(float(drive.d))} N m s/rad")
@@ -208,4 +211,31 @@ def drive_lines(drive: Drive) -> list[str]:
         f"  load   J2 = {short(float(drive.J2))} kg m2, Mc = {short(float(drive.Mc))} N m, {drive.load_kind}",
         f"  start  to {short(float(drive.target_speed))} rad/s ({rpm:.4g} rpm)",
         *(["  also   " + ", ".join(extra)] if extra else []),
+        *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to is not None else []),
     ]
+
+
+def controllers_set_up(drive: Drive | None, fitted_to: Drive) -> str:
+    """For which drive the controllers are set up, and by what that differs from the one that runs.
+
+    >>> from softstart import Drive
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> controllers_set_up(crane.replace(gap=2.0), crane)
+    'controllers are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
+    """
+    from softstart.drive import PARAMETERS
+
+    found = []
+    for parameter in PARAMETERS.values() if drive is not None else ():
+        there, here = getattr(fitted_to, parameter.name), getattr(drive, parameter.name)
+        if parameter.name not in ("name", "source") and there != here:
+            shown = [_set(value) for value in (there, here)]
+            found.append(f"{parameter.path} {shown[0]} there, {shown[1]} here")
+    most = 6
+    more = f", and {len(found) - most} more" if len(found) > most else ""
+    differs = ": " + "; ".join(found[:most]) + more if found else ""
+    return f'controllers are set up for "{printable(fitted_to.name)}"{differs}'
+
+
+def _set(value: object) -> str:
+    return short(value) if isinstance(value, float) else "not set" if value in (None, "") else str(value)

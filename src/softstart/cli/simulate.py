@@ -15,10 +15,12 @@ from softstart.cli.options import (
     command_line,
     controller_option,
     drive_argument,
+    fitted_to_option,
     json_option,
     out_option,
     param_option,
     read_drive,
+    read_fitted_to,
     read_params,
     read_until,
     set_option,
@@ -29,6 +31,7 @@ from softstart.cli.usage import Command
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from softstart.drive import Drive
     from softstart.run import Run
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
@@ -47,6 +50,7 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 )
 @param_option("KEY=VALUE", "Set a parameter of the controller, as time='200 ms'. May be repeated.")
 @set_option
+@fitted_to_option
 @until_option
 @json_option
 @out_option("Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.")
@@ -56,6 +60,7 @@ def simulate(
     controller: str,
     params: tuple[str, ...],
     settings: tuple[str, ...],
+    fitted_to: str | None,
     until: str | None,
     as_json: bool,
     out: str | None,
@@ -68,9 +73,11 @@ def simulate(
     with mistakes.noted():
         one = read_drive(drive, settings)
     with mistakes.noted():
-        check_name(controller, "--controller")
+        check_name(controller, "--controller", "several are compared: softstart compare --controllers ")
     with mistakes.noted():
         given = read_params(params)
+    with mistakes.noted():
+        nominal = read_fitted_to(fitted_to)
     with mistakes.noted():
         end = read_until(until)
     mistakes.settle()
@@ -83,20 +90,28 @@ def simulate(
             from softstart.simulation import simulate as simulate_start
 
             with Attributed():
-                run = simulate_start(one, made, end)
+                run = simulate_start(one, made, end, fitted_to=nominal)
         if folder is not None:
-            from softstart.cli.report import write_start
+            from softstart.cli.compare_report import write_start
 
             with working("drawing the figure ..."):
-                write_start(run, folder, command_line())
+                write_start(run, folder, command_line(), nominal)
 
     from softstart.cli.show import console, print_json
 
     if as_json:
         stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
-        print_json({**run.summary(), "stages": stages, "events": [asdict(event) for event in run.events]})
+        named = nominal.name if nominal else None
+        print_json(
+            {
+                **run.summary(),
+                "fitted_to": named,
+                "stages": stages,
+                "events": [asdict(event) for event in run.events],
+            }
+        )
     else:
-        _show(console(), run)
+        _show(console(), run, nominal)
         if out is not None:
             print(f"\nWritten to {out}: report.md, figure, traces, stages and events.")
 
@@ -137,10 +152,10 @@ def event_rows(run: Run) -> list[list[object]]:
     return [[event.time, event.kind, event.value] for event in run.events]
 
 
-def _show(to: Console, run: Run) -> None:
+def _show(to: Console, run: Run, fitted_to: Drive | None) -> None:
     from softstart.cli.show import Column, column_of, drive_lines, print_table, sentence
 
-    for index, line in enumerate(drive_lines(run.drive)):
+    for index, line in enumerate(drive_lines(run.drive, fitted_to)):
         sentence(to, line, "bold" if index == 0 else "")
     name = run.controller.name or type(run.controller).__name__
     values = ", ".join(f"{key} = {_value(value)}" for key, value in run.controller.parameters.items())

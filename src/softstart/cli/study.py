@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.completing import studies
 from softstart.cli.folder import file_stem, output_folder, write_table
 from softstart.cli.options import Mistakes, json_option, out_option
 from softstart.cli.usage import Command
@@ -18,11 +19,13 @@ from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_stud
 if TYPE_CHECKING:
     from rich.console import Console
 
+HEADINGS = ("study", "question", "pictures, each as .svg and .png")
+PICTURE_ENDINGS = ("svg", "png")  # as save_figure writes them, which would bring matplotlib along
 MARKS = {Verdict.CONFIRMED: "green", Verdict.REFUTED: "red", Verdict.PARTLY: "yellow"}
 
 
 @click.command(cls=Command)
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=studies)
 @click.option("--list", "only_list", is_flag=True, help="List the studies, as without NAME.")
 @json_option
 @out_option("Write pictures (SVG, PNG) and tables (CSV) into this folder.")
@@ -75,6 +78,12 @@ def write_study(found: Study, result: StudyResult, folder: Path) -> None:
         write_table(folder / "claims.csv", ("statement", "verdict", "evidence"), rows)
 
 
+def _listed(one: Study) -> dict[str, Any]:
+    """A study in the list: `pictures` are names without ending, `files` those that --out writes."""
+    files = [f"{stem}.{ending}" for stem in one.pictures for ending in PICTURE_ENDINGS]
+    return {"name": one.name, "title": one.title, "pictures": one.pictures, "files": files}
+
+
 def _list(as_json: bool) -> None:
     from softstart.cli.show import Column, console, print_json, print_table, sentence
 
@@ -84,13 +93,13 @@ def _list(as_json: bool) -> None:
         with broken.noted():
             found.append(find_study(name))
     if as_json:
-        print_json({"studies": [{"name": s.name, "title": s.title, "pictures": s.pictures} for s in found]})
+        print_json({"studies": [_listed(one) for one in found]})
         return
     to = console()
     rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
-    print_table(to, [Column(heading, False) for heading in ("study", "question", "pictures")], rows)
+    print_table(to, [Column(heading, False) for heading in HEADINGS], rows)
     to.print()
-    sentence(to, "Run one, with its pictures: softstart study NAME --out DIR")
+    sentence(to, "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR")
     for one in broken.sentences:
         sentence(to, one)
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.completing import axes as axes_known
+from softstart.cli.completing import files_only
 from softstart.cli.folder import output_folder
 from softstart.cli.options import (
     DEFAULT_DRIVE,
@@ -20,10 +22,12 @@ from softstart.cli.options import (
     command_line,
     controller_option,
     drive_argument,
+    fitted_to_option,
     json_option,
     out_option,
     param_option,
     read_drive,
+    read_fitted_to,
     read_params,
     read_until,
     set_option,
@@ -53,12 +57,14 @@ AT_MOST = 4.0  # times a second, that the line of progress changes
     metavar="KEY=VALUES",
     multiple=True,
     required=True,
+    shell_complete=axes_known,
     help="An axis of the grid: a parameter of the drive, as shaft.gap=0.25:4:100 (from:to:count, with :log "
     "behind in equal ratios) or load.kind=active,reactive, or of the controller, as controller.torque='10 "
     "N*m,20 N*m'. To be repeated.",
 )
 @param_option("KEY=VALUE", "A parameter of the controller, the same for all starts. May be repeated.")
 @set_option
+@fitted_to_option
 @until_option
 @click.option(
     "--figures", metavar="A,B,...", help="Figures to keep, as k_dyn,start_time; the status always is."
@@ -66,7 +72,12 @@ AT_MOST = 4.0  # times a second, that the line of progress changes
 @click.option("--workers", metavar="N", help="Processes on this machine. By default one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead.")
 @click.option("--chunk", metavar="N", help="Most starts that are computed and written at a time.")
-@click.option("--netcdf", metavar="FILE", help="Also write the finished results as netCDF.")
+@click.option(
+    "--netcdf",
+    metavar="FILE",
+    shell_complete=files_only(".nc"),
+    help="Also write the finished results as netCDF.",
+)
 @json_option
 @out_option(
     f"Write the results chunk by chunk into DIR/{RESULTS}, and figure, table and report.md beside it: the "
@@ -79,6 +90,7 @@ def sweep(
     axes: tuple[str, ...],
     params: tuple[str, ...],
     settings: tuple[str, ...],
+    fitted_to: str | None,
     until: str | None,
     figures: str | None,
     workers: str | None,
@@ -101,13 +113,15 @@ def sweep(
         one = read_drive(drive, settings)
     with mistakes.noted():
         if controller is not None:
-            check_name(controller, "--controller")
+            check_name(controller, "--controller", "several are an axis: --axis controller=")
         elif not any(text.partition("=")[0].strip() == "controller" for text in axes):
             raise InputError(
                 "--controller is missing: name one, or make an axis of several, as controller=direct,ramp."
             )
     with mistakes.noted():
         values = read_params(params)
+    with mistakes.noted():
+        asked["fitted_to"] = read_fitted_to(fitted_to)
     with mistakes.noted():
         asked["until"] = read_until(until)
     for option, text in (("workers", workers), ("chunk", chunk)):
@@ -129,27 +143,30 @@ def sweep(
             if folder is not None:
                 from softstart.cli.sweep_report import write_sweep
 
-                write_sweep(results, summary, one, folder, command_line())
+                write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
 
     from softstart.cli.show import console, print_json
+    from softstart.cli.sweep_cells import MOST_SHOWN, cell_rows
     from softstart.cli.sweep_text import axis_summary, show
 
     if as_json:
         print_json(
             {
                 "drive": one.name,
+                "fitted_to": asked["fitted_to"].name if asked["fitted_to"] else None,
                 "controller": controller,
                 "axes": axis_summary(results),
                 **summary.summary(),
+                "cells": list(cell_rows(results)) if summary.starts <= MOST_SHOWN else None,
                 "seconds": time.monotonic() - begin,
                 "computed": last.done - last.before if last else 0,
                 "results": None if to is None else str(to),
             }
         )
         return
-    show(console(), one, results, summary, last)
+    show(console(), one, asked["fitted_to"], results, summary, last)
     if out is not None:
-        print(f"\nWritten to {out}: {RESULTS}, report.md, the figure and the table.")
+        print(f"\nWritten to {out}: {RESULTS}, report.md, the figure and the tables.")
 
 
 def _computed(
@@ -209,13 +226,13 @@ def as_option(sentence: str) -> str:
     >>> as_option("to = here/sweep.zarr: it holds ..."), as_option("chunk = 3: ...; leave chunk out to go on")
     ('--out: here/sweep.zarr: it holds ...', '--chunk = 3: ...; leave --chunk out to go on')
     """
-    found = re.match(r"(to|netcdf|scheduler|workers|chunk|figures|grid)\b", sentence)
+    found = re.match(r"(to|netcdf|scheduler|workers|chunk|figures|grid|fitted_to)\b", sentence)
     if found is None:
         return sentence
     word = found[1]
     if word == "to":
         return "--out: " + sentence.removeprefix("to = ")
-    option = "--axis" if word == "grid" else f"--{word}"
+    option = "--axis" if word == "grid" else f"--{word.replace('_', '-')}"
     return re.sub(rf"\b{word}(?= =|:|,| out\b)", option, sentence)
 
 

@@ -5,8 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softstart.cli.compare_report import (
+    drive_table,
+    markdown,
+    markdown_table,
+    provenance,
+    write_fitted_to,
+)
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import drive_table, markdown, markdown_table, provenance
 
 if TYPE_CHECKING:
     import xarray
@@ -22,8 +28,16 @@ results = xarray.open_zarr("sweep.zarr")
 ```"""
 
 
-def write_sweep(results: xarray.Dataset, summary: Summary, drive: Drive, folder: Path, command: str) -> None:
+def write_sweep(
+    results: xarray.Dataset,
+    summary: Summary,
+    drive: Drive,
+    folder: Path,
+    command: str,
+    fitted_to: Drive | None,
+) -> None:
     """Everything that sums a sweep up."""
+    from softstart.cli.sweep_cells import FILE, MOST_SHOWN, cell_table, write_cells
     from softstart.cli.sweep_text import axis_columns, conclusion, endings, figure_columns
     from softstart.figures import save_figure
     from softstart.sweeping.pictures import sweep_figure
@@ -32,6 +46,7 @@ def write_sweep(results: xarray.Dataset, summary: Summary, drive: Drive, folder:
     if picture is not None:
         save_figure(picture, folder, "sweep")
     write_text(folder / "drive.toml", drive.to_toml())
+    write_fitted_to(fitted_to, folder)
     rows = []
     for name, spread in summary.spreads.items():
         unit = results[name].attrs.get("units", "")
@@ -50,11 +65,17 @@ def write_sweep(results: xarray.Dataset, summary: Summary, drive: Drive, folder:
     ):
         cells = [list(row) for row in zip(*columns.values(), strict=True)]
         parts += [f"## {title}", markdown_table(list(columns), cells)] if cells else []
+    if summary.starts <= MOST_SHOWN:
+        headings, cells, axes = cell_table(results)
+        headings = [" ".join(heading.split()) for heading in headings]
+        parts += ["## Each start", markdown_table(headings, cells, numbers_from=axes)]
+    written = f", each start in [{FILE}]({FILE})" if write_cells(results, folder) else ""
     parts += [
-        "All numbers with their digits: [sweep.csv](sweep.csv). Every start is in the folder `sweep.zarr`:",
+        f"All numbers with their digits: [sweep.csv](sweep.csv){written}. Every start is in the folder "
+        "`sweep.zarr`:",
         OPEN,
         "## The drive",
         drive_table(drive),
-        provenance(drive, command),
+        provenance(drive, command, fitted_to, one=False),
     ]
     write_text(folder / "report.md", "\n\n".join(parts) + "\n")

@@ -99,12 +99,22 @@ def pace(last: Progress | None) -> str:
     return said + "."
 
 
-def show(to: Console, drive: Drive, results: xarray.Dataset, summary: Summary, last: Progress | None) -> None:
+def show(
+    to: Console,
+    drive: Drive,
+    fitted_to: Drive | None,
+    results: xarray.Dataset,
+    summary: Summary,
+    last: Progress | None,
+) -> None:
     """Print everything."""
-    from softstart.cli.show import Column, drive_lines, print_table, sentence
+    from softstart.cli.show import Column, controllers_set_up, drive_lines, print_table, sentence
+    from softstart.cli.sweep_cells import MOST_SHOWN, cell_table
 
     for index, line in enumerate(drive_lines(drive)):
         sentence(to, line, "bold" if index == 0 else "")
+    if fitted_to is not None:
+        sentence(to, f"  {controllers_set_up(None, fitted_to)}")
     for title, columns, texts in (
         ("The grid", axis_columns(results), ("axis", "unit")),
         ("Over all starts", figure_columns(results, summary), ("figure", "unit")),
@@ -113,8 +123,18 @@ def show(to: Console, drive: Drive, results: xarray.Dataset, summary: Summary, l
         if rows:
             to.print()
             print_table(to, [Column(name, name not in texts) for name in columns], rows, title=title)
+    if summary.starts <= MOST_SHOWN:
+        headings, cells, _ = cell_table(results, to)
+        to.print()
+        print_table(to, [Column(name, _numbers(cells, i)) for i, name in enumerate(headings)], cells,
+                    title="Each start")  # fmt: skip
     to.print()
     sentence(to, conclusion(results, summary), "bold")
     for note in (*endings(summary), pace(last)):
         if note:
             sentence(to, note, "dim")
+
+
+def _numbers(cells: list[list[str]], column: int) -> bool:
+    """Whether a column holds numbers, which are set to the right."""
+    return not any(row[column][:1].isalpha() for row in cells)

@@ -123,7 +123,11 @@ def as_option(sentence: str) -> str:
 
     >>> as_option("start_time = 'soon': give a time."), as_option("tolerances: gap is off.")
     ("--start-time = 'soon': give a time.", '--tolerance: gap is off.')
+    >>> as_option('controller = mine: name one with its range, as free={"rise": ("0.5x", "2x")}.')
+    'controller = mine: name one with its range, as --free rise=0.5x:2x.'
     """
+    sentence = re.sub(r'free=\{"(\w+)": \("([^"]+)", "([^"]+)"\)\}', r"--free \1=\2:\3", sentence)
+    sentence = re.sub(r"^(free: \w+ = )\('([^']+)', '([^']+)'\)", r"\1\2:\3", sentence)
     found = re.match(r"(\w+)(?= |:)", sentence)
     if found is None:
         return sentence

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
 from softstart.cli.folder import write_table, write_text
-from softstart.cli.report import drive_table, markdown, markdown_table, provenance
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from typing import Any
 
 import click
 
-HELP_NAMES = {"help_option_names": ["-h", "--help"]}
+from softstart.cli.completing import Words
+
+HELP_NAMES = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 class Command(click.Command):
-    """A command whose mistakes know to which command they belong."""
+    """A command whose mistakes know to which command they belong, and whose words complete themselves."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        for parameter in self.params:
+            if parameter.type is click.STRING:
+                parameter.type = Words()
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """The arguments read; a UsageError always has its context."""

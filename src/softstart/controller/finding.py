@@ -8,6 +8,7 @@ import inspect
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from softstart.controller.base import Controller, Sensor
 from softstart.controller.gain_files import SUFFIXES
 from softstart.errors import InputError
 from softstart.plugins import load, registered
-from softstart.units import to_si
+from softstart.units import show, to_si
 
 GROUP = "softstart.controllers"
 
@@ -101,7 +102,7 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             continue
         try:
             unit = known[key].metadata.get("unit", "")
-            values[key] = to_si(value, unit, name=key) if kind == "quantity" else _text(key, value)
+            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value)
         except InputError as error:
             wrong.extend(error.sentences)
     missing = [
@@ -127,6 +128,27 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
     return made
 
 
+def quantity(key: str, value: object, unit: str) -> Any:
+    """A parameter in SI; one that is a plain dataclass field has no unit, and is a bare number.
+
+    >>> quantity("rise", "20 ms", "s"), quantity("rise", "0.02", "")
+    (0.02, 0.02)
+    >>> quantity("rise", "20 ms", "")
+    Traceback (most recent call last):
+    softstart.errors.InputError: rise = "20 ms": this parameter has no unit; give a bare number, as 0.02, or
+    declare it in its class with parameter(unit, meaning).
+    """
+    try:
+        return to_si(value, unit or "1", name=key)
+    except InputError:
+        if unit:
+            raise
+    raise InputError(
+        f"{key} = {show(value)}: this parameter has no unit; give a bare number, as 0.02, or declare it in "
+        "its class with parameter(unit, meaning)."
+    )
+
+
 def _text(key: str, value: object) -> str:
     """A parameter that is a text."""
     if isinstance(value, Path):
@@ -141,7 +163,8 @@ def _from_file(text: str) -> type[Controller]:
     path = Path(path_text if path_text.endswith(".py") else path_text + ".py")
     if not path.is_file():
         raise InputError(f'controller = "{text}": there is no file {path}; give path/to/file.py:ClassName.')
-    module_name = f"softstart_loose_{path.stem}_{abs(hash(path.resolve()))}"
+    # named by its content: compiled steps on disk find their module again in the next process, and elsewhere
+    module_name = f"softstart_loose_{path.stem}_{sha256(path.read_bytes()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None:
         raise InputError(f'controller = "{text}": {path} cannot be read as a Python file.')

@@ -106,6 +106,7 @@ def pareto(
     base: Drive | None = None,
     save_to: str | Path | None = None,
     progress: Progress | None = None,
+    each: Callable[[FrontPoint], object] | None = None,
 ) -> Front:
     """The least K_dyn for each of several bounds on the start time, with its lower bound.
 
@@ -120,6 +121,7 @@ def pareto(
     save_to : a file in which each finished point is kept at once. A second call with the same inputs takes
         them from there; other inputs are refused.
     progress : told, before each point that is computed, what is being done.
+    each : given each point at once, also those of the controllers' own start times.
 
     The sweep goes from long start times to short ones, each optimum starting from the one before. Start times
     too short for any start are marked infeasible, no error. Raises InputError, and OptimumError if not a
@@ -145,7 +147,7 @@ def pareto(
     options = {"method": method, "torque_speed": torque_speed, "smoothness": smoothness, "base": base}
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
-    found = _Sweep(drive, options, saved, progress).through(asked)
+    found = _Sweep(drive, options, saved, progress, each).through(asked)
     points = tuple(found[terminal, t] for t in times)
     if not any(point.found for point in points) and any(point.status == "NOT_FOUND" for point in points):
         raise OptimumError(next(point.status_text for point in points if point.status == "NOT_FOUND"))
@@ -157,12 +159,17 @@ def default_start_times(
 ) -> list[float]:
     """`count` start times in s, from 1.02 of the shortest feasible one to 1.6 of that of `direct`.
 
-    Closer together towards the short end, where the curve is steep. `options` go to `Problem`.
+    Where the shortest one cannot be found, that of `direct` stands for it. Closer together towards the short
+    end, where the curve is steep. `options` go to `Problem`.
     """
     from softstart.optimal.shortest import shortest_start_time
 
     shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time", **options))
     direct = simulate(drive, "direct").start_time
+    if not math.isfinite(shortest):
+        shortest = direct
+    if not math.isfinite(shortest):
+        raise OptimumError("No start time was found at which there is an optimum; name some to be tried.")
     longest = LONG * (direct if LONG * direct > 1.2 * shortest else shortest)  # direct may never get there
     share = np.linspace(0.0, 1.0, count) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
@@ -187,6 +194,7 @@ class _Sweep:
     options: dict[str, Any]
     saved: SavedPoints
     progress: Progress | None
+    each: Callable[[FrontPoint], object] | None
 
     def through(self, asked: set[tuple[Terminal, float]]) -> dict[tuple[Terminal, float], FrontPoint]:
         """All points asked for."""
@@ -210,6 +218,8 @@ class _Sweep:
             if point.status == "INFEASIBLE":
                 too_short = point
             found[terminal, start_time] = point
+            if self.each is not None:
+                self.each(point)
         return found
 
     def _computed(self, terminal: Terminal, start_time: float, warm: Any) -> tuple[FrontPoint, Any]:

@@ -24,12 +24,12 @@ OBJECTIVES = get_args(Objective)
 class Problem:
     """An optimal start.
 
-    minimise   K_dyn = peak |T| over the whole run / M12avg_base, or heat, or the start time
-    subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
-               t_f <= start_time, K_dyn <= k_dyn, heat <= heat
-    and at t_f synchronous: w1 = w2 = target_speed, from then on the shaft torque is held
-               steady:      also T = Mc
-               reached:     only w2 = target_speed for the first time; the motor coasts until T is at its peak
+        minimise   K_dyn = peak |T| over the whole run / M12avg_base, or heat, or the start time
+        subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
+                   t_f <= start_time, K_dyn <= k_dyn, heat <= heat
+        and at t_f synchronous: w1 = w2 = target_speed, from then on the shaft torque is held
+                   steady:      also T = Mc
+                   reached:     only w2 = target_speed for the first time; the motor coasts until T peaks
 
     heat is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque. `torque_speed` are corners
     (rad/s, N m) of a concave limit of the motor's torque over its speed. `smoothness` in s weighs

@@ -2,7 +2,7 @@
 
 Let z = theta - gap/2 (negative while the gap is open), T = c max(0, z), a = Ms/J1 + Mc/J2 and b = Mc/J2 the
 relative accelerations of full and of no torque, T0 = c b/Omega^2. A start whose T stays below P obeys a speed
-limit z' <= V(z) at every twist:
+limit z' <= V(z) at every twist of its first way up:
 
     V^2 <= v0^2 + 2 a (z - z0) [- Omega^2 (z^2 - z0^2)]            full torque brings no more       (pulse)
     V^2 <= Omega^2/c^2 ((P - T0)^2 - (T - T0)^2) [+ 2 b z]         else no torque at all ends above P (coast)
@@ -10,11 +10,9 @@ limit z' <= V(z) at every twist:
 (terms in brackets in contact and in the gap respectively). For d(z'^2/2)/dz = z'' lies between that
 without and that with full torque. Pulse, coast, hold moves at this limit all the way and then holds T = P. So
 no start of peak P has a larger T at any instant, nor a larger load speed, J2 w2' = T - Mc. That counts starts
-whose gap closes several times. The second limit holds on every way up. The first one can be passed after a
-fall, but too late: about the rest position under full torque the phase of no start runs faster than that of
-full torque (a smaller force on the way up to that position delays it), and from the reversal it has a quarter
-period to go, after the quarter at least that it took from the contact, while full torque is at its peak
-within a half.
+whose gap closes several times. The second limit holds on every way up. After a
+fall the first one can be passed, but too late: docs/theory/optimum.md has the proof, about instants in place
+of twists.
 
 The least P whose load reaches the target speed in time is the optimum; it is where the load speed at the
 bound, which grows with P, is the target: one scalar equation.

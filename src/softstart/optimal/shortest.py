@@ -16,10 +16,12 @@ from softstart.simulation import simulate
 
 COARSE, FINE = 40, 80  # steps of the linear programs
 WITHIN = 2e-6  # of the start time
+MOST_TRIALS = 40
 
 
 def shortest_start_time(problem: Problem) -> float:
-    """The shortest t_f in s of any start of the problem whose gap closes once; infinite if there is none.
+    """The shortest t_f in s of any start of the problem whose gap closes once; infinite if there is none, nan
+    if the search for it did not converge.
 
     K_dyn may be anything unless the problem bounds it. For an ideal torque the greatest speed that can be had
     at a given t_f is a linear program, and it rises with t_f; otherwise collocation minimises t_f.
@@ -39,45 +41,87 @@ def shortest_start_time(problem: Problem) -> float:
     try:
         return solve(quickest).end_time
     except NotConverged:
-        return math.inf
+        return math.inf if bounded else math.nan  # without bounds there is always a start
 
 
 def _by_linear_program(problem: Problem) -> float:
-    """Newton's iteration on the greatest speed over t_f, whose slope is near (Ms - Mc)/(J1 + J2)."""
+    """The t_f at which the greatest speed is the target: on a coarse grid, then on a fine one near there."""
     entry = entry_of(problem)
     contact = Contact.of(problem.drive)
     slope = (problem.highest_torque - contact.Mc) / (contact.J1 + contact.J2)
     soonest = max(momentum_shortest_time(problem), entry.earliest)
-    end = 1.2 * soonest + math.pi / contact.Omega
-    best, enough = math.nan, math.inf
+    end, te = 1.2 * soonest + math.pi / contact.Omega, math.nan
     for steps, within in ((COARSE, 1e-3), (FINE, WITHIN)):
-        enough, short_of = math.inf, 0.0
-        for _ in range(40):
-            speed, te = greatest_speed(problem, entry, end, steps, best)
+        bracket = Bracket()
+        for _ in range(MOST_TRIALS):
+            speed, te = greatest_speed(problem, entry, end, steps, te)
             if not math.isfinite(speed):
-                short_of, best = max(short_of, end), math.nan
-                end = 0.5 * (end + enough) if math.isfinite(enough) else 1.3 * end
-                if end > 100.0 * soonest or abs(enough - short_of) <= within * end:
-                    break
-                continue
-            best = te
+                te = math.nan
             missing = (problem.target * AIM - speed) / slope
-            if missing <= 0.0:
-                enough = min(enough, end)
-            else:
-                short_of = max(short_of, end)
+            bracket.take(end, missing)
             if abs(missing) <= within * end:
-                enough = min(enough, end + max(missing, 0.0))
+                bracket.high = min(bracket.high, end + max(missing, 0.0))
                 break
-            end += missing
-            if not short_of < end < enough:
-                end = 0.5 * (short_of + enough)
-            if enough - short_of <= within * end:
+            if bracket.high - bracket.low <= within * end or end > 100.0 * soonest:
                 break
-        end = enough
+            end = bracket.next()
+        end = bracket.high
         if not math.isfinite(end):
             return math.inf
-    return enough
+    return end
+
+
+class Bracket:
+    """Where between two times what is missing, a time that falls with it, is zero: regula falsi (Illinois).
+
+    While one side is not known yet, a step by as much as is `missing`, corrected by what the last one
+    brought; 1.3 times as long where nothing is known.
+
+    >>> bracket, t = Bracket(), 1.0
+    >>> for _ in range(8):
+    ...     missing = 2.0 - t**3
+    ...     bracket.take(t, missing)
+    ...     t = bracket.next()
+    >>> round(t, 6)
+    1.259921
+    """
+
+    def __init__(self) -> None:
+        self.low, self.high = 0.0, math.inf
+        self.missing_at = [math.inf, -math.inf]  # at low and high; halved where a side stays twice
+        self.tried: list[tuple[float, float]] = []
+
+    def take(self, end: float, missing: float) -> None:
+        """An end too early (missing above 0), or one that is enough."""
+        side = 0 if missing > 0.0 else 1
+        if self.tried and (self.tried[-1][1] > 0.0) == (missing > 0.0):
+            self.missing_at[1 - side] *= 0.5
+        self.missing_at[side] = missing
+        self.tried.append((end, missing))
+        if side == 0:
+            self.low = max(self.low, end)
+        else:
+            self.high = min(self.high, end)
+
+    def next(self) -> float:
+        """The next end to be tried."""
+        if self.low == 0.0 or math.isinf(self.high):
+            return self._from_one_side()
+        low, high = self.missing_at
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return 0.5 * (self.low + self.high)
+        return min(max((self.low * high - self.high * low) / (high - low), self.low), self.high)
+
+    def _from_one_side(self) -> float:
+        end, missing = self.tried[-1]
+        if not math.isfinite(missing):
+            return 1.3 * end
+        steeper = 1.0
+        if len(self.tried) > 1:
+            before, more = self.tried[-2]
+            if math.isfinite(more) and more != missing:
+                steeper = min(max((end - before) / (more - missing), 1.0), 4.0)
+        return max(end + steeper * missing, 0.5 * end)
 
 
 def verdict_on(problem: Problem) -> Verdict:
@@ -85,7 +129,10 @@ def verdict_on(problem: Problem) -> Verdict:
     assert problem.start_time is not None
     bound = problem.start_time
     shortest = shortest_start_time(problem)
-    if not math.isfinite(shortest):
+    if math.isnan(shortest):
+        constraint, least = _constraint(problem, shortest), momentum_shortest_time(problem)
+        shown = f"the shortest start time was not found, it is no less than {least:.6g} s"
+    elif not math.isfinite(shortest):
         constraint = "the first contact, so hard that the gap opens again whatever the motor does"
         shown = "no start time would do"
         if problem.k_dyn is not None:

@@ -8,12 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softstart.controller.finding import quantity
 from softstart.drive import PARAMETERS
 from softstart.drive.reading import read_parameter
 from softstart.drive.sentences import Wording, flat_name_meant, refused
 from softstart.errors import InputError
 from softstart.sweeping.maker import Maker, Parameters
-from softstart.units import RefusedError, nearest, show, to_si
+from softstart.units import RefusedError, nearest, show
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"
@@ -157,7 +158,7 @@ def read_column(key: str, values: object, parameters: Parameters | None) -> Colu
     known = parameters[field]
     if known.kind == "object":
         raise InputError(f"{key}: an axis carries numbers or texts, and this parameter is an object.")
-    read = _texts(key, values) if known.kind == "text" else _flat(key, to_si(values, known.unit, name=key))
+    read = _texts(key, values) if known.kind == "text" else _flat(key, quantity(key, values, known.unit))
     return Column(f"{PREFIX}_{field}", owner, field, known.unit, known.meaning or field, read)
 
 

@@ -67,8 +67,9 @@ def coordinate_variables(axes: tuple[Axis, ...]) -> list[Variable]:
 
 def about(question: Question, plan: Plan) -> dict[str, Any]:
     """Attributes of the whole."""
-    shown = question.maker.shown
-    return {
+    shown, fitted_to = question.maker.shown, question.fitted_to
+    other = {} if fitted_to is None else {"softstart_fitted_to": fitted_to.to_toml()}
+    return other | {
         "title": f"{question.drive.name}, {shown}" if shown else question.drive.name,
         "source": f"softstart {__version__}",
         "softstart_drive": question.drive.to_toml(),

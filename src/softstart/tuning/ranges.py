@@ -115,8 +115,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
         asked: dict[str, Any] = {name: None for name in tunable(controller) if name not in given}
         if not asked:
             raise InputError(
-                f"controller = {what}: it has no parameter to tune; name one with its range, "
-                'as free={"torque": (10, 60)}.'
+                f"controller = {what}: it has no parameter to tune by itself; {_example(known)}."
             )
     elif isinstance(free, str):
         asked = {free: None}
@@ -134,6 +133,14 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     if wrong:
         raise InputError(wrong)
     return tuple(found)
+
+
+def _example(known: Mapping[str, Field[Any]]) -> str:
+    """How a range is named, with a parameter that there is."""
+    names = [name for name, f in known.items() if f.metadata.get("kind", "quantity") == "quantity"]
+    if not names:
+        return "none of its parameters is a quantity, so take another controller"
+    return f'name one with its range, as free={{"{names[0]}": ("0.5x", "2x")}}'
 
 
 def _declared(field: Field[Any]) -> Range | None:

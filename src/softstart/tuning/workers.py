@@ -41,7 +41,6 @@ class Workers:
         self.trials = trials
         self.count = count
         self.pool: ProcessPoolExecutor | None = None
-        self.children: list[Any] = []
         self.others: set[Any] = set()
 
     def __enter__(self) -> Self:
@@ -53,8 +52,9 @@ class Workers:
         if self.pool is None:
             return
         if kind is not None:  # whoever waits for a Ctrl-C should not wait for the work in hand
-            for child in self.children:
-                child.terminate()
+            for child in multiprocessing.active_children():
+                if child not in self.others:
+                    child.terminate()
         self.pool.shutdown(wait=True, cancel_futures=True)
 
     def each(self, work: Work, items: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
@@ -69,7 +69,6 @@ class Workers:
                 places: dict[Future[Any], int] = {
                     pool.submit(_do, work, item): index for index, item in enumerate(items)
                 }
-            self.children = [one for one in multiprocessing.active_children() if one not in self.others]
             pending = set(places)
             while pending:
                 done, pending = wait(pending, return_when=FIRST_COMPLETED)
@@ -98,15 +97,24 @@ class Workers:
 
 @contextmanager
 def _deaf_to_interruption() -> Iterator[None]:
-    """Ctrl-C goes to all processes of a terminal; workers leave it to their parent from the beginning."""
+    """Ctrl-C goes to all processes of a terminal; workers leave it to their parent from the beginning.
+
+    Where the system can, it is held back, not ignored: what comes meanwhile reaches the parent afterwards.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+    elif hasattr(signal, "pthread_sigmask"):
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+    else:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.chain import Chain, natural_vibration
-from softstart.chain.backbone import backbone
+from softstart.chain import Chain, chain_backbone, natural_vibration
 from softstart.study import Table
 from softstart_studies.paper_r.motion import Motion, moved, released
 
@@ -196,26 +195,15 @@ def node_table() -> Table:
 
 def backbone_table() -> Table:
     """Frequency against amplitude: the chain with all its gaps, and its two masses by the exact formula."""
-    from softstart.chain import reduce_chain
-
-    chain = tractor()
-    two = reduce_chain(chain, method="modal").to_drive()
-    vibration = natural_vibration(chain)
+    vibration = natural_vibration(tractor())
     per_nose = float(np.abs(vibration.torque[1]).max() / abs(vibration.shape[1, 0]))
-    rows = []
-    for nose in (0.5, 1.0, 2.0, 4.0, 8.0):
-        torque = per_nose * np.radians(nose)
-        exact = float(
-            backbone(float(two.J1), float(two.J2), float(two.c), float(two.gap), torque / float(two.c))
-        )
-        rows.append(
-            (
-                nose,
-                round(torque, 1),
-                round(free(chain, 1, nose).Omega / float(vibration.Omega[1]), 4),
-                round(exact / float(two.Omega), 4),
-            )
-        )
+    noses = (0.5, 1.0, 2.0, 4.0, 8.0)
+    found = chain_backbone(tractor(), per_nose * np.radians(noses))
+    columns = (found.torque, found.frequency / found.Omega, found.two_masses / found.Omega)
+    rows = [
+        (nose, round(torque, 1), round(chain, 4), round(exact, 4))
+        for nose, torque, chain, exact in zip(noses, *(column.tolist() for column in columns), strict=True)
+    ]
     return Table(
         "Backbone: frequency of the free vibration with all gaps (assumed chain)",
         (

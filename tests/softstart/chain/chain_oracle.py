@@ -45,6 +45,8 @@ class Given:
     restitution: np.ndarray | None = None  # NaN where elastic
     motor: int = 0
     load: int = -1
+    efficiency: np.ndarray | None = None
+    gear: np.ndarray | None = None  # the mass at which the gear of each shaft sits
 
 
 class ChainOracle:
@@ -53,12 +55,17 @@ class ChainOracle:
     def __init__(self, given: Given, path: TorquePath, target: float = math.inf, rtol: float = 1e-12):
         self.g, self.path, self.target, self.rtol = given, path, target, rtol
         self.n = given.J.size
-        self.t = 0.0
+        self.t, self.leaps = 0.0, 0
         self.y = np.concatenate([given.theta0, given.w0]).astype(float)
         self.side = np.zeros(self.n - 1)
         self.form = ["joined" if gap == 0 else "open" for gap in given.gap]
         self.rigid = np.zeros(self.n - 1, bool) if given.restitution is None else ~np.isnan(given.restitution)
-        self.direction = np.where(given.reactive, np.sign(given.w0), 1.0)
+        self.eta = np.ones(self.n - 1) if given.efficiency is None else given.efficiency
+        self.rubs = given.reactive.copy()
+        if given.gear is not None:
+            self.rubs[given.gear[self.eta < 1]] = True
+        self.direction = np.where(self.rubs, np.sign(given.w0), 1.0)
+        self.sign = np.ones(self.n - 1)  # of the torques of shafts with lossy gears
         self.events: list[tuple[float, str, int]] = []
         self.peaks = np.zeros(self.n - 1)
         elastic = np.where(self.rigid, 0.0, given.c)
@@ -70,6 +77,7 @@ class ChainOracle:
         for k in range(self.n - 1):
             if self.form[k] == "open" and abs(self.y[k]) > 0.5 * given.gap[k]:
                 self.touch(k, math.copysign(1.0, self.y[k]), overlap=True)
+        self.sign[self.torques(self.y) < 0] = -1.0
 
     # ---- mechanics ----
 
@@ -89,17 +97,31 @@ class ChainOracle:
         return T
 
     def pushed(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The torque on each mass without Coulomb friction."""
+        """The torque on each mass without friction of a reactive load or of gears."""
         T = self.torques(y)
         q = np.append(0.0, T) - np.append(T, 0.0) - self.g.ground * y[self.n - 1 :] + self.g.mean
         q[self.g.motor] += self.path.torque(t, self.span)[0]
         for i, omega, cosine, sine in self.g.tones:
             q[i] += cosine * math.cos(omega * t) + sine * math.sin(omega * t)
-        return q
+        return q - np.where(self.rubs & ~self.g.reactive, self.g.Mc, 0.0)
+
+    def rubbing(self, y: np.ndarray, i: int, direction: float) -> float:
+        """The friction on mass i if it moves in this direction; the load torque where nothing rubs."""
+        R = float(self.g.Mc[i]) if self.g.reactive[i] or not self.rubs[i] else 0.0
+        T = self.torques(y)
+        for k in (i - 1, i):
+            if 0 <= k < self.n - 1 and self.eta[k] < 1 and self.g.gear[k] == i:  # type: ignore[index]
+                on_mass = T[k] if k < i else -T[k]
+                drives = direction * self.sign[k] * (1 if k < i else -1) > 0
+                passed = self.eta[k] * on_mass if drives else on_mass / self.eta[k]
+                R += direction * (on_mass - passed)
+        return R
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         w = y[self.n - 1 :]
-        a = (self.pushed(t, y) - self.direction * self.g.Mc) / self.g.J
+        a = self.pushed(t, y) / self.g.J
+        for i in np.flatnonzero(self.rubs | (self.g.Mc != 0)):
+            a[i] -= self.direction[i] * self.rubbing(y, int(i), self.direction[i]) / self.g.J[i]
         a[self.direction == 0] = 0.0
         return np.concatenate([w[:-1] - w[1:], a])
 
@@ -131,11 +153,15 @@ class ChainOracle:
             elif self.form[k] == "loose":
                 add("pass", k, lambda t, y, spring=spring: -spring(y))
                 add("rejoin", k, lambda t, y, a=spring, b=damper: a(y) + b(y))
+        for k in range(n - 1):
+            dead = self.form[k] == "press" and g.law[k] == "dead-zone" and g.d[k] > 0
+            if self.eta[k] < 1 and (dead or self.form[k] == "joined"):
+                add("turn", k, lambda t, y, k=k: -self.sign[k] * self.torques(y)[k])
         for i in range(n):
-            if g.reactive[i] and self.direction[i] == 0:
-                add("forward", i, lambda t, y, i=i: self.pushed(t, y)[i] - g.Mc[i])
-                add("back", i, lambda t, y, i=i: -self.pushed(t, y)[i] - g.Mc[i])
-            elif g.reactive[i]:
+            if self.rubs[i] and self.direction[i] == 0:
+                add("forward", i, lambda t, y, i=i: self.pushed(t, y)[i] - self.rubbing(y, i, 1.0))
+                add("back", i, lambda t, y, i=i: -self.pushed(t, y)[i] - self.rubbing(y, i, -1.0))
+            elif self.rubs[i]:
                 add("stop", i, lambda t, y, i=i, s=self.direction[i]: -s * y[n - 1 + i])
         if self.target < math.inf:
             load = g.load % n
@@ -155,10 +181,13 @@ class ChainOracle:
             self.events.append((self.t, "impact", k))
             for i in (k, k + 1):
                 direction = np.sign(self.y[self.n - 1 + i])
-                if self.g.reactive[i] and direction != self.direction[i]:
+                if self.rubs[i] and direction != self.direction[i]:
+                    stops, starts = ("load-stops", "load-starts")
+                    if not self.g.reactive[i]:
+                        stops, starts = ("gear-holds", "gear-lets-go")
                     if self.direction[i] != 0:
-                        self.events.append((self.t, "load-stops", i))
-                    self.events.append((self.t, "load-starts", i))
+                        self.events.append((self.t, stops, i))
+                    self.events.append((self.t, starts, i))
                     self.direction[i] = direction
             return
         spring = self.g.c[k] * self.overlap(self.y)[k] if overlap else 0.0
@@ -167,6 +196,7 @@ class ChainOracle:
             self.form[k] = "loose"
             return
         self.form[k] = "stiff" if self.g.law[k] == "modelica" and damper > spring else "press"
+        self.sign[k] = side if spring + damper >= 0 else -side
         if not overlap:
             self.events.append((self.t, "closed", k))
 
@@ -183,16 +213,19 @@ class ChainOracle:
             self.y[k] = self.side[k] * 0.5 * self.g.gap[k]
         elif name == "rejoin":
             self.form[k] = "press"
+            self.sign[k] = self.side[k]
             self.events.append((self.t, "closed", k))
         elif name in ("stiffen", "soften"):
             self.form[k] = "stiff" if name == "stiffen" else "press"
         elif name == "stop":
             self.y[self.n - 1 + k] = 0.0
-            self.events.append((self.t, "load-stops", k))
+            self.events.append((self.t, "load-stops" if self.g.reactive[k] else "gear-holds", k))
             self.direction[k] = 0.0
         elif name in ("forward", "back"):
             self.direction[k] = 1.0 if name == "forward" else -1.0
-            self.events.append((self.t, "load-starts", k))
+            self.events.append((self.t, "load-starts" if self.g.reactive[k] else "gear-lets-go", k))
+        elif name == "turn":
+            self.sign[k] = -self.sign[k]
         else:
             self.target = math.inf
             self.events.append((self.t, "target", k))
@@ -204,7 +237,8 @@ class ChainOracle:
             self.span = span
             while span[1] - self.t > 1e-14 * span[1]:
                 self.leap()
-                if len(self.events) > EVENT_CAP:
+                self.leaps += 1
+                if len(self.events) > EVENT_CAP or self.leaps > 4 * EVENT_CAP:
                     raise RuntimeError("too many events")
         self.theta, self.w, self.T = self.y[: self.n - 1], self.y[self.n - 1 :], self.torques(self.y)
         return self
@@ -279,8 +313,14 @@ class ChainOracle:
         if name in ("stop", "target"):
             return float(np.abs(self.y[self.n - 1 :]).max()) + 1e-300
         if name in ("forward", "back"):
-            return float(self.g.Mc[place])
-        return float(self.g.c[place] * (abs(self.y[place]) + self.g.gap[place]))
+            return float(self.g.Mc[place]) + float(
+                np.abs(self.torques(self.y))[max(place - 1, 0) : place + 1].sum()
+            )
+        spring = float(self.g.c[place] * (abs(self.y[place]) + self.g.gap[place]))
+        if name == "turn":  # its twist is near 0
+            damper = float(self.g.d[place] * np.abs(self.y[self.n - 1 :]).max())
+            return float(np.abs(self.peaks).max()) + damper + 1e-300
+        return spring
 
     def note_tops(
         self, t_old: float, y_old: np.ndarray, grid: np.ndarray, states: np.ndarray, until: float

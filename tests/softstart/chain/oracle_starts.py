@@ -23,6 +23,8 @@ NAMES = {
     "load stops": "load-stops",
     "target speed reached": "target",
     "impact": "impact",
+    "gear holds": "gear-holds",
+    "gear lets go": "gear-lets-go",
 }
 ANY_DRIVE = Drive.load("crane-4amtkf")  # the pieces take nothing from it
 
@@ -72,15 +74,26 @@ def random_chain(rng: np.random.Generator, count: int, rigid: bool = False) -> d
     }
 
 
+def with_losses(rng: np.random.Generator, drawn: dict[str, Any]) -> dict[str, Any]:
+    """The same with losses in most gears of its springs, on either side of them."""
+    count = drawn["c"].size
+    lossy = (rng.random(count) < 0.7) & np.isnan(drawn["restitution"])
+    efficiency = np.where(lossy, rng.uniform(0.4, 0.99, count), 1.0)
+    return drawn | {"efficiency": efficiency, "gear": np.arange(count) + rng.integers(0, 2, count)}
+
+
 def both(
     J: np.ndarray, c: np.ndarray, d: np.ndarray, gap: np.ndarray, law: list[str], restitution: np.ndarray,
     theta0: np.ndarray, w0: np.ndarray, Mc: np.ndarray, reactive: np.ndarray, ground: np.ndarray,
     tones: list[tuple[int, float, float, float]], pieces: list[tuple[float, float]], lag: float, rate: float,
-    motor: int, t_end: float, target: float, rtol: float = 1e-12,
+    motor: int, t_end: float, target: float, rtol: float = 1e-12, efficiency: np.ndarray | None = None,
+    gear: np.ndarray | None = None, check: bool = True,
 ) -> tuple[ChainRun, ChainOracle]:  # fmt: skip
-    """The same start by the kernel and by the oracle."""
+    """The same start by the kernel and, to `check` it, by the oracle."""
     reactive = reactive & (Mc > 0)
     target = max(target, float(w0[-1]) + 1e-2)
+    eta = np.ones(c.size) if efficiency is None else efficiency
+    after = np.zeros(c.size, bool) if gear is None else gear == np.arange(c.size)
     largest = max(*(abs(u) for _, u in pieces), 1.0)
     chain = Chain(
         [
@@ -92,7 +105,8 @@ def both(
             Shaft(gap=float(gap[k]), restitution=float(restitution[k]), start_position=float(theta0[k]))
             if restitution[k] == restitution[k]
             else Shaft(float(c[k]), damping=float(d[k]), gap=float(gap[k]), contact_law=law[k],  # type: ignore[arg-type]
-                       start_position=float(theta0[k]))
+                       start_position=float(theta0[k]), efficiency=float(eta[k]),
+                       side="after" if after[k] else "before")
             for k in range(c.size)
         ],
         Motor(largest, mass=f"mass {motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate),
@@ -105,10 +119,26 @@ def both(
     controller = Pieces(pieces=tuple(pieces), end=math.inf)
     run = simulate_chain(chain, controller, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
     given = Given(
-        J, Mc, reactive, w0, c, d, gap, law, theta0, ground, np.zeros(J.size), tones, restitution, motor
+        J,
+        Mc,
+        reactive,
+        w0,
+        c,
+        d,
+        gap,
+        law,
+        theta0,
+        ground,
+        np.zeros(J.size),
+        tones,
+        restitution,
+        motor,
+        efficiency=eta,
+        gear=gear,
     )
     path = TorquePath(list(pieces), lag, rate, 0.0, t_end)
-    return run, ChainOracle(given, path, target, rtol).go()
+    oracle = ChainOracle(given, path, target, rtol)
+    return run, oracle.go() if check else oracle
 
 
 def differences(run: ChainRun, oracle: ChainOracle) -> dict[str, float]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, InputError, Measured, PlainController, simulate
+from softstart.chain import Chain, Mass, Shaft, chain_backbone, natural_vibration
 from softstart.chain.backbone import backbone
 
 
@@ -45,3 +46,30 @@ def test_limits_and_order() -> None:
     assert np.all(np.asarray(backbone(J1, J2, c, 0.0, amplitudes)) == drive.Omega)
     with pytest.raises(InputError, match="above 0"):
         backbone(J1, J2, c, 0.5, 0.0)
+
+
+@pytest.mark.parametrize("amplitude", [0.05, 0.4])
+def test_two_masses_as_a_chain_swing_at_the_frequency_of_the_formula(amplitude: float) -> None:
+    chain = Chain([Mass(0.3), Mass(0.7 * 9)], [Shaft(50.0, gap=0.4, ratio=3.0)])
+    found = chain_backbone(chain, 50.0 * amplitude)
+    assert found.two_masses[0] == pytest.approx(float(backbone(0.3, 0.7, 50.0, 0.4, amplitude)), rel=1e-12)
+    assert found.frequency[0] == pytest.approx(found.two_masses[0], rel=2e-5)
+
+
+def test_without_gaps_each_mode_keeps_its_frequency() -> None:
+    chain = Chain([Mass(1), Mass(0.4), Mass(2)], [Shaft(30), Shaft(50)])
+    for mode in (1, 2):
+        found = chain_backbone(chain, [0.1, 10.0], mode)
+        assert found.frequency == pytest.approx(natural_vibration(chain).Omega[mode], rel=1e-5)
+    assert len(found.plot().axes) == 1
+    assert found.summary()["mode"] == 2
+
+
+def test_bad_questions_are_refused() -> None:
+    chain = Chain([Mass(1), Mass(2)], [Shaft(30, gap=0.1)])
+    with pytest.raises(InputError, match="mode = 2"):
+        chain_backbone(chain, 1.0, 2)
+    with pytest.raises(InputError, match="above 0 N m"):
+        chain_backbone(chain, [1.0, 0.0])
+    with pytest.raises(InputError, match="one is rigid"):
+        chain_backbone(Chain([Mass(1), Mass(2), Mass(1)], [Shaft(30, gap=0.1), Shaft("inf")]), 1.0)

@@ -15,7 +15,7 @@ ONE_SENTENCE = {
         ["zzzzzz"],
         [
             "there are compare, simulate, optimize, pareto, tune, sweep, linear, reduce, clutch, balance, "
-            "drives, controllers and study"
+            "report, serve, drives, controllers, study and completion"
         ],
     ),
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),

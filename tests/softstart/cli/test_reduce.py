@@ -138,11 +138,30 @@ def test_two_masses_verify_themselves(run, place):
     assert told["chain_start_time"] == pytest.approx(told["start_time"], rel=1e-10)
 
 
+def test_another_order_on_the_chain_is_told(run, place):
+    done = run("reduce", "--verify", "pulse-coast-hold,ramp", "--json", "--out", "found")
+    told = json.loads(done.out)
+    pulse, ramp = told["verified"]
+    assert pulse["k_dyn"] < ramp["k_dyn"] < ramp["chain_k_dyn"] < pulse["chain_k_dyn"]
+    verdict = told["verdict"]
+    assert verdict["order_differs"]
+    assert verdict["order_on_chain"] == ["ramp", "pulse-coast-hold"] == verdict["order_on_drive"][::-1]
+    assert verdict["largest_ratio"] == pulse["chain_k_dyn"] / pulse["k_dyn"]
+    assert verdict["caution"].startswith("On the chain ramp is gentler than pulse-coast-hold (K_dyn 3.13 and")
+    assert "pulse-coast-hold has 3.98 times its K_dyn on the drive" in verdict["caution"]
+    assert verdict["caution"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
+    (place / "two.toml").write_text(Chain.from_drive(Drive.load("crane-4amtkf")).to_toml())
+    out = run("reduce", "two.toml", "--verify", "pulse-coast-hold,ramp").out
+    assert "verified on the chain" in out
+    assert "choose by the chain" not in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("--verify", "rampp"), '--verify = "rampp": there is no controller'),
         (("tractor-like", "--up-to", "70", "--verify", "direct"), "3 are left"),
+        (("--param", "ramp.time=1"), "--param: it sets up a controller of --verify"),
     ],
 )
 def test_what_cannot_be_verified(run, nothing_left, arguments, said):
@@ -150,3 +169,11 @@ def test_what_cannot_be_verified(run, nothing_left, arguments, said):
     assert (code, out) == (2, "")
     assert said in err
     nothing_left()
+
+
+def test_a_parameter_of_a_controller_to_verify(run):
+    asked = ("--verify", "ramp", "--param", "ramp.time=0.3 s", "--json")
+    done = run("reduce", "--set", "shaft[2].efficiency=0.9", *asked)
+    (one,) = json.loads(done.out)["verified"]
+    assert one["chain"]["parameters"]["time"] == 0.3
+    assert one["gear_losses"] > 0.0

@@ -17,7 +17,8 @@ def test_json_has_summary_stages_and_events(run):
     told = json.loads(out, parse_constant=pytest.fail)
     wanted = simulate(Drive.load("crane-4amtkf"), "reduced-two-stage", 0.3, parameters={"torque": 15.5})
     summary = wanted.summary()
-    assert told.keys() == {*summary, "stages", "events"}
+    assert told.keys() == {*summary, "fitted_to", "stages", "events"}
+    assert told["fitted_to"] is None
     assert told["k_dyn"] == wanted.k_dyn
     assert told["start_time"] is None
     assert math.isnan(wanted.start_time)

@@ -73,7 +73,8 @@ def test_list(run):
         assert "Does a wider gap raise K_dyn?" in out
         assert "No module named 'nothing'" in " ".join(out.split())
     told = json.loads(run("study", "--list", "--json").out)
-    assert {"name": "example", "title": Example.title, "pictures": ["gap"]} in told["studies"]
+    listed = {"name": "example", "title": Example.title, "pictures": ["gap"], "files": ["gap.svg", "gap.png"]}
+    assert listed in told["studies"]
 
 
 def test_result_is_shown(run):
@@ -104,6 +105,10 @@ def test_files(run, place):
     code, out, _ = run("study", "example", "--out", "results")
     assert code == 0
     names = {path.name for path in (place / "results").iterdir()}
+    listed = {
+        one["name"]: one["files"] for one in json.loads(run("study", "--list", "--json").out)["studies"]
+    }
+    assert set(listed["example"]) == {name for name in names if not name.endswith(".csv")}
     assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv"}
     table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")
     assert table == '"gap, rad",K_dyn,note\n0.5,3.1179,[G]\n2.0,,\n'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import signal
 import subprocess
@@ -47,7 +48,7 @@ def test_the_tables_are_shown_and_fit(run, monkeypatch, width):
         assert words in out
 
 
-FILES = {"sweep.zarr", "report.md", "sweep.csv", "sweep.svg", "sweep.png", "drive.toml"}
+FILES = {"sweep.zarr", "report.md", "sweep.csv", "cells.csv", "sweep.svg", "sweep.png", "drive.toml"}
 
 
 def test_the_files_and_the_same_command_again(run, place):
@@ -88,6 +89,50 @@ def test_controllers_as_an_axis(run):
     assert told["starts"] == 20
     assert told["axes"]["controller"]["values"] == ["direct", "ramp"]
     assert told["worst"]["at"]["controller"] == "direct"
+
+
+def test_each_start_of_a_small_grid_is_told(run, place):
+    command = ("sweep", "--axis", "controller=direct,ramp", "--axis", "shaft.gap=0.5,2", "--workers", "1")
+    code, out, err = run(*command, "--out", "few")
+    assert (code, err) == (0, "")
+    lines = [line.split() for line in out.partition("Each start")[2].splitlines()]
+    with (place / "few" / "cells.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row["controller"], float(row["gap [rad]"])) for row in rows] == [
+        ("direct", 0.5), ("direct", 2.0), ("ramp", 0.5), ("ramp", 2.0)
+    ]  # fmt: skip
+    told = json.loads(run(*command, "--json").out)["cells"]
+    report = (place / "few" / "report.md").read_text("utf-8")
+    for row, cell in zip(rows, told, strict=True):
+        one = simulate(CRANE.replace(gap=float(row["gap [rad]"])), row["controller"])
+        figures = (one.k_dyn, one.start_time, one.peak_torque)
+        assert tuple(float(row[key]) for key in ("k_dyn", "start_time [s]", "peak_torque [N*m]")) == figures
+        assert (cell["k_dyn"], cell["gap"], row["status"]) == (one.k_dyn, one.drive.gap, "REACHED")
+        assert [row["controller"], f"{one.drive.gap:g}", f"{one.k_dyn:.4f}"] in [line[:3] for line in lines]
+        assert f"| {row['controller']} | {one.drive.gap:g} | {one.k_dyn:.4f} |" in report
+
+
+def test_a_start_that_went_wrong_stands_out_and_a_large_grid_is_not_listed(run, monkeypatch):
+    few = ("sweep", "--controller", "direct", "--workers", "1", "--until", "0.36", "--axis")
+    out = run(*few, "shaft.gap=0.5,1.5").out
+    (late,) = [line for line in out.splitlines() if "stopped early" in line]
+    assert late.split()[0] == "0.5"
+    assert ["1.5", "4.3847", "reached"] in [line.split()[:3] for line in out.splitlines()]
+    out = run(*few, "shaft.gap=0.5:1.5:41").out
+    assert "Each start" not in out
+    assert json.loads(run(*few, "shaft.gap=0.5:1.5:41", "--json").out)["cells"] is None
+
+
+def test_a_grid_too_large_for_a_table_writes_no_cells(place, monkeypatch):
+    from softstart import sweep
+    from softstart.cli import sweep_cells
+
+    results = sweep(CRANE, "direct", {"gap": [0.5, 1.0, 2.0]}, workers=1)
+    monkeypatch.setattr(sweep_cells, "MOST_WRITTEN", 2)
+    assert not sweep_cells.write_cells(results, place)
+    assert not (place / sweep_cells.FILE).exists()
+    monkeypatch.setattr(sweep_cells, "MOST_WRITTEN", 3)
+    assert sweep_cells.write_cells(results, place)
 
 
 LONG = (
@@ -150,6 +195,10 @@ ONE_SENTENCE = {
         ("--controller", "ramp", "--axis", "gap=0:1:1000000", "--axis", "damping=0:1:1000"),
         ["--axis: 1,000,000,000 starts", "--out DIR"],
     ),
+    "several": (
+        (*GAP, "--controller", "direct, ramp"), ["give one controller", "--axis controller=direct,ramp."]
+    ),
+    "fitted to": ((*GAP, "--controller", "ramp", "--fitted-to", "crane"), ["--fitted-to:", "shipped drive"]),
     "drive": (("crane-4amtk", *GAP, "--controller", "ramp"), ["did you mean crane-4amtkf?"]),
 }  # fmt: skip
 

@@ -194,7 +194,12 @@ ONE_SENTENCE = {
     "controller": (["--controller", "rmp"], ["did you mean ramp?"]),
     "gains": (["--controller", "good.toml"], ["no tuned gains"]),
     "missing gains": (["--controller", "not.toml"], ["is not there"]),
-    "nothing to tune": (["--controller", "direct"], ["no parameter to tune"]),
+    "nothing to tune": (["--controller", "direct"], ["no parameter to tune", "as --free torque=0.5x:2x."]),
+    "a free one without a range": (
+        ["--controller", "direct", "--free", "torque"],
+        ["give one, as --free torque=0.5x:2x"],
+    ),
+    "ends the wrong way": (["--free", "time=3:1"], ["time = 3:1: the lowest value"]),
     "drive": (["crane-4amtk"], ["did you mean crane-4amtkf?"]),
     "output": (["--out", "good.toml"], ["is a file, not a folder"]),
 }

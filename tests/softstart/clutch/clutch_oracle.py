@@ -35,8 +35,12 @@ def torque_of(clutch):
     return lambda t: MM * shapes[kind](t / tM) if t < tM else MM, [tM]
 
 
-def integrate(clutch, until: float) -> Outcome:
-    """From rest to `until`: y = theta, wM, wc, friction work."""
+def integrate(clutch, until: float, finest: float = 0.3) -> Outcome:
+    """From rest to `until`: y = theta, wM, wc, friction work.
+
+    Events are seen where their function has changed its sign between two steps, of `finest/B` at most: a slip
+    or a touch that begins and ends within one is not; take a smaller share then.
+    """
     IM, Ic, c, d = clutch.clutch_inertia, clutch.load_inertia, clutch.stiffness, clutch.damping
     w0, Mc, half = clutch.drive_speed, clutch.load_torque, 0.5 * clutch.gap
     torque, corners = torque_of(clutch)
@@ -99,7 +103,7 @@ def integrate(clutch, until: float) -> Outcome:
         found = solve_ivp(
             slopes, (t, stop), y, "DOP853", rtol=3e-12, atol=1e-12 * w0,
             events=[*(g for _, g in events), turn],
-            max_step=0.3 / clutch.B,  # a short touch is not stepped over
+            max_step=finest / clutch.B,  # a short touch is not stepped over
         )  # fmt: skip
         peak = max(peak, abs(shaft(y, side)), abs(shaft(found.y[:, -1], side)))
         for extreme in found.y_events[-1]:
@@ -126,6 +130,8 @@ def integrate(clutch, until: float) -> Outcome:
             side = int(name.removeprefix("touch"))
             if slip == 0 and abs(shaft(y, side)) > torque(t):  # a damped impact is a step of the torque
                 slip, reslips = int(math.copysign(1, shaft(y, side))), reslips + 1
+            if load == 0 and abs(shaft(y, side)) > Mc:  # and a load at rest is torn off at once
+                load = int(math.copysign(1, shaft(y, side)))
         elif name == "stop":
             load, y[2] = 0, 0.0
             if abs(shaft(y, side)) > Mc:

@@ -51,6 +51,8 @@ def test_drawn_clutches(clutch):
     run = engage(clutch)
     assert run.energy.residual < 1e-11
     other = integrate(clutch, run.end_time)
+    if abs(run.friction_work / other.work - 1.0) > 1e-8:  # it has stepped over a short slip or touch
+        other = integrate(clutch, run.end_time, finest=0.02)
     # 3e-12 a step, some dozens of spans; an impact multiplies what is off by a few
     assert run.peak_torque == pytest.approx(other.peak, rel=1e-7)
     assert run.friction_work == pytest.approx(other.work, rel=1e-7)
@@ -62,6 +64,49 @@ def test_drawn_clutches(clutch):
     w0 = clutch.drive_speed
     assert float(last["wM"][0]) == pytest.approx(other.end[1], abs=1e-6 * w0)
     assert float(last["wc"][0]) == pytest.approx(other.end[2], abs=1e-6 * w0)
+
+
+@pytest.mark.parametrize(
+    ("given", "seen"),
+    [
+        (  # T rises barely above what the clutch can hold: slip of 1.3 s begins in a graze
+            {
+                "clutch_inertia": 0.12220360440195487, "load_inertia": 0.40347059897724624,
+                "clutch_torque": 46.52163449475746, "load_torque": 5.934603671082232,
+                "stiffness": 1.0377494958873468, "drive_speed": 137.8119284991804,
+                "engagement_time": 0.5487575604877146, "damping": 0.012479462449332927,
+                "gap": 13.448804748870037, "load_kind": "reactive", "law": "quadratic-concave",
+            },
+            "slips again",
+        ),
+        (  # synchronous while the clutch can hold less than the shaft pulls, in the other direction
+            {
+                "clutch_inertia": 0.7464829901627057, "load_inertia": 5.180164153403425,
+                "clutch_torque": 77.87308289113429, "load_torque": 0.0, "stiffness": 135.35726940257612,
+                "drive_speed": 9.324692492756984, "engagement_time": 0.38919162083116443,
+                "gap": 0.1725945342311675, "law": "table", "law_times": [0.0, 0.5, 1.0, 1.5],
+                "law_torques": [77.87308289113429, 15.297497799825784, 0.0, 77.87308289113429],
+            },
+            "overrun",
+        ),
+        (  # a damped impact tears a standing load off at once
+            {
+                "clutch_inertia": 0.4, "load_inertia": 1.0, "clutch_torque": 60.0, "load_torque": 20.0,
+                "stiffness": 40.0, "drive_speed": 50.0, "engagement_time": 0.5, "damping": 4.0, "gap": 2.0,
+                "load_kind": "reactive",
+            },
+            "load moves",
+        ),
+    ],
+)  # fmt: skip
+def test_where_an_integrator_needs_short_steps(given, seen):
+    """Where the two once differed the integrator had stepped over an event; with short steps it agrees."""
+    run = engage(Clutch(**given))
+    assert seen in [event.name for event in run.events]
+    other = integrate(Clutch(**given), run.end_time, finest=0.06)
+    assert run.friction_work == pytest.approx(other.work, rel=1e-10)
+    assert run.peak_torque == pytest.approx(other.peak, rel=1e-10)
+    assert run.slip_time == pytest.approx(other.slip_time, rel=1e-10, nan_ok=True)
 
 
 BASE = {

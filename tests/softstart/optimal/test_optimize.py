@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -194,19 +195,21 @@ OTHERS = {
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_no_shipped_controller_is_gentler_in_its_own_time(name: str) -> None:
+    """Who is harder than the optimum of a shorter time is harder than that of its own, which is no higher."""
     drive = OTHERS[name]
-    compared = 0
+    shortest = shortest_start_time(Problem(drive, 1.0, "reached"))
+    runs = []
     for controller in ready_controller_names():
-        try:
-            run = simulate(drive, make_controller(controller))
-        except SimulationError:
-            continue
-        if not run.start_time > 1.0001 * shortest_start_time(Problem(drive, 1.0, "reached")):
-            continue  # quicker than any start whose gap closes once
-        best = optimize(drive, run.start_time, terminal="reached")
-        assert best.k_dyn <= run.k_dyn * (1 + 1e-6), controller
-        compared += 1
-    assert compared >= 4
+        with contextlib.suppress(SimulationError):
+            runs.append(simulate(drive, make_controller(controller)))
+    # quicker than any start whose gap closes once: not compared
+    compared = sorted((r for r in runs if r.start_time > 1.0001 * shortest), key=lambda r: r.start_time)
+    assert len(compared) >= 4
+    least = math.inf
+    for run in compared:
+        if run.k_dyn < least:
+            least = optimize(drive, run.start_time, terminal="reached").k_dyn
+        assert least <= run.k_dyn * (1 + 1e-6), run.controller.name
 
 
 @pytest.mark.parametrize("name", OTHERS)

@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from softstart import Drive
-from softstart.optimal import linear_search, shortest
+from softstart import Drive, optimize, simulate
+from softstart.optimal import collocation, linear_search, shortest
+from softstart.optimal.front import default_start_times
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.shortest import shortest_start_time, verdict_on
@@ -25,6 +26,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
         ({}, "synchronous"),
         ({"load_kind": "reactive"}, "steady"),
         ({"damping": 0.5, "contact_law": "dead-zone"}, "reached"),
+        ({"target_speed": "880 rpm"}, "reached"),  # Newton's steps alone go to and fro here
     ],
 )
 def test_it_parts_what_can_be_from_what_cannot(
@@ -131,3 +133,21 @@ def test_several_contacts_are_pointed_out() -> None:
     problem = Problem(drive, 0.9 * shortest_start_time(Problem(drive, 1.0, "reached")), "reached")
     said = verdict_on(problem).sentence
     assert ("Constant torque" in said) == ("contacts" in said)
+
+
+def test_what_was_not_found_is_not_called_impossible(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that does not converge proves nothing: the start time stays unknown, and is said to be."""
+
+    def gives_up(problem: Problem, warm: Any = None) -> None:
+        raise collocation.NotConverged("no solution found", 1.0)
+
+    monkeypatch.setattr(collocation, "solve", gives_up)
+    drive = CRANE.replace(torque_lag=0.005)
+    assert math.isnan(shortest_start_time(Problem(drive, 0.3)))
+    assert shortest_start_time(Problem(drive, 0.3, minimise="heat", k_dyn=0.5)) == math.inf
+    said = verdict_on(Problem(drive, 0.1))
+    assert "was not found" in said.sentence
+    assert "no start time would do" not in said.sentence
+    assert default_start_times(drive)[0] == pytest.approx(1.02 * simulate(drive, "direct").start_time)
+    with pytest.raises(collocation.NotConverged):
+        optimize(drive, 0.3, method="collocation")

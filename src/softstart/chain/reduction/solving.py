@@ -221,7 +221,10 @@ def _notes(chain: Chain, reduced: Chain) -> Iterator[str]:
         yield "the damping to the ground is left out of the drive, which has none"
     efficiency = math.prod(shaft.efficiency for shaft in chain.shafts)
     if efficiency < 1.0 and len(reduced.masses) == 2:
-        yield f"the efficiencies of the gears (together {efficiency:.4g}) are left out of the drive"
+        yield (
+            f"the efficiencies of the gears (together {efficiency:.4g}) are left out of the drive, which "
+            "starts as if nothing were lost; the chain is started with them"
+        )
     if any(shaft.rigid and shaft.gap > 0.0 for shaft in chain.shafts):
         yield "rigid gaps are counted with the springs beside them: their impacts are not kept"
     if len({shaft.contact_law for shaft in chain.shafts}) > 1:

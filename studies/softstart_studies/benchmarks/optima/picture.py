@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def optima_figure(outcomes: Sequence[Outcome]) -> Figure:
     """K_dyn over computing time, a panel a start time, by package; hollow where a condition breaks."""
+    from matplotlib.ticker import LogLocator
+
     tasks = list(dict.fromkeys(one.task for one in outcomes))
     packages = list(dict.fromkeys(entry.package for entry in ENTRIES.values()))
     with drawing():
@@ -28,6 +30,10 @@ def optima_figure(outcomes: Sequence[Outcome]) -> Figure:
                 axes.plot(*place, "o", color=colour, markerfacecolor=colour if one.kept else "white")
                 axes.annotate(one.name, place, (5, 4), textcoords="offset points", color=colour)
             axes.set_xscale("log")
+            for formatter in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+                formatter(lambda seconds, _: f"{seconds:g}")
+            axes.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+            axes.ticklabel_format(axis="y", useOffset=False)
             axes.margins(x=0.25, y=0.12)
             axes.set_xlabel("computing time, s")
             axes.set_title(f"start within {task.start_time:g} s", loc="left")

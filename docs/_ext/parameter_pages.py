@@ -1,0 +1,168 @@
+"""The reference of files and controllers, from the tables that the program itself reads with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from typing import Any
+
+from command_pages import cell, prose
+
+from softstart.balancing.tables import TABLES as ENGINE
+from softstart.chain.tables import TABLES as CHAIN
+from softstart.clutch.parameters import TABLES as CLUTCH
+from softstart.controller import controller_class, controller_names
+from softstart.controller.base import Sensor
+from softstart.drive import PARAMETERS
+from softstart.input_tables import REQUIRED, Table
+from softstart.study import find_study, study_names
+
+
+def drive_file() -> str:
+    """Every key of a drive file."""
+    lines: list[str] = []
+    for table in dict.fromkeys(p.table for p in PARAMETERS.values()):
+        lines += [_heading(table, False), "", "| key | symbol | unit | default | range | meaning | example |"]
+        lines += ["|---|---|---|---|---|---|---|"]
+        for p in (p for p in PARAMETERS.values() if p.table == table):
+            default = "**needed**" if p.required else _default(p.default, p.unit, p.follows)
+            if p.name == "target_speed":
+                default = "`rated_speed`, else **needed**"
+            limit = _choices(p.choices) or _limit(p.limit, p.unit)
+            lines.append(
+                f"| `{p.key}` | {p.symbol and f'`{p.symbol}`'} | {_unit(p.unit)} | {default} | {limit} "
+                f"| {prose(p.meaning)} | `{p.example}` |"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+def chain_file() -> str:
+    """Every key of a chain file."""
+    return _tables(CHAIN)
+
+
+def clutch_file() -> str:
+    """Every key of a clutch file."""
+    return _tables(CLUTCH)
+
+
+def engine_file() -> str:
+    """Every key of an engine file."""
+    return _tables(ENGINE)
+
+
+def _tables(tables: Iterable[Table]) -> str:
+    lines: list[str] = []
+    for table in tables:
+        lines += [_heading(table.name, table.many), ""]
+        if table.many:
+            lines += [f"As often as needed, at least {table.least}.", ""]
+        elif table.name and not table.required:
+            lines += ["May be left out as a whole.", ""]
+        lines += ["| key | unit | default | range | meaning | example |", "|---|---|---|---|---|---|"]
+        for f in table.fields:
+            default = "**needed**" if f.default is REQUIRED else _default(f.default, f.unit)
+            limit = _choices(f.choices) or _limit(f.limit, f.unit)
+            many = " (a list)" if f.many else ""
+            lines.append(
+                f"| `{f.key}` | {_unit(f.unit)} | {default} | {limit} | {prose(f.meaning)}{many} "
+                f"| `{cell(f.example)}` |"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _heading(name: str, many: bool) -> str:
+    if not name:
+        return "## Above the first table"
+    return f"## `[[{name}]]`" if many else f"## `[{name}]`"
+
+
+def _unit(unit: str) -> str:
+    return {"": "text", "1": "-"}.get(unit, unit.replace("*", "\N{NO-BREAK SPACE}").replace("^2", "²"))
+
+
+def _limit(limit: str, unit: str) -> str:
+    return "" if limit == "any" else limit
+
+
+def _choices(choices: Iterable[str]) -> str:
+    return ", ".join(f"`{choice}`" for choice in choices)
+
+
+def _default(value: Any, unit: str, follows: str = "") -> str:
+    if follows:
+        return f"`{follows}`"
+    if value is None:
+        return "not given"
+    if isinstance(value, str):
+        return f"`{value}`" if value else "empty"
+    if math.isinf(value):
+        return "none (`inf`)"
+    if unit == "rad" and value:
+        return f"{math.degrees(value):g} deg"
+    return f"{value:g}"
+
+
+def controllers() -> str:
+    """Every installed controller: what it does and sees, its parameters."""
+    lines: list[str] = []
+    for name in controller_names():
+        cls = controller_class(name)
+        lines += [f"## {name}", "", f"{prose(cls.summary[:1].upper() + cls.summary[1:])}.", ""]
+        lines += [f"Sees {', '.join(_seen(cls))}. Source: {prose(cls.source) or 'own design'}.", ""]
+        if not fields(cls):
+            lines += ["It has no parameters.", ""]
+            continue
+        lines += ["| parameter | unit | meaning | default | searched by `tune` |", "|---|---|---|---|---|"]
+        for field in fields(cls):
+            told = field.metadata
+            lines.append(
+                f"| `{field.name}` | {_unit(told['unit']) if told['kind'] == 'quantity' else told['kind']} "
+                f"| {prose(told['meaning'])} | {prose(told['default']) or '-'} | {_searched(told)} |"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _seen(cls: Any) -> Iterator[str]:
+    yield from ("time", "encoder", "motor torque")
+    yield from (str(s.name).lower().replace("_", " ") for s in Sensor if s and s in cls.sensors)
+
+
+def _searched(told: Any) -> str:
+    parts = []
+    if told["multiples"]:
+        parts.append("{:g} to {:g} times the default".format(*told["multiples"]))
+    if told["between"]:
+        parts.append("{:g} to {:g}".format(*told["between"]))
+    return ", within ".join(parts) or "-"
+
+
+def shipped() -> str:
+    """The drives that come with it."""
+    from softstart import Drive
+    from softstart.drive.library import names
+
+    lines = ["| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | source |"]
+    lines += ["|---|--:|--:|--:|--:|--:|---|---|"]
+    for name in names():
+        d = Drive.load(name)
+        load = f"{d.Mc:g} N m, {d.load_kind}"
+        lines.append(
+            f"| `{name}` | {d.J1:g} | {d.J2:g} | {d.c:g} | {d.gap:g} | {d.Ms:g} | {load} "
+            f"| {prose(cell(d.source))} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def studies() -> str:
+    """The studies and their pictures."""
+    lines = ["| study | question | pictures |", "|---|---|---|"]
+    for name in study_names():
+        study = find_study(name)
+        pictures = ", ".join(f"`{stem}`" for stem in study.pictures) or "-"
+        lines.append(f"| `{name}` | {prose(study.title)} | {pictures} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,36 @@
+"""Method 2 of [G] over the whole start
+====================================
+
+Method 2 looks much gentler than method 1 as long as only its first contact is looked at. [G] raises the
+torque when that contact ends, by its equation (15); the gap is open then, the motor runs ahead, and the
+*second* contact comes under full torque. Raised at the peak of the first contact instead, by (14), the gap
+never opens again.
+"""
+
+# %%
+# The crane drive of [G], J2 = 5 J1, gaps of 0.5 and 2 rad; each mark is a whole start, to its last contact.
+from softstart_studies.paper_g import pictures, whole_start
+from softstart_studies.paper_g.crane import GAP_1, GAP_2, SHARE, crane, simulated
+
+figure = pictures.whole_start_figure([whole_start.whole_start(gap) for gap in (GAP_1, GAP_2)])
+figure.set_label("K_dyn of the first contact and of the whole start over M1/Ms.")
+
+# %%
+# The same in time, with M1 = Ms/4:
+traces = [
+    ("method 2: raised at the end of stage 2, (15)", simulated(crane(), SHARE, 2)),
+    ("raised at the peak of stage 2, (14)", whole_start.at_peak(GAP_1, SHARE)),
+]
+in_time = pictures.traces_figure(traces, 0.26)
+in_time.set_label("Shaft torque of the two starts; grey where the gap is open.")
+
+# %%
+# In figures:
+for name, run in traces:
+    print(f"{name}: K_dyn {run.k_dyn:.4f}, {run.contacts} contacts, start time {run.start_time:.4f} s")
+
+# %%
+# All tables and verdicts: ``softstart study paper-g --out results`` (3 s).
+#
+# **References.** [G] R. P. Gerasymiak, V. V. Subbotin, *Dual-mass mechanical part electromechanical system
+# behavior analysis*.

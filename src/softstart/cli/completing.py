@@ -1,0 +1,186 @@
+"""What the words of a command line may become: the answers to the Tab key, for options and arguments.
+
+Each answer holds whole words. One that ends in `=`, `/`, `:` or `.` is not yet finished, and the shells set
+no space behind it. Nothing here raises: where there is no answer, there is none.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from softstart.plugins import registered
+
+if TYPE_CHECKING:
+    from softstart.input_tables import Table
+
+Answer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+Keys = Mapping[
+    str, tuple[str, Sequence[str]]
+]  # what is set: its meaning, and its values where these are words
+
+CONTROLLERS, STUDIES = "softstart.controllers", "softstart.studies"
+
+
+def names_or_files(names: Callable[[], Iterable[str]], *endings: str) -> Answer:
+    """One of these names, or a file that ends so."""
+
+    def complete(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
+        found = [name for name in names() if name.startswith(begun)]
+        return [*map(CompletionItem, found), *map(CompletionItem, files(begun, *endings))]
+
+    return complete
+
+
+def controllers(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """One more controller after the last comma: a name not yet named, tuned gains, or a class in a file."""
+    done, comma, begun = incomplete.rpartition(",")
+    path, colon, _ = begun.rpartition(":")
+    if colon:
+        found = [f"{path}:{name}" for name in classes(path)]
+    else:
+        named = done.split(",")
+        found = [name for name in registered(CONTROLLERS) if name not in named]
+        found += [
+            path + ":" if path.endswith(".py") else path for path in files(begun, ".py", ".toml", ".csv")
+        ]
+    return [CompletionItem(done + comma + word) for word in found if word.startswith(begun)]
+
+
+def files_only(*endings: str) -> Answer:
+    """Files with these endings and folders; folders alone without endings."""
+    return names_or_files(tuple, *endings)
+
+
+def studies(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The name of a study."""
+    return [CompletionItem(name) for name in registered(STUDIES) if name.startswith(incomplete)]
+
+
+def settings(keys: Callable[[], Keys]) -> Answer:
+    """`key=`, and behind it a value where the values are words."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        key, equals, _ = incomplete.partition("=")
+        known = keys()
+        if equals:
+            _, values = known.get(key, ("", ()))
+            found = [CompletionItem(f"{key}={value}") for value in values]
+        else:
+            found = [CompletionItem(f"{key}=", help=meaning) for key, (meaning, _) in known.items()]
+        return [item for item in found if item.value.startswith(incomplete)]
+
+    return complete
+
+
+def axes(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """A parameter of the drive, or `controller=` with names behind it."""
+    key, equals, value = incomplete.partition("=")
+    if equals and key == "controller":
+        return [CompletionItem(f"{key}={item.value}") for item in controllers(ctx, param, value)]
+    found = [CompletionItem("controller=", help="controllers, with commas between")]
+    return [item for item in found if item.value.startswith(incomplete)] + settings(drive_keys)(
+        ctx, param, incomplete
+    )
+
+
+def parameters(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """`key=` of the controller named before, `controller.key=` where there may be several.
+
+    Only installed controllers are asked: no file runs because somebody pressed Tab.
+    """
+    one, several = ctx.params.get("controller"), ctx.params.get("controllers")
+    names = (one or several or ",".join(registered(CONTROLLERS))).split(",")
+    if not one and "." not in incomplete:
+        found = [f"{name}." for name in names if name in registered(CONTROLLERS)]
+        return [CompletionItem(word) for word in found if word.startswith(incomplete)]
+    items: list[CompletionItem] = []
+    for name in names:
+        if name in registered(CONTROLLERS) and (one or incomplete.startswith(f"{name}.")):
+            items += _parameters_of(name, "" if one else f"{name}.")
+    return [item for item in items if item.value.startswith(incomplete)]
+
+
+def _parameters_of(name: str, before: str) -> Iterator[CompletionItem]:
+    from dataclasses import fields
+
+    from softstart.controller import controller_class
+
+    for field in fields(controller_class(name)):
+        meaning, unit = field.metadata.get("meaning", ""), field.metadata.get("unit", "")
+        yield CompletionItem(f"{before}{field.name}=", help=_with_unit(meaning, unit))
+
+
+class Words(click.types.StringParamType):
+    """Text of which the words in the option's metavar, `a|b|c`, are known; in capitals it is a placeholder.
+
+    >>> option = click.Option(["--terminal"], metavar="synchronous|steady|FILE", type=Words())
+    >>> [item.value for item in option.shell_complete(click.Context(click.Command("x")), "s")]
+    ['synchronous', 'steady']
+    """
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """The words that begin so."""
+        words = (param.metavar or "").strip("[]").split("|")
+        found = [word for word in words if word.islower() and word.startswith(incomplete)]
+        return [CompletionItem(word) for word in found] if len(words) > 1 else []
+
+
+def drive_keys() -> Keys:
+    """The parameters of a drive as `--set` names them."""
+    from softstart.drive import PARAMETERS
+
+    return {p.path: (_with_unit(p.meaning, p.unit), p.choices) for p in PARAMETERS.values()}
+
+
+def table_keys(tables: Iterable[Table]) -> Keys:
+    """The keys of a file of tables as `--set` names them; the first of a list of tables stands for all."""
+    found: dict[str, tuple[str, Sequence[str]]] = {}
+    for table in tables:
+        place = f"{table.name}{'[1]' if table.many else ''}." if table.name else ""
+        for field in table.fields:
+            found[place + field.key] = (_with_unit(field.meaning, field.unit), field.choices)
+    return found
+
+
+def files(begun: str, *endings: str) -> list[str]:
+    """Files with these endings and all folders (with a slash behind) whose path begins so.
+
+    >>> "pyproject.toml" in files("nowhere/", ".toml")
+    False
+    """
+    folder, slash, head = begun.rpartition("/")
+    place = os.path.expanduser(folder) or slash or "."
+    found: list[tuple[bool, str]] = []
+    try:
+        with os.scandir(place) as entries:
+            for entry in entries:
+                name, is_folder = entry.name, entry.is_dir()
+                hidden = name.startswith((".", "__")) and not head.startswith((".", "__"))
+                if name.startswith(head) and not hidden and (is_folder or name.endswith(endings)):
+                    found.append((is_folder, f"{folder}{slash}{name}{'/' if is_folder else ''}"))
+    except OSError:
+        return []
+    return [path for _, path in sorted(found)]
+
+
+def classes(path: str) -> list[str]:
+    """Names of the classes in a Python file, which is read and not run."""
+    import ast
+
+    try:
+        with open(os.path.expanduser(path), encoding="utf-8") as opened:
+            body = ast.parse(opened.read()).body
+    except (OSError, SyntaxError, ValueError):
+        return []
+    return [node.name for node in body if isinstance(node, ast.ClassDef)]
+
+
+def _with_unit(meaning: str, unit: Any) -> str:
+    return f"{meaning}, {unit}" if unit and unit != "1" else meaning

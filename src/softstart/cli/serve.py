@@ -1,0 +1,72 @@
+"""`softstart serve`: the interactive page in a browser."""
+
+from __future__ import annotations
+
+import os
+
+import click
+
+from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_drive, set_option
+from softstart.cli.usage import Command
+
+
+@click.command(cls=Command)
+@drive_argument(DEFAULT_DRIVE)
+@set_option
+@click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 takes a free one.")
+@click.option(
+    "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen at."
+)
+@click.option(
+    "--token", default="", metavar="TOKEN", help="Ask everyone for this token; needed with --expose."
+)
+@click.option("--expose", is_flag=True, help="Let other machines reach the page; needs --host and --token.")
+@click.option("--no-browser", is_flag=True, help="Do not open a browser.")
+def serve(
+    drive: str, settings: tuple[str, ...], port: int, host: str, token: str, expose: bool, no_browser: bool
+) -> None:
+    """Design a soft start in the browser: sliders, traces that follow, strategies side by side.
+
+    The page is served to this machine alone, unless it is told otherwise. Without DRIVE it begins with the
+    crane drive of the literature. Ctrl-C ends it. Needs NiceGUI: pip install 'softstart[ui]'.
+    """
+    # threads of linear algebra libraries spin on small matrices, and the page must answer within milliseconds
+    for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(library, "1")
+    from softstart.page.serve import Address, check_installed, listening, run
+
+    address = Address(host, port, token, expose)
+    mistakes = Mistakes()
+    for check in (address.check, check_installed):
+        with mistakes.noted():
+            check()
+    with mistakes.noted():
+        loaded = read_drive(drive, settings)
+    mistakes.settle()
+    listener = listening(address)
+    with listener:
+        _warm_up()
+
+        def ready(url: str) -> None:
+            print(f"softstart is at {url}  (Ctrl-C ends it)", flush=True)
+            if not no_browser and address.is_loopback:
+                import threading
+                import webbrowser
+
+                # some browsers take the terminal until they are closed; the page must not wait for that
+                threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+
+        run(loaded, address, listener, ready)
+
+
+def _warm_up() -> None:
+    """Start all strategies once: whatever must be compiled is compiled before the page opens."""
+    from softstart.cli.running import working
+    from softstart.page.bench import Bench
+    from softstart.page.map import axes_about, k_dyn_row
+
+    with working("getting the engine ready ..."):
+        bench = Bench()
+        _ = bench.strategies
+        axes = axes_about(bench.drive, 3, 3)
+        k_dyn_row(bench.drive, bench.controllers[bench.selected], axes.gaps, axes.inertias[1])

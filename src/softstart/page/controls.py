@@ -1,0 +1,176 @@
+"""What a user does on the page, taken onto the bench; a mistake becomes a sentence beside its field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from time import perf_counter
+from typing import Any
+
+from softstart.drive.parameters import PARAMETERS
+from softstart.errors import InputError
+from softstart.page.bench import Bench
+from softstart.page.frames import Screen
+from softstart.page.trouble import sentence_of
+
+DRIFT = 2e-4  # of two clocks against one another: more than any have
+BY_PATH = {parameter.path: parameter for parameter in PARAMETERS.values()}
+
+# name, what stands before the field; the sliders are those of scales.scales_about
+GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "Motor": (
+        ("starting_torque", "starting torque"),
+        ("motor_inertia", "inertia"),
+        ("torque_lag", "torque lag"),
+        ("maximum_torque", "largest torque"),
+        ("minimum_torque", "braking torque"),
+        ("torque_rate", "torque rate"),
+        ("computing_delay", "dead time"),
+        ("encoder_lines", "encoder lines"),
+        ("torque_noise", "torque noise"),
+    ),
+    "Shaft": (
+        ("gap", "total gap"),
+        ("stiffness", "stiffness"),
+        ("damping", "damping"),
+        ("start_position", "start position"),
+        ("contact_law", "contact law"),
+    ),
+    "Load": (
+        ("load_inertia", "inertia"),
+        ("load_torque", "torque"),
+        ("load_kind", "kind"),
+    ),
+    "Start": (
+        ("target_speed", "target speed"),
+        ("initial_load_speed", "speed before"),
+    ),
+}  # fmt: skip
+SYMBOLS = {
+    "starting_torque": "Ms",
+    "motor_inertia": "J\N{SUBSCRIPT ONE}",
+    "torque_lag": "\N{GREEK SMALL LETTER TAU}",
+    "gap": "\N{GREEK SMALL LETTER DELTA}",
+    "stiffness": "c",
+    "damping": "d",
+    "start_position": "\N{GREEK SMALL LETTER THETA}",
+    "load_inertia": "J\N{SUBSCRIPT TWO}",
+    "load_torque": "Mc",
+    "target_speed": "\N{GREEK SMALL LETTER OMEGA}",
+}
+
+
+def groups(screen: Screen) -> list[dict[str, Any]]:
+    """The fields in their groups, as the browser builds them."""
+    return [
+        {"title": title, "rows": [_row(name, label, name in screen.scales) for name, label in rows]}
+        for title, rows in GROUPS.items()
+    ]
+
+
+def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
+    parameter = PARAMETERS[name]
+    return {
+        "path": parameter.path,
+        "symbol": SYMBOLS.get(name, ""),
+        "label": label,
+        "meaning": f"{parameter.meaning}; write for example {parameter.example}",
+        "unit": readable(parameter.unit),
+        "slider": slider,
+        "choices": list(parameter.choices),
+    }
+
+
+def readable(unit: str) -> str:
+    """A unit as it is printed.
+
+    >>> readable("kg*m^2"), readable("N*m*s/rad"), readable("1")
+    ('kg m²', 'N m s/rad', '')
+    """
+    return "" if unit == "1" else unit.replace("*", " ").replace("^2", "\N{SUPERSCRIPT TWO}")
+
+
+class Delay:
+    """How late messages come, in s: over the quickest one of late, since the two clocks are not set alike.
+
+    >>> delay = Delay(clock=iter([10.0, 10.5, 11.4]).__next__)
+    >>> [round(delay.of(stamp), 3) for stamp in (3.0, 3.5, 4.0)]
+    [0.0, 0.0, 0.4]
+    """
+
+    def __init__(self, clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self._offset = math.inf
+        self._last = 0.0
+
+    def of(self, stamp: float) -> float:
+        """The delay of a message with the sender's time on it."""
+        now = self._clock()
+        self._offset = min(now - stamp, self._offset + DRIFT * (now - self._last))
+        self._last = now
+        return now - stamp - self._offset
+
+
+class Controls:
+    """Takes messages of the browser, dictionaries with `what` and more; never raises for a wrong one.
+
+    `poke` is called after each message that changes what is to be seen.
+    """
+
+    def __init__(self, bench: Bench, screen: Screen, poke: Callable[[], None]) -> None:
+        self._bench = bench
+        self._screen = screen
+        self._poke = poke
+        self._delay = Delay()
+        self._ways: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+            "slide": self._slide,
+            "edit": self._edit,
+            "jump": self._jump,
+            "select": lambda message: bench.select(str(message["name"])),
+            "show": lambda message: bench.show(str(message["name"]), bool(message["visible"])),
+            "remove": lambda message: bench.remove(str(message["name"])),
+            "keep": self._keep,
+            "hello": lambda message: screen.forget(),
+        }
+
+    def take(self, message: object) -> None:
+        """One message. What is wrong with it is told in the next frame, beside the field if it has one."""
+        if not isinstance(message, Mapping):
+            return
+        way = self._ways.get(str(message.get("what")))
+        if way is None:
+            return
+        place = str(message.get("path", ""))
+        stamp = message.get("stamp")
+        if isinstance(stamp, int | float) and math.isfinite(stamp):
+            self._screen.stamp = float(stamp)
+            self._screen.late = self._delay.of(float(stamp) / 1000.0)
+        try:
+            way(message)
+        except Exception as error:  # a message may hold anything
+            self._screen.mistakes[place] = sentence_of(error)
+        else:
+            self._screen.mistakes.pop(place, None)
+        self._poke()
+
+    def _slide(self, message: Mapping[str, Any]) -> None:
+        parameter = BY_PATH[str(message["path"])]
+        scale = self._screen.scales[parameter.name]
+        self._bench.set(parameter.path, scale.value(float(message["position"])))
+
+    def _edit(self, message: Mapping[str, Any]) -> None:
+        path, text = str(message["path"]), str(message["text"]).strip()
+        if path not in BY_PATH:
+            raise InputError(f'"{path}": there is no such field.')
+        if not text:
+            raise InputError(f"{path}: the field is empty; write for example {BY_PATH[path].example}.")
+        self._bench.set(path, " ".join(text.split()))
+
+    def _jump(self, message: Mapping[str, Any]) -> None:
+        gap, inertia = float(message["gap"]), float(message["inertia"])
+        self._bench.set_all({"shaft.gap": gap, "load.inertia": inertia})
+        for path in ("shaft.gap", "load.inertia"):
+            self._screen.mistakes.pop(path, None)
+
+    def _keep(self, message: Mapping[str, Any]) -> None:
+        self._screen.kept = bool(message["kept"])

@@ -1,0 +1,306 @@
+"""Long computations in processes of their own: a fair queue, progress, and a cancel that stops."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import pickle
+import threading
+import time
+from collections.abc import Callable, Hashable, Sequence
+from enum import Enum
+from typing import Any
+
+from softstart.errors import InputError
+from softstart.page.job_place import Place
+from softstart.page.job_process import Told
+
+PATIENCE = 0.1  # s between two looks at whether a job is to stop
+MOST_WAITING = 8  # jobs of one user
+
+MISTAKE = (
+    "There is a mistake in softstart, and this could not be computed; the log of the server, where "
+    "softstart serve was started, says more. Everything else goes on."
+)
+
+log = logging.getLogger("softstart.page")
+
+
+class State(Enum):
+    """Where a job is; the values are the sentences shown."""
+
+    WAITING = "Waiting for its turn."
+    RUNNING = "Computing."
+    DONE = "Done."
+    CANCELLED = "Cancelled."
+    FAILED = "Not computed."
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more will come."""
+        return self not in {State.WAITING, State.RUNNING}
+
+
+class Job:
+    """A function that runs, ran or will run in a process of its own. Made by `Jobs.begin`.
+
+    `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
+    `parts` what came out so far; `result` what came out at the end; `sentences` why there is no result.
+    `changes` counts what happened, so that whoever looks now and then sees whether to look closer.
+    """
+
+    def __init__(self, jobs: Jobs, user: Hashable, title: str, packed: bytes) -> None:
+        self.user = user
+        self.title = title
+        self.state = State.WAITING
+        self.share: float | None = None
+        self.message = ""
+        self.parts: list[Any] = []
+        self.result: Any = None
+        self.sentences: tuple[str, ...] = ()
+        self.changes = 0
+        self.pid: int | None = None
+        self._jobs = jobs
+        self._packed = packed
+        self._stop = threading.Event()
+        self._over = threading.Event()
+        self._began = self._ended = 0.0
+
+    def __repr__(self) -> str:
+        """Title and state."""
+        return f"<Job: {self.title}, {self.state.name.lower()}>"
+
+    @property
+    def error(self) -> str:
+        """Why there is no result, one sentence a line; empty where there is one, or may come."""
+        return "\n".join(self.sentences)
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was cancelled and its process is being ended."""
+        return self._stop.is_set() and not self.state.over
+
+    @property
+    def ahead(self) -> int:
+        """How many waiting jobs come before this one; 0 for one that does not wait."""
+        return self._jobs.ahead(self)
+
+    @property
+    def seconds(self) -> float:
+        """Time since its process was started, or that its process took."""
+        if not self._began:
+            return 0.0
+        return (self._ended or time.monotonic()) - self._began
+
+    def cancel(self) -> None:
+        """Stop it; its process is gone within a second. Does nothing to a job that is over."""
+        self._stop.set()
+        self._jobs.withdraw(self)
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until it is over; False if that takes longer than `timeout` seconds."""
+        return self._over.wait(timeout)
+
+
+class Jobs:
+    """Runs at most `limit` jobs at once, and those of one user one after another.
+
+    Whose last job began longest ago is served next, so that nobody waits for another one's long queue. By
+    default two jobs at once, more where there are more than three processors. `end` must be called when the
+    server ends; processes whose server was killed end by themselves. `modules` are imported by each process
+    before it is given work: with `warm` that is done before anybody waits for it.
+    """
+
+    def __init__(self, limit: int | None = None, modules: Sequence[str] = ()) -> None:
+        self.limit = limit or max(2, (os.cpu_count() or 1) - 1)
+        self.modules = modules
+        self._spare: Place | None = None
+        self._warming = False
+        self._lock = threading.RLock()
+        self._waiting: list[Job] = []
+        self._running: dict[Job, threading.Thread] = {}
+        self._served: dict[Hashable, int] = {}
+        self._turns = itertools.count(1)
+        self._ended = False
+
+    def begin(self, user: Hashable, title: str, work: Callable[..., Any], *args: Any, **keywords: Any) -> Job:
+        """Put `work(*args, tell=..., **keywords)` into the queue of `user`.
+
+        The function must be importable, its arguments and its result picklable; `tell` is a
+        `softstart.page.job_process.Tell`. Raises InputError if too many jobs of this user wait already.
+        """
+        job = Job(self, user, title, pickle.dumps((work, args, keywords)))
+        with self._lock:
+            if self._ended:
+                raise InputError("The server is ending; nothing new is begun.")
+            if sum(one.user == user for one in self._waiting) >= MOST_WAITING:
+                raise InputError(
+                    f"{MOST_WAITING} computations of yours are waiting already; cancel one, or wait for it."
+                )
+            self._waiting.append(job)
+            self._advance()
+        return job
+
+    def of(self, user: Hashable) -> list[Job]:
+        """The jobs of a user that are not over, the running one first."""
+        with self._lock:
+            return [job for job in (*self._running, *self._waiting) if job.user == user]
+
+    def ahead(self, job: Job) -> int:
+        """How many waiting jobs come before this one."""
+        with self._lock:
+            order = self._order()
+            return order.index(job) if job in order else 0
+
+    def leave(self, user: Hashable) -> None:
+        """A user has gone: cancel all that is computed for them."""
+        with self._lock:
+            for job in self.of(user):
+                job.cancel()
+            self._served.pop(user, None)
+
+    def end(self, timeout: float = 5.0) -> None:
+        """Cancel everything, and wait until no process is left. Nothing can be begun afterwards."""
+        with self._lock:
+            self._ended = True
+            spare, self._spare = self._spare, None
+            threads = list(self._running.values())
+            for job in (*self._waiting, *self._running):
+                job.cancel()
+        if spare is not None:
+            spare.leave()
+        latest = time.monotonic() + timeout
+        for thread in threads:
+            thread.join(max(0.0, latest - time.monotonic()))
+
+    def withdraw(self, job: Job) -> None:
+        """Take a cancelled job out of the queue, if it waits there."""
+        with self._lock:
+            if job in self._waiting:
+                self._waiting.remove(job)
+                _conclude(job, State.CANCELLED)
+            elif not job.state.over:
+                job.changes += 1
+
+    # the queue -----------------------------------------------------------------------------------------
+
+    def _order(self) -> list[Job]:
+        """Waiting jobs in the order in which they would be served: turn by turn, one of each user."""
+        rank: dict[Hashable, int] = {}
+        keys = []
+        for place, job in enumerate(self._waiting):
+            turn = rank[job.user] = rank.get(job.user, -1) + 1
+            keys.append((turn, self._served.get(job.user, 0), place, job))
+        return [job for *_, job in sorted(keys, key=lambda key: key[:3])]
+
+    def _advance(self) -> None:
+        """Start what may be started now. Called with the lock held."""
+        for job in self._order():
+            busy = {one.user for one in self._running}
+            if self._ended or len(self._running) >= self.limit:
+                return
+            if job.user in busy:
+                continue
+            self._waiting.remove(job)
+            self._served[job.user] = next(self._turns)
+            job.state, job._began = State.RUNNING, time.monotonic()
+            job.changes += 1
+            thread = threading.Thread(target=self._attend, args=(job,), name=f"job {job.title}", daemon=True)
+            self._running[job] = thread
+            thread.start()
+
+    # one job -------------------------------------------------------------------------------------------
+
+    def _attend(self, job: Job) -> None:
+        """Start the process of a job, listen to it, and see it to its end: the work of one thread."""
+        state = State.FAILED
+        sentences: tuple[str, ...] = (MISTAKE,)
+        try:
+            place = self._place()
+            try:
+                job.pid = place.process.pid
+                place.connection.send_bytes(job._packed)
+                state, sentences = _listen(job, place)
+            finally:
+                place.leave()
+        except Exception:  # a thread that died would hold its place in the queue for ever
+            log.exception("The process of %r could not be attended.", job.title)
+        with self._lock:
+            del self._running[job]
+            _conclude(job, state, sentences)
+            self._advance()
+        self.warm()
+
+    def warm(self) -> None:
+        """Have a process wait for the next job, so that it begins at once. Returns before it is ready."""
+        with self._lock:
+            if self._ended or self._spare is not None or self._waiting or self._warming:
+                return
+            self._warming = True
+        threading.Thread(target=self._warm, daemon=True).start()
+
+    def _warm(self) -> None:
+        try:
+            place = Place(self.modules)
+        except OSError:  # no process to be had now: a job will say so, or find one
+            log.exception("No process could be made ready.")
+            place = None
+        with self._lock:
+            self._warming = False
+            if self._ended and place is not None:
+                place.leave()
+            else:
+                self._spare = place
+
+    def _place(self) -> Place:
+        """The process that waits, or a new one."""
+        with self._lock:
+            place, self._spare = self._spare, None
+        if place is None:
+            return Place(self.modules)
+        if place.process.is_alive():
+            return place
+        place.leave()
+        return Place(self.modules)
+
+
+def _conclude(job: Job, state: State, sentences: tuple[str, ...] = ()) -> None:
+    job._ended = time.monotonic() if job._began else 0.0
+    job._packed = b""
+    job.sentences, job.state = sentences, state
+    job.changes += 1
+    job._over.set()
+
+
+def _listen(job: Job, place: Place) -> tuple[State, tuple[str, ...]]:
+    """Take in what the process says until it has ended or is to stop."""
+    connection = place.connection
+    while not job._stop.is_set():
+        try:
+            if not connection.poll(PATIENCE):
+                continue
+            told: Told = connection.recv()
+        except (EOFError, OSError):
+            return State.FAILED, (_ended_by_itself(place),)
+        if told.kind == "progress":
+            job.share, job.message = told.content
+        elif told.kind == "part":
+            job.parts.append(told.content)
+        elif told.kind == "result":
+            job.result, job.share = pickle.loads(told.content), 1.0
+            return State.DONE, ()
+        elif told.kind == "refused":
+            return State.FAILED, tuple(told.content)
+        else:
+            log.error("In the process of %r:\n%s", job.title, told.content)
+            return State.FAILED, (MISTAKE,)
+        job.changes += 1
+    return State.CANCELLED, ()
+
+
+def _ended_by_itself(place: Place) -> str:
+    return (
+        f"The process of this computation was ended from outside ({place.how_it_ended()}), perhaps because "
+        "memory ran out; start it again, or ask for less."
+    )

@@ -1,0 +1,139 @@
+"""Results that follow a hand on a slider: the newest drive wins, and nothing ever queues up.
+
+A change only raises a flag. One task looks at the drive as it is when it gets there, computes the selected
+strategy, sends it, and goes on with the others until the flag is up again. Frames that the browser has
+not drawn yet are counted: with `WINDOW` of them on their way the task waits, and what happens meanwhile melts
+into the next frame. So the page is behind by a few frames at most, however slow browser or line are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+from softstart.page.trouble import log, sentence_of
+
+WINDOW = 2  # frames sent and not yet drawn
+GLANCES = 24  # small frames between two that were drawn: more, and the browser is not keeping up
+PATIENCE = 1.0  # s, after which a frame that was never answered is taken as lost
+REST = 0.12  # s without a change, after which what is slow or secondary is computed
+
+Frame = dict[str, Any]
+
+
+class Work(Protocol):
+    """What is computed: in frames now, in slices when the drive has come to rest."""
+
+    @property
+    def version(self) -> int:
+        """Counts the changes."""
+
+    def glance(self) -> Frame | None:
+        """The one figure that follows every step of the hand, if it is quick to compute."""
+
+    def first(self) -> Frame:
+        """The frame that must follow the hand."""
+
+    def others(self) -> Iterator[Frame | None]:
+        """Further frames of the same drive; each step takes a few ms; may be left at any step."""
+
+    def at_rest(self) -> Iterator[Frame | None]:
+        """What can wait: each step takes a few ms; may be left at any step, and is begun anew then."""
+
+
+class Live:
+    """Sends frames of `work` by `send(number, frame)` as long as `run` runs.
+
+    `poke` says that something changed, `drawn(number)` that the browser has drawn a frame. Frames are
+    numbered from 1; a glance has the number 0 and is not answered.
+    """
+
+    def __init__(
+        self,
+        work: Work,
+        send: Callable[[int, Frame], None],
+        trouble: Callable[[str], None] = log.error,
+        rest: float = REST,
+    ) -> None:
+        self._work = work
+        self._send = send
+        self._trouble = trouble
+        self._rest = rest
+        self._changed = asyncio.Event()
+        self._drawn = asyncio.Event()
+        self._sent = 0
+        self._glances = 0
+        self._answered = 0
+
+    def poke(self) -> None:
+        """Something changed: the large figure is sent at once, the rest when its turn comes."""
+        self._changed.set()
+        if self._glances >= GLANCES:
+            return
+        try:
+            frame = self._work.glance()
+        except Exception as error:  # told with the frame that follows, if it is still so
+            log.debug("no glance", exc_info=error)
+            return
+        if frame is not None:
+            self._glances += 1
+            self._send(0, frame)
+
+    def drawn(self, number: int) -> None:
+        """The browser has drawn this frame, hence all before it."""
+        self._answered = min(max(self._answered, number), self._sent)
+        self._glances = 0
+        self._drawn.set()
+
+    @property
+    def on_their_way(self) -> int:
+        """Frames that were sent and are not drawn."""
+        return self._sent - self._answered
+
+    async def run(self) -> None:
+        """Follow the work until cancelled. What goes wrong is told and does not end it."""
+        self._changed.set()
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            try:
+                await self._follow()
+            except Exception as error:  # the page must live on, whatever a controller does
+                self._trouble(sentence_of(error))
+
+    async def _follow(self) -> None:
+        await self._room()
+        self._changed.clear()  # the frame below is of the drive as it is now
+        self._put(self._work.first())
+        if await self._going_on(self._work.others()):
+            return
+        try:
+            await asyncio.wait_for(self._changed.wait(), self._rest)
+        except TimeoutError:
+            await self._going_on(self._work.at_rest())
+
+    async def _going_on(self, steps: Iterator[Frame | None]) -> bool:
+        """Take the steps one by one; True if something changed meanwhile, and the rest was left."""
+        for frame in steps:
+            if frame is not None:
+                await self._room()
+                self._put(frame)
+            await asyncio.sleep(0)  # what came over the line is read here
+            if self._changed.is_set():
+                return True
+        return False
+
+    def _put(self, frame: Frame) -> None:
+        self._sent += 1
+        self._send(self._sent, frame)
+
+    async def _room(self) -> None:
+        """Wait until fewer than WINDOW frames are on their way."""
+        await asyncio.sleep(0)
+        while self.on_their_way >= WINDOW:
+            self._drawn.clear()
+            try:
+                await asyncio.wait_for(self._drawn.wait(), PATIENCE)
+            except TimeoutError:
+                self._answered, self._glances = self._sent, 0

@@ -1,0 +1,167 @@
+"""The optimal start: asked for a start time, computed in the background, put among the strategies."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from functools import partial
+from typing import TYPE_CHECKING, cast
+
+from nicegui import ui
+
+from softstart.controller.finding import make_controller
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.page import works
+from softstart.page.bench import REFERENCE, Bench
+from softstart.page.downloads import file_name
+from softstart.page.job_view import LOOK, JobView
+from softstart.page.jobs import Jobs
+from softstart.page.panel_parts import (
+    Mark,
+    action,
+    box,
+    choice,
+    facts,
+    field,
+    guarded,
+    hint,
+    number,
+    percent,
+    save,
+)
+
+if TYPE_CHECKING:
+    from softstart.controller.base import Controller
+    from softstart.optimal.problem import Terminal
+    from softstart.optimal.result import Optimum
+
+TERMINALS = {
+    "synchronous": "both masses at target speed",
+    "reached": "load at target speed",
+    "steady": "both, and shaft torque at rest",
+}
+BOUNDS = {"certificate": "certified for", "momentum": "by momentum, for", "none": "none: "}
+
+
+class OptimumPanel:
+    """Form, progress and result; built in the current slot."""
+
+    def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
+        self._bench = bench
+        self._drive: Drive = bench.drive
+        self._found: works.Gentlest | None = None
+        with box().classes("panel-form"):
+            self._time = field(
+                "Start time", "1.2x", "optimum-time", "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
+            )
+            self._end = choice("At its end", TERMINALS, "synchronous", "optimum-terminal")
+            self._go = action("Compute", self._begin, "optimum-go", main=True)
+            self._time.on("keydown.enter", self._begin)
+        self._hint = hint(
+            "The torque over time with the least K_dyn, and a bound that no torque can go below."
+        )
+        self._view = JobView(jobs, user, "optimum", on_done=self._done, on_state=self._state)
+        with box().classes("panel-result") as self._result:
+            self._mark = Mark(bench, "optimum")
+            self._figures = ui.html("", sanitize=False).classes("w-full")
+            self._sentence = ui.label().classes("panel-sentence").props('data-testid="optimum-sentence"')
+            self._why = ui.label().classes("panel-hint")
+            with box().classes("panel-actions"):
+                ui.label("Torque profile").classes("panel-caption")
+                for suffix in (".csv", ".toml", ".c"):
+                    text = suffix[1:].upper()
+                    action(text, guarded(partial(self._save, suffix)), f"optimum-{suffix[1:]}")
+        self._result.set_visibility(False)
+        ui.timer(LOOK, self._mark.look)
+
+    def _begin(self) -> None:
+        text = str(self._time.value).strip()
+        try:
+            _check(text)
+        except InputError as error:
+            self._view.refuse(error)
+            return
+        if not self._view.busy:
+            self._drive = self._bench.drive
+            terminal = cast("Terminal", self._end.value)
+            self._view.begin("optimal start", works.gentlest, self._drive, text, terminal)
+
+    def _state(self) -> None:
+        self._go.set_enabled(not self._view.busy)
+        if self._view.failed:
+            self._result.set_visibility(False)  # what is left there answers another question
+
+    def _done(self, found: works.Gentlest) -> None:
+        self._found = found
+        self._figures.set_content(facts(figures(found.best), "optimum-figures"))
+        bound = found.best.bound
+        self._why.set_text(
+            f"Method {found.best.method}: {found.best.why}. "
+            f"Lower bound {BOUNDS[bound.kind]} {bound.covers}".rstrip(".")
+            + "."
+        )
+        self._result.set_visibility(True)
+        self._mark.of(self._drive)
+        self._hint.set_visibility(False)
+        try:
+            self._bench.add(label_of(found.best), player_of(found.best), select=False)
+        except InputError as error:  # the table is full
+            self._sentence.set_text(" ".join(error.sentences))
+        else:
+            self._sentence.set_text(self._beside(found.best))
+
+    def _beside(self, best: Optimum) -> str:
+        """What it is worth, against the constant torque."""
+        said = f"It is among the strategies: {label_of(best)}."
+        if self._mark.stale or REFERENCE not in self._bench.controllers:
+            return said
+        direct = self._bench.result(REFERENCE)
+        if direct.run is None:
+            return said
+        return f"{said} Direct has {direct.k_dyn:.4g} in {direct.start_time:.4g} s."
+
+    def _save(self, suffix: str) -> None:
+        assert self._found is not None
+        name = file_name(label_of(self._found.best), suffix=suffix)
+        save(self._found.files[suffix], name)
+
+
+def player_of(best: Optimum) -> Controller:
+    """The controller that plays the optimum, under the name that it has among the strategies."""
+    player = make_controller("profile", {"profile": best.profile})
+    object.__setattr__(player, "name", label_of(best))  # as `softstart.controller.tuned` names tuned gains
+    return player
+
+
+def label_of(best: Optimum) -> str:
+    """What the optimum is called among the strategies."""
+    ending = "" if best.problem.terminal == "synchronous" else f", {best.problem.terminal}"
+    return f"optimum {best.end_time:.4g} s{ending}"
+
+
+def figures(best: Optimum) -> list[tuple[str, str]]:
+    """The figures of an optimum as they are shown."""
+    known = best.bound.kind != "none"
+    return [
+        ("K_dyn", number(best.k_dyn)),
+        ("lower bound", number(best.k_dyn_lower_bound) if known else number(None)),
+        ("above it by", percent(best.gap_percent if known else None)),
+        ("start time", f"{number(best.end_time)} s"),
+        ("peak torque", f"{number(best.run.peak_torque)} N m"),
+        ("contacts", str(best.run.contacts)),
+    ]
+
+
+def _check(text: str) -> None:
+    """A start time, or an InputError."""
+    from softstart.tuning.question import bound_of
+
+    try:
+        if not text:
+            raise InputError("")
+        bound_of(text)
+    except InputError:
+        raise InputError(
+            f'Start time "{text}": give a time above 0 s, as 0.3 or 300 ms, or a multiple of that of direct, '
+            "as 1.2x."
+        ) from None

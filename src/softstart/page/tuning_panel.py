@@ -1,0 +1,237 @@
+"""Tuning in the background: gains for each gap and load inertia, and one set for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from softstart.controller.finding import controller_class, controller_names, make_controller
+from softstart.controller.gain_files import RobustFile, read_gains
+from softstart.controller.tuned import RobustGains, Tuned, scheduled
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.page import works
+from softstart.page.bench import Bench
+from softstart.page.downloads import file_name
+from softstart.page.job_view import LOOK, JobView, duration
+from softstart.page.jobs import Jobs
+from softstart.page.panel_parts import (
+    Mark,
+    action,
+    box,
+    choice,
+    facts,
+    field,
+    fixed,
+    guarded,
+    hint,
+    number,
+    save,
+    table,
+    tell,
+)
+
+FIRST = "shaped"  # the controller offered first, if it is there
+SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
+MOST_CELLS = 60
+
+
+class TuningPanel:
+    """Form, progress and result; built in the current slot."""
+
+    def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
+        self._bench = bench
+        self._drive: Drive = bench.drive
+        self._found: works.Tuned | None = None
+        names = tunable()
+        with box().classes("panel-form"):
+            first = FIRST if FIRST in names else names[0]
+            self._name = choice("Strategy", names, first, "tuning-controller")
+            self._gaps = field(
+                "Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", "0.5 (rad), 30 deg, or 2x: of the drive's own"
+            )
+            self._inertias = field(
+                "Load inertias",
+                "0.4x, 1x, 2x",
+                "tuning-inertias",
+                "0.1 (kg m2), 2x of the drive's own, or 5J1 of the motor's",
+            )
+            self._searches = choice("Search", SEARCHES, "3", "tuning-searches")
+            self._certified = ui.checkbox("optimum of each cell", value=False).classes("panel-check")
+            self._certified.props('dense data-testid="tuning-certified"')
+            self._go = action("Tune", self._begin, "tuning-go", main=True)
+        self._hint = hint(
+            "Gains with the least K_dyn that start no slower than the defaults: for each gap and load "
+            "inertia, and one set for all of them."
+        )
+        self._view = JobView(jobs, user, "tuning", on_done=self._done, on_state=self._state)
+        with box().classes("panel-result") as self._result:
+            self._mark = Mark(bench, "tuning")
+            self._figures = ui.html("", sanitize=False)
+            self._gains = ui.html("", sanitize=False)
+            with box().classes("panel-actions"):
+                ui.label("One set for all").classes("panel-caption")
+                action("Use", guarded(lambda: self._add("robust.toml")), "tuning-use-robust")
+                action("TOML", guarded(lambda: self._save("robust.toml")), "tuning-robust-toml")
+            self._cells = ui.html("", sanitize=False).classes("panel-scroll")
+            with box().classes("panel-actions"):
+                ui.label("By gap and inertia").classes("panel-caption")
+                action("Use", guarded(lambda: self._add("schedule.toml")), "tuning-use-schedule")
+                action("TOML", guarded(lambda: self._save("schedule.toml")), "tuning-schedule-toml")
+                action("CSV", guarded(lambda: self._save("schedule.csv")), "tuning-schedule-csv")
+        self._result.set_visibility(False)
+        ui.timer(LOOK, self._mark.look)
+
+    def _begin(self) -> None:
+        if self._view.busy:
+            return
+        self._drive = self._bench.drive
+        try:
+            gaps, inertias = grid_of(self._drive, str(self._gaps.value), str(self._inertias.value))
+        except InputError as error:
+            self._view.refuse(error)
+            return
+        name = str(self._name.value)
+        self._view.begin(
+            f"tuning of {name}", works.tuning, self._drive, name, gaps, inertias,
+            bool(self._certified.value), int(self._searches.value),
+        )  # fmt: skip
+
+    def _state(self) -> None:
+        self._go.set_enabled(not self._view.busy)
+        if self._view.failed:
+            self._result.set_visibility(False)  # what is left there answers another question
+
+    def _done(self, found: works.Tuned) -> None:
+        self._found = found
+        self._figures.set_content(facts(figures(found), "tuning-figures"))
+        self._gains.set_content(gain_table(found))
+        self._cells.set_content(cell_table(found))
+        self._hint.set_visibility(False)
+        self._result.set_visibility(True)
+        self._mark.of(self._drive)
+
+    def _add(self, file: str) -> None:
+        assert self._found is not None
+        controller = controller_of(self._found.files[file], file)
+        label = self._bench.add(controller.name or file, controller)
+        tell(f"{label} is among the strategies.")
+
+    def _save(self, file: str) -> None:
+        assert self._found is not None
+        stem, _, suffix = file.rpartition(".")
+        save(self._found.files[file], file_name(self._found.controller, stem, suffix=f".{suffix}"))
+
+
+def tunable() -> list[str]:
+    """Names of the installed controllers that say where tuning may look.
+
+    >>> "shaped" in tunable(), "direct" in tunable()
+    (True, False)
+    """
+    from dataclasses import fields
+
+    found = []
+    for name in controller_names():
+        try:
+            metadata = [field.metadata for field in fields(controller_class(name))]
+        except InputError:  # somebody's broken plug-in
+            continue
+        if any(one.get("multiples") or one.get("between") for one in metadata):
+            found.append(name)
+    return found
+
+
+def grid_of(drive: Drive, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
+    """Gaps in rad and load inertias in kg m2 from texts with commas; all mistakes in one InputError.
+
+    >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1")
+    ([0.25, 1.0], [0.175])
+    """
+    from softstart.tuning.grid import gaps_of, inertias_of
+
+    wrong: list[str] = []
+    found: list[list[float]] = []
+    for text, name, read in ((gaps, "Gaps", gaps_of), (inertias, "Load inertias", inertias_of)):
+        parts = [part.strip() for part in text.split(",")]
+        if not all(parts):
+            wrong.append(
+                f'{name} "{text}": a place is empty; write values with commas between, as 0.5x, 1x, 2x.'
+            )
+            continue
+        try:
+            found.append(list(read(drive, parts, name)))
+        except InputError as error:
+            wrong.extend(error.sentences)
+    if not wrong and len(found[0]) * len(found[1]) > MOST_CELLS:
+        wrong.append(
+            f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
+            f"{MOST_CELLS}; take fewer, or softstart tune in a terminal."
+        )
+    if wrong:
+        raise InputError(wrong)
+    return found[0], found[1]
+
+
+def controller_of(text: str, file: str) -> Tuned:
+    """The controller that the text of a file of tuned gains stands for."""
+    path = Path(file)
+    saved = read_gains(text, path)
+    if isinstance(saved, RobustFile):
+        return RobustGains(path.stem, make_controller(saved.controller, saved.parameters), saved.drive)
+    return scheduled(saved, path.stem)
+
+
+def figures(found: works.Tuned) -> list[tuple[str, str]]:
+    """What one set for all gains over the defaults."""
+    one = found.summary["robust"]
+    return [
+        ("worst K_dyn, one set", number(one["worst"])),
+        ("with the defaults", number(one["worst_default"])),
+        ("in time", "yes" if one["feasible"] else f"no, {100 * one['excess']:.2g} % late"),
+        ("searches that agree", f"{one['agreement']} of {one['restarts']}"),
+        ("starts", f"{found.starts:,} in {duration(found.seconds)}"),
+    ]
+
+
+def gain_table(found: works.Tuned) -> str:
+    """The gains of the set for all, beside the defaults."""
+    one = found.summary["robust"]
+    meta = {name: one["defaults"].get(name) for name in one["gains"]}
+    units = units_of(found.controller)
+    rows = [
+        [name, units.get(name, ""), number(default, 5), number(one["gains"][name], 5)]
+        for name, default in meta.items()
+    ]  # fmt: skip
+    return table(["gain", "unit", "default", "one set for all"], rows, 2, "tuning-gains")
+
+
+def units_of(name: str) -> dict[str, str]:
+    """Units of a controller's parameters, readable."""
+    from dataclasses import fields
+
+    from softstart.page.controls import readable
+
+    return {one.name: readable(str(one.metadata.get("unit", ""))) for one in fields(controller_class(name))}
+
+
+def cell_table(found: works.Tuned) -> str:
+    """One row a cell: gap, inertia, K_dyn before and after, the optimum where it was asked for, the gains."""
+    schedule: dict[str, Any] = found.summary["schedule"]
+    price: dict[str, Any] = found.summary["price"] or {}
+    best = price.get("schedule_optimum")
+    one = found.summary["robust"]["cells"]["k_dyn"]
+    gains = list(found.summary["robust"]["gains"])
+    rows = []
+    for i, gap in enumerate(found.summary["gaps"]):
+        for j, inertia in enumerate(found.summary["load_inertias"]):
+            k = (schedule["k_dyn_default"][i][j], one[i][j], schedule["k_dyn"][i][j])
+            row = [number(gap), number(inertia), *(fixed(value, 3) for value in k)]
+            if best is not None:
+                row.append(fixed(best[i][j], 3))
+            rows.append([*row, *(number(schedule[name][i][j]) for name in gains)])
+    head = ["gap rad", "J2 kg m\N{SUPERSCRIPT TWO}", "K_dyn default", "one set", "by cell"]
+    return table([*head, *(["optimum"] if best is not None else []), *gains], rows, 0, "tuning-cells")

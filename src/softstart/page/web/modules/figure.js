@@ -1,0 +1,53 @@
+// The figure that stands large: K_dyn of the selected strategy, and the facts about its start.
+import { element, fixed, significant } from "./numbers.js";
+
+const FACTS = [
+  ["start_time", "start time", "s", (f) => fixed(f.start_time, 4)],
+  ["time_lost", "lost to direct", "s", (f) => fixed(f.time_lost, 4)],
+  ["peak_torque", "peak torque", "N m", (f) => significant(f.peak_torque, 5)],
+  ["base", "K = 1 at", "N m", (f) => significant(f.base, 5)],
+  ["impact_speed", "first impact", "rad/s", (f) => significant(f.impact_speed, 4)],
+  ["contacts", "contacts", "", (f) => (f.contacts ?? "\u2013").toString()],
+];
+
+export class Figure {
+  constructor(place) {
+    this.name = element("div", { class: "name" });
+    this.value = element("output", { class: "k-dyn", id: "k-dyn", "aria-live": "off" });
+    this.status = element("div", { class: "status", role: "status" });
+    this.facts = new Map();
+    const list = element("dl");
+    for (const [key, label, unit] of FACTS) {
+      const value = element("dd", {}, "");
+      this.facts.set(key, value);
+      list.append(element("div", {}, element("dt", {}, label), value, element("span", { class: "unit" }, unit)));
+    }
+    const head = element("div", { class: "head" }, element("div", { class: "caption" }, "K", element("sub", {}, "dyn")), this.value);
+    place.append(this.name, head, list, this.status);
+  }
+
+  show(figure) {
+    this.value.textContent = fixed(figure.k_dyn, 3);
+    this.value.dataset.value = figure.k_dyn ?? "";
+    this.value.classList.toggle("none", figure.k_dyn === null);
+    if (this.name.textContent !== figure.name) this.name.textContent = figure.name;
+    for (const [key, , , text] of FACTS) {
+      const place = this.facts.get(key);
+      const shown = text(figure);
+      if (place.textContent !== shown) place.textContent = shown;
+    }
+    this.said = figure.reached ? "" : figure.status;
+    this.tell();
+  }
+
+  // a mistake that belongs to no field stands here, after how the start ended
+  mistake(sentence) {
+    this.wrong = sentence;
+    this.tell();
+  }
+
+  tell() {
+    const text = [this.said, this.wrong].filter(Boolean).join(" ");
+    if (this.status.textContent !== text) this.status.textContent = text;
+  }
+}

@@ -1,0 +1,109 @@
+// Takes frames of the server, keeps what they say, and draws it once a screen refresh.
+import { Controls } from "./controls.js";
+import { Figure } from "./figure.js";
+import { GapMap } from "./map.js";
+import { Plots, unpack } from "./plots.js";
+import { Table } from "./table.js";
+import { Theme } from "./theme.js";
+
+export class Instrument {
+  constructor(root, groups, send) {
+    this.send = send;
+    this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "" };
+    this.pulse = root.querySelector(".pulse");
+    this.driveName = root.querySelector(".drive-name");
+    this.times = [];
+    this.waiting = 0;
+    const say = (message) => this.say(message);
+    this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
+    this.controls = new Controls(root.querySelector(".controls"), groups, say);
+    this.figure = new Figure(root.querySelector(".figure"));
+    this.table = new Table(root.querySelector(".strategies"), this.theme, say);
+    this.plots = new Plots(root.querySelector(".plots"), this.theme);
+    this.map = new GapMap(root.querySelector(".map"), this.theme, say);
+    this.resized = new ResizeObserver(() => this.redraw());
+    for (const part of root.querySelectorAll("canvas")) this.resized.observe(part.parentElement);
+  }
+
+  // the stamp comes back with the first frame that knows of the message
+  say(message) {
+    this.send({ ...message, stamp: message.what === "hello" ? 0 : performance.now() });
+  }
+
+  // numbers are shown at once; pictures wait for the next refresh of the screen, where only the newest counts
+  take(number, frame) {
+    const state = this.state;
+    if (frame.order) {
+      const known = new Set(frame.order);
+      for (const name of state.rows.keys()) if (!known.has(name)) state.rows.delete(name);
+      for (const name of state.traces.keys()) if (!known.has(name)) state.traces.delete(name);
+      Object.assign(state, { order: frame.order, shown: frame.shown, added: frame.added, selected: frame.selected });
+      state.here = frame.here;
+      state.fields = frame.fields;
+    }
+    for (const row of frame.rows ?? []) state.rows.set(row.name, { ...state.rows.get(row.name), ...row });
+    for (const [name, packed] of Object.entries(frame.traces ?? {})) {
+      if (packed) state.traces.set(name, packed); // unpacked when drawn: most are overtaken before
+      else state.traces.delete(name);
+      this.plotted = false;
+    }
+    if (frame.figure) {
+      // a glance has shown it already, unless the start was too long for one
+      if (this.version !== frame.version || frame.at_rest) this.figure.show(frame.figure);
+      this.version = frame.version;
+      this.stamp = frame.stamp;
+    }
+    if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
+    if (frame.fields) this.controls.show(frame.fields, frame.mistakes);
+    if (frame.drive !== undefined && this.driveName.textContent !== frame.drive) {
+      this.driveName.textContent = frame.drive;
+    }
+    this.map.take(frame);
+    if (!number) return; // a glance: the figure alone
+    this.number = number;
+    if (frame.order) this.plotted = false;
+    this.waiting ||= requestAnimationFrame(() => this.draw());
+  }
+
+  // size or colours have changed: everything anew
+  redraw() {
+    this.plotted = false;
+    this.map?.fade();
+    this.waiting ||= requestAnimationFrame(() => this.draw());
+  }
+
+  draw() {
+    this.waiting = 0;
+    if (this.ended) return;
+    this.table.show(this.state);
+    if (!this.plotted) {
+      this.plotted = true;
+      for (const [name, packed] of this.state.traces) if (packed.data) this.state.traces.set(name, unpack(packed));
+      this.plots.draw(this.state);
+    }
+    this.map.draw(this.state);
+    if (this.number !== this.answered) {
+      this.answered = this.number;
+      this.send({ what: "drawn", number: this.number });
+      this.measure();
+    }
+  }
+
+  // how long it took from the hand to the picture, and how many pictures there were in the last second
+  measure() {
+    const now = performance.now();
+    this.times = this.times.filter((time) => now - time < 1000);
+    this.times.push(now);
+    if (!this.stamp || this.stamp === this.measured) return;
+    this.measured = this.stamp;
+    this.lag = now - this.stamp;
+    this.pulse.textContent = `${Math.round(this.lag)} ms   ${this.times.length}/s`;
+    this.pulse.dataset.lag = this.lag;
+  }
+
+  end() {
+    this.ended = true;
+    this.resized.disconnect();
+    this.theme.end();
+  }
+}

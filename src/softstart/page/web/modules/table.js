@@ -1,0 +1,110 @@
+// Strategies side by side: one is selected, any may be drawn; the order changes only when a heading is pressed.
+import { element, fixed, significant } from "./numbers.js";
+
+const COLUMNS = [
+  ["name", "strategy", "", null],
+  ["k_dyn", "K", "dyn", (row) => fixed(row.k_dyn, 3)],
+  ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3)],
+  ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4)],
+  ["start_time", "start, s", "", (row) => fixed(row.start_time, 4)],
+  ["time_lost", "lost, s", "", (row) => fixed(row.time_lost, 4)],
+];
+
+export class Table {
+  constructor(place, theme, say) {
+    this.theme = theme;
+    this.say = say;
+    this.lines = new Map();
+    this.by = "";
+    this.body = element("tbody");
+    const heads = COLUMNS.map(([key, text, sub]) => {
+      const button = element("button", { type: "button", title: `Sort by ${text}${sub}` }, text);
+      if (sub) button.append(element("sub", {}, sub));
+      button.addEventListener("click", () => this.sort(key));
+      return element("th", { scope: "col", "data-key": key }, button);
+    });
+    this.heads = heads;
+    const first = element("th", { scope: "col", class: "eye" }, element("span", { class: "hidden" }, "drawn"));
+    const last = element("th", { class: "bar-head", scope: "col" }, element("span", {}, "K, line at 1"));
+    const head = element("tr", {}, first, ...heads, last);
+    place.append(element("table", {}, element("thead", {}, head), this.body));
+  }
+
+  sort(key) {
+    this.by = this.by === key ? "" : key;
+    this.sorted = undefined;
+    this.show(this.state);
+  }
+
+  show(state) {
+    this.state = state;
+    this.arrange(state);
+    const largest = Math.max(2, ...[...state.rows.values()].map((row) => row.k_dyn ?? 0));
+    for (const name of state.order) {
+      const line = this.lines.get(name);
+      const row = state.rows.get(name);
+      const selected = name === state.selected;
+      if (line.selected !== selected) {
+        line.selected = selected;
+        line.tr.classList.toggle("selected", selected);
+        line.radio.checked = selected;
+      }
+      line.out.hidden = !state.added.includes(name);
+      line.eye.checked = state.shown.includes(name);
+      line.tr.style.setProperty("--colour", this.theme.strategy(state.order.indexOf(name)));
+      if (!row || line.row === row) continue;
+      line.row = row;
+      line.cells.forEach((cell, index) => {
+        const text = COLUMNS[index + 1][3](row);
+        if (cell.textContent !== text) cell.textContent = text;
+      });
+      line.tr.title = row.trouble;
+      line.tr.classList.toggle("trouble", Boolean(row.trouble));
+      line.bar.style.setProperty("--share", `${(100 * (row.k_dyn ?? 0)) / largest}%`);
+      line.bar.style.setProperty("--one", `${100 / largest}%`);
+    }
+  }
+
+  arrange(state) {
+    const wanted = `${this.by}|${state.order.join("|")}`;
+    if (this.sorted === wanted) return;
+    this.sorted = wanted;
+    for (const [name, line] of this.lines) {
+      if (!state.order.includes(name)) {
+        line.tr.remove();
+        this.lines.delete(name);
+      }
+    }
+    const value = (name) => {
+      const found = state.rows.get(name)?.[this.by];
+      return typeof found === "number" ? found : Infinity;
+    };
+    const names = [...state.order];
+    if (this.by === "name") names.sort();
+    else if (this.by) names.sort((a, b) => value(a) - value(b) || 0);
+    for (const name of names) {
+      if (!this.lines.has(name)) this.lines.set(name, this.line(name));
+      this.body.append(this.lines.get(name).tr);
+    }
+    for (const head of this.heads) {
+      head.setAttribute("aria-sort", head.dataset.key === this.by ? "ascending" : "none");
+    }
+  }
+
+  line(name) {
+    const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}` });
+    const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}` });
+    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
+    const bar = element("td", { class: "bar", "aria-hidden": "true" });
+    const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
+    out.addEventListener("click", () => this.say({ what: "remove", name }));
+    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), out));
+    const tr = element("tr", { "data-name": name }, element("td", { class: "eye" }, eye), title, ...cells, bar);
+    eye.addEventListener("change", () => this.say({ what: "show", name, visible: eye.checked }));
+    radio.addEventListener("change", () => this.say({ what: "select", name }));
+    tr.addEventListener("click", (event) => {
+      if (!event.target.closest("input, label, button")) this.say({ what: "select", name });
+    });
+    return { tr, eye, radio, cells, bar, out };
+  }
+}

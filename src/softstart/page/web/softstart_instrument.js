@@ -1,0 +1,37 @@
+// The live part of the page: builds its parts once, then only changes numbers and draws.
+import { Instrument } from "softstart-page";
+
+export default {
+  template: `
+<div class="instrument">
+  <header class="topbar">
+    <strong class="brand">softstart</strong>
+    <span class="drive-name"></span>
+    <span class="pulse" title="From the slider to the drawn picture, and pictures in the last second"></span>
+    <div class="theme" role="radiogroup" aria-label="Colours"></div>
+  </header>
+  <nav class="controls" aria-label="Parameters of the drive"></nav>
+  <main class="centre">
+    <section class="plots"><canvas role="img" aria-label="Torques, speeds and twist over time"></canvas></section>
+    <section class="strategies"></section>
+  </main>
+  <aside class="side">
+    <section class="figure"></section>
+    <section class="map"></section>
+    <section class="panels"><slot></slot></section>
+  </aside>
+</div>`,
+  props: { groups: Array },
+  mounted() {
+    this.instrument = new Instrument(this.$el, this.groups, (message) => this.$emit("act", message));
+    this.instrument.say({ what: "hello" });
+  },
+  unmounted() {
+    this.instrument.end();
+  },
+  methods: {
+    frame(number, frame) {
+      this.instrument?.take(number, frame);
+    },
+  },
+};

@@ -1,0 +1,239 @@
+"""What the page computes in the background: optimal start, curve of the least K_dyn, tuning, report.
+
+Each function runs in a process of its own (`softstart.page.jobs`), says how far it is through `tell`, and
+gives back plain data.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from softstart.drive import Drive
+from softstart.errors import SimulationError
+from softstart.optimal.direct import start_time_of_direct
+from softstart.page.downloads import text_of
+from softstart.page.job_process import Tell
+from softstart.simulation import simulate
+
+if TYPE_CHECKING:
+    from softstart.controller.base import Controller
+    from softstart.optimal.front_points import FrontPoint
+    from softstart.optimal.problem import Terminal
+    from softstart.optimal.result import Optimum
+    from softstart.profile import TorqueProfile
+    from softstart.tuning.outcome import Tuning
+
+LONG_MULTIPLES = (
+    1.05,
+    1.1,
+    1.15,
+    1.2,
+    1.3,
+    1.4,
+    1.6,
+)  # of the start time of direct: the easy end of the curve
+SHORT_SHARES = (0.0, 0.06, 0.2, 0.5)  # of the way from the shortest start time to the shortest easy one
+SHORT = 1.02  # how far above the shortest feasible start time the curve ends
+TUNING_SHARES = {
+    "starts": (0.0, 0.05),
+    "schedule": (0.05, 0.45),
+    "robust": (0.45, 0.8),
+    "certified": (0.8, 1.0),
+}
+SELDOM = 0.1  # s between two reports of a work that would report thousands of times
+
+
+@dataclass(frozen=True)
+class Gentlest:
+    """An optimal start and the files of its profile, text by suffix: `.csv`, `.toml`, `.c`."""
+
+    best: Optimum
+    files: dict[str, str]
+
+
+def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -> Gentlest:
+    """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
+    tell(None, "looking for the gentlest start")
+    from softstart.optimal.solving import optimize
+
+    with no_solution_told():
+        best = optimize(drive, seconds_of(drive, start_time), terminal=terminal)
+    tell(None, "writing the profile")
+    about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
+    profile = best.profile
+    files = {
+        ".csv": text_of(profile.to_csv, ".csv"),
+        ".toml": text_of(lambda path: profile.to_toml(path, about), ".toml"),
+        ".c": text_of(lambda path: profile.to_c(path, about=about), ".c"),
+    }
+    return Gentlest(replace(best, warm=None), files)
+
+
+def seconds_of(drive: Drive, start_time: str) -> float:
+    """The start time in s; InputError for a text that is none.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> round(seconds_of(crane, "1.2x"), 4), seconds_of(crane, "300 ms")
+    (0.4482, 0.3)
+    """
+    from softstart.tuning.question import bound_of
+
+    bound = bound_of(start_time)
+    return bound.value * (start_time_of_direct(drive) if bound.kind == "direct" else 1.0)
+
+
+def curve(
+    drive: Drive, start_times: Sequence[float], terminal: Terminal = "reached", *, tell: Tell
+) -> list[FrontPoint]:
+    """The least K_dyn over the start time: the easy long ones first, those of the strategies, the short ones.
+
+    Each point is told as a part as soon as it is known; the result is all of them in order of start time.
+    """
+    from softstart.optimal.front import pareto
+    from softstart.optimal.problem import Problem
+    from softstart.optimal.shortest import shortest_start_time
+
+    points: list[FrontPoint] = []
+    direct = simulate(drive, "direct").start_time
+    easy = [one * direct for one in LONG_MULTIPLES] if math.isfinite(direct) else []
+    own = [one for one in start_times if math.isfinite(one)]
+    long = sorted({*easy, *(one for one in own if easy and one >= easy[0])})
+    total = len(easy) + len(SHORT_SHARES) + len(own) + 1
+    done = 0
+
+    def each(point: FrontPoint) -> None:
+        nonlocal done
+        done += 1
+        if point.found:
+            points.append(point)
+            tell.part(point)
+
+    def doing(what: str) -> None:
+        tell(min(done / total, 1.0), what.rpartition(": ")[2].removesuffix(f", {terminal}"))
+
+    def through(times: Sequence[float]) -> None:
+        if times:
+            pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
+
+    with no_solution_told():
+        through(long)
+        tell(done / total, "the shortest start time")
+        shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
+        done += 1
+        if math.isfinite(shortest):
+            first, last = SHORT * shortest, easy[0] if easy and easy[0] > SHORT * shortest else 1.6 * shortest
+            through([first + share * (last - first) for share in SHORT_SHARES])
+            through([one for one in own if shortest <= one < (easy[0] if easy else math.inf)])
+    if not points:
+        raise SimulationError(
+            "None of these start times is feasible; give this drive more torque or a lower target."
+        )
+    return sorted(points, key=lambda point: point.start_time_bound)
+
+
+@contextmanager
+def no_solution_told() -> Iterator[None]:
+    """That there is no solution, or that none was found, is said in its own sentence."""
+    from softstart.optimal.collocation import NotConverged
+    from softstart.optimal.result import InfeasibleError, OptimumError
+
+    try:
+        yield
+    except (InfeasibleError, OptimumError, NotConverged) as error:
+        raise SimulationError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What a tuning found, as plain data: `summary` of the Tuning, and its files by name."""
+
+    summary: dict[str, Any]
+    files: dict[str, str]
+    seconds: float
+    starts: int
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller that was tuned."""
+        return str(self.summary["controller"])
+
+
+def tuning(
+    drive: Drive,
+    controller: str,
+    gaps: Sequence[Any] | None,
+    inertias: Sequence[Any] | None,
+    certified: bool = True,
+    restarts: int = 3,
+    *,
+    tell: Tell,
+) -> Tuned:
+    """Gains of a controller for each gap and load inertia, and one set for all."""
+    from softstart.tuning.solving import tune
+
+    found = tune(
+        drive, controller, gaps, inertias, certified=certified, restarts=restarts, workers=1,
+        progress=_Seldom(tell),
+    )  # fmt: skip
+    tell(1.0, "writing the gains")
+    return Tuned(found.summary(), _files(found), found.seconds, found.starts)
+
+
+def _files(found: Tuning) -> dict[str, str]:
+    return {
+        "robust.toml": text_of(lambda path: found.to_toml(path, "robust"), ".toml"),
+        "schedule.toml": text_of(lambda path: found.to_toml(path, "schedule"), ".toml"),
+        "schedule.csv": text_of(found.to_csv, ".csv"),
+    }
+
+
+class _Seldom:
+    """Tells what a tuning does, not more than some times a second, with a share made of its parts."""
+
+    def __init__(self, tell: Tell) -> None:
+        self.tell = tell
+        self.title, self.last = "", -math.inf
+
+    def __call__(self, doing: str) -> None:
+        now = time.monotonic()
+        title = doing.partition(",")[0]
+        if title == self.title and now < self.last + SELDOM:
+            return
+        self.title, self.last = title, now
+        self.tell(tuning_share(doing), doing)
+
+
+def tuning_share(doing: str) -> float | None:
+    """How much of a tuning is done, from what it says it is doing.
+
+    >>> tuning_share("schedule, searches 2 of 4, 3,088 starts, 6,314/s"), tuning_share("something else")
+    (0.25, None)
+    """
+    for begin, (low, high) in TUNING_SHARES.items():
+        if doing.startswith(begin):
+            counted = re.search(r"(search |\s)?(\d+) of (\d+)", doing)
+            if counted is None:
+                return low
+            done = int(counted[2]) - (1 if counted[1] == "search " else 0)
+            return low + (high - low) * done / int(counted[3])
+    return None
+
+
+def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> str:
+    """C code that plays a torque profile."""
+    tell(None, "writing C code")
+    return text_of(lambda path: profile.to_c(path, about=about), ".c")
+
+
+def report(drive: Drive, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:
+    """The report for a customer, as one HTML text."""
+    tell(0.0, "starting the drive")
+    from softstart.reporting import report as made
+
+    return made(drive, controllers=controllers, progress=tell, command=command).to_html()

@@ -1,0 +1,9 @@
+"""The report for a customer: one HTML file that says which strategy, why, and what to set on the inverter."""
+
+from __future__ import annotations
+
+from softstart.reporting.making import report
+from softstart.reporting.resolution import Resolution
+from softstart.reporting.result import Report
+
+__all__ = ["Report", "Resolution", "report"]

@@ -1,0 +1,88 @@
+"""HTML from small functions: text is escaped, only what they made themselves is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+VOID = frozenset({"meta", "br", "hr", "col"})
+
+
+class Html(str):
+    """Text that is HTML already. Plain `str` never is."""
+
+    __slots__ = ()
+
+
+Part = str | None
+
+
+def html(*parts: Part) -> Html:
+    """Parts one after the other; text among them is escaped, None left out.
+
+    >>> html("a < b", tag("b", "&"))
+    'a &lt; b<b>&amp;</b>'
+    """
+    return Html("".join(one if isinstance(one, Html) else escape(one) for one in parts if one is not None))
+
+
+def tag(name: str, /, *parts: Part, **attributes: str | None) -> Html:
+    """An element; `class_` and `aria_label` stand for class and aria-label, None leaves an attribute out.
+
+    >>> tag("p", "1 < 2", class_='x"y')
+    '<p class="x&quot;y">1 &lt; 2</p>'
+    """
+    written = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{escape(value)}"'
+        for key, value in attributes.items()
+        if value is not None
+    )
+    if name in VOID:
+        return Html(f"<{name}{written}>")
+    return Html(f"<{name}{written}>{html(*parts)}</{name}>")
+
+
+def joined(parts: Iterable[Part], between: str = "\n") -> Html:
+    """Parts with a separator between them."""
+    return Html(escape(between).join(html(one) for one in parts if one is not None))
+
+
+def table(
+    headings: Sequence[Part],
+    rows: Sequence[Sequence[Part]],
+    *,
+    caption: str,
+    text_columns: Sequence[int] = (0,),
+    strong: Sequence[int] = (),
+    class_: str | None = None,
+) -> Html:
+    """A table whose first column heads its rows; all but `text_columns` are set as numbers."""
+    kinds = ["text" if index in text_columns else "number" for index in range(len(headings))]
+    head = [tag("th", one, scope="col", class_=kind) for one, kind in zip(headings, kinds, strict=True)]
+    body = []
+    for number, row in enumerate(rows):
+        first, *others = (html(one) for one in row)
+        cells = [tag("th", first, scope="row", class_=kinds[0])]
+        cells += [tag("td", one, class_=kind) for one, kind in zip(others, kinds[1:], strict=True)]
+        body.append(tag("tr", *cells, class_="strong" if number in strong else None))
+    whole = tag(
+        "table",
+        tag("caption", caption),
+        tag("thead", tag("tr", *head)),
+        tag("tbody", joined(body)),
+        class_=class_,
+    )
+    return tag("div", whole, class_="wide")
+
+
+def css_string(text: str) -> str:
+    """Any text as a string of CSS that ends nowhere but at its end.
+
+    >>> css_string('a"</style>')
+    '"a\\\\22 \\\\3c \\\\2f style\\\\3e "'
+    """
+    return (
+        '"'
+        + "".join(c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
+        + '"'
+    )

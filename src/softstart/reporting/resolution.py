@@ -1,0 +1,180 @@
+"""How finely an inverter can be set, and rounding to that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.reporting.values import RPM, decimals_of, digits, short
+from softstart.units import nearest, to_si
+
+EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"
+_KEYS = {
+    "torque": ("N*m", '"0.5%" of the rated torque, or "0.2 N*m"'),
+    "time": ("s", '"10 ms"'),
+    "speed": ("rad/s", '"1 rpm"'),
+    "frequency": ("Hz", '"0.1 Hz"'),
+    "share": ("1", '"1%" or 0.01'),
+}
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """The steps in which the settings of an inverter can be changed.
+
+    torque : in N m, or as a share of the rated torque where `torque_share` is given (then that counts);
+    time in s, speed in rad/s, frequency in Hz, share: of numbers without a unit.
+
+    The defaults are those of usual inverters: torque in 0.1 % of the rated torque, times in ms, speeds in
+    rpm, frequencies in 0.1 Hz, S-curve shares and gains in 0.01.
+
+    >>> Resolution.read("torque=0.5%, time=10 ms").time
+    0.01
+    """
+
+    torque: float | None = None
+    torque_share: float = 0.001
+    time: float = 1e-3
+    speed: float = 1.0 / RPM
+    frequency: float = 0.1
+    share: float = 0.01
+
+    def __post_init__(self) -> None:
+        wrong = [
+            f"{f.name} = {getattr(self, f.name)!r}: a step is a number above 0."
+            for f in fields(self)
+            if not _step(getattr(self, f.name)) and not (f.name == "torque" and self.torque is None)
+        ]
+        if wrong:
+            raise InputError(wrong)
+
+    @classmethod
+    def read(cls, text: str | Mapping[str, object], option: str = "resolution") -> Self:
+        """From `key=value,...` or a mapping; all mistakes at once, sentences begin with `option`.
+
+        >>> Resolution.read("tme=10ms")
+        Traceback (most recent call last):
+        softstart.errors.InputError: resolution "tme=10ms": there is no such key; did you mean time?
+        """
+        pairs = (
+            _pairs(text, option) if isinstance(text, str) else [(k, v, f"{k}={v}") for k, v in text.items()]
+        )
+        made, wrong, seen = cls(), list[str](), set[str]()
+        for key, value, said in pairs:
+            start = f'{option} "{said}"'
+            if key not in _KEYS:
+                near = nearest(str(key), _KEYS)
+                hint = f"did you mean {near}?" if near else f"there are {', '.join(_KEYS)}."
+                wrong.append(f"{start}: there is no such key; {hint}")
+            elif key in seen:
+                wrong.append(f"{start}: {key} is given twice; keep one of the two.")
+            else:
+                seen.add(key)
+                try:
+                    made = replace(made, **_read(key, value))  # type: ignore[arg-type]
+                except InputError as error:
+                    reason = error.sentences[0].partition(": ")[2] or error.sentences[0]
+                    wrong.append(f"{start}: {reason}")
+        if wrong:
+            raise InputError(wrong)
+        return made
+
+    def step(self, name: str, unit: str, rated_torque: float) -> float | None:
+        """The step of a parameter in its SI unit; None where it is not rounded.
+
+        >>> Resolution().step("time", "s", 24.0), Resolution().step("low_torque", "N*m", 24.0)
+        (0.001, 0.024)
+        """
+        if unit == "N*m":
+            return self.torque if self.torque is not None else self.torque_share * rated_torque
+        if unit == "rad/s":
+            return 2.0 * math.pi * self.frequency if "frequency" in name else self.speed
+        return {"s": self.time, "1": self.share}.get(unit)
+
+    def told(self, drive: Drive) -> list[tuple[str, str]]:
+        """What is rounded to what, for people."""
+        rated, meant = rated_torque(drive)
+        if self.torque is not None:
+            torque = f"{short(self.torque)} N m"
+        else:
+            share = f"{short(100.0 * self.torque_share)} %"
+            step = short(float(f"{self.torque_share * rated:.4g}"))
+            torque = f"{share} of the {meant} of {digits(rated)} N m, that is {step} N m"
+        return [
+            ("torques", torque),
+            ("times", f"{short(1e3 * self.time)} ms"),
+            ("speeds", f"{short(self.speed * RPM)} rpm"),
+            ("frequencies", f"{short(self.frequency)} Hz"),
+            ("shares and gains", short(self.share)),
+        ]
+
+
+def rated_torque(drive: Drive) -> tuple[float, str]:
+    """What 100 % means, N m, and what that is: rated power/rated speed, else the starting torque.
+
+    >>> round(rated_torque(Drive.load("crane-4amtkf"))[0], 2)
+    23.87
+    """
+    if drive.rated_power is not None and drive.rated_speed is not None:
+        return float(drive.rated_power / drive.rated_speed), "rated torque"
+    return float(drive.Ms), "starting torque"
+
+
+def nearest_step(value: float, step: float, most: float = math.inf) -> float:
+    """The nearest multiple of `step` up to `most`; what is not 0 stays at least one step.
+
+    >>> nearest_step(0.1118, 0.01), nearest_step(0.0004, 0.001), nearest_step(0.0, 0.001)
+    (0.11, 0.001, 0.0)
+    """
+    if value == 0.0:
+        return 0.0
+    count = max(1, round(abs(value) / step))
+    if count * step > most * (1.0 + 1e-12):
+        count = max(1, math.floor(most / step * (1.0 + 1e-12)))
+    return math.copysign(_multiple(count, step), value)
+
+
+def _multiple(count: int, step: float) -> float:
+    """The product, without the noise of binary fractions where the step is a short decimal."""
+    exact = count * step
+    decimal = round(exact, decimals_of(step)) if decimals_of(step) < 9 else exact
+    return decimal if abs(decimal - exact) <= 1e-12 * exact else exact
+
+
+def _pairs(text: str, option: str) -> list[tuple[str, object, str]]:
+    found: list[tuple[str, object, str]] = []
+    wrong = []
+    for part in text.split(","):
+        key, equals, value = (one.strip() for one in part.partition("="))
+        if not (key and equals and value):
+            wrong.append(f'{option} "{part.strip()}": write keys and values, as {EXAMPLE}.')
+        else:
+            found.append((key, value, part.strip()))
+    if wrong:
+        raise InputError(wrong)
+    return found
+
+
+def _read(key: str, value: object) -> dict[str, float | None]:
+    unit, example = _KEYS[key]
+    shown = str(value).strip()
+    if key in ("torque", "share") and isinstance(value, str) and shown.endswith("%"):
+        share = float(to_si(shown[:-1], "1", name=key)) / 100.0
+        if not share > 0.0:
+            raise InputError(f"{key}: a step is above 0; write {example}.")
+        return {"torque_share": share, "torque": None} if key == "torque" else {"share": share}
+    if key == "frequency" and shown.lower().endswith("hz"):
+        value = shown[:-2]
+        unit = "1"
+    number = float(to_si(value, "1" if unit == "Hz" else unit, name=key))
+    if not number > 0.0:
+        raise InputError(f"{key}: a step is above 0; write {example}.")
+    return {key: number}
+
+
+def _step(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf

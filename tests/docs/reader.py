@@ -1,0 +1,174 @@
+"""A reader of a page, who does what it says, in an empty folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.docs.shown import among, difference, named
+from tests.docs.steps import Step
+
+ROOT = Path(__file__).parents[2]
+SEEN = 3.0  # s of its processor time for which a long command is watched at work: imports are over then
+WATCHED = 8.0  # s of the clock after which that is enough in any case
+PATIENCE = 300.0  # s for a command that is not called long, on a machine that may be busy
+INTERRUPTED = 130
+
+
+@dataclass
+class Reader:
+    """Does steps in `folder`; `wrong` has a sentence for each that did not go as the page says."""
+
+    folder: Path
+    page: str
+    wrong: list[str] = field(default_factory=list)
+    took: list[tuple[float, float, str]] = field(default_factory=list)
+    python: str = ""
+
+    def do(self, step: Step) -> None:
+        """One step."""
+        began, used = time.perf_counter(), _used()
+        if step.kind == "file":
+            path = self.folder / step.name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(step.text, encoding="utf-8")
+            return
+        problem = self._command(step) if step.kind == "command" else self._python(step)
+        first = step.text.strip().splitlines()[0]
+        name = f"{self.page}:{step.line}: {first}"
+        if problem:
+            self.wrong.append(f"{name}\n    {problem}")
+        self.took.append((_used() - used, time.perf_counter() - began, name))
+
+    def _command(self, step: Step) -> str:
+        if step.text.startswith("make"):
+            # CI makes them; here it is enough that make knows how
+            words = step.text.split("#")[0].split()
+            return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0, None)
+        if step.long:
+            return _watched(["bash", "-c", step.text], self.folder)
+        done = _run(["bash", "-c", step.text], self.folder)
+        missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
+        said = f"not printed: {', '.join(missing)}" if missing else ""
+        return _ended(done, step.exit_code, step.output) or said
+
+    def _python(self, step: Step) -> str:
+        code = step.text
+        if ">>>" in code:
+            name = self.folder / "session.txt"
+            name.write_text(code, encoding="utf-8")
+            words = ["-m", "doctest", "-o", "ELLIPSIS", "-o", "NORMALIZE_WHITESPACE", str(name)]
+            return _ended(_run([sys.executable, *words], self.folder), 0, None)
+        code = self.python + "\n" + code if step.continued else code
+        name = self.folder / "_page_script.py"
+        name.write_text(code, encoding="utf-8")
+        self.python = code
+        if step.long:
+            return _watched([sys.executable, str(name)], self.folder)
+        return _ended(_run([sys.executable, str(name)], self.folder), 0, step.output)
+
+
+def _used() -> float:
+    """Processor time of all processes that have ended, s."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return children.ru_utime + children.ru_stime
+
+
+def _environment() -> dict[str, str]:
+    """That of a new user: this installation first on the path, nothing that changes how output looks."""
+    known = {
+        k: v for k, v in os.environ.items() if not re.match(r"COLUMNS|LINES|PYTEST|SOFTSTART|FORCE_COLOR", k)
+    }
+    path = os.pathsep.join([str(Path(sys.executable).parent), known.get("PATH", "")])
+    return known | {"PATH": path, "OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
+
+
+@contextmanager
+def _started(words: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """The process, in a group of its own that is gone afterwards."""
+    with subprocess.Popen(
+        words, cwd=folder, env=_environment(), text=True, stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+        preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def _hears_ctrl_c() -> None:
+    """As from a terminal: what is started in the background by a shell is deaf to it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _run(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    with _started(words, folder) as process:
+        try:
+            out, err = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            out, err = process.communicate()
+            err += f"not done after {PATIENCE:g} s: mark it <!-- long: ... -->"
+    return subprocess.CompletedProcess(words, process.returncode, out, err)
+
+
+def _ended(done: subprocess.CompletedProcess[str], code: int, shown: str | None) -> str:
+    if done.returncode != code:
+        last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
+        return f"exit code {done.returncode} instead of {code}: {last}"
+    printed = done.stdout + ("\n" + done.stderr if code else "")
+    return difference(shown, printed) if shown is not None else ""
+
+
+def _watched(words: list[str], folder: Path) -> str:
+    """Start, see it at work, interrupt: a command of softstart then ends with 130."""
+    if words[0] == "bash":
+        words = [*words[:-1], f"exec {words[-1]}"]
+    with _started(words, folder) as process:
+        began = time.perf_counter()
+        while process.poll() is None and time.perf_counter() - began < WATCHED and _work_of(process) < SEEN:
+            time.sleep(0.2)
+        if process.poll() is None:
+            err = _interrupted(process)
+        else:
+            err = process.communicate()[1].strip()
+            if process.returncode == 0:
+                return "ended by itself: it is not long, take the mark away"
+            return f"exit code {process.returncode} at once: {err[-500:]}"
+    if err is None:
+        return "does not end after Ctrl-C"
+    expected = (INTERRUPTED,) if words[0] == "bash" else (INTERRUPTED, 1, -signal.SIGINT)
+    if process.returncode in expected:
+        return ""
+    return f"exit code {process.returncode} instead of 130 after Ctrl-C: {err.strip()[-500:]}"
+
+
+def _work_of(process: subprocess.Popen[str]) -> float:
+    """Processor time of a process that runs, s; 0 where the system does not tell."""
+    try:
+        fields = Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _interrupted(process: subprocess.Popen[str]) -> str | None:
+    """What it said after Ctrl-C, pressed again as a person would; None if it goes on all the same."""
+    for _ in range(4):
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            return process.communicate(timeout=15)[1]
+        except subprocess.TimeoutExpired:
+            continue
+    return None

@@ -1,0 +1,22 @@
+"""Every command and every Python block of the pages runs as its page says (`make docs-commands`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.docs.reader import ROOT, Reader
+from tests.docs.steps import pages, steps
+
+PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages(ROOT)}
+TO_DO = {name: found for name, page in PAGES.items() if (found := steps(page.read_text(encoding="utf-8")))}
+
+
+@pytest.mark.parametrize("name", TO_DO)
+def test_page(name: str, tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
+    reader = Reader(tmp_path, name)
+    for step in TO_DO[name]:
+        reader.do(step)
+    record_property("took", reader.took)
+    assert not reader.wrong, "\n".join(["", *reader.wrong])

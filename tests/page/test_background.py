@@ -1,0 +1,218 @@
+"""Optimal start, limit and tuning on the page: computed aside, cancelled, put among the strategies."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import Drive, optimize, simulate, tune
+from softstart.controller import make_controller
+
+CRANE = Drive.load("crane-4amtkf")
+LONG = 60.0  # s
+
+
+def tab(page: Any, name: str) -> None:
+    page.get_by_role("tab", name=name, exact=True).click()
+
+
+def state(page: Any, name: str) -> str:
+    return str(page.get_by_test_id(f"{name}-state").inner_text())
+
+
+def until(what: Callable[[], bool], seconds: float, page: Any) -> None:
+    latest = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < latest
+        page.wait_for_timeout(50)
+
+
+def done(page: Any, name: str, seconds: float = LONG) -> None:
+    until(lambda: bool(re.match("Done|Not computed|Cancelled", state(page, name))), seconds, page)
+    trouble = page.get_by_test_id(f"{name}-trouble")
+    assert state(page, name).startswith("Done in"), trouble.inner_text()
+
+
+def facts(page: Any, name: str) -> dict[str, str]:
+    """Figures by what they are."""
+    pairs = page.get_by_test_id(f"{name}-figures").locator("div").all()
+    return {
+        pair.locator("dt").inner_text().replace("\n", ""): pair.locator("dd").inner_text() for pair in pairs
+    }
+
+
+def k_dyn(page: Any, strategy: str) -> str:
+    """That of a strategy in the table."""
+    cell = page.locator(f'tr[data-name="{strategy}"] td[data-key="k_dyn"]')
+    cell.wait_for()
+    return str(cell.inner_text())
+
+
+def options(page: Any, name: str, choice: str) -> None:
+    page.get_by_test_id(name).click()
+    page.get_by_role("option", name=choice, exact=True).click()
+
+
+def saved(page: Any, name: str) -> tuple[str, str]:
+    """Name and text of the file that a button gives."""
+    with page.expect_download() as download:
+        page.get_by_test_id(name).click()
+    return download.value.suggested_filename, Path(download.value.path()).read_text(encoding="utf-8")
+
+
+def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_path: Path) -> None:
+    direct = simulate(CRANE, "direct").start_time
+    best = optimize(CRANE, 1.2 * direct)
+    page.get_by_test_id("optimum-time").fill("1.2x")
+    page.get_by_test_id("optimum-go").click()
+    done(page, "optimum")
+    shown = facts(page, "optimum")
+    assert shown["Kdyn"] == f"{best.k_dyn:.4g}"
+    assert shown["lower bound"] == f"{best.k_dyn_lower_bound:.4g}"
+    assert shown["start time"] == f"{best.end_time:.4g} s"
+    assert shown["contacts"] == "1"
+    label = f"optimum {best.end_time:.4g} s"
+    assert k_dyn(page, label) == f"{best.k_dyn:.3f}"
+
+    for suffix in ("csv", "toml", "c"):
+        name, text = saved(page, f"optimum-{suffix}")
+        assert name == f"optimum-{best.end_time:.4g}-s.{suffix}"
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        if suffix == "c":
+            assert "double torque_profile(double time)" in text
+            continue
+        again = make_controller("profile", {"file": str(tmp_path / name)})
+        assert simulate(CRANE, again).k_dyn == best.k_dyn
+
+    page.locator(f'tr[data-name="{label}"] input[type=radio]').click()
+    tab(page, "Files")
+    page.get_by_test_id("export-strategy").get_by_text(label).wait_for()
+    name, text = saved(page, "export-profile-csv")
+    assert (tmp_path / name).read_text(encoding="utf-8") == text
+    name, text = saved(page, "export-c")
+    assert name == f"optimum-{best.end_time:.4g}-s.c"
+    assert "double torque_profile(double time)" in text
+    assert (
+        f"--param profile.file=optimum-{best.end_time:.4g}-s.csv"
+        in page.get_by_test_id("command").inner_text()
+    )
+    tab(page, "Optimum")
+
+    assert not page.get_by_test_id("optimum-stale").is_visible()
+    gap = page.locator('[data-path="shaft.gap"] input[type=text]')
+    gap.fill("0.7")
+    gap.press("Enter")
+    page.get_by_test_id("optimum-stale").wait_for()
+    assert (
+        page.get_by_test_id("optimum-stale").inner_text()
+        == "For shaft.gap 0.5 rad; the drive has changed since."
+    )
+
+    load = page.locator('[data-path="load.torque"] input[type=text]')
+    load.fill("-2")
+    load.press("Enter")
+    page.get_by_test_id("optimum-stale").get_by_text("load.torque").wait_for()
+    page.get_by_test_id("optimum-go").click()
+    until(lambda: state(page, "optimum") == "Not computed.", LONG, page)
+    assert "this load drives instead of braking" in page.get_by_test_id("optimum-trouble").inner_text()
+    page.get_by_test_id("optimum-time").fill("soon")
+    page.get_by_test_id("optimum-go").click()
+    page.get_by_text('Start time "soon": give a time above 0 s').wait_for()
+    assert not page.get_by_test_id("optimum-figures").is_visible()  # no answer to another question
+
+
+def test_the_limit_grows_point_by_point_and_is_cancelled_in_mid_run(page: Any, server: Any) -> None:
+    tab(page, "Limit")
+    until(lambda: bool(server.jobs()), 10.0, page)  # the process that waits for work
+    page.get_by_test_id("curve-go").click()
+    page.locator(".curve-point").nth(3).wait_for(timeout=1000 * LONG)
+    assert state(page, "curve").startswith("Computing: ")
+    before = set(server.jobs())
+    page.get_by_test_id("curve-cancel").click()
+    began = time.monotonic()
+    until(lambda: state(page, "curve").startswith("Cancelled after"), 3.0, page)
+    assert time.monotonic() - began < 1.5
+    assert before - set(server.jobs()), "the process of the cancelled job is still there"
+    assert page.locator(".curve-point").count() >= 4  # what was found stays
+    assert page.get_by_test_id("curve-go").is_enabled()
+    assert k_dyn(page, "direct") == f"{simulate(CRANE, 'direct').k_dyn:.3f}"  # the page lives on
+
+
+def test_tuned_gains_are_those_of_tune_and_join_the_strategies(page: Any, tmp_path: Path) -> None:
+    name, gaps = "reduced-first-stage", ["1x", "2x"]
+    found = tune(CRANE, name, gaps, ["1x"], restarts=1, certified=False, workers=1)
+    assert found.robust is not None
+    assert found.schedule is not None
+    tab(page, "Tuning")
+    options(page, "tuning-controller", name)
+    page.get_by_test_id("tuning-gaps").fill("1x, 2 quarks")
+    page.get_by_test_id("tuning-go").click()
+    page.get_by_test_id("tuning-trouble").get_by_text("quarks").wait_for()
+    page.get_by_test_id("tuning-gaps").fill(", ".join(gaps))
+    page.get_by_test_id("tuning-inertias").fill("1x")
+    options(page, "tuning-searches", "one search, quick")
+    page.get_by_test_id("tuning-go").click()
+    done(page, "tuning")
+    shown = facts(page, "tuning")
+    assert shown["worst Kdyn, one set"] == f"{found.robust.worst:.4g}"
+    assert shown["with the defaults"] == f"{found.robust.worst_default:.4g}"
+    cells = page.get_by_test_id("tuning-cells").locator("tbody tr").all()
+    assert len(cells) == 2
+    for line, least in zip(cells, found.schedule.k_dyn.values.ravel(), strict=True):
+        assert line.locator("td").nth(4).inner_text() == f"{least:.3f}"
+
+    for what, controller in (("robust", found.robust.controller), ("schedule", found.scheduled)):
+        page.get_by_test_id(f"tuning-use-{what}").click()
+        expected = simulate(CRANE, controller).k_dyn
+        assert k_dyn(page, f"{name} ({what})") == f"{expected:.3f}"
+        file, text = saved(page, f"tuning-{what}-toml")
+        assert file == f"{name}-{what}.toml"
+        (tmp_path / file).write_text(text, encoding="utf-8")
+        assert simulate(CRANE, make_controller(str(tmp_path / file))).k_dyn == expected
+
+
+def test_two_users_have_their_own_benches_and_turns_and_a_closed_tab_ends_its_jobs(
+    visit: Callable[..., Any], server: Any
+) -> None:
+    first, second = visit(), visit()
+    tab(first, "Limit")
+    first.get_by_test_id("curve-go").click()
+    tab(first, "Tuning")
+    first.get_by_test_id("tuning-go").click()
+    until(lambda: state(first, "tuning").startswith("Waiting for its turn."), 5.0, first)
+    second.get_by_test_id("optimum-go").click()  # comes later, and does not wait for the queue of the other
+    done(second, "optimum")
+    assert state(first, "tuning").startswith("Waiting for its turn.")
+    best = "optimum " + facts(second, "optimum")["start time"]
+    assert k_dyn(second, best)
+    assert first.get_by_text(best, exact=True).count() == 0
+    until(lambda: len(server.jobs()) > 0, 5.0, second)
+    first.context.close()
+    spare = 1  # one process waits for the next job
+    until(lambda: len(server.jobs()) <= spare, 25.0, second)
+    second.get_by_test_id("optimum-time").fill("0.5")
+    second.get_by_test_id("optimum-go").click()
+    assert k_dyn(second, "optimum 0.5 s") == f"{optimize(CRANE, 0.5).k_dyn:.3f}"
+
+
+@pytest.mark.parametrize(("width", "height", "dark"), [(1280, 800, False), (1920, 1080, True)])
+def test_panels_stay_within_their_column(
+    visit: Callable[..., Any], screenshot: Callable[..., Path], width: int, height: int, dark: bool
+) -> None:
+    """Nothing is cut off sideways, at both widths; the pictures are there to be looked at."""
+    page = visit(width, height, dark)
+    for name in ("Optimum", "Limit", "Tuning", "Files"):
+        tab(page, name)
+        if name == "Optimum":
+            page.get_by_test_id("optimum-go").click()
+            done(page, "optimum")
+        page.wait_for_timeout(150)
+        panel = page.locator(".instrument .panel").first
+        inside, box = panel.evaluate("e => [e.scrollWidth, e.clientWidth]")
+        assert inside <= box + 1, name
+        assert screenshot(page, f"panel-{name.lower()}-{width}").stat().st_size > 10_000

@@ -1,0 +1,126 @@
+"""Files on the page: a drive in and out, traces, code, the report, the command line."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import Drive, InputError, simulate
+
+CRANE = Drive.load("crane-4amtkf")
+BROKEN = b"""name = "broken"
+[motor]
+inertia = -1
+starting_torque = "62 N"
+[shaft]
+stiffness = 368.465
+gap = "0.5 rad"
+[load]
+inertia = "0.175 kg*m^2"
+torque = 7.16
+[start]
+target_sped = 92
+"""
+
+
+def put(page: Any, name: str, content: bytes) -> None:
+    page.locator('input[type="file"]').set_input_files(
+        {"name": name, "mimeType": "application/toml", "buffer": content}
+    )
+
+
+def saved(page: Any, name: str, timeout: float = 20_000) -> tuple[str, bytes]:
+    with page.expect_download(timeout=timeout) as download:
+        page.get_by_test_id(name).click()
+    return download.value.suggested_filename, Path(download.value.path()).read_bytes()
+
+
+def k_dyn(page: Any, text: str) -> None:
+    """Wait until the large figure shows this."""
+    page.wait_for_function("text => document.getElementById('k-dyn').textContent.trim() === text", arg=text)
+
+
+@pytest.fixture
+def files(page: Any) -> Any:
+    page.get_by_role("tab", name="Files", exact=True).click()
+    return page
+
+
+def test_a_broken_drive_file_shows_all_its_sentences_and_changes_nothing(files: Any) -> None:
+    with pytest.raises(InputError) as told:
+        Drive.from_toml(BROKEN.decode())
+    assert len(told.value.sentences) >= 3
+    own = f"{simulate(CRANE, 'direct').k_dyn:.3f}"
+    k_dyn(files, own)
+    trouble = files.get_by_test_id("drive-trouble")
+    for name, content, sentences in (
+        ("broken.toml", BROKEN, told.value.sentences),
+        ("picture.toml", b"name = '\xff\xfe'", ("the file is not UTF-8 text (line 1); save it as UTF-8.",)),
+        ("no.toml", b"", ("it is empty",)),
+        ("large.toml", b"#" * 300_000, ("more than 256 kB",)),
+    ):
+        put(files, name, content)
+        for sentence in sentences:
+            trouble.get_by_text(sentence).wait_for()
+        assert "as it was" in trouble.inner_text()
+    assert files.locator("#k-dyn").inner_text().strip() == own
+    assert files.locator(".drive-name").inner_text() == CRANE.name
+
+
+def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
+    own = CRANE.replace(name='../Мой "кран" <b>7</b>', gap=1.25, load_kind="reactive", damping=0.3)
+    put(files, "mine.toml", own.to_toml().encode())
+    k_dyn(files, f"{simulate(own, 'direct').k_dyn:.3f}")
+    assert files.locator(".drive-name").inner_text() == own.name
+    assert not files.get_by_test_id("drive-trouble").is_visible()
+    name, content = saved(files, "drive-save")
+    assert re.fullmatch(r"[a-z0-9-]+\.toml", name)
+    (tmp_path / name).write_bytes(content)
+    assert Drive.load(tmp_path / name) == own
+    files.get_by_test_id("drive-shipped").click()
+    files.get_by_role("option", name=Drive.load("servo-axis-small").name).click()
+    k_dyn(files, f"{simulate('servo-axis-small', 'direct').k_dyn:.3f}")
+
+
+def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
+    """The report is computed aside; meanwhile everything else goes on."""
+    with files.expect_download(lambda it: it.suggested_filename.endswith(".html"), timeout=120_000) as report:
+        files.get_by_test_id("export-report").click()
+        name, content = saved(files, "export-traces")
+        assert name == "crane-travel-drive-4amtkf-h-112l6-direct-traces.csv"
+        simulate(CRANE, "direct").to_csv(tmp_path / "same.csv")
+        assert content == (tmp_path / "same.csv").read_bytes()
+
+        files.get_by_role("tab", name="Optimum", exact=True).click()
+        assert files.get_by_test_id("optimum-go").is_enabled()
+        files.get_by_role("tab", name="Files", exact=True).click()
+        gap = files.locator('[data-path="shaft.gap"] input[type=text]')
+        gap.fill("0.75")
+        gap.press("Enter")
+        drive = CRANE.replace(gap=0.75)
+        k_dyn(files, f"{simulate(drive, 'direct').k_dyn:.3f}")
+        command = files.get_by_test_id("command")
+        files.wait_for_function("() => document.querySelector('.command').innerText.includes('0.75')")
+        words = shlex.split(command.inner_text())
+        assert words[:2] == ["softstart", "compare"]
+        ran = subprocess.run(
+            [str(Path(sys.executable).with_name(words[0])), *words[1:], "--json"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        found = {one["controller"]: one["k_dyn"] for one in json.loads(ran.stdout)["strategies"]}
+        assert found["direct"] == simulate(drive, "direct").k_dyn
+    html = Path(report.value.path()).read_text(encoding="utf-8")
+    assert report.value.suggested_filename == "crane-travel-drive-4amtkf-h-112l6-report.html"
+    assert html.lstrip().lower().startswith("<!doctype html")
+    assert CRANE.name in html
+    assert not re.search(r'(?:src|href)="(?:https?:)?//', html)

@@ -1,0 +1,264 @@
+"""The live part of the page in a real browser: what a hand does, and what is seen then."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import Drive, simulate
+
+CRANE = Drive.load("crane-4amtkf")
+STEPS = 60
+COUNT = """() => {
+  window.updates = 0;
+  window.lags = [];
+  const pulse = document.querySelector(".pulse");
+  new MutationObserver((all) => { window.updates += all.filter((one) => one.addedNodes.length).length; })
+    .observe(document.querySelector("#k-dyn"), { childList: true });
+  new MutationObserver(() => window.lags.push(Number(pulse.dataset.lag)))
+    .observe(pulse, { attributes: true, attributeFilter: ["data-lag"] });
+}"""
+
+
+def opened(page: Any) -> Any:
+    """The page with its first figures."""
+    page.wait_for_selector("#k-dyn[data-value]", timeout=30_000)
+    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
+    return page
+
+
+def k_dyn(page: Any) -> float:
+    return float(page.locator("#k-dyn").get_attribute("data-value"))
+
+
+def wait_for_k(page: Any, value: float) -> None:
+    page.wait_for_function(
+        "(wanted) => Math.abs(document.querySelector('#k-dyn').dataset.value - wanted) < 1e-12 * wanted",
+        arg=value,
+        timeout=20_000,
+    )
+
+
+def slider(page: Any, path: str) -> Any:
+    return page.locator(f'[data-path="{path}"] input[type=range]')
+
+
+def field(page: Any, path: str) -> Any:
+    return page.locator(f'[data-path="{path}"] input[type=text]')
+
+
+def drag(page: Any, path: str, start: float, end: float, steps: int) -> None:
+    """From one share of the slider's length to another, by mouse."""
+    box = slider(page, path).bounding_box()
+    x, y, width = box["x"] + 6, box["y"] + box["height"] / 2, box["width"] - 12
+    page.mouse.move(x + start * width, y)
+    page.mouse.down()
+    page.mouse.move(x + end * width, y, steps=steps)
+    page.mouse.up()
+
+
+def settled(page: Any, expression: str) -> Any:
+    """The value of an expression that has not changed for a second: a busy machine is behind the hand."""
+    value = None
+    while value != (value := page.evaluate(expression)):
+        page.wait_for_timeout(1000)
+    return value
+
+
+def test_a_slider_moved_by_mouse_gives_the_k_dyn_of_simulate(page):
+    opened(page)
+    assert k_dyn(page) == simulate(CRANE, "direct").k_dyn
+    drag(page, "shaft.gap", 0.25, 0.8, 12)
+    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
+    page.wait_for_timeout(300)
+    gap = float(field(page, "shaft.gap").input_value())
+    wait_for_k(page, simulate(CRANE.replace(gap=gap), "direct").k_dyn)
+    for name in ("shaped", "ramp"):
+        shown = page.locator(f'tr[data-name="{name}"] td[data-key="k_dyn"]').inner_text()
+        assert shown == f"{simulate(CRANE.replace(gap=gap), name).k_dyn:.3f}"
+
+
+@pytest.mark.parametrize("strategy", ["direct", "state-feedback"])  # the quickest, and the slowest to design
+def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy):
+    opened(page)
+    page.locator(f'tr[data-name="{strategy}"] input[type=radio]').check()
+    page.wait_for_timeout(1500)
+    page.evaluate(COUNT)
+    drag(page, "shaft.gap", 0.02, 0.98, STEPS)
+    updates = settled(page, "window.updates")
+    lags = sorted(page.evaluate("window.lags"))
+    print(
+        f"\n{strategy}, {STEPS} steps: {updates} updates of K_dyn, {len(lags)} pictures; hand to picture "
+        f"{lags[len(lags) // 2]:.0f} ms (median), {lags[-1]:.0f} ms (worst), last {page.inner_text('.pulse')}"
+    )
+    assert updates >= 55
+
+
+def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):
+    opened(page)
+    page.wait_for_timeout(2500)
+    box = page.locator(".map canvas").bounding_box()
+    page.mouse.click(box["x"] + 0.62 * box["width"], box["y"] + 0.3 * box["height"])
+    page.wait_for_function(
+        "document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value != '0.5'"
+    )
+    page.wait_for_timeout(200)
+    gap = float(field(page, "shaft.gap").input_value())
+    inertia = float(field(page, "load.inertia").input_value())
+    assert gap > 0.5
+    assert inertia > 0.175
+    wait_for_k(page, simulate(CRANE.replace(gap=gap, load_inertia=inertia), "direct").k_dyn)
+    page.locator(".map canvas").focus()
+    page.keyboard.press("ArrowLeft")  # and its neighbour by keyboard
+    page.wait_for_function(
+        "(gap) => document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value < gap", arg=gap
+    )
+
+
+def test_a_mistake_stands_beside_its_field_and_the_state_stays(page):
+    opened(page)
+    before = k_dyn(page)
+    field(page, "shaft.gap").fill("4 metres")
+    field(page, "shaft.gap").press("Enter")
+    told = page.locator("#field-shaft-gap-mistake")
+    told.wait_for(state="visible")
+    assert "metres is a length, not an angle" in told.inner_text()
+    assert field(page, "shaft.gap").input_value() == "4 metres"
+    assert k_dyn(page) == before
+    field(page, "shaft.gap").fill("4 deg")
+    field(page, "shaft.gap").press("Enter")
+    told.wait_for(state="hidden")
+    wait_for_k(page, simulate(CRANE.replace(gap="4 deg"), "direct").k_dyn)
+    field(page, "motor.starting_torque").fill("5")  # weaker than its load
+    field(page, "motor.starting_torque").press("Tab")
+    page.locator("#field-motor-starting_torque-mistake").wait_for(state="visible")
+    field(page, "motor.starting_torque").press("Escape")
+    page.locator("#field-motor-starting_torque-mistake").wait_for(state="hidden")
+    assert field(page, "motor.starting_torque").input_value() == "62"
+
+
+def test_everything_is_reached_by_keyboard(page):
+    opened(page)
+    slider(page, "shaft.gap").focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function(
+        "document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value == '0.51'"
+    )
+    wait_for_k(page, simulate(CRANE.replace(gap=0.51), "direct").k_dyn)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "field-shaft-gap"
+    page.locator('tr[data-name="direct"] input[type=radio]').focus()
+    page.keyboard.press("ArrowDown")  # the next strategy
+    page.wait_for_function("document.querySelector('.figure .name').textContent == 'pulse-coast-hold'")
+    wait_for_k(page, simulate(CRANE.replace(gap=0.51), "pulse-coast-hold").k_dyn)
+    outline = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+    assert outline != "none"
+
+
+def test_strategies_are_drawn_hidden_and_sorted(page):
+    opened(page)
+    page.locator('tr[data-name="ramp"] input[type=checkbox]').check()
+    page.wait_for_timeout(400)
+    assert page.locator('tr[data-name="ramp"] input[type=checkbox]').is_checked()
+    page.locator('th[data-key="k_dyn"] button').click()
+    names = page.locator(".strategies tbody tr").evaluate_all("all => all.map((tr) => tr.dataset.name)")
+    assert (
+        names == sorted(names, key=lambda name: simulate(CRANE, name).k_dyn) or names[0] == "pulse-coast-hold"
+    )
+    page.locator('tr[data-name="s-curve"] td.number').first.click()
+    wait_for_k(page, simulate(CRANE, "s-curve").k_dyn)
+
+
+def test_two_users_have_drives_of_their_own(page, visit):
+    opened(page)
+    other = opened(visit())
+    field(other, "shaft.gap").fill("2 rad")
+    field(other, "shaft.gap").press("Enter")
+    wait_for_k(other, simulate(CRANE.replace(gap=2.0), "direct").k_dyn)
+    page.wait_for_timeout(300)
+    assert k_dyn(page) == simulate(CRANE, "direct").k_dyn
+    assert field(page, "shaft.gap").input_value() == "0.5"
+    other.close()
+    drag(page, "load.inertia", 0.5, 0.6, 3)  # a closed tab takes nothing from the other one
+    page.wait_for_function(
+        "document.querySelector('[data-path=\"load.inertia\"] input[type=text]').value > 0.18"
+    )
+
+
+def test_a_lost_line_is_taken_up_again_with_the_same_drive(page):
+    opened(page)
+    field(page, "shaft.gap").fill("1 rad")
+    field(page, "shaft.gap").press("Enter")
+    wait_for_k(page, simulate(CRANE.replace(gap=1.0), "direct").k_dyn)
+    page.evaluate("window.socket.io.engine.close()")
+    page.wait_for_function("!window.socket.connected", timeout=5000)
+    page.wait_for_function("window.socket.connected", timeout=15_000)
+    drag(page, "load.inertia", 0.5, 0.7, 5)
+    page.wait_for_function(
+        "document.querySelector('[data-path=\"load.inertia\"] input[type=text]').value > 0.2"
+    )
+    page.wait_for_timeout(400)
+    inertia = float(field(page, "load.inertia").input_value())
+    wait_for_k(page, simulate(CRANE.replace(gap=1.0, load_inertia=inertia), "direct").k_dyn)
+
+
+def test_colours_follow_the_system_and_the_switch(page):
+    page.emulate_media(color_scheme="dark")
+    opened(page)
+    page.wait_for_function("document.body.classList.contains('body--dark')")
+    paper = "getComputedStyle(document.querySelector('.controls')).backgroundColor"
+    light = [int(part) > 200 for part in re.findall(r"\d+", page.evaluate(paper))[:3]]
+    assert light == [False] * 3
+    page.locator('.theme input[value="light"]').check(force=True)
+    page.wait_for_function(f"{paper} == 'rgb(255, 255, 255)'")
+    page.emulate_media(color_scheme="light")
+    page.locator('.theme input[value="dark"]').check(force=True)
+    page.wait_for_function(f"{paper} != 'rgb(255, 255, 255)'")
+
+
+def test_no_request_leaves_the_machine_and_no_cookie_is_set(page, server):
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("websocket", lambda socket: asked.append(socket.url))
+    page.reload()
+    opened(page)
+    page.wait_for_timeout(500)
+    place = server.url.split("//")[1].split("/")[0]
+    foreign = [url for url in asked if url.split("//")[-1].split("/")[0] != place]
+    assert [url for url in foreign if not url.startswith(("data:", "blob:"))] == []
+    assert any(url.startswith("ws://") for url in asked)
+    assert page.context.cookies() == []
+
+
+def test_with_a_token_the_page_opens_by_it_and_by_nothing_else(start_server, visit, browser):
+    server = start_server("--token", "a-token-of-some-length")
+    bare = server.url.partition("?")[0]
+    page = opened(visit(url=server.url))
+    assert "token" not in page.url
+    drag(page, "shaft.gap", 0.25, 0.5, 5)  # the socket is let in by the cookie
+    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 0.8")
+    (cookie,) = page.context.cookies()
+    assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
+    stranger = browser.new_page()
+    assert stranger.goto(bare).status == 401
+    assert "needs its token" in stranger.inner_text("body")
+    stranger.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080)])
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_the_main_view_fits_without_scrolling(visit, tmp_path: Path, width, height, colours):
+    page = opened(visit(width, height, dark=colours == "dark"))
+    page.wait_for_timeout(2500)
+    page.screenshot(path=tmp_path / f"page-{width}-{colours}.png")
+    sizes = page.evaluate(
+        "['.controls', '.strategies', '.centre'].map((name) => document.querySelector(name))"
+        ".map((part) => [part.scrollHeight - part.clientHeight, part.scrollWidth - part.clientWidth])"
+    )
+    assert sizes == [[0, 0]] * 3
+    whole = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.evaluate(whole) == [width, height]

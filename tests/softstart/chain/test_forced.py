@@ -1,0 +1,87 @@
+"""The forced response of a chain: linear where its gaps are closed, and against scipy where they are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from softstart import InputError
+from softstart.chain import Chain, Mass, Shaft, forced_response
+
+C, D, GAP = 200.0, 10.0, 0.01
+TWO = Chain([Mass(1.0), Mass(2.0)], [Shaft(C, damping=D, gap=GAP)])
+
+
+def geared(gap: float) -> Chain:
+    """Three masses, a gear of 3 to 1 between the last two."""
+    return Chain(
+        [Mass(0.5), Mass(0.2), Mass(9.0)],
+        [Shaft(80, damping=0.5, gap=gap), Shaft(50, damping=0.4, gap=gap, ratio=3.0)],
+    )
+
+
+def test_without_gaps_it_is_the_linear_response() -> None:
+    found = forced_response(geared(0.0), [3.0, 11.0, 30.0], {1: 1.0, 2: 2.0})
+    np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
+    np.testing.assert_allclose(found.torque, found.torque_without_gaps, rtol=1e-9)
+    # two masses by hand: the twist is an oscillator of the reduced inertia 2/3
+    w, m = 14.0, 2.0 / 3.0
+    twist = 1.5 / 1.0 / (C / m - w * w + 1j * w * D / m)
+    one = forced_response(Chain(TWO.masses, [Shaft(C, damping=D)]), w, {0: 1.5})
+    assert one.torque[0, 0] == pytest.approx(abs((C + 1j * w * D) * twist), rel=1e-9)
+    assert one.amplitude[0] == pytest.approx([abs(twist) * 2 / 3, abs(twist) / 3], rel=1e-9)
+
+
+@pytest.mark.parametrize("locking", [9.0, -9.0])
+def test_a_constant_torque_above_the_alternating_one_locks_all_gaps(locking: float) -> None:
+    found = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0}, locking=locking)
+    assert found.torque_without_gaps.max() < abs(locking)
+    np.testing.assert_allclose(found.amplitude, found.without_gaps, rtol=1e-9)
+    loose = forced_response(geared(0.05), [3.0, 30.0], {1: 1.0, 2: 2.0})
+    assert (np.abs(loose.amplitude / loose.without_gaps - 1.0).max(axis=1) > 0.2).all()
+
+
+def test_an_open_gap_against_scipy() -> None:
+    """A twist that passes through the gap and back twice a period; scipy starts elsewhere."""
+    w, size, locking = 12.0, 1.0, 0.3
+
+    def motion(t: float, y: np.ndarray) -> list[float]:
+        z, rate = y
+        torque = 0.0
+        for side in (1.0, -1.0):
+            if side * z > GAP / 2:
+                torque = side * max(0.0, C * (side * z - GAP / 2) + D * side * rate)
+        return [rate, (size * np.cos(w * t) + locking - torque) / 1.0 - (torque - locking) / 2.0]
+
+    period = 2.0 * np.pi / w
+    settled, periods = 24, 4
+    t = np.linspace(settled * period, (settled + periods) * period, 1024, endpoint=False)
+    run = solve_ivp(motion, (0.0, t[-1]), [GAP, 0.0], t_eval=t, rtol=1e-8, atol=1e-11, max_step=period / 60)
+    swing = np.sqrt(2.0 * np.var(run.y[0])) * np.array([2.0, 1.0]) / 3.0  # of the two about their mean
+    found = forced_response(TWO, w, {0: size}, locking=locking)
+    rest = forced_response(TWO, w, {0: size}, locking=locking, from_rest=True)
+    np.testing.assert_allclose(rest.amplitude, found.amplitude, rtol=1e-5)
+    assert found.spread[0] < 1e-5
+    np.testing.assert_allclose(found.amplitude[0], swing, rtol=1e-5)
+    assert found.amplitude[0, 0] > 2.0 * found.without_gaps[0, 0]
+
+
+def test_bad_questions_are_refused_together() -> None:
+    undamped = Chain([Mass(1), Mass(2)], [Shaft(30, gap=0.1)], load_mass="mass 1")
+    with pytest.raises(InputError) as caught:
+        forced_response(undamped, [0.0], {}, locking=1.0, settle=-1.0)
+    said = " ".join(caught.value.sentences)
+    for words in ("frequency:", "locking:", "settle = -1", "excitation:", "without damping"):
+        assert words in said
+    partly = Chain([Mass(1), Mass(2), Mass(1)], [Shaft(30), Shaft(30, damping=0.0)])
+    with pytest.raises(InputError, match="without damping"):
+        forced_response(partly, 1.0, {0: 1.0})
+    with pytest.raises(InputError, match="one is rigid"):
+        forced_response(Chain([Mass(1, damping=1), Mass(2)], [Shaft("inf")]), 1.0, {0: 1.0})
+
+
+def test_it_is_drawn_and_told() -> None:
+    found = forced_response(TWO, [10.0, 15.0], {"mass 1": 1.0})
+    assert len(found.plot("mass 2").axes[0].lines) == 2
+    assert found.summary()["amplitude"] == found.amplitude.tolist()

@@ -1,0 +1,67 @@
+"""`softstart report`: the file is written whole or not at all, and bad input is told at once."""
+
+import json
+
+import pytest
+
+CHEAP = ("--controllers", "direct,ramp", "--budget", "0")
+
+
+def test_report_is_written_and_summed_up(run, place):
+    code, out, err = run(
+        "report", "good.toml", *CHEAP, "--out", "r.html", "--json", "--resolution", "time=5ms"
+    )
+    assert (code, err) == (0, "")
+    made = json.loads(out)
+    page = (place / "r.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert made["recommended"] == "ramp"
+    assert f"{made['k_dyn']:.3f}" in page
+    assert "softstart report good.toml" in page
+    assert made["provenance"]["command"].startswith("softstart report good.toml")
+    time = next(one for one in made["sheets"][0]["settings"] if one["name"] == "time")
+    assert time["rounded"] == 0.11
+    assert not list(place.rglob("*.part"))
+
+
+def test_interrupted_report_leaves_the_old_file(run, place, monkeypatch):
+    (place / "r.html").write_text("old")
+
+    def stop(report):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("softstart.reporting.result.Report.to_html", stop)
+    code, out, err = run("report", "good.toml", *CHEAP, "--out", "r.html")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err
+    assert (place / "r.html").read_text() == "old"
+    assert not list(place.rglob("*.part"))
+
+
+def test_numbers_for_people_without_a_file_are_refused_and_all_mistakes_told(run, nothing_left):
+    code, out, err = run(
+        "report", "nowhere.toml", "--resolution", "tme=1ms", "--slower", "-1", "--budget", "x"
+    )
+    assert (code, out) == (2, "")
+    for words in (
+        "--out: name the file",
+        "no such file",
+        "did you mean time?",
+        '--slower = "-1"',
+        "--budget",
+    ):
+        assert words in err
+    assert "5 things are wrong" in err
+    nothing_left()
+
+
+@pytest.mark.parametrize(
+    ("out", "says"),
+    [("folder", "is a folder"), ("gone/r.html", "cannot be written"), ("", "name of a file")],
+)
+def test_a_place_that_cannot_be_written_is_told_first(run, nothing_left, out, says):
+    code, stdout, err = run("report", "good.toml", "--out", out)
+    assert (code, stdout) == (2, "")
+    assert err.count("\n") == 1
+    assert says in err
+    nothing_left()

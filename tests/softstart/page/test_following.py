@@ -1,0 +1,239 @@
+"""Following a hand: the newest drive wins, nothing queues up, mistakes stay beside their fields."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import simulate
+from softstart.controller import make_controller
+from softstart.drive.parameters import PARAMETERS
+from softstart.page.bench import Bench
+from softstart.page.controls import GROUPS, Controls
+from softstart.page.frames import Screen
+from softstart.page.live import GLANCES, WINDOW, Live
+
+
+class Line:
+    """A line to a browser that draws a frame some turns of the loop after it was sent, or never."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, dict[str, Any]]] = []
+        self.most_on_their_way = 0
+        self.live: Live | None = None
+        self.draws = True
+
+    def send(self, number: int, frame: dict[str, Any]) -> None:
+        json.dumps(frame, allow_nan=False)  # it can go over a line
+        self.frames.append((number, frame))
+        if number:
+            self.most_on_their_way = max(self.most_on_their_way, self.live.on_their_way)
+            if self.draws:
+                asyncio.get_running_loop().call_later(0.002, self.live.drawn, number)
+
+
+async def until(true, seconds: float = 30.0) -> None:
+    """Wait for a condition; a busy machine may take its time."""
+    async with asyncio.timeout(seconds):
+        while not true():
+            await asyncio.sleep(0.005)
+
+
+async def followed(bench: Bench, hand, line: Line | None = None, rest: float = 0.01) -> Line:
+    """Run a page without a browser while `hand` moves."""
+    line = line or Line()
+    screen = Screen(bench)
+    live = line.live = Live(screen, line.send, rest=rest)
+    controls = Controls(bench, screen, lambda: None)
+    bench.on_change(live.poke)
+    task = asyncio.create_task(live.run())
+    try:
+        await hand(controls, line)
+    finally:
+        task.cancel()
+    return line
+
+
+def rows_of_map(line: Line) -> dict[int, Any]:
+    return {frame["map_row"]["index"]: frame for _, frame in line.frames if "map_row" in frame}
+
+
+def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
+    bench = Bench(controllers=["direct", "ramp", "shaped"])
+
+    async def hand(controls, line):
+        for position in range(100, 400, 5):
+            controls.take({"what": "slide", "path": "shaft.gap", "position": position, "stamp": position})
+            await asyncio.sleep(0)
+        await until(lambda: "map_row" in line.frames[-1][1])  # the last thing that is done at rest
+
+    line = asyncio.run(followed(bench, hand))
+    assert line.most_on_their_way <= WINDOW
+    frames = [frame for number, frame in line.frames if number and "figure" in frame]
+    assert len(frames) < 60  # coalesced
+    assert frames[-1]["stamp"] == 395
+    assert frames[-1]["figure"]["k_dyn"] == simulate(bench.drive, "direct").k_dyn
+    rows = {}
+    for _, frame in line.frames:
+        rows |= {row["name"]: row for row in frame.get("rows", [])}
+    for name in bench.controllers:
+        assert rows[name]["k_dyn"] == simulate(bench.drive, name).k_dyn
+        assert rows[name]["worn"] == bench.worn(name)
+
+
+def test_every_step_has_its_glance_until_the_browser_stops_drawing():
+    bench = Bench(controllers=["direct"])
+    line = Line()
+    steps = 60
+
+    async def hand(controls, line):
+        await until(lambda: len(line.frames) >= 2 and line.live.on_their_way == 0)
+        line.frames.clear()
+        line.draws = False
+        for position in range(steps):
+            controls.take({"what": "slide", "path": "shaft.gap", "position": position + 100})
+        await asyncio.sleep(0.05)
+
+    asyncio.run(followed(bench, hand, line, rest=9.0))
+    glances = [frame for number, frame in line.frames if number == 0]
+    assert len(glances) == GLANCES
+    numbered = [frame for number, frame in line.frames if number]
+    assert len(numbered) <= WINDOW
+
+
+def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
+    bench = Bench(controllers=["direct"])
+
+    async def hand(controls, line):
+        await until(lambda: len(rows_of_map(line)) == 17)
+        line.frames.clear()
+        controls.take({"what": "jump", "gap": 1.0, "inertia": 0.175})
+        await asyncio.sleep(0.2)
+        assert not any("map_row" in frame for _, frame in line.frames)  # gap and inertia are its axes
+        controls.take({"what": "slide", "path": "shaft.stiffness", "position": 200})
+        await until(lambda: len(rows_of_map(line)) == 17)
+        assert any(frame.get("map_is_old") for _, frame in line.frames)
+        rows = rows_of_map(line)
+        head = rows[8]["map"]
+        here = bench.drive.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
+        assert rows[8]["map_row"]["k"][6] == simulate(here, "direct").k_dyn
+
+    asyncio.run(followed(bench, hand))
+
+
+def test_what_fails_is_told_and_following_goes_on():
+    class Broken(Screen):
+        broken = True
+
+        def first(self):
+            if self.broken:
+                raise KeyError("lost")
+            return super().first()
+
+    bench, line, told = Bench(controllers=["direct"]), Line(), []
+
+    async def scene():
+        screen = Broken(bench)
+        line.live = Live(screen, line.send, told.append)
+        task = asyncio.create_task(line.live.run())
+        await until(lambda: told)
+        screen.broken = False
+        line.live.poke()
+        await until(lambda: any("figure" in frame for number, frame in line.frames if number))
+        task.cancel()
+
+    asyncio.run(scene())
+    assert len(told) == 1
+    assert "KeyError" in told[0]
+
+
+def controls_of(bench: Bench) -> tuple[Controls, Screen]:
+    screen = Screen(bench)
+    return Controls(bench, screen, lambda: None), screen
+
+
+def test_a_mistake_stays_beside_its_field_until_it_is_mended():
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "4 metres"})
+    assert "not an angle" in screen.first()["mistakes"]["shaft.gap"]
+    controls.take({"what": "edit", "path": "load.torque", "text": "8"})
+    assert list(screen.mistakes) == ["shaft.gap"]
+    assert bench.drive.gap == 0.5
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
+    assert not screen.mistakes
+    assert screen.first()["fields"]["shaft.gap"] == ["0.0698132", 21, "4\N{DEGREE SIGN}"]
+
+
+def test_a_slider_sets_exactly_the_value_that_its_field_shows():
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    for name, scale in screen.scales.items():
+        path = PARAMETERS[name].path
+        controls.take({"what": "slide", "path": path, "position": 300})
+        assert not screen.mistakes, name
+        text, position, _ = screen.first()["fields"][path]
+        assert float(text) == scale.value(300)
+        assert position == pytest.approx(300, abs=1)
+
+
+def test_a_strategy_that_has_joined_can_be_taken_out_again():
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    bench.add("tuned", make_controller("ramp"))
+    assert screen.first()["added"] == ["tuned"]
+    controls.take({"what": "remove", "name": "tuned"})
+    assert (screen.first()["order"], screen.first()["selected"]) == (["direct"], "direct")
+    controls.take({"what": "remove", "name": "direct"})
+    assert "last strategy" in screen.first()["mistakes"][""]
+
+
+def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    controls.take({"what": "edit", "path": "shaft.gap", "text": ""})
+    assert "empty" in screen.mistakes["shaft.gap"]
+    bench.take(bench.drive.replace(gap=0.005))
+    assert not screen.first()["mistakes"]
+    assert screen.scales["gap"].high == 0.02
+    assert max(screen.axes.gaps) == 0.02
+
+
+def test_every_parameter_with_a_field_is_one_of_the_drive():
+    shown = [name for rows in GROUPS.values() for name, _ in rows]
+    assert len(set(shown)) == len(shown)
+    assert set(Screen(Bench(controllers=["direct"])).scales) <= set(shown)
+
+
+KEYS = ("path", "text", "position", "gap", "inertia", "name", "visible", "kept", "stamp")
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.fixed_dictionaries(
+        {
+            "what": st.sampled_from(
+                ["slide", "edit", "jump", "select", "show", "keep", "remove", "hello", "?"]
+            )
+        },
+        optional=dict.fromkeys(KEYS, JSON),
+    )
+    | JSON
+)
+def test_no_message_whatever_kills_the_page(message):
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    controls.take(message)
+    frame = screen.first()
+    json.dumps(frame, allow_nan=False)
+    assert frame["figure"]["k_dyn"] is not None

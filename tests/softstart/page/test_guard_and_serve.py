@@ -1,0 +1,240 @@
+"""Who is let in: names, origins, the token; and what the command refuses in a sentence."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+
+import pytest
+
+from softstart import InputError
+from softstart.page.guard import Guard
+from softstart.page.serve import Address, guarded, listening
+
+TOKEN = "a-token-of-some-length"
+
+
+def ask(guard: Guard, kind: str = "http", query: str = "", method: str = "GET", **headers: str):
+    """What the guard answers: (status or close code, headers, whether the app was reached)."""
+    reached: list[str] = []
+    sent: list[dict] = []
+
+    async def app(scope, receive, send):
+        reached.append(scope["type"])
+        if scope["type"] == "http":
+            await send({"type": "http.response.start", "status": 200, "headers": []})
+            await send({"type": "http.response.body", "body": b""})
+
+    async def receive():
+        return {"type": f"{kind}.connect"}
+
+    async def send(message):
+        sent.append(message)
+
+    guard.app = app
+    pairs = [(key.encode(), value.encode()) for key, value in headers.items()]
+    scope = {"type": kind, "method": method, "path": "/", "query_string": query.encode(), "headers": pairs}
+    asyncio.run(guard(scope, receive, send))
+    first = sent[0] if sent else {}
+    return first.get("status", first.get("code")), dict(first.get("headers", [])), bool(reached)
+
+
+def local(**options) -> Guard:
+    return guarded(None, Address(**options), 8765)
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize(
+    "host", ["localhost:8765", "127.0.0.1:8765", "[::1]:8765", "LOCALHOST", "127.0.0.1:9000"]
+)
+def test_names_of_this_machine_are_let_in(kind, host):
+    assert ask(local(), kind, host=host, origin=f"http://{host}")[2]
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"host": "evil.example:8765"},
+        {"host": "localhost.evil.example"},
+        {"host": "127.0.0.1@evil.example"},
+        {"host": "127.0.0.1/evil"},
+        {"host": "192.168.1.7:8765"},
+        {"host": ""},
+        {"host": "[::1"},
+        {},
+        {"host": "localhost:8765", "origin": "http://evil.example"},
+        {"host": "localhost:8765", "origin": "http://localhost:9999"},
+        {"host": "localhost:8765", "origin": "http://localhost:8765.evil.example"},
+        {"host": "localhost:8765", "origin": "null"},
+        {"host": "localhost:8765", "origin": "file://localhost:8765"},
+    ],
+)
+def test_foreign_names_and_origins_are_refused(kind, headers):
+    code, _, reached = ask(local(), kind, **headers)
+    assert not reached
+    assert code == (403 if kind == "http" else 1008)
+
+
+def test_two_host_headers_are_refused():
+    guard = local()
+    scope_headers = [(b"host", b"localhost"), (b"host", b"evil.example")]
+    sent = []
+
+    async def send(message):
+        sent.append(message)
+
+    asyncio.run(guard({"type": "http", "method": "GET", "headers": scope_headers}, None, send))
+    assert sent[0]["status"] == 403
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+def test_with_a_token_nobody_comes_in_without_it(kind):
+    guard = local(token=TOKEN)
+    for cookie in (
+        "",
+        "softstart-8765=x",
+        f"softstart-8765={TOKEN}",
+        "softstart-8765=\N{LATIN SMALL LETTER E WITH ACUTE}",
+    ):
+        code, _, reached = ask(guard, kind, host="localhost", cookie=cookie)
+        assert not reached
+        assert code == (401 if kind == "http" else 1008)
+    assert not ask(guard, kind, query=f"token={TOKEN}x", host="localhost")[2]
+    assert not ask(guard, "websocket", query=f"token={TOKEN}", host="localhost")[2]
+    assert not ask(guard, "http", query=f"token={TOKEN}", method="POST", host="localhost")[2]
+
+
+def test_the_token_opens_once_and_the_cookie_stands_for_it_then():
+    guard = local(token=TOKEN)
+    code, headers, reached = ask(guard, query=f"token={TOKEN}", host="localhost")
+    assert (code, reached) == (200, False)
+    cookie = headers[b"set-cookie"].decode()
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    assert TOKEN not in cookie
+    shown = cookie.partition(";")[0]
+    assert ask(guard, "http", host="localhost", cookie=f"a=b; {shown}")[2]
+    assert ask(guard, "websocket", host="localhost", cookie=shown)[2]
+    assert not ask(local(token=TOKEN), "http", host="localhost", cookie=shown)[2]  # of another process
+    assert not ask(guard, "http", host="evil.example", cookie=shown)[2]
+
+
+def test_exposed_pages_answer_to_addresses_but_not_to_foreign_names():
+    guard = local(host="0.0.0.0", token=TOKEN, expose=True)
+    assert ask(guard, host="192.168.1.7:8765")[0] == 401  # asked for its token
+    assert ask(guard, host="evil.example:8765")[0] == 403
+
+
+def test_answers_forbid_the_browser_to_ask_anyone_else():
+    _, headers, _ = ask(local(), host="localhost")
+    assert b"default-src 'self'" in headers[b"content-security-policy"]
+    assert b"frame-ancestors 'none'" in headers[b"content-security-policy"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"host": "0.0.0.0"}, "--expose and --token"),
+        ({"host": "192.168.1.7", "expose": True}, "add --token TOKEN,"),
+        ({"host": "192.168.1.7", "token": TOKEN}, "add --expose,"),
+        ({"host": "evil.example"}, "--expose"),
+        ({"token": "short"}, "guessed"),
+        ({"port": 99999}, "0 to 65535"),
+    ],
+)
+def test_dangerous_addresses_are_refused_with_the_remedy(options, said):
+    with pytest.raises(InputError, match=said):
+        Address(**options).check()
+
+
+def test_addresses_that_are_fine():
+    for options in ({}, {"host": "::1"}, {"host": "127.0.0.9"}, {"host": "localhost", "token": TOKEN},
+                    {"host": "0.0.0.0", "expose": True, "token": TOKEN}):  # fmt: skip
+        Address(**options).check()
+    assert Address(host="::1").url(80) == "http://[::1]:80/"
+    assert Address(token="a&b" * 9).url(1).endswith("?token=" + "a%26b" * 9)
+
+
+def test_a_port_in_use_is_told_with_the_remedy():
+    told = pytest.raises(InputError, match="another program listens there already")
+    with listening(Address(port=0)) as taken, told:
+        listening(Address(port=taken.getsockname()[1]))
+
+
+def run_serve(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())", "serve"]
+    return subprocess.run([*command, *arguments], capture_output=True, text=True, check=False, **options)
+
+
+def test_the_command_tells_all_mistakes_at_once():
+    done = run_serve("nowhere.toml", "--host", "0.0.0.0", "--port", "-4", "--token", "abc")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    for said in ("4 things are wrong", "nowhere.toml", "--host 0.0.0.0", "--port -4", "guessed"):
+        assert said in done.stderr
+
+
+def test_without_nicegui_the_remedy_is_told(tmp_path):
+    code = (
+        "import sys, importlib.util as u; find = u.find_spec;"
+        "u.find_spec = lambda name, *a: None if name == 'nicegui' else find(name, *a);"
+        "from softstart.cli import main; sys.exit(main(['serve', '--no-browser']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'softstart[ui]'" in done.stderr
+
+
+@pytest.mark.skipif(not __import__("importlib.util").util.find_spec("nicegui"), reason="needs NiceGUI")
+def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
+    command = "import sys; from softstart.cli import main; sys.exit(main())"
+    server = subprocess.Popen(
+        [sys.executable, "-c", command, "serve", "--port", "0", "--no-browser"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        line = server.stdout.readline()
+        assert line.startswith("softstart is at http://127.0.0.1:")
+        url = line.split()[3]
+        with urllib.request.urlopen(url, timeout=20) as got:
+            text = got.read().decode()
+            assert "set-cookie" not in {key.lower() for key in got.headers}
+        assert "softstart: Crane travel drive" in text
+        port = int(url.rstrip("/").rpartition(":")[2])
+        upgrade = (
+            b"GET /_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\n"
+            b"Host: localhost:%d\r\nOrigin: %s\r\n"
+            b"Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+            b"Sec-WebSocket-Key: c29mdHN0YXJ0IHNlcnZlIQ==\r\n\r\n"
+        )
+        own = b"http://localhost:%d" % port
+        for request, answer in (
+            (b"GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n", b" 403 "),
+            (upgrade % (port, b"http://evil.example"), b" 403 "),
+            (upgrade % (port, own), b" 101 "),
+        ):
+            with socket.create_connection(("127.0.0.1", port), timeout=10) as raw:
+                raw.sendall(request)
+                assert answer in raw.recv(200)
+        server.send_signal(signal.SIGTERM)
+        began = time.monotonic()
+        assert server.wait(timeout=20) == 130
+        assert time.monotonic() - began < 10.0
+        errors = server.stderr.read()
+        assert "interrupted" in errors
+        assert "Traceback" not in errors
+        assert list(tmp_path.iterdir()) == []
+    finally:
+        server.kill()
+        server.wait()
+        server.stdout.close()
+        server.stderr.close()

@@ -1,0 +1,203 @@
+"""Jobs: a fair queue, progress, a cancel that stops, and no process that outlives its server."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import InputError
+from softstart.page.job_process import NICENESS, OUT_OF_MEMORY
+from softstart.page.jobs import MISTAKE, MOST_WAITING, Job, Jobs, State
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def works(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The functions, importable also in the processes: these get the path of this one."""
+    monkeypatch.syspath_prepend(str(HERE))
+    import works_for_jobs
+
+    return works_for_jobs
+
+
+@pytest.fixture
+def jobs() -> Iterator[Jobs]:
+    jobs = Jobs(limit=1)
+    yield jobs
+    jobs.end()
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return not Path(f"/proc/{pid}/stat").is_file() or ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+
+
+def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
+    latest = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < latest
+        time.sleep(0.01)
+
+
+def test_fair_queue_in_processes_of_low_priority(jobs: Jobs, works: Any, tmp_path: Path) -> None:
+    """One user's queue of three does not keep the others waiting, and each job runs in its own process."""
+    log = str(tmp_path / "log")
+    begun = [jobs.begin(user, line, works.noted, log, line) for user, line in
+             (("A", "A1"), ("A", "A2"), ("A", "A3"), ("B", "B1"), ("C", "C1"), ("B", "B2"))]  # fmt: skip
+    assert begun[0].state is State.RUNNING
+    assert {job.title: job.ahead for job in begun[1:]} == {"B1": 0, "C1": 1, "A2": 2, "B2": 3, "A3": 4}
+    assert all(job.wait(30) for job in begun)
+    assert Path(log).read_text().split() == ["A1", "B1", "C1", "A2", "B2", "A3"]
+    for job in begun:
+        assert (job.state, job.share, job.message) == (State.DONE, 1.0, "half of it")
+        assert (job.parts, job.error) == ([job.title], "")
+        pid, niceness, threads = job.result
+        assert (pid, niceness, threads) == (job.pid, min(os.nice(0) + NICENESS, 19), "1")
+        assert not alive(pid)
+    assert len({job.pid for job in begun} | {os.getpid()}) == 7
+    assert jobs.of("A") == []
+
+
+def test_two_users_at_once_one_job_each(works: Any, tmp_path: Path) -> None:
+    jobs = Jobs(limit=2)
+    try:
+        first, second = (jobs.begin("A", name, works.endless, str(tmp_path / name)) for name in "12")
+        other = jobs.begin("B", "3", works.endless, str(tmp_path / "3"))
+        assert [job.state for job in (first, second, other)] == [State.RUNNING, State.WAITING, State.RUNNING]
+        second.cancel()
+        assert (second.state, second.pid, second.seconds) == (State.CANCELLED, None, 0.0)
+        until((tmp_path / "3").exists)
+        until((tmp_path / "1").exists)
+        jobs.leave("A")
+        assert first.wait(1.0)
+        assert (first.state, other.state) == (State.CANCELLED, State.RUNNING)
+    finally:
+        began = time.monotonic()
+        jobs.end()
+        assert time.monotonic() - began < 1.5
+    assert other.state is State.CANCELLED
+    assert not any(alive(job.pid) for job in (first, other) if job.pid)
+    with pytest.raises(InputError, match="ending"):
+        jobs.begin("A", "late", works.noted, str(tmp_path / "log"), "late")
+
+
+def test_cancel_ends_even_a_deaf_process_within_a_second(jobs: Jobs, works: Any, tmp_path: Path) -> None:
+    endless = jobs.begin("A", "endless", works.endless, str(tmp_path / "started"))
+    until(lambda: bool(endless.parts))
+    assert (endless.state, endless.share, endless.message) == (State.RUNNING, None, "for ever")
+    own, other = endless.parts[0]
+    assert endless.pid == own
+    assert alive(other)
+    os.kill(endless.pid, signal.SIGINT)  # Ctrl-C goes to all processes of a terminal
+    began = time.monotonic()
+    assert not endless.wait(0.2)
+    endless.cancel()
+    assert endless.stopping
+    assert endless.wait(2.0)
+    assert time.monotonic() - began < 1.2
+    assert endless.state is State.CANCELLED
+    assert not alive(own)
+    until(lambda: not alive(other), 0.5)  # killed too; the system may take a moment to clear it away
+    endless.cancel()
+    assert endless.state is State.CANCELLED
+
+
+@pytest.mark.parametrize(
+    ("how", "sentences"),
+    [
+        ("input", ("gap = -1: a gap is 0 or more.", "load.inertia = 0: it must be above 0.")),
+        ("simulation", ("The start cannot be finished.",)),
+        ("memory", (OUT_OF_MEMORY,)),
+        ("mistake", (MISTAKE,)),
+        ("unsendable", (MISTAKE,)),
+        ("killed", None),
+    ],
+)
+def test_failures_are_sentences(
+    jobs: Jobs, works: Any, how: str, sentences: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.ERROR, "softstart.page"):
+        job = jobs.begin("A", how, works.failing, how)
+        assert job.wait(20)
+    assert job.state is State.FAILED
+    assert job.result is None
+    if sentences is None:
+        assert "signal 9" in job.error
+    else:
+        assert job.sentences == sentences
+    assert ("Traceback" in caplog.text) == (sentences == (MISTAKE,))
+    assert "Traceback" not in job.error
+
+
+def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
+    """It has imported what it needs by then; a dead one is replaced unnoticed; none outlives the server."""
+    jobs = Jobs(limit=1, modules=["works_for_jobs"])
+    try:
+        jobs.warm()
+        until(lambda: jobs._spare is not None)
+        assert jobs._spare is not None
+        waiting = jobs._spare.process.pid
+        job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
+        assert job.wait(20)
+        assert (job.pid, job.state) == (waiting, State.DONE)
+        until(lambda: jobs._spare is not None)
+        dead = jobs._spare.process.pid
+        assert dead is not None
+        os.kill(dead, signal.SIGKILL)
+        until(lambda: not alive(dead))
+        again = jobs.begin("A", "again", works.noted, str(tmp_path / "log"), "again")
+        assert again.wait(20)
+        assert again.state is State.DONE
+        until(lambda: jobs._spare is not None)
+        last = jobs._spare.process.pid
+        assert last is not None
+    finally:
+        jobs.end()
+    assert not alive(last)
+
+
+def test_no_user_fills_the_queue(jobs: Jobs, works: Any, tmp_path: Path) -> None:
+    for k in range(MOST_WAITING + 1):
+        jobs.begin("A", "", works.endless, str(tmp_path / f"{k}"))
+    with pytest.raises(InputError, match="waiting already"):
+        jobs.begin("A", "", works.endless, str(tmp_path / "more"))
+    last: Job = jobs.begin("B", "", works.endless, str(tmp_path / "other"))
+    assert last.ahead == 0
+
+
+SERVER = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+import works_for_jobs
+from softstart.page.jobs import Jobs
+if __name__ == "__main__":
+    job = Jobs().begin("A", "endless", works_for_jobs.endless, sys.argv[2])
+    time.sleep(60)
+"""
+
+
+def test_processes_end_with_a_server_that_was_killed(tmp_path: Path) -> None:
+    script, started = tmp_path / "server.py", tmp_path / "started"
+    script.write_text(SERVER, encoding="utf-8")
+    server = subprocess.Popen([sys.executable, str(script), str(HERE), str(started)])
+    try:
+        until(lambda: started.exists() and bool(started.read_text()))
+    finally:
+        server.kill()
+        server.wait()
+    pids = [int(word) for word in started.read_text().split()]
+    assert len(pids) == 2
+    until(lambda: not any(map(alive, pids)), 2.0)

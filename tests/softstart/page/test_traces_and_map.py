@@ -1,0 +1,100 @@
+"""What is drawn is what was computed: thinning keeps extrema, the map is made of simulated starts."""
+
+from __future__ import annotations
+
+import base64
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from softstart import Drive, simulate
+from softstart.controller import make_controller
+from softstart.page.map import axes_about, k_dyn_row
+from softstart.page.scales import STEPS, Scale, scales_about
+from softstart.page.traces import CHANNELS, landmarks, thinned, traces_of
+
+CRANE = Drive.load("crane-4amtkf")
+
+
+@pytest.mark.parametrize("controller", ["direct", "state-feedback", "ramp"])
+@pytest.mark.parametrize("buckets", [20, 320])
+def test_thinned_traces_keep_every_located_instant(controller, buckets):
+    stiff = CRANE.replace(stiffness=40_000.0)  # 80 periods: what is thinned is much
+    run = simulate(stiff, controller)
+    traces = traces_of(run, buckets)
+    assert traces.t.size < 8000
+    assert set(landmarks(run)) <= set(traces.t)
+    # the peak is located by the kernel and evaluated again from the record: a few roundings apart
+    assert np.abs(traces.T).max() == pytest.approx(run.peak_torque, rel=1e-13)
+    assert run.peak_time in traces.t
+    exact = run.at(traces.t)
+    for name in CHANNELS:
+        assert np.array_equal(getattr(traces, name), exact[name])
+    for event in run.events:
+        assert event.time in traces.t
+    for stage in run.stages:
+        assert stage.peak_time in traces.t
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    arrays(np.float64, st.tuples(st.integers(1, 4), st.integers(1, 200)), elements=st.floats(-1e6, 1e6)),
+    st.integers(1, 50),
+)
+def test_each_bucket_keeps_its_least_and_largest(rows, buckets):
+    keep = thinned(rows, buckets)
+    width = max(1, -(-rows.shape[1] // buckets))
+    assert keep[0]
+    assert keep[-1]
+    for start in range(0, rows.shape[1], width):
+        part, kept = rows[:, start : start + width], keep[start : start + width]
+        assert np.array_equal(part.max(axis=1), part[:, kept].max(axis=1))
+        assert np.array_equal(part.min(axis=1), part[:, kept].min(axis=1))
+
+
+def test_packed_traces_come_back_to_single_precision():
+    traces = traces_of(simulate(CRANE, "direct"))
+    rows = np.frombuffer(base64.b64decode(traces.packed("t", "T")), dtype="<f4").reshape(2, -1)
+    assert np.array_equal(rows[1], traces.T.astype("f4"))
+
+
+@pytest.mark.parametrize("controller", ["direct", "shaped", "current-limit-feedback"])
+def test_the_map_is_made_of_simulated_starts(controller):
+    axes = axes_about(CRANE, 4, 3)
+    made = make_controller(controller)
+    for inertia in axes.inertias:
+        row = k_dyn_row(CRANE, made, axes.gaps, inertia)
+        for gap, k in zip(axes.gaps, row, strict=True):
+            assert k == simulate(CRANE.replace(gap=gap, load_inertia=inertia), made).k_dyn
+
+
+def test_with_the_controller_kept_the_map_refers_to_the_drive_of_the_moment():
+    made = make_controller("reduced-first-stage")
+    row = k_dyn_row(CRANE, made, (0.5, 2.0), 0.07, CRANE)
+    for gap, k in zip((0.5, 2.0), row, strict=True):
+        other = CRANE.replace(gap=gap, load_inertia=0.07)
+        assert k == simulate(other, made, fitted_to=CRANE, base=CRANE).k_dyn
+
+
+def test_the_cell_of_a_drive_is_the_nearest_one():
+    axes = axes_about(CRANE)
+    for column, row in ((0, 0), (7, 3), (24, 16)):
+        assert axes.nearest(axes.gaps[column], axes.inertias[row]) == (column, row)
+    assert axes.nearest(99.0, 1e-9) == (24, 0)
+
+
+@given(st.sampled_from(sorted(scales_about(CRANE))), st.integers(0, STEPS))
+def test_a_slider_shows_the_position_it_was_set_to(name, position):
+    scale = scales_about(CRANE)[name]
+    value = scale.value(position)
+    assert scale.low <= value <= scale.high
+    assert abs(scale.position(value) - position) <= 1  # four digits of the value may be half a step off
+    assert float(f"{value:.6g}") == value  # the field shows what is computed with
+
+
+def test_a_slider_stays_at_its_end_for_values_beyond():
+    assert Scale(1.0, 10.0, logarithmic=True).position(-3.0) == 0
+    assert Scale(0.0, 1.0).position(7.0) == STEPS

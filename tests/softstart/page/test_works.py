@@ -1,0 +1,138 @@
+"""What the page computes in the background, and what it shows of it; without processes, without a browser."""
+
+from __future__ import annotations
+
+import csv
+import math
+import shlex
+import xml.etree.ElementTree as ET
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, SimulationError, optimize, simulate, tune
+from softstart.controller import make_controller
+from softstart.optimal.result import OptimumError
+from softstart.page import works
+from softstart.page.command_text import command_text
+from softstart.page.curve_chart import Mark, curve_svg
+from softstart.page.curve_panel import against, csv_of
+from softstart.page.downloads import file_name
+from softstart.page.drift import drift
+from softstart.page.optimum_panel import label_of, player_of
+from softstart.page.tuning_panel import controller_of, tunable
+
+CRANE = Drive.load("crane-4amtkf")
+
+
+class Heard:
+    """Takes what a work tells."""
+
+    def __init__(self) -> None:
+        self.shares: list[float | None] = []
+        self.parts: list[Any] = []
+
+    def __call__(self, share: float | None, message: str = "") -> None:
+        self.shares.append(share)
+
+    def part(self, value: Any) -> None:
+        self.parts.append(value)
+
+
+def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
+    found = works.gentlest(CRANE, "1.2x", "reached", tell=Heard())  # type: ignore[arg-type]
+    best = optimize(CRANE, 1.2 * simulate(CRANE, "direct").start_time, terminal="reached")
+    assert found.best.k_dyn == best.k_dyn
+    assert simulate(CRANE, player_of(found.best)).k_dyn == best.k_dyn
+    assert player_of(found.best).name == label_of(best) == f"optimum {best.end_time:.4g} s, reached"
+    for suffix in (".csv", ".toml"):
+        path = tmp_path / f"profile{suffix}"
+        path.write_text(found.files[suffix], encoding="utf-8")
+        assert simulate(CRANE, "profile", parameters={"file": str(path)}).k_dyn == best.k_dyn
+    with pytest.raises(SimulationError, match="no way"), works.no_solution_told():
+        raise OptimumError("no way")
+    with pytest.raises(InputError, match="start_time"):
+        works.gentlest(CRANE, "-1", "reached", tell=Heard())  # type: ignore[arg-type]
+
+
+def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The easy end only: the short end takes a search, which the browser's test and those of pareto have."""
+    monkeypatch.setattr("softstart.optimal.shortest.shortest_start_time", lambda problem: math.inf)
+    runs = {name: simulate(CRANE, name) for name in ("current-limit-feedback", "ramp")}
+    heard = Heard()
+    points = works.curve(CRANE, [run.start_time for run in runs.values()], tell=heard)  # type: ignore[arg-type]
+    assert {p.start_time_bound for p in heard.parts} == {p.start_time_bound for p in points}
+    times = [p.start_time_bound for p in points]
+    assert times == sorted(times)
+    least = [p.k_dyn for p in points if p.k_dyn is not None]
+    assert least == sorted(least, reverse=True)  # more time never costs torque
+    shares = [share for share in heard.shares if share is not None]
+    assert shares == sorted(shares)
+    assert 0.0 <= shares[0] <= shares[-1] <= 1.0
+
+    marks = [Mark(name, run.start_time, run.k_dyn) for name, run in runs.items()]
+    rows = against(points, marks)
+    assert [row[0] for row in rows] == ["current-limit-feedback", "ramp"]
+    for row in rows:
+        run = runs[row[0]]
+        assert row[4] == f"{run.k_dyn / optimize(CRANE, run.start_time, terminal='reached').k_dyn:.3f}"
+    table = list(csv.DictReader(csv_of(points).splitlines()))
+    assert [float(line["k_dyn"]) for line in table] == least
+
+    drawn = ET.fromstring(curve_svg(points, [*marks, Mark("<b>&", 0.5, 2.0), Mark("never", math.nan, 1.0)]))
+    names = [e.text for e in drawn.iter("text") if e.get("class") == "curve-name"]
+    assert sorted(str(name) for name in names) == ["<b>&", "current-limit-feedback", "ramp"]
+    assert sum(e.get("class") == "curve-point" for e in drawn.iter("circle")) == len(points)
+    assert curve_svg([], []) == ""
+
+
+def test_tuned_gains_come_as_files() -> None:
+    heard = Heard()
+    found = works.tuning(
+        CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, tell=heard  # type: ignore[arg-type]
+    )  # fmt: skip
+    same = tune(CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, workers=1)
+    assert same.robust is not None
+    assert found.summary["robust"]["gains"] == same.robust.gains
+    for file, controller in (("robust.toml", same.robust.controller), ("schedule.csv", same.scheduled)):
+        assert (
+            simulate(CRANE, controller_of(found.files[file], file)).k_dyn == simulate(CRANE, controller).k_dyn
+        )
+    shares = [share for share in heard.shares if share is not None]
+    assert shares == sorted(shares)
+    assert "reduced-first-stage" in tunable()
+
+
+@given(st.text(max_size=80), st.sampled_from([".csv", ".toml", ".c", ".html"]))
+def test_file_names_are_safe_whatever_a_drive_is_called(text: str, suffix: str) -> None:
+    name = file_name(text, suffix=suffix)
+    stem = name.removesuffix(suffix)
+    assert stem
+    assert set(stem) <= set("abcdefghijklmnopqrstuvwxyz0123456789-.")
+    assert not stem.startswith((".", "-"))
+    assert not stem.endswith((".", "-"))
+    assert ".." not in name
+    assert Path(name).name == name
+    assert len(name) <= 70
+
+
+def test_the_command_line_starts_the_same_drive() -> None:
+    changed = CRANE.replace(gap=0.7, load_kind="reactive", target_speed=60.0)
+    words = shlex.split(command_text(changed, {"ramp": make_controller("ramp")}))
+    assert words[:3] == ["softstart", "compare", "crane-4amtkf"]
+    settings = [after for word, after in pairwise(words) if word == "--set"]
+    assert Drive.load(words[2]).with_settings(settings) == changed
+    assert words[-2:] == ["--controllers", "ramp"]
+    own = CRANE.replace(name="My own; rm -rf")
+    assert shlex.split(command_text(own, {}))[2] == "my-own-rm-rf.toml"
+
+
+def test_drift_names_what_was_and_what_is_another_drive() -> None:
+    assert drift(CRANE, CRANE.replace(gap=CRANE.gap)) == ""
+    assert drift(CRANE, CRANE.replace(starting_torque=60.0)).startswith("For motor.starting_torque 62 N m;")
+    other = Drive.load("servo-axis-small")
+    assert drift(CRANE, other) == f"For {CRANE.name}; another drive is on the bench."

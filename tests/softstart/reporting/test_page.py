@@ -1,0 +1,179 @@
+"""The HTML file: it holds the numbers, loads nothing, and no text from outside gets out of its place."""
+
+import re
+from collections import Counter
+from html.parser import HTMLParser
+
+import pytest
+
+from softstart import Drive, compare, optimize
+from softstart.reporting.markup import VOID, css_string
+from softstart.reporting.svg import inlined
+
+from .conftest import COMMAND, HOSTILE
+
+OPEN = VOID | {"path", "use", "rect", "line", "polyline"}
+
+
+class Page(HTMLParser):
+    """Elements, ids, attributes and text of a page; every element must be closed by its own name."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.ids, self.attributes, self.text, self.inside = Counter(), [], [], [], []
+        self.tables, self.cells = [], None
+        self.feed(text)
+        assert self.inside == []
+
+    def handle_startendtag(self, name, attributes):
+        self._seen(name, attributes)
+
+    def handle_starttag(self, name, attributes):
+        self._seen(name, attributes)
+        if name not in VOID:
+            self.inside.append(name)
+        if name == "table":
+            self.tables.append([])
+        if name == "tr":
+            self.tables[-1].append([])
+        if name in ("th", "td"):
+            self.tables[-1][-1].append("")
+
+    def handle_endtag(self, name):
+        assert self.inside.pop() == name
+
+    def handle_data(self, data):
+        self.text.append(data)
+        if {"th", "td"} & set(self.inside[-2:]):
+            self.tables[-1][-1][-1] += data
+
+    def _seen(self, name, attributes):
+        self.elements[name] += 1
+        self.ids += [value for key, value in attributes if key == "id"]
+        self.attributes += [(name, key, value or "") for key, value in attributes]
+
+
+@pytest.fixture(scope="module")
+def read(page):
+    return Page(page)
+
+
+def rows_of(read, heading):
+    """The rows of the table whose heading has this column, by their first cell."""
+    for table in read.tables:
+        if heading in table[0]:
+            return {row[0]: dict(zip(table[0], row, strict=True)) for row in table[1:]}
+    raise AssertionError(heading)
+
+
+def test_nothing_is_loaded_from_anywhere(read, page):
+    assert not set(read.elements) & {"script", "img", "image", "link", "iframe", "object", "embed", "video",
+                                     "base", "form", "foreignobject"}  # fmt: skip
+    for element, key, value in read.attributes:
+        assert not key.startswith("on"), (element, key)
+        if key in ("href", "src", "xlink:href", "srcset", "data", "action"):
+            assert value.startswith("#"), (element, key, value)
+        for url in re.findall(r"url\(([^)]*)\)", value):
+            assert url.startswith("#")
+    css = re.search(r"<style>(.*?)</style>", page, re.DOTALL)[1]
+    assert "url(" not in css
+    assert "@import" not in css
+    policies = [value for name, key, value in read.attributes if (name, key) == ("meta", "content")]
+    assert "default-src 'none'; style-src 'unsafe-inline'" in policies
+
+
+def test_ids_are_unique_and_every_reference_leads_to_one(read, page):
+    assert [name for name, count in Counter(read.ids).items() if count > 1] == []
+    wanted = {value[1:] for _, key, value in read.attributes if key.endswith("href")}
+    wanted |= set(re.findall(r"url\(#([^)]+)\)", page))
+    wanted |= {v for _, key, value in read.attributes if key == "aria-labelledby" for v in value.split()}
+    assert len(wanted) > 20
+    assert wanted <= set(read.ids)
+
+
+def test_text_from_outside_stays_text(read, page):
+    shown = "".join(read.text)
+    assert shown.count(HOSTILE) >= 3  # title, heading, source
+    assert COMMAND in shown
+    assert "<script" not in page.lower()
+    assert "<img" not in page.lower()
+    assert page.count("</style>") == page.count("</title>") - (read.elements["title"] - 1) == 1
+    header = re.search(r"@top-left \{ content: (\"[^\"]*\");", page)[1]
+    assert set(header) <= set('"\\ 0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ')
+    decoded = re.sub(r"\\([0-9a-f]+) ", lambda m: chr(int(m[1], 16)), header[1:-1])
+    assert HOSTILE.startswith(decoded[:-1])
+
+
+@pytest.mark.parametrize("text", ['"', "\\", "\n", "</style>", "}", "\u00e9\U0001f600", "\\a "])
+def test_css_strings_end_where_they_end(text):
+    written = css_string(text)
+    assert re.sub(r"\\([0-9a-f]+) ", lambda m: chr(int(m[1], 16)), written[1:-1]) == text
+    assert not set(written[1:-1]) & set('"<>}\n')
+
+
+def test_numbers_are_those_of_compare(read, hostile):
+    names = [row.run.controller.name for row in hostile.comparison.rows]
+    made = {row.run.controller.name: row for row in compare(hostile.drive, names).rows}
+    table = rows_of(read, "peak torque, N m")
+    assert set(table) == set(names)
+    for name, row in made.items():
+        cells = table[name]
+        assert cells["K_dyn"] == f"{row.run.k_dyn:.3f}"
+        assert cells["K_dyn, gap \N{MULTIPLICATION SIGN} 4"] == f"{row.k_dyn_worn_gap:.3f}"
+        assert cells["K_dyn, J2 \N{MULTIPLICATION SIGN} 0.4"] == f"{row.k_dyn_light_load:.3f}"
+        assert float(cells["start time, s"]) == pytest.approx(row.run.start_time, rel=1e-3)
+        assert float(cells["peak torque, N m"]) == pytest.approx(row.run.peak_torque, rel=1e-3)
+        lost = float(cells["time lost, s"].replace("\N{MINUS SIGN}", "-"))
+        assert lost == pytest.approx(row.time_lost, abs=1e-4)
+
+
+def test_limit_is_that_of_optimize(read, hostile):
+    table = rows_of(read, "optimum at that time")
+    for row in hostile.comparison.rows:
+        name, time = row.run.controller.name, row.run.start_time
+        point = hostile.limit.optimum_at(time)
+        if point is None:
+            assert table[name]["optimum at that time"] == "\N{EN DASH}"
+            assert time in hostile.limit.missing
+            continue
+        best = optimize(hostile.drive, time, terminal="reached")
+        assert point.k_dyn == best.k_dyn
+        assert hostile.lower_bound(row) <= best.k_dyn <= row.run.k_dyn
+        assert table[name]["optimum at that time"] == f"{best.k_dyn:.3f}"
+        assert table[name]["lower bound at that time"] == f"{hostile.lower_bound(row):.3f}"
+    assert hostile.limit.optimum_at(hostile.choice.recommended.row.run.start_time) is not None
+
+
+def test_figures_are_vector_named_and_the_same_each_time(read, page):
+    assert read.elements["svg"] == read.elements["figure"] == read.elements["figcaption"] == 4
+    assert page.count('role="img"') == 4
+    assert "data:image" not in page
+
+    def drawn():
+        from softstart.figures import new_figure
+
+        figure, axes = new_figure()
+        axes.plot([0, 1], [0, 1], "o")
+        return inlined(figure, "figure-9", "a < b")
+
+    assert drawn() == drawn()
+    assert "<metadata" not in drawn()
+    assert 'id="figure-9-title">a &lt; b</title>' in drawn()
+
+
+def test_provenance_holds_the_drive(read, hostile):
+    text = hostile.provenance.drive_toml
+    assert Drive.from_toml(text) == hostile.drive
+    assert text in "".join(read.text)
+
+
+def test_a_bound_that_grows_beyond_the_frame_is_cut():
+    import numpy as np
+
+    from softstart.reporting.limit import Limit
+    from softstart.reporting.pictures import _within
+
+    limit = Limit(times=(1.0, 1.1, 1.2, 1.3, 2.0), bounds=(1e9, 5.0, 1.2, 1.0, 0.8))
+    t, k = _within(limit, 0.9, 1.25, 6.0)
+    assert t.tolist() == [1.0, 1.1, 1.2, 1.25]
+    np.testing.assert_allclose(k, [6.0, 5.0, 1.2, 1.1])

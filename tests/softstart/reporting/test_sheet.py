@@ -1,0 +1,160 @@
+"""Rounding to what an inverter can be set to, and the starts with the rounded values."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, simulate
+from softstart.controller import make_controller
+from softstart.reporting import Resolution, report
+from softstart.reporting.resolution import nearest_step, rated_torque
+from softstart.reporting.sheet import make_sheet
+
+
+def sheet_of(name, steps, **parameters):
+    drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    controller = make_controller(name, parameters)
+    return drive, make_sheet(drive, controller, simulate(drive, controller), Resolution.read(steps))
+
+
+@pytest.mark.parametrize("name", ["ramp", "s-curve", "shaped", "acceleration-delay"])
+def test_rounded_values_are_multiples_and_their_figures_those_of_simulate(name):
+    drive, sheet = sheet_of(name, "torque=0.5%,time=10ms,speed=2rpm,share=5%")
+    rated = 2200.0 / drive.rated_speed
+    assert rated_torque(drive) == (rated, "rated torque")
+    steps = {"N*m": 0.005 * rated, "s": 0.01, "rad/s": 2.0 * math.pi / 30.0, "1": 0.05}
+    for one in sheet.varied:
+        step = 0.2 * math.pi if one.name == "frequency" else steps[one.unit]
+        assert one.step == pytest.approx(step, rel=1e-12)
+        assert one.rounded / step == pytest.approx(round(one.rounded / step), abs=1e-9)
+        assert one.rounded > 0.0
+        assert abs(one.rounded - one.exact) <= 0.5 * step * (1.0 + 1e-9) or one.rounded == pytest.approx(step)
+    again = simulate(drive, name, parameters={one.name: one.rounded for one in sheet.settings})
+    assert sheet.rounded.k_dyn == again.k_dyn
+    assert sheet.rounded.start_time == again.start_time
+    assert sheet.exact.k_dyn == simulate(drive, name).k_dyn
+    assert {one.name for one in sheet.settings if one.step is None} <= {"period", "shaper"}
+
+
+def test_worst_case_is_the_worst_of_all_half_steps():
+    drive, sheet = sheet_of("s-curve", "torque=0.5%,time=10ms,share=5%")
+    assert [one.name for one in sheet.varied] == ["initial", "time", "rounding", "full_torque"]
+    runs = {}
+    for sides in itertools.product((-0.5, 0.5), repeat=4):
+        values = {
+            one.name: min(
+                one.rounded + side * one.step, {"rounding": 1.0, "full_torque": 64.0}.get(one.name, 99)
+            )
+            for one, side in zip(sheet.varied, sides, strict=True)
+        }
+        runs[tuple(values.values())] = simulate(drive, "s-curve", parameters=values)
+    assert sheet.variants == 16
+    assert sheet.worst_k_dyn == max(run.k_dyn for run in runs.values())
+    assert sheet.slowest == max(run.start_time for run in runs.values())
+    assert runs[tuple(sheet.worst_values.values())].k_dyn == sheet.worst_k_dyn
+    assert sheet.worst_k_dyn > sheet.rounded.k_dyn
+
+
+def test_finer_steps_bring_the_exact_figures_back():
+    off = []
+    for time in (20, 2, 0.2):
+        _, sheet = sheet_of("ramp", f"torque={0.02 * time}%,time={time}ms")
+        off.append(abs(sheet.rounded.k_dyn - sheet.exact.k_dyn) + abs(sheet.worst_k_dyn - sheet.exact.k_dyn))
+    assert off[0] > off[1] > off[2]
+    assert off[2] < 0.01
+
+
+def test_gains_tuned_for_another_drive_keep_its_numbers():
+    from softstart.controller.tuned import RobustGains
+
+    crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    light = crane.replace(load_inertia=0.07)
+    gains = RobustGains("mine", make_controller("shaped"), light)
+    sheet = make_sheet(crane, gains, simulate(crane, gains), Resolution())
+    values = {one.name: one.rounded for one in sheet.settings}
+    assert sheet.name == "shaped (mine)"
+    assert sheet.rounded.k_dyn == simulate(crane, "shaped", parameters=values, fitted_to=light).k_dyn
+
+
+def test_torque_is_not_rounded_beyond_the_motor():
+    drive, sheet = sheet_of("direct", "torque=7 N*m", torque=63.0)
+    assert drive.maximum_torque == 64.0
+    assert sheet.varied[0].rounded == 63.0
+    _, sheet = sheet_of("direct", "torque=15 N*m", torque=62.0)
+    assert sheet.varied[0].rounded == 60.0
+    _, sheet = sheet_of("direct", "torque=33 N*m", torque=62.0)
+    assert sheet.varied[0].rounded == 33.0
+
+
+def test_a_step_above_the_value_is_said_to_be_coarse():
+    _, sheet = sheet_of("ramp", "time=1s")
+    time = next(one for one in sheet.settings if one.name == "time")
+    assert time.rounded == 1.0
+    assert time.coarse
+
+
+@given(
+    st.floats(1e-6, 1e6), st.sampled_from([0.1, 0.01, 0.001, 0.5, 0.25, 1.0, 2.0, 0.3581]), st.floats(1, 1e7)
+)
+def test_nearest_step(value, step, most):
+    found = nearest_step(value, step, most)
+    count = Fraction(found) / Fraction(step)
+    assert abs(count - round(count)) < 1e-9 * max(1, count)
+    assert round(count) >= 1
+    if found <= most and value <= most - step and value >= step:
+        assert abs(found - value) <= 0.5 * step + 1e-9 * value
+    assert found <= max(most, step) * (1.0 + 1e-9)
+    assert nearest_step(found, step) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    {
+        "tme=10ms": "did you mean time?",
+        "colour=3": "there are torque, time, speed, frequency, share.",
+        "time=10kg": "not a time",
+        "time=0": "above 0",
+        "time=-1ms": "above 0",
+        "torque=0%": "above 0",
+        "torque=nan%": "not a number",
+        "speed=50 Hz": "frequency",
+        "time=inf": "finite",
+        "time": "write keys and values",
+        "": "write keys and values",
+        "time=1ms,time=2ms": "given twice",
+        "time=soon": "a time",
+    }.items(),
+)
+def test_bad_resolutions_are_refused_in_one_sentence(text, says):
+    with pytest.raises(InputError) as caught:
+        Resolution.read(text, "--resolution")
+    assert len(caught.value.sentences) == 1
+    sentence = caught.value.sentences[0]
+    assert sentence.startswith('--resolution "')
+    assert says in sentence
+    assert sentence.endswith((".", "?"))
+
+
+def test_all_mistakes_at_once():
+    with pytest.raises(InputError) as caught:
+        Resolution.read("tme=1ms,torque=0,speed=3 m")
+    assert len(caught.value.sentences) == 3
+    with pytest.raises(InputError) as caught:
+        report("crane-4amtkf", resolution="x=1", slower=-1.0, budget=math.nan)
+    assert len(caught.value.sentences) == 3
+    with pytest.raises(InputError, match="step is a number above 0"):
+        Resolution(time=0.0)
+
+
+def test_the_worst_case_counts_the_rounded_values_themselves():
+    servo = Drive.load("servo-axis-small")
+    shaped = make_controller("shaped")
+    sheet = make_sheet(servo, shaped, simulate(servo, shaped), Resolution())
+    assert sheet.worst_k_dyn >= sheet.rounded.k_dyn
+    assert sheet.slowest >= sheet.rounded.start_time
+    values = {one.name: one.rounded for one in sheet.settings} | dict(sheet.worst_values)
+    assert simulate(servo, "shaped", parameters=values).k_dyn == sheet.worst_k_dyn
