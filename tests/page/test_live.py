@@ -173,6 +173,25 @@ def test_strategies_are_drawn_hidden_and_sorted(page):
     wait_for_k(page, simulate(CRANE, "s-curve").k_dyn)
 
 
+def test_what_is_ticked_stays_ticked_while_older_frames_come(page):
+    opened(page)
+    box = page.locator('tr[data-name="ramp"] input[type=checkbox]')
+    assert not box.is_checked()
+    after = box.evaluate("""(box) => {
+      const { instrument } = window.getElement(document.querySelector(".instrument"));
+      box.click();
+      instrument.table.show(instrument.state);  // the server has not heard of it yet
+      return [instrument.state.shown.includes("ramp"), box.checked];
+    }""")
+    assert after == [False, True]
+    shown = "window.getElement(document.querySelector('.instrument')).instrument.state.shown.includes('ramp')"
+    page.wait_for_function(shown)
+    assert box.is_checked()
+    box.uncheck()
+    page.wait_for_function(f"!{shown}")
+    assert not box.is_checked()
+
+
 def test_two_users_have_drives_of_their_own(page, visit):
     opened(page)
     other = opened(visit())

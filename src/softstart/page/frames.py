@@ -18,7 +18,8 @@ from softstart.page.scales import Scale, scales_about
 from softstart.page.traces import traces_of
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
-QUICK = 0.004  # s, of a start that is computed at every step of a hand, even if no picture follows
+QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
+LONG = (math.inf, math.inf)
 TOO_LATE = 0.3  # s
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 PACKED = ("t", "T", "u", "w1", "w2", "theta")
@@ -35,7 +36,7 @@ class Screen:
         self.stamp = 0.0  # the browser's clock at the last input that has been taken
         self.late = 0.0  # s, how long the last message has waited to be read
         self.mistakes: dict[str, str] = {}  # sentences by the field they stand beside
-        self._costs: dict[str, float] = {}  # of the last start of each strategy, s
+        self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
         self._origin = bench.origin
         self._next = 0  # whose turn it is among the other strategies
         self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has the map
@@ -61,21 +62,21 @@ class Screen:
         self._map_of = None
 
     def glance(self) -> Frame | None:
-        """The large figure alone, where the last start of the selected strategy was quick.
+        """The large figure alone, where one of the last two starts of the selected strategy was quick.
 
         None while messages wait to be read: then each start would make the others wait longer.
         """
         bench = self.bench
         if self.late > TOO_LATE:
             return None
-        if self._origin is not bench.origin or self._costs.get(bench.selected, math.inf) > QUICK:
+        if self._origin is not bench.origin or min(self._costs.get(bench.selected, LONG)) > QUICK:
             return None
         found = self._result(bench.selected)
         return {"stamp": self.stamp, "version": bench.version, "figure": figure(bench, found)}
 
     def _result(self, label: str) -> Strategy:
         found = self.bench.result(label, QUICK_EVENTS)
-        self._costs[label] = found.cost
+        self._costs[label] = (self._costs.get(label, LONG)[1], found.cost)
         return found
 
     # frames that follow the hand -----------------------------------------------------------------------

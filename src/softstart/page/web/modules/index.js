@@ -9,7 +9,7 @@ import { Theme } from "./theme.js";
 export class Instrument {
   constructor(root, groups, send) {
     this.send = send;
-    this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "" };
+    this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", stamp: 0 };
     this.pulse = root.querySelector(".pulse");
     this.driveName = root.querySelector(".drive-name");
     this.times = [];
@@ -27,7 +27,9 @@ export class Instrument {
 
   // the stamp comes back with the first frame that knows of the message
   say(message) {
-    this.send({ ...message, stamp: message.what === "hello" ? 0 : performance.now() });
+    const stamp = message.what === "hello" ? 0 : performance.now();
+    this.send({ ...message, stamp });
+    return stamp;
   }
 
   // numbers are shown at once; pictures wait for the next refresh of the screen, where only the newest counts
@@ -38,6 +40,7 @@ export class Instrument {
       for (const name of state.rows.keys()) if (!known.has(name)) state.rows.delete(name);
       for (const name of state.traces.keys()) if (!known.has(name)) state.traces.delete(name);
       Object.assign(state, { order: frame.order, shown: frame.shown, added: frame.added, selected: frame.selected });
+      state.stamp = frame.stamp;
       state.here = frame.here;
       state.fields = frame.fields;
     }

@@ -46,7 +46,6 @@ export class GapMap {
       this.rows = frame.map.inertias.map(() => null);
     }
     this.head = frame.map;
-    this.keep.checked = frame.map.kept;
     this.rows[frame.map_row.index] = frame.map_row.k;
     this.old = false;
     this.fade();

@@ -50,7 +50,8 @@ export class Table {
         line.radio.checked = selected;
       }
       line.out.hidden = !state.added.includes(name);
-      line.eye.checked = state.shown.includes(name);
+      if (line.asked <= state.stamp) line.asked = -1; // the server knows what was pressed last
+      if (line.asked < 0) line.eye.checked = state.shown.includes(name);
       line.tr.style.setProperty("--colour", this.theme.strategy(state.order.indexOf(name)));
       if (!row || line.row === row) continue;
       line.row = row;
@@ -100,11 +101,12 @@ export class Table {
     out.addEventListener("click", () => this.say({ what: "remove", name }));
     const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), out));
     const tr = element("tr", { "data-name": name }, element("td", { class: "eye" }, eye), title, ...cells, bar);
-    eye.addEventListener("change", () => this.say({ what: "show", name, visible: eye.checked }));
     radio.addEventListener("change", () => this.say({ what: "select", name }));
     tr.addEventListener("click", (event) => {
       if (!event.target.closest("input, label, button")) this.say({ what: "select", name });
     });
-    return { tr, eye, radio, cells, bar, out };
+    const line = { tr, eye, radio, cells, bar, out, asked: -1 };
+    eye.addEventListener("change", () => (line.asked = this.say({ what: "show", name, visible: eye.checked })));
+    return line;
   }
 }
