@@ -220,11 +220,12 @@ def check_name(name: str, option: str, several: str = "") -> str:
     """The name, if it is that of an installed controller or leads to a file that is there.
 
     Such a file holds Python code, or tuned gains as TOML or CSV. `several` says what to do with more than one
-    controller, where one is asked for.
+    controller, where that can be done in one go.
     """
-    if several and "," in name and not Path(name.partition(".py")[0] + ".py").is_file():
+    if "," in name and not Path(name.partition(".py")[0] + ".py").is_file():
         names = ",".join(part.strip() for part in name.split(",") if part.strip())
-        raise InputError(f'{option} = "{name}": give one controller here; {several}{names}.')
+        remedy = several + names if several else "run the command once for each of them"
+        raise InputError(f'{option} = "{name}": give one controller here; {remedy}.')
     if ".py" in name:
         path = Path(name[: name.index(".py") + 3])
         if not path.is_file():

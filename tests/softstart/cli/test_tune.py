@@ -192,6 +192,7 @@ ONE_SENTENCE = {
     "workers": (["--workers", "0"], ["--workers"]),
     "parameter": (["--param", "tim=3"], ["did you mean", "time"]),
     "controller": (["--controller", "rmp"], ["did you mean ramp?"]),
+    "controllers": (["--controller", "ramp,shaped"], ["give one controller", "once for each"]),
     "gains": (["--controller", "good.toml"], ["no tuned gains"]),
     "missing gains": (["--controller", "not.toml"], ["is not there"]),
     "nothing to tune": (["--controller", "direct"], ["no parameter to tune", "as --free torque=0.5x:2x."]),
