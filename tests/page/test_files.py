@@ -64,7 +64,7 @@ def test_a_broken_drive_file_shows_all_its_sentences_and_changes_nothing(files: 
         ("broken.toml", BROKEN, told.value.sentences),
         ("picture.toml", b"name = '\xff\xfe'", ("the file is not UTF-8 text (line 1); save it as UTF-8.",)),
         ("no.toml", b"", ("it is empty",)),
-        ("large.toml", b"#" * 300_000, ("more than 256 kB",)),
+        ("large.toml", b"#" * 300_000, ("more than 64 kB",)),
     ):
         put(files, name, content)
         for sentence in sentences:
@@ -87,6 +87,23 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
     files.get_by_test_id("drive-shipped").click()
     files.get_by_role("option", name=Drive.load("servo-axis-small").name).click()
     k_dyn(files, f"{simulate('servo-axis-small', 'direct').k_dyn:.3f}")
+
+
+def test_an_own_drive_is_given_its_own_name(files: Any, tmp_path: Path) -> None:
+    """Nobody types all the figures of a drive to see another one's name in the report."""
+    own = 'Hoist "7" = left'
+    name = files.locator('[data-path="name"] input')
+    name.fill(own)
+    name.press("Enter")
+    files.wait_for_function("(name) => document.querySelector('.drive-name').textContent === name", arg=own)
+    assert files.title() == f"softstart: {own}"
+    file, content = saved(files, "drive-save")
+    assert file == "hoist-7-left.toml"
+    (tmp_path / file).write_bytes(content)
+    assert Drive.load(tmp_path / file) == CRANE.replace(name=own)
+    name.fill("")
+    name.press("Enter")
+    files.locator("#field-name-mistake").get_by_text("the field is empty").wait_for()
 
 
 def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
@@ -124,3 +141,5 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert html.lstrip().lower().startswith("<!doctype html")
     assert CRANE.name in html
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
+    name, content = saved(files, "export-again")
+    assert (name, content.decode()) == (report.value.suggested_filename, html)

@@ -192,6 +192,79 @@ def test_what_is_ticked_stays_ticked_while_older_frames_come(page):
     assert not box.is_checked()
 
 
+def test_older_frames_change_neither_what_was_written_nor_what_was_selected(page):
+    opened(page)
+    instrument = 'const { instrument } = window.getElement(document.querySelector(".instrument"));'
+    written = field(page, "shaft.gap").evaluate(f"""(field) => {{
+      {instrument}
+      const before = {{ ...instrument.state.fields, "shaft.gap": ["0.6", 180, ""] }};
+      field.value = "700 mrad";
+      for (const what of ["input", "change"]) field.dispatchEvent(new Event(what));
+      instrument.controls.show(before, {{}}, instrument.state.stamp);  // of a slide that came before
+      return field.value;
+    }}""")
+    assert written == "700 mrad"
+    wait_for_k(page, simulate(CRANE.replace(gap=0.7), "direct").k_dyn)
+    radio = page.locator('tr[data-name="ramp"] input[type=radio]')
+    selected = radio.evaluate(f"""(radio) => {{
+      {instrument}
+      radio.click();
+      instrument.table.show({{ ...instrument.state, selected: "shaped" }});  // pressed before
+      return radio.checked;
+    }}""")
+    assert selected
+    wait_for_k(page, simulate(CRANE.replace(gap=0.7), "ramp").k_dyn)
+    assert radio.is_checked()
+
+
+def test_a_field_shows_what_the_drive_has_and_a_slider_where_it_is(page):
+    opened(page)
+    gap = field(page, "shaft.gap")
+    gap.fill("500 mrad")  # what it is already
+    gap.press("Enter")
+    page.wait_for_function("document.getElementById('field-shaft-gap').value === '0.5'")
+    gap.fill("0.6")  # and taken back by hand, which browsers do not call a change
+    gap.fill("0.5")
+    gap.press("Tab")
+    drag(page, "shaft.gap", 0.25, 0.5, 4)
+    page.wait_for_function("document.getElementById('field-shaft-gap').value > 0.9")
+    torque = field(page, "load.torque")
+    torque.fill("50")
+    torque.press("Enter")
+    page.wait_for_function("document.getElementById('field-load-torque').value === '50'")
+    drag(page, "motor.starting_torque", 0.97, 0.1, 4)  # weaker than its load: refused
+    page.locator("#field-motor-starting_torque-mistake").wait_for(state="visible")
+    page.wait_for_function("""() => {
+      const [slider, field] = document.querySelectorAll('[data-path="motor.starting_torque"] input');
+      const { rows } = window.getElement(document.querySelector(".instrument")).instrument.controls;
+      return Number(slider.value) === rows.get("motor.starting_torque").position && field.value > 50;
+    }""")
+
+
+def test_the_map_heeds_only_what_begins_on_it(page):
+    opened(page)
+    page.wait_for_timeout(2500)
+    plots, chart = page.locator(".plots").bounding_box(), page.locator(".map canvas").bounding_box()
+    x, y = chart["x"] + 0.6 * chart["width"], chart["y"] + 0.3 * chart["height"]
+    page.mouse.move(plots["x"] + 200, y)
+    page.mouse.down()
+    page.mouse.move(x, y, steps=4)
+    page.mouse.up()
+    page.mouse.click(x, y, button="right")
+    page.wait_for_timeout(300)
+    assert field(page, "shaft.gap").input_value() == "0.5"
+    page.mouse.click(x, y)
+    page.wait_for_function("document.getElementById('field-shaft-gap').value > 0.5")
+    gap = float(field(page, "shaft.gap").input_value())
+    page.locator(".map canvas").evaluate("""(map) => {
+      for (let k = 0; k < 3; k++) map.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
+    }""")  # quicker than any answer
+    wanted = gap - 3 * 2.0 / 24
+    page.wait_for_function(
+        "(gap) => Math.abs(document.getElementById('field-shaft-gap').value - gap) < 1e-3", arg=wanted
+    )
+
+
 def test_two_users_have_drives_of_their_own(page, visit):
     opened(page)
     other = opened(visit())
@@ -223,6 +296,18 @@ def test_a_lost_line_is_taken_up_again_with_the_same_drive(page):
     page.wait_for_timeout(400)
     inertia = float(field(page, "load.inertia").input_value())
     wait_for_k(page, simulate(CRANE.replace(gap=1.0, load_inertia=inertia), "direct").k_dyn)
+
+
+def test_a_page_loaded_anew_goes_on_with_its_drive(page, visit):
+    opened(page)
+    field(page, "shaft.gap").fill("1.3 rad")
+    field(page, "shaft.gap").press("Enter")
+    page.wait_for_function("(sessionStorage.getItem('softstart-drive') ?? '').includes('gap = 1.3')")
+    page.reload()
+    wait_for_k(opened(page), simulate(CRANE.replace(gap=1.3), "direct").k_dyn)
+    assert field(page, "shaft.gap").input_value() == "1.3"
+    other = opened(visit())  # another tab has nothing of it
+    assert k_dyn(other) == simulate(CRANE, "direct").k_dyn
 
 
 def test_colours_follow_the_system_and_the_switch(page):

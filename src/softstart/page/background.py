@@ -54,7 +54,11 @@ def jobs_of(user: Hashable) -> Jobs:
 def server_jobs() -> Jobs:
     """The jobs of all users of this server; they end with it."""
     jobs = Jobs(modules=IMPORTED)
-    app.on_shutdown(jobs.end)
+
+    def end() -> None:  # without a parameter: for one, NiceGUI would hand itself over
+        jobs.end()
+
+    app.on_shutdown(end)
     return jobs
 
 

@@ -117,8 +117,8 @@ class Bench:
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Labels of the strategies that are drawn, in the order of the table."""
-        return tuple(label for label in self._controllers if label in self._shown)
+        """Labels of the strategies that are drawn, in the order of the table; the selected one always is."""
+        return tuple(label for label in self._controllers if label in {*self._shown, self._selected})
 
     @property
     def added(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from functools import cache
+from typing import TYPE_CHECKING
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
@@ -13,6 +14,9 @@ from softstart.drive import Drive, library
 from softstart.drive.parameters import Parameter
 from softstart.page.downloads import file_name
 from softstart.page.drift import changes
+
+if TYPE_CHECKING:
+    from softstart.profile import TorqueProfile
 
 MOST_SETTINGS = 8  # more than that are better kept in a file
 
@@ -36,7 +40,7 @@ def command_text(
     for label, controller in strategies.items():
         if isinstance(controller, Tuned):
             names.append(gain_file(label))
-        elif hasattr(getattr(controller, "profile", None), "to_c"):
+        elif profile_of(controller) is not None:
             names.append("profile")
             params.append(f"profile.file={profile_file(label)}")
         elif label in controller_names():
@@ -46,6 +50,17 @@ def command_text(
     for param in params[-1:]:  # the command takes one profile
         words += ["--param", param]
     return shlex.join(words)
+
+
+def profile_of(controller: Controller) -> TorqueProfile | None:
+    """The torque profile that a controller plays; None for one that plays none.
+
+    >>> from softstart.controller import make_controller
+    >>> profile_of(make_controller("direct")) is None
+    True
+    """
+    profile = getattr(controller, "profile", None)
+    return profile if hasattr(profile, "to_c") else None
 
 
 def drive_words(drive: Drive) -> list[str]:

@@ -10,14 +10,16 @@ from typing import Any
 from softstart.drive.parameters import PARAMETERS
 from softstart.errors import InputError
 from softstart.page.bench import Bench
-from softstart.page.frames import Screen
+from softstart.page.frames import SERVER, Screen
 from softstart.page.trouble import sentence_of
 
 DRIFT = 2e-4  # of two clocks against one another: more than any have
+LATEST = 1e15  # ms, beyond any clock of a browser
 BY_PATH = {parameter.path: parameter for parameter in PARAMETERS.values()}
 
 # name, what stands before the field; the sliders are those of scales.scales_about
 GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "Drive": (("name", "name"),),
     "Motor": (
         ("starting_torque", "starting torque"),
         ("motor_inertia", "inertia"),
@@ -78,6 +80,7 @@ def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
         "unit": readable(parameter.unit),
         "slider": slider,
         "choices": list(parameter.choices),
+        "words": not parameter.unit and not parameter.choices,
     }
 
 
@@ -114,7 +117,8 @@ class Delay:
 class Controls:
     """Takes messages of the browser, dictionaries with `what` and more; never raises for a wrong one.
 
-    `poke` is called after each message that changes what is to be seen.
+    `poke` is called after each message that may change what is to be seen but has left the bench as it is: of
+    its own changes the bench tells itself.
     """
 
     def __init__(self, bench: Bench, screen: Screen, poke: Callable[[], None]) -> None:
@@ -130,7 +134,8 @@ class Controls:
             "show": lambda message: bench.show(str(message["name"]), bool(message["visible"])),
             "remove": lambda message: bench.remove(str(message["name"])),
             "keep": self._keep,
-            "hello": lambda message: screen.forget(),
+            "leave": self._leave,
+            "hello": self._hello,
         }
 
     def take(self, message: object) -> None:
@@ -140,9 +145,11 @@ class Controls:
         way = self._ways.get(str(message.get("what")))
         if way is None:
             return
-        place = str(message.get("path", ""))
+        path = str(message.get("path", ""))
+        place = path if path in BY_PATH else ""  # where no field is, a mistake stands beside the figure
+        version = self._bench.version
         stamp = message.get("stamp")
-        if isinstance(stamp, int | float) and math.isfinite(stamp):
+        if isinstance(stamp, int | float) and abs(stamp) < LATEST:
             self._screen.stamp = float(stamp)
             self._screen.late = self._delay.of(float(stamp) / 1000.0)
         try:
@@ -151,7 +158,8 @@ class Controls:
             self._screen.mistakes[place] = sentence_of(error)
         else:
             self._screen.mistakes.pop(place, None)
-        self._poke()
+        if self._bench.version == version:
+            self._poke()
 
     def _slide(self, message: Mapping[str, Any]) -> None:
         parameter = BY_PATH[str(message["path"])]
@@ -166,11 +174,21 @@ class Controls:
             raise InputError(f"{path}: the field is empty; write for example {BY_PATH[path].example}.")
         self._bench.set(path, " ".join(text.split()))
 
+    def _leave(self, message: Mapping[str, Any]) -> None:
+        """What was written in a field is taken back: nothing changes, and its mistake goes with it."""
+
     def _jump(self, message: Mapping[str, Any]) -> None:
         gap, inertia = float(message["gap"]), float(message["inertia"])
         self._bench.set_all({"shaft.gap": gap, "load.inertia": inertia})
         for path in ("shaft.gap", "load.inertia"):
             self._screen.mistakes.pop(path, None)
+
+    def _hello(self, message: Mapping[str, Any]) -> None:
+        """A page that is loaded anew goes on with the drive that its tab has kept of this server."""
+        self._screen.forget()
+        kept = message.get("kept")
+        if isinstance(kept, Mapping) and kept.get("server") == SERVER:
+            self._bench.load(str(kept["drive"]))
 
     def _keep(self, message: Mapping[str, Any]) -> None:
         self._screen.kept = bool(message["kept"])

@@ -178,7 +178,7 @@ def _limit(frame: _Frame, found: Sequence[FrontPoint]) -> list[str]:
 
 
 def _names(frame: _Frame, marks: Sequence[Mark], found: Sequence[FrontPoint]) -> list[str]:
-    """The strategies, each with its name where no other one stands."""
+    """The strategies, each with its name where no other one stands; in a crowd some go without."""
     line = sorted((frame.x(p.start_time_bound), frame.y(p.k_dyn or 1.0)) for p in found)
     taken = [(x - 2, y - 2, x + 2, y + 2) for x, y in _along(line)]
     places = [(frame.x(mark.start_time), frame.y(mark.k_dyn)) for mark in marks]
@@ -186,14 +186,17 @@ def _names(frame: _Frame, marks: Sequence[Mark], found: Sequence[FrontPoint]) ->
     dots, names = [], []
     for mark, (x, y) in sorted(zip(marks, places, strict=True), key=lambda one: one[1][1]):
         name = mark.name if len(mark.name) <= 26 else mark.name[:25] + "\N{HORIZONTAL ELLIPSIS}"
-        left, top = _free(x, y, LETTER * len(name), taken)
-        taken.append((left, top, left + LETTER * len(name), top + LINE))
         colour = html.escape(mark.colour)
         told = f"{html.escape(mark.name)}: K_dyn {mark.k_dyn:.4g} in {mark.start_time:.4g} s"
         dots.append(
             f'<rect class="curve-mark" x="{x - 3.5:.1f}" y="{y - 3.5:.1f}" width="7" height="7" rx="1" '
             f'style="fill:{colour}"><title>{told}</title></rect>'
         )
+        place = _free(x, y, LETTER * len(name), taken)
+        if place is None:
+            continue  # the name is at hand under the pointer, and in the table
+        left, top = place
+        taken.append((left, top, left + LETTER * len(name), top + LINE))
         if abs(top + LINE / 2 - y) > LINE or not x - 9.0 - LETTER * len(name) < left < x + 14.0:
             end = left - 2.0 if left > x else left + LETTER * len(name) + 2.0
             names.append(
@@ -215,8 +218,8 @@ def _along(line: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     return found
 
 
-def _free(x: float, y: float, width: float, taken: Sequence[tuple[float, ...]]) -> tuple[float, float]:
-    """The corner of a free place for a name near a point: beside it, else higher, lower, further."""
+def _free(x: float, y: float, width: float, taken: Sequence[tuple[float, ...]]) -> tuple[float, float] | None:
+    """The corner of a free place for a name near a point: beside it, else higher, lower, further, or none."""
     for left in (x + 8.0, x - 8.0 - width, x + 22.0, x - 22.0 - width, x + 44.0, x + 70.0):
         for step in range(20):
             shift = ((step + 1) // 2) * (LINE * 0.55) * (1 if step % 2 else -1)
@@ -227,7 +230,7 @@ def _free(x: float, y: float, width: float, taken: Sequence[tuple[float, ...]]) 
                 left < b[2] and left + width > b[0] and top < b[3] and top + LINE > b[1] for b in taken
             ):
                 return left, top
-    return max(LEFT, min(x + 8.0, WIDTH - width)), y - LINE / 2
+    return None
 
 
 def _path(corners: Sequence[tuple[float, float]]) -> str:

@@ -67,7 +67,6 @@ class CurvePanel:
         own = {found.start_time for found in self._bench.strategies}
         times = sorted(one for one in own if math.isfinite(one))
         self._picture.set_content("")
-        self._hint.set_visibility(False)
         self._mark.of(self._drive)
         self._view.begin(
             "least K_dyn over start time", works.curve, self._drive, times, cast("Terminal", self._end.value)
@@ -76,6 +75,7 @@ class CurvePanel:
     def _state(self) -> None:
         self._go.set_enabled(not self._view.busy)
         self._result.set_visibility(bool(self._points) and not self._view.busy)
+        self._hint.set_visibility(not self._points and not self._view.busy)
 
     def _part(self, point: FrontPoint) -> None:
         self._points.append(point)

@@ -8,6 +8,17 @@ from softstart.drive import PARAMETERS, Drive
 from softstart.drive.parameters import Parameter
 
 NAMED = 3  # parameters named in a sentence
+WORDS = ("name", "source")  # they change no result
+LONGEST = 60  # letters of a name in a sentence
+
+
+def clipped(name: str) -> str:
+    """A name short enough to stand in a sentence.
+
+    >>> clipped("Crane"), len(clipped("Crane " * 100))
+    ('Crane', 60)
+    """
+    return name if len(name) <= LONGEST else name[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def drift(computed: Drive, now: Drive) -> str:
@@ -16,14 +27,16 @@ def drift(computed: Drive, now: Drive) -> str:
     >>> crane = Drive.load("crane-4amtkf")
     >>> drift(crane, crane)
     ''
+    >>> drift(crane, crane.replace(name="the same by another name"))
+    ''
     >>> drift(crane, crane.replace(gap=1.0))
     'For shaft.gap 0.5 rad; the drive has changed since.'
     """
-    changed = changes(computed, now)
+    changed = [p for p in changes(computed, now) if p.name not in WORDS]
     if not changed:
         return ""
     if computed.name != now.name:
-        return f"For {computed.name}; another drive is on the bench."
+        return f"For {clipped(computed.name)}; another drive is on the bench."
     named = ", ".join(f"{p.path} {_value(p, getattr(computed, p.name))}" for p in changed[:NAMED])
     more = f" and {len(changed) - NAMED} more" if len(changed) > NAMED else ""
     return f"For {named}{more}; the drive has changed since."

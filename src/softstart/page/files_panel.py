@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import weakref
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -12,18 +13,22 @@ from softstart.errors import InputError
 from softstart.page import works
 from softstart.page.background import jobs_of
 from softstart.page.bench import Bench
-from softstart.page.command_text import command_text, drive_file, shipped_drives
+from softstart.page.command_text import command_text, drive_file, profile_of, shipped_drives
 from softstart.page.downloads import file_name, text_of
+from softstart.page.drift import clipped
 from softstart.page.job_view import LOOK, JobView
 from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import action, box, choice, guarded, hint, save, tell
+from softstart.page.trouble import sentence_of
 
 if TYPE_CHECKING:
     from nicegui.events import UploadEventArguments
 
     from softstart.profile import TorqueProfile
 
-LARGEST = 256 * 1024  # bytes of a drive file
+LARGEST = 64 * 1024  # bytes of a drive file
+LONGEST_LINE = 2000  # letters; a key of thousands of parts is read for many seconds
+MOST_SENTENCES = 12  # about one file; whoever has mended these sees the next ones
 
 
 def files_panel(bench: Bench, user: Hashable) -> None:
@@ -49,8 +54,18 @@ class DriveFiles:
         self._bench = bench
         shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box().classes("panel-form"):
+            own = weakref.ref(self)  # the route of an upload outlives its tab, and must not keep its bench
+
+            async def uploaded(event: UploadEventArguments) -> None:
+                if (panel := own()) is not None:
+                    await panel._uploaded(event)
+
+            def rejected() -> None:
+                if (panel := own()) is not None:
+                    panel._rejected()
+
             self._upload = ui.upload(
-                on_upload=self._uploaded, on_rejected=self._rejected, max_file_size=LARGEST, auto_upload=True
+                on_upload=uploaded, on_rejected=rejected, max_file_size=LARGEST, auto_upload=True
             ).classes("panel-upload")
             self._upload.props('accept=".toml,text/plain" data-testid="drive-upload"')
             pick = action("Load a file ...", lambda: None, "drive-load", main=True)
@@ -67,20 +82,21 @@ class DriveFiles:
 
     async def _uploaded(self, event: UploadEventArguments) -> None:
         name = event.file.name
-        content = await event.file.read()
+        large = event.file.size() > LARGEST  # the browser refuses that itself; others may ask
+        content = b"" if large else await event.file.read()
         self._upload.reset()
         try:
+            if large:
+                raise InputError(TOO_LARGE)
             self._bench.take(drive_of(content, name))
-        except InputError as error:
+        except Exception as error:  # a file may hold anything
             self._refuse(name, error)
         else:
             self._taken()
 
     def _rejected(self) -> None:
         self._upload.reset()
-        self._refuse(
-            "The file", InputError(f"It has more than {LARGEST // 1024} kB; a drive file has one or two.")
-        )
+        self._refuse("The file", InputError(TOO_LARGE))
 
     def _take(self, name: str) -> None:
         if name:
@@ -90,18 +106,33 @@ class DriveFiles:
 
     def _taken(self) -> None:
         self._troubles.set_visibility(False)
-        tell(f"{self._bench.drive.name} is on the bench.")
+        tell(f"{clipped(self._bench.drive.name)} is on the bench.")
 
-    def _refuse(self, name: str, error: InputError) -> None:
+    def _refuse(self, name: str, error: Exception) -> None:
         self._troubles.clear()
         self._troubles.set_visibility(True)
         with self._troubles:
-            ui.label(f"{name} was not loaded; the drive on the bench is as it was.").classes("trouble-title")
-            for sentence in error.sentences:
+            ui.label(f"{clipped(name)} was not loaded; the drive on the bench is as it was.").classes(
+                "trouble-title"
+            )
+            for sentence in few(error.sentences if isinstance(error, InputError) else [sentence_of(error)]):
                 ui.label(sentence).classes("trouble")
 
     def _save(self) -> None:
         save(self._bench.drive.to_toml(), drive_file(self._bench.drive))
+
+
+TOO_LARGE = f"It has more than {LARGEST // 1024} kB; a drive file has one or two."
+
+
+def few(sentences: Sequence[str]) -> list[str]:
+    """The first sentences, and how many there are beside them.
+
+    >>> few(["a.", "b."]), few([f"{k}." for k in range(20_000)])[-2:]
+    (['a.', 'b.'], ['11.', 'There are 19,988 more of them.'])
+    """
+    left = len(sentences) - MOST_SENTENCES
+    return [*sentences[:MOST_SENTENCES], *([f"There are {left:,} more of them."] if left > 0 else [])]
 
 
 def drive_of(content: bytes, name: str) -> Drive:
@@ -111,13 +142,16 @@ def drive_of(content: bytes, name: str) -> Drive:
     Traceback (most recent call last):
     softstart.errors.InputError: mine.toml: the file is not UTF-8 text (line 1); save it as UTF-8.
     """
-    if len(content) > LARGEST:
-        raise InputError(f"{name}: the file has more than {LARGEST // 1024} kB; a drive file has one or two.")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{name}: the file is not UTF-8 text (line {line}); save it as UTF-8.") from None
+        place = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{name}: the file is not UTF-8 text (line {place}); save it as UTF-8.") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(
+                f"{name}: line {number} has more than {LONGEST_LINE} letters, as no drive file has."
+            )
     return Drive.from_toml(text)
 
 
@@ -126,7 +160,7 @@ class Exports:
 
     def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
         self._bench = bench
-        self._saved_as = ""
+        self._saved_as = self._text = ""
         self._seen = -1
         with box().classes("panel-actions"):
             self._caption = ui.label().classes("panel-caption").props('data-testid="export-strategy"')
@@ -134,7 +168,7 @@ class Exports:
             with box().classes("panel-actions") as self._of_profile:
                 action("Profile CSV", guarded(lambda: self._profile(".csv")), "export-profile-csv")
                 action("Profile TOML", guarded(lambda: self._profile(".toml")), "export-profile-toml")
-                action("C code", guarded(self._code), "export-c")
+                self._c = action("C code", guarded(self._code), "export-c")
         with box().classes("panel-actions"):
             ui.label("Report for a customer").classes("panel-caption")
             self._report = action("Report HTML", guarded(self._begin_report), "export-report", main=True)
@@ -143,6 +177,10 @@ class Exports:
             "parameter sheet. It takes a while and is computed in the background."
         )
         self._view = JobView(jobs, user, "export", on_done=self._done, on_state=self._state)
+        # some browsers hold back a file that comes long after the press of a button
+        with box().classes("panel-actions"):
+            self._again = action("Save it again", guarded(self._save), "export-again")
+        self._again.set_visibility(False)
         ui.timer(LOOK, self._look)
         self._look()
 
@@ -155,7 +193,9 @@ class Exports:
         self._of_profile.set_visibility(self._profile_of_selected() is not None)
 
     def _state(self) -> None:
-        self._report.set_enabled(not self._view.busy)
+        for button in (self._report, self._c):  # what is computed aside, one after the other
+            button.set_enabled(not self._view.busy)
+        self._again.set_visibility(bool(self._text) and not self._view.busy and not self._view.failed)
 
     def _named(self, *parts: str, suffix: str) -> str:
         return file_name(self._bench.drive.name, *parts, suffix=suffix)
@@ -167,12 +207,16 @@ class Exports:
         save(text_of(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
 
     def _profile_of_selected(self) -> TorqueProfile | None:
-        profile = getattr(self._bench.controllers[self._bench.selected], "profile", None)
-        return profile if hasattr(profile, "to_c") else None
+        return profile_of(self._bench.controllers[self._bench.selected])
+
+    def _needed(self) -> TorqueProfile:
+        profile = self._profile_of_selected()
+        if profile is None:  # another strategy was selected a moment ago
+            raise InputError(f"{self._bench.selected}: this strategy plays no torque profile.")
+        return profile
 
     def _profile(self, suffix: str) -> None:
-        profile = self._profile_of_selected()
-        assert profile is not None
+        profile = self._needed()
         about = {"drive": self._bench.drive.name, "strategy": self._bench.selected}
         write: Any = profile.to_csv if suffix == ".csv" else lambda path: profile.to_toml(path, about)
         save(text_of(write, suffix), file_name(self._bench.selected, suffix=suffix))
@@ -180,16 +224,17 @@ class Exports:
     def _code(self) -> None:
         if self._view.busy:
             return
-        self._saved_as = file_name(self._bench.selected, suffix=".c")
+        profile = self._needed()
+        self._saved_as, self._text = file_name(self._bench.selected, suffix=".c"), ""
         about = {"drive": self._bench.drive.name, "strategy": self._bench.selected}
-        self._view.begin("C code", works.code, self._profile_of_selected(), about)
+        self._view.begin("C code", works.code, profile, about)
 
     def _begin_report(self) -> None:
         if self._view.busy:
             return
         bench = self._bench
         strategies = dict(bench.controllers)
-        self._saved_as = self._named("report", suffix=".html")
+        self._saved_as, self._text = self._named("report", suffix=".html"), ""
         self._view.begin(
             "report",
             works.report,
@@ -199,7 +244,11 @@ class Exports:
         )
 
     def _done(self, text: str) -> None:
-        save(text, self._saved_as)
+        self._text = text
+        self._save()
+
+    def _save(self) -> None:
+        save(self._text, self._saved_as)
 
 
 class CommandLine:
@@ -228,10 +277,12 @@ class CommandLine:
             for word in text.replace(",", " ").replace("=", " ").split()
             if word.endswith((".toml", ".csv"))
         ]
+        profiles = [label for label in bench.shown if profile_of(bench.controllers[label]) is not None]
         self._note.set_text(
-            f"First save from here: {', '.join(needed)}." if needed
-            else "It repeats the table of strategies for this drive in a terminal."
-        )  # fmt: skip
+            (f"First save from here: {', '.join(needed)}. " if needed else "")
+            + (f"Of the {len(profiles)} profiles a command takes one. " if len(profiles) > 1 else "")
+            + ("" if needed else "It gives the strategies that are drawn as a table in a terminal.")
+        )
 
 
 COPY = """() => {

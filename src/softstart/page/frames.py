@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any
@@ -22,6 +23,7 @@ QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if
 LONG = (math.inf, math.inf)
 TOO_LATE = 0.3  # s
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
+SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded anew comes back, or does not
 PACKED = ("t", "T", "u", "w1", "w2", "theta")
 
 
@@ -39,7 +41,9 @@ class Screen:
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
         self._origin = bench.origin
         self._next = 0  # whose turn it is among the other strategies
-        self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has the map
+        self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has all rows
+        self._map_seen = False  # it has some rows, of whatever
+        self._drive_kept: Drive | None = None  # by its tab
 
     @property
     def version(self) -> int:
@@ -60,6 +64,7 @@ class Screen:
     def forget(self) -> None:
         """The browser has lost what it had: send the map again."""
         self._map_of = None
+        self._map_seen = False
 
     def glance(self) -> Frame | None:
         """The large figure alone, where one of the last two starts of the selected strategy was quick.
@@ -100,7 +105,7 @@ class Screen:
             "traces": {bench.selected: drawn(found)},
             "rows": [row(bench, found)],
             "here": here(bench.drive),
-            "map_is_old": self._map_of is not None and not self._map_is_right(),
+            "map_is_old": self._map_seen and not self._map_is_right(),
         }
 
     def others(self) -> Iterator[Frame | None]:
@@ -128,8 +133,11 @@ class Screen:
     # when the drive is at rest -------------------------------------------------------------------------
 
     def at_rest(self) -> Iterator[Frame | None]:
-        """Starts with very many events, K_dyn with a worn gap, then the map."""
+        """The drive, for the tab to keep; long starts, K_dyn with a worn gap, then the map."""
         bench = self.bench
+        if self._drive_kept is not bench.drive:
+            self._drive_kept = bench.drive
+            yield {"keep": {"server": SERVER, "drive": bench.drive.to_toml()}}
         for label in bench.controllers:
             if bench.ready(label) is None:
                 found = bench.result(label)
@@ -153,6 +161,10 @@ class Screen:
         nominal = drive if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
         order = from_middle(len(axes.inertias), axes.nearest(*here(drive))[1])
+        self._map_of, self._map_seen = (
+            None,
+            True,
+        )  # from here on it has rows of both, if this is left half-way
         for index in order:
             k: list[float | None] = []
             while len(k) < len(axes.gaps):
@@ -212,7 +224,7 @@ def fields(drive: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
     shown: dict[str, list[Any]] = {}
     for name, parameter in PARAMETERS.items():
         value = getattr(drive, name)
-        if name in ("name", "source") or value is None:
+        if name == "source" or value is None:
             continue
         text = value if isinstance(value, str) else written(float(value))
         scale = scales.get(name)

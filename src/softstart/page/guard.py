@@ -4,6 +4,8 @@ A page on loopback can be reached by every web site that the user's browser show
 made to point at 127.0.0.1 (DNS rebinding) and by a socket opened from a foreign page. So the Host header must
 name this machine, and an Origin, where there is one, must be this page. With a token, whoever asks must
 have shown it once; a cookie of this process, which scripts cannot read, stands for it then.
+Of requests without an Origin, for an image say, browsers tell the site they come from: only a link may come
+from elsewhere.
 """
 
 from __future__ import annotations
@@ -12,7 +14,6 @@ import hmac
 import ipaddress
 import secrets
 from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -22,6 +23,7 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 POLICY_VIOLATION = 1008
+MOST_BODY = 1 << 20  # bytes of a request: a drive file, or some messages of a browser without sockets
 POLICY = (  # nothing the page does leaves the machine, whatever is put into it
     "default-src 'self'",
     "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:",  # NiceGUI compiles its templates in the browser
@@ -72,7 +74,10 @@ class Guard:
         if refusal:
             await _refuse(scope, receive, send, 403, refusal)
         elif not self._token or self._has_pass(headers):
-            await self.app(scope, receive, _with_headers(send))
+            if any(_too_long(text) for text in headers.all("content-length")):
+                await _refuse(scope, receive, send, 413, "This is more than the page takes.")
+            else:
+                await self.app(scope, _limited(receive), _with_headers(send))
         elif scope["type"] == "http" and scope.get("method") == "GET" and self._shows_token(scope):
             await self._admit(scope, send)
         else:
@@ -85,7 +90,9 @@ class Guard:
         if len(hosts) != 1 or not self._is_this_machine(host := hosts[0]):
             return "This name is not one of this machine; open the address that softstart serve has printed."
         origins = headers.all("origin")
-        if any(not _same_place(origin, host) for origin in origins):
+        elsewhere = {"cross-site", "same-site"}.intersection(headers.all("sec-fetch-site"))
+        followed = headers.all("sec-fetch-dest") == ["document"]
+        if any(not _same_place(origin, host) for origin in origins) or (elsewhere and not followed):
             return "This request comes from another page."
         return ""
 
@@ -94,14 +101,9 @@ class Guard:
         return name in self._names or (self._exposed and _is_address(name))
 
     def _has_pass(self, headers: _Headers) -> bool:
-        for text in headers.all("cookie"):
-            try:
-                shown = SimpleCookie(text).get(self._cookie)
-            except CookieError:
-                continue
-            if shown is not None and _equal(shown.value, self._pass):
-                return True
-        return False
+        # read by hand: other programs on this host have cookies too, and one that is odd must hide no other
+        pairs = [pair.strip().partition("=") for text in headers.all("cookie") for pair in text.split(";")]
+        return any(_equal(value, self._pass) for name, _, value in pairs if name == self._cookie)
 
     def _shows_token(self, scope: Scope) -> bool:
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
@@ -158,6 +160,29 @@ def _same_place(origin: str, host: str) -> bool:
     """
     scheme, separator, place = origin.partition("://")
     return separator != "" and scheme in ("http", "https") and place.lower() == host.lower()
+
+
+def _too_long(length: str) -> bool:
+    """True if a body of this length, or of none that could be read, is not taken.
+
+    >>> _too_long("65536"), _too_long("9999999"), _too_long("9" * 9999), _too_long("-1")
+    (False, True, True, True)
+    """
+    return not length.isdecimal() or len(length) > 9 or int(length) > MOST_BODY
+
+
+def _limited(receive: Receive) -> Receive:
+    """Take no more than `MOST_BODY` of a body of unknown length: the rest is as if the line were lost."""
+    left = MOST_BODY
+
+    async def receiving() -> MutableMapping[str, Any]:
+        nonlocal left
+        message = await receive()
+        if message["type"] == "http.request":
+            left -= len(message.get("body", b""))
+        return message if left >= 0 else {"type": "http.disconnect"}
+
+    return receiving
 
 
 def _with_headers(send: Send) -> Send:

@@ -69,6 +69,7 @@ class JobView:
         self.job: Job | None = None
         self._seen = self._parts = -1
         self._second = -1
+        self._given = False  # its result was handed on
         with ui.element("div").classes("job") as self._box:
             self._line = ui.label().classes("job-line").props(
                 f'role=status aria-live=polite data-testid="{name}-state"'
@@ -103,7 +104,7 @@ class JobView:
         except InputError as error:
             self.refuse(error)
             return
-        self._seen, self._parts = -1, 0
+        self._seen, self._parts, self._given = -1, 0, False
         self._look()
 
     def refuse(self, error: InputError) -> None:
@@ -123,32 +124,35 @@ class JobView:
         job = self.job
         if job is None:
             return
-        second = -1 if job.state.over else int(job.seconds)
-        if job.changes == self._seen and second == self._second and job.state is not State.WAITING:
+        # the job goes on in a thread of its own: each is read once, the count first, since it is raised last
+        changes, state = job.changes, job.state
+        second = -1 if state.over else int(job.seconds)
+        if changes == self._seen and second == self._second and state is not State.WAITING:
             return
-        news = job.changes != self._seen
-        self._seen, self._second = job.changes, second
+        news = changes != self._seen
+        self._seen, self._second = changes, second
         self._line.set_text(told(job))
         if not news:
             return
         while self._parts < len(job.parts):
             self._parts += 1
             self._on_part(job.parts[self._parts - 1])
-        self._show(job)
-        if job.state is State.DONE:
-            self._on_done(job.result)
-        self._on_state()
+        self._show(job, state)
+        try:
+            if state is State.DONE and not self._given:
+                self._given = True
+                self._on_done(job.result)
+        finally:
+            self._on_state()
 
-    def _show(self, job: Job) -> None:
-        over = job.state.over
+    def _show(self, job: Job, state: State) -> None:
+        over = state.over
         self._box.set_visibility(True)
-        self._box.classes(
-            add=CLASS_OF[job.state], remove=" ".join(CLASS_OF[s] for s in State if s is not job.state)
-        )
+        self._box.classes(add=CLASS_OF[state], remove=" ".join(CLASS_OF[s] for s in State if s is not state))
         self._cancel.set_visibility(not over)
         self._cancel.set_enabled(not job.stopping)
         self._bar.set_visibility(not over)
-        share = job.share if job.state is State.RUNNING else None
+        share = job.share if state is State.RUNNING else None
         self._bar.props(
             add="indeterminate" if share is None else "", remove="" if share is None else "indeterminate"
         )

@@ -75,16 +75,17 @@ class OptimumPanel:
         ui.timer(LOOK, self._mark.look)
 
     def _begin(self) -> None:
+        if self._view.busy:  # the Enter key is heard while the button is not
+            return
         text = str(self._time.value).strip()
         try:
             _check(text)
         except InputError as error:
             self._view.refuse(error)
             return
-        if not self._view.busy:
-            self._drive = self._bench.drive
-            terminal = cast("Terminal", self._end.value)
-            self._view.begin("optimal start", works.gentlest, self._drive, text, terminal)
+        self._drive = self._bench.drive
+        terminal = cast("Terminal", self._end.value)
+        self._view.begin("optimal start", works.gentlest, self._drive, text, terminal)
 
     def _state(self) -> None:
         self._go.set_enabled(not self._view.busy)

@@ -57,12 +57,16 @@ class Address:
         wrong = []
         if not 0 <= self.port <= 65535:
             wrong.append(f"--port {self.port}: a port is a number from 0 to 65535; 0 takes a free one.")
-        if self.token and (len(self.token) < SHORTEST_TOKEN or not self.token.isascii()):
+        if not self.token.isascii():
+            wrong.append("--token: not all of it is plain letters and digits; it must stand in an address.")
+        elif self.token and len(self.token) < SHORTEST_TOKEN:
             wrong.append(
                 f"--token: a token of {len(self.token)} characters can be guessed; use at least "
                 f"{SHORTEST_TOKEN} letters and digits."
             )
-        if not self.is_loopback and not (self.expose and self.token):
+        if not self.host.strip():
+            wrong.append("--host: the address is empty; give one of this machine, 0.0.0.0 for all it has.")
+        elif not self.is_loopback and not (self.expose and self.token):
             lacking = " and ".join(
                 name
                 for name, given in (("--expose", self.expose), ("--token TOKEN", self.token))

@@ -115,7 +115,7 @@ def curve(
             tell.part(point)
 
     def doing(what: str) -> None:
-        tell(min(done / total, 1.0), what.rpartition(": ")[2].removesuffix(f", {terminal}"))
+        tell(min(done / total, 1.0), f"start in {what.rpartition(': ')[2].removesuffix(f', {terminal}')}")
 
     def through(times: Sequence[float]) -> None:
         if times:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
 from softstart.page.bench import MAX_STRATEGIES, Bench
+from softstart.page.command_text import command_text
 
 
 class Failing(PlainController):
@@ -125,6 +126,20 @@ def test_an_added_controller_joins_with_its_own_figures():
         bench.add(f"more {number}", soft)
     with pytest.raises(InputError, match="remove one first"):
         bench.add("too many", soft)
+
+
+def test_the_selected_strategy_is_always_one_of_those_drawn():
+    bench = Bench(controllers=["direct", "ramp"])
+    bench.show("direct", visible=False)
+    assert bench.shown == ("direct",)
+    assert command_text(bench.drive, {label: bench.controllers[label] for label in bench.shown}).endswith(
+        "--controllers direct"
+    )
+    bench.select("ramp")
+    assert bench.shown == ("ramp",)
+    bench.add("tuned", make_controller("ramp"))
+    bench.remove("tuned")
+    assert bench.selected in bench.shown
 
 
 def test_a_start_with_too_many_events_waits_for_rest():

@@ -92,7 +92,7 @@ def test_every_step_has_its_glance_until_the_browser_stops_drawing():
     steps = 60
 
     async def hand(controls, line):
-        await until(lambda: len(line.frames) >= 2 and line.live.on_their_way == 0)
+        await until(lambda: line.frames and line.live.on_their_way == 0)
         line.frames.clear()
         line.draws = False
         for position in range(steps):
@@ -122,6 +122,24 @@ def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
         head = rows[8]["map"]
         here = bench.drive.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
         assert rows[8]["map_row"]["k"][6] == simulate(here, "direct").k_dyn
+
+    asyncio.run(followed(bench, hand))
+
+
+def test_a_map_left_half_way_is_old_until_all_its_rows_have_come():
+    """Going back to the strategy before does not make the rows of both a map of one."""
+    bench = Bench(controllers=["direct", "ramp"])
+
+    async def hand(controls, line):
+        await until(lambda: len(rows_of_map(line)) == 17)
+        controls.take({"what": "select", "name": "ramp"})
+        await until(lambda: any(row["map"]["strategy"] == "ramp" for row in rows_of_map(line).values()))
+        controls.take({"what": "select", "name": "direct"})
+        line.frames.clear()
+        await until(lambda: len(rows_of_map(line)) == 17)
+        (now,) = [frame for _, frame in line.frames if "map_is_old" in frame]
+        assert now["map_is_old"]
+        assert {row["map"]["strategy"] for row in rows_of_map(line).values()} == {"direct"}
 
     asyncio.run(followed(bench, hand))
 
@@ -168,6 +186,46 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
     assert screen.first()["fields"]["shaft.gap"] == ["0.0698132", 21, "4\N{DEGREE SIGN}"]
+
+
+def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
+    """Escape: the field shows six digits, so its text is not sent."""
+    bench = Bench(controllers=["direct"])
+    bench.set("shaft.stiffness", 368.4651234567)
+    controls, screen = controls_of(bench)
+    controls.take({"what": "edit", "path": "shaft.stiffness", "text": "soft"})
+    assert screen.mistakes
+    controls.take({"what": "leave", "path": "shaft.stiffness"})
+    assert not screen.mistakes
+    assert bench.drive.stiffness == 368.4651234567
+
+
+def test_each_message_is_told_of_once_and_no_place_is_made_up():
+    bench = Bench(controllers=["direct"])
+    pokes: list[int] = []
+    screen = Screen(bench)
+    bench.on_change(lambda: pokes.append(1))
+    controls = Controls(bench, screen, lambda: pokes.append(2))
+    controls.take({"what": "slide", "path": "shaft.gap", "position": 200, "stamp": 10**400})
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "wide"})
+    controls.take({"what": "edit", "path": "no.field", "text": "1"})
+    assert pokes == [1, 2, 2]
+    assert list(screen.mistakes) == ["shaft.gap", ""]
+
+
+def test_a_page_loaded_anew_goes_on_with_the_drive_that_its_tab_has_kept():
+    before = Bench(controllers=["direct"])
+    before.set_all({"shaft.gap": 0.1 + 0.2, "name": 'my "own" drive'})
+    (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
+    bench = Bench(controllers=["direct"])
+    controls, screen = controls_of(bench)
+    controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}})
+    assert bench.drive == bench.origin != before.drive
+    controls.take({"what": "hello", "kept": kept})
+    assert bench.drive == before.drive
+    assert not screen.mistakes
+    assert len([frame for frame in screen.at_rest() if frame and "keep" in frame]) == 1
+    assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
 
 
 def test_a_slider_sets_exactly_the_value_that_its_field_shows():

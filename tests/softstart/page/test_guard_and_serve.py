@@ -13,7 +13,7 @@ import urllib.request
 import pytest
 
 from softstart import InputError
-from softstart.page.guard import Guard
+from softstart.page.guard import MOST_BODY, Guard
 from softstart.page.serve import Address, guarded, listening
 
 TOKEN = "a-token-of-some-length"
@@ -125,6 +125,50 @@ def test_the_token_opens_once_and_the_cookie_stands_for_it_then():
     assert not ask(guard, "http", host="evil.example", cookie=shown)[2]
 
 
+def test_an_odd_cookie_of_another_program_does_not_hide_the_pass():
+    """Cookies are shared between the ports of a host; some programs write JSON into theirs."""
+    guard = local(token=TOKEN)
+    _, headers, _ = ask(guard, query=f"token={TOKEN}", host="localhost")
+    shown = headers[b"set-cookie"].decode().partition(";")[0]
+    for other in ('state={"a": 1, "b": [2]}', "x", "=;;", "caf\xe9=\xe9"):
+        assert ask(guard, host="localhost", cookie=f"{other}; {shown}")[2], other
+        assert not ask(guard, host="localhost", cookie=f"{other}; {shown}x")[2], other
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+@pytest.mark.parametrize(
+    ("dest", "reached"), [("document", True), ("image", False), ("iframe", False), (None, False)]
+)
+def test_a_foreign_page_can_link_here_and_embed_nothing(site, dest, reached):
+    """An image of a foreign page has no Origin, and each would build a page and start all strategies."""
+    headers = {"host": "localhost:8765", "sec-fetch-site": site} | ({"sec-fetch-dest": dest} if dest else {})
+    assert ask(local(), **headers)[2] == reached
+    assert ask(
+        local(), host="localhost:8765", **{"sec-fetch-site": "same-origin", "sec-fetch-dest": "image"}
+    )[2]
+
+
+def test_bodies_have_an_end():
+    own = {"host": "localhost", "origin": "http://localhost"}
+    assert ask(local(), method="POST", **own, **{"content-length": "65536"})[2]
+    for length in (str(MOST_BODY + 1), "9" * 5000, "many"):
+        code, _, reached = ask(local(), method="POST", **own, **{"content-length": length})
+        assert (code, reached) == (413, False)
+
+    taken = []
+
+    async def app(scope, receive, send):
+        while (message := await receive())["type"] == "http.request":
+            taken.append(len(message["body"]))
+
+    async def receive():
+        return {"type": "http.request", "body": bytes(1 << 16), "more_body": True}
+
+    scope = {"type": "http", "method": "POST", "headers": [(b"host", b"localhost")]}
+    asyncio.run(guarded(app, Address(), 8765)(scope, receive, None))
+    assert sum(taken) == MOST_BODY
+
+
 def test_exposed_pages_answer_to_addresses_but_not_to_foreign_names():
     guard = local(host="0.0.0.0", token=TOKEN, expose=True)
     assert ask(guard, host="192.168.1.7:8765")[0] == 401  # asked for its token
@@ -145,6 +189,8 @@ def test_answers_forbid_the_browser_to_ask_anyone_else():
         ({"host": "192.168.1.7", "token": TOKEN}, "add --expose,"),
         ({"host": "evil.example"}, "--expose"),
         ({"token": "short"}, "guessed"),
+        ({"token": "\N{CYRILLIC SMALL LETTER SHA}" * 20}, "plain letters"),
+        ({"host": "", "expose": True, "token": TOKEN}, "is empty; give one"),  # it would be all of them
         ({"port": 99999}, "0 to 65535"),
     ],
 )

@@ -90,6 +90,20 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
     assert curve_svg([], []) == ""
 
 
+def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
+    marks = [Mark(f"optimum {0.60 + 0.002 * k:.3f} s", 0.60 + 0.002 * k, 0.7 - 0.001 * k) for k in range(40)]
+    drawn = ET.fromstring(curve_svg([], marks))
+    assert sum(e.get("class") == "curve-mark" for e in drawn.iter("rect")) == 40
+    places = [
+        (float(e.get("x", "")), float(e.get("y", "")), 5.0 * len(e.text or ""))
+        for e in drawn.iter("text")
+        if e.get("class") == "curve-name"
+    ]
+    assert len(places) > 10
+    for k, (x, y, wide) in enumerate(places):
+        assert not any(abs(y - v) < 11.4 and x < u + w and u < x + wide for u, v, w in places[k + 1 :])
+
+
 def test_tuned_gains_come_as_files() -> None:
     heard = Heard()
     found = works.tuning(

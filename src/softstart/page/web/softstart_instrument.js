@@ -24,7 +24,7 @@ export default {
   props: { groups: Array },
   mounted() {
     this.instrument = new Instrument(this.$el, this.groups, (message) => this.$emit("act", message));
-    this.instrument.say({ what: "hello" });
+    this.instrument.hello();
   },
   unmounted() {
     this.instrument.end();

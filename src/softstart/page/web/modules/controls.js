@@ -16,29 +16,31 @@ export class Controls {
     }
   }
 
-  row({ path, symbol, label, meaning, unit, slider, choices }) {
+  row({ path, symbol, label, meaning, unit, slider, choices, words }) {
     const id = `field-${path.replace(".", "-")}`;
     const name = element("label", { for: id, title: meaning }, element("i", {}, symbol), label);
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
-    const line = element("div", { class: `row${slider ? "" : " plain"}`, "data-path": path }, name);
-    const parts = { line, mistake, other: element("span", { class: "other" }) };
+    const line = element("div", { class: `row${slider ? "" : " plain"}${words ? " words" : ""}`, "data-path": path }, name);
+    // stamps of what was asked last: by the field until that is answered, by the slider
+    const parts = { line, mistake, other: element("span", { class: "other" }), asked: -1, slid: -1 };
     if (slider) {
       parts.slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${label}, slider` });
       parts.slider.addEventListener("input", () => {
-        this.say({ what: "slide", path, position: Number(parts.slider.value) });
+        parts.slid = this.say({ what: "slide", path, position: Number(parts.slider.value) });
       });
+      parts.slider.addEventListener("pointerdown", () => this.hold(parts));
       line.append(parts.slider);
     }
-    line.append(parts.other);
+    if (!words) line.append(parts.other);
     if (choices.length) {
-      parts.field = element("select", { id }, ...choices.map((choice) => element("option", {}, choice)));
+      parts.field = element("select", { id, "aria-describedby": mistake.id }, ...choices.map((choice) => element("option", {}, choice)));
       parts.field.addEventListener("change", () => this.edit(path, parts));
       line.append(parts.field, element("span", { class: "unit" }));
     } else {
       parts.field = element("input", { id, type: "text", spellcheck: "false", autocomplete: "off", "aria-describedby": mistake.id });
       this.listen(path, parts);
-      const tail = element("span", { class: "unit" }, unit);
-      line.append(parts.field, tail);
+      line.append(parts.field);
+      if (!words) line.append(element("span", { class: "unit" }, unit));
     }
     this.rows.set(path, parts);
     return [line, mistake];
@@ -49,53 +51,87 @@ export class Controls {
     field.addEventListener("focus", () => field.select());
     field.addEventListener("input", () => (parts.typing = true));
     field.addEventListener("change", () => this.edit(path, parts));
+    // what was typed and taken back by hand is no change to the browser: the field follows the drive again
+    field.addEventListener("blur", () => this.leave(parts));
     field.addEventListener("keydown", (event) => {
-      if (event.key === "Escape") {
-        parts.typing = false;
-        parts.wrong = undefined;
-        field.value = parts.text ?? "";
-        this.say({ what: "edit", path, text: field.value });
-      }
+      if (event.key !== "Escape") return;
+      parts.refused = false;
+      parts.typing = true;
+      this.leave(parts);
+      // not sent as a text: the field shows six digits, and the drive may have more
+      if (parts.sentence || parts.asked >= 0) this.say({ what: "leave", path });
     });
+  }
+
+  leave(parts) {
+    if (parts.typing && !parts.refused) parts.field.value = parts.text ?? "";
+    parts.typing = false;
   }
 
   edit(path, parts) {
     parts.typing = false;
-    parts.asked = parts.field.value;
-    this.say({ what: "edit", path, text: parts.field.value });
+    parts.asked = this.say({ what: "edit", path, text: parts.field.value });
   }
 
-  show(fields, mistakes) {
+  // the thumb belongs to the hand until it lets go
+  hold(parts) {
+    parts.held = true;
+    const free = () => {
+      parts.held = false;
+      this.put(parts);
+      for (const way of ["pointerup", "pointercancel"]) window.removeEventListener(way, free, true);
+    };
+    for (const way of ["pointerup", "pointercancel"]) window.addEventListener(way, free, true);
+  }
+
+  // the thumb where the drive is, once the server has answered; a step beside it is the rounding of the value
+  put(parts) {
+    if (!parts.slider || parts.held || parts.slid > this.stamp) return;
+    const near = document.activeElement === parts.slider ? 1 : 0;
+    if (Math.abs(Number(parts.slider.value) - parts.position) > near) parts.slider.value = parts.position;
+    this.fill(parts);
+  }
+
+  fill(parts) {
+    const share = `${(100 * parts.slider.value) / STEPS}%`;
+    if (parts.share !== share) parts.slider.style.setProperty("--share", share);
+    parts.share = share;
+  }
+
+  // `stamp` is that of the last thing the server had taken in when it sent this
+  show(fields, mistakes, stamp) {
+    this.stamp = stamp;
     for (const [path, parts] of this.rows) {
+      if (parts.asked > stamp) continue; // it does not know yet what was written here
+      const answered = parts.asked >= 0;
+      parts.asked = -1;
       const [text, position, other] = fields[path] ?? ["", null, ""];
       const sentence = mistakes[path] ?? "";
-      if (parts.text !== text || parts.sentence !== sentence || parts.position !== position) {
-        parts.text = text;
-        parts.position = position;
-        // a field that is being written or was refused keeps what its writer wrote
-        const refused = sentence && parts.asked !== undefined;
-        if (!parts.typing && !refused) {
-          if (parts.field.value !== text) parts.field.value = text;
-          parts.asked = undefined;
-        }
-        if (parts.slider && document.activeElement !== parts.slider) parts.slider.value = position;
-        else if (parts.slider && !sentence && Number(parts.slider.value) === position) parts.slider.value = position;
-        if (parts.slider) parts.slider.style.setProperty("--share", `${(100 * parts.slider.value) / STEPS}%`);
-        if (parts.slider) parts.slider.setAttribute("aria-valuetext", other ? `${text}, ${other}` : text);
-        parts.other.textContent = other;
-        parts.other.title = other;
-      }
+      const { field, slider } = parts;
       if (parts.sentence !== sentence) {
         parts.sentence = sentence;
         parts.mistake.textContent = sentence;
         parts.mistake.hidden = !sentence;
         parts.line.classList.toggle("wrong", Boolean(sentence));
-        parts.field.setAttribute("aria-invalid", String(Boolean(sentence)));
-        if (!sentence && !parts.typing) {
-          parts.asked = undefined;
-          parts.field.value = text;
-        }
+        field.setAttribute("aria-invalid", String(Boolean(sentence)));
       }
+      // a field that is being written or was refused keeps what its writer wrote
+      parts.refused = Boolean(sentence) && (answered || Boolean(parts.refused));
+      if (!parts.typing && !parts.refused && field.value !== text) {
+        field.value = text;
+        if (answered && document.activeElement === field) field.select?.();
+      }
+      if (parts.text !== text || parts.position !== position) {
+        parts.text = text;
+        parts.position = position;
+        if (slider) {
+          this.fill(parts);
+          slider.setAttribute("aria-valuetext", other ? `${text}, ${other}` : text);
+        }
+        parts.other.textContent = other;
+        parts.other.title = other;
+      }
+      this.put(parts);
     }
   }
 }

@@ -6,6 +6,8 @@ import { Plots, unpack } from "./plots.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
 
+const KEPT = "softstart-drive";
+
 export class Instrument {
   constructor(root, groups, send) {
     this.send = send;
@@ -23,6 +25,25 @@ export class Instrument {
     this.map = new GapMap(root.querySelector(".map"), this.theme, say);
     this.resized = new ResizeObserver(() => this.redraw());
     for (const part of root.querySelectorAll("canvas")) this.resized.observe(part.parentElement);
+  }
+
+  // a page is loaded anew by its reader, or when the line was lost for long: it goes on with its drive
+  hello() {
+    let kept = null;
+    try {
+      kept = JSON.parse(sessionStorage.getItem(KEPT));
+    } catch {
+      // a browser that keeps nothing begins with the drive of the server
+    }
+    this.say({ what: "hello", kept });
+  }
+
+  keep(drive) {
+    try {
+      sessionStorage.setItem(KEPT, JSON.stringify(drive));
+    } catch {
+      // see above
+    }
   }
 
   // the stamp comes back with the first frame that knows of the message
@@ -57,9 +78,11 @@ export class Instrument {
       this.stamp = frame.stamp;
     }
     if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
-    if (frame.fields) this.controls.show(frame.fields, frame.mistakes);
+    if (frame.fields) this.controls.show(frame.fields, frame.mistakes, frame.stamp);
+    if (frame.keep) this.keep(frame.keep);
     if (frame.drive !== undefined && this.driveName.textContent !== frame.drive) {
-      this.driveName.textContent = frame.drive;
+      this.driveName.textContent = this.driveName.title = frame.drive;
+      document.title = `softstart: ${frame.drive}`;
     }
     this.map.take(frame);
     if (!number) return; // a glance: the figure alone

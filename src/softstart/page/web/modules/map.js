@@ -30,13 +30,17 @@ export class GapMap {
     place.append(element("div", { class: "map-head" }, this.title, keep), holder, this.said);
     this.canvas.addEventListener("pointerdown", (event) => this.press(event));
     this.canvas.addEventListener("pointermove", (event) => this.point(event));
+    for (const way of ["pointerup", "pointercancel"]) this.canvas.addEventListener(way, () => (this.pressed = false));
     this.canvas.addEventListener("pointerleave", () => (this.said.textContent = ""));
     this.canvas.addEventListener("keydown", (event) => this.walk(event));
   }
 
+  // a map comes row by row, and those of an earlier one stay pale until they are replaced
   take(frame) {
-    if (frame.map_is_old !== undefined && frame.map_is_old !== this.old) {
-      this.old = frame.map_is_old;
+    const { map_is_old: old } = frame;
+    if (old !== undefined && this.rows && old !== this.old) {
+      this.old = old;
+      this.fresh = new Set(old ? [] : this.rows.keys());
       this.fade();
     }
     if (!frame.map_row) return;
@@ -44,10 +48,12 @@ export class GapMap {
     if (this.axes !== axes) {
       this.axes = axes;
       this.rows = frame.map.inertias.map(() => null);
+      this.fresh = new Set();
     }
     this.head = frame.map;
     this.rows[frame.map_row.index] = frame.map_row.k;
-    this.old = false;
+    this.fresh.add(frame.map_row.index);
+    this.old = undefined;
     this.fade();
   }
 
@@ -73,12 +79,16 @@ export class GapMap {
   }
 
   press(event) {
-    const node = this.node(event.offsetX, event.offsetY);
-    if (node) this.go(node);
+    const node = event.button === 0 && this.node(event.offsetX, event.offsetY);
+    if (!node) return;
+    this.pressed = true;
+    this.canvas.setPointerCapture(event.pointerId);
+    this.go(node);
   }
 
   go([column, row]) {
-    this.say({ what: "jump", gap: this.head.gaps[column], inertia: this.head.inertias[row] });
+    const asked = this.say({ what: "jump", gap: this.head.gaps[column], inertia: this.head.inertias[row] });
+    this.aim = { asked, node: [column, row] };
   }
 
   point(event) {
@@ -87,7 +97,7 @@ export class GapMap {
       this.said.textContent = "";
       return;
     }
-    if (event.buttons === 1) this.go(node);
+    if (this.pressed && String(node) !== String(this.aim.node)) this.go(node);
     const k = this.rows[node[1]]?.[node[0]];
     this.said.textContent = `\u03b4 ${significant(this.head.gaps[node[0]], 4)} rad   J\u2082 ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}`;
   }
@@ -97,12 +107,16 @@ export class GapMap {
     const step = steps[event.key];
     if (!step || !this.head || !this.here) return;
     event.preventDefault();
-    const [px, py] = this.place(...this.here);
-    const { x, y, w, h } = this.box;
-    const node = this.node(Math.min(Math.max(px, x), x + w), Math.min(Math.max(py, y), y + h));
+    const node = this.aim?.asked > this.stamp ? this.aim.node : this.nodeHere(); // keys are quicker than answers
     const { gaps, inertias } = this.head;
     const to = [node[0] + step[0], node[1] + step[1]];
     if (to[0] >= 0 && to[0] < gaps.length && to[1] >= 0 && to[1] < inertias.length) this.go(to);
+  }
+
+  nodeHere() {
+    const [px, py] = this.place(...this.here);
+    const { x, y, w, h } = this.box;
+    return this.node(Math.min(Math.max(px, x), x + w), Math.min(Math.max(py, y), y + h));
   }
 
   // forget the picture: rows, size or colours have changed
@@ -111,6 +125,7 @@ export class GapMap {
   }
 
   draw(state) {
+    this.stamp = state.stamp;
     if (!this.head) return;
     const here = String(state.here);
     if (this.picture && here === this.drawn) return;
@@ -143,8 +158,8 @@ export class GapMap {
     pen.beginPath();
     pen.rect(box.x, box.y, box.w, box.h);
     pen.clip();
-    pen.globalAlpha = this.old ? 0.45 : 1;
     this.rows.forEach((row, j) => {
+      pen.globalAlpha = this.fresh.has(j) ? 1 : 0.45;
       row?.forEach((k, i) => {
         const [cx, cy] = [box.x + i * dx, box.y + box.h - j * dy];
         pen.fillStyle = k === null ? paper : shadeOf((k - low) / (high - low || 1));

@@ -221,7 +221,9 @@ export class Plots {
     Object.assign(panel, { low: range.low, high: range.high });
     this.shade(panel, main.stages);
     this.frame(panel, range, "Torque", "N m");
-    const named = others.length > 2 ? [] : others.map((name) => [`T, ${name}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
+    let named = others.length > 2 ? [] : others.map((name) => [`T, ${name}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
+    const wide = named.reduce((sum, [text]) => sum + panel.pen.measureText(text).width + 36, 0);
+    if (wide > panel.w - 260) named = []; // names that do not fit beside the others stand in the table alone
     this.legend(panel, [...named, ["motor u", ink, [5, 3], 1.2], ["shaft T", own, [], 2.4]]);
     this.inside(panel, () => {
       const base = state.rows.get(state.selected);

@@ -3,7 +3,7 @@ export function scheme() {
   const holder = document.createElement("div");
   holder.className = "scheme";
   holder.innerHTML = `
-<svg viewBox="0 0 320 62" role="img" aria-label="Motor inertia J1, shaft of stiffness c and damping d, gap, load inertia J2">
+<svg viewBox="0 0 328 62" role="img" aria-label="Motor inertia J1, shaft of stiffness c and damping d, gap, load inertia J2">
   <g fill="none" stroke="currentColor" stroke-width="1.4">
     <rect class="motor" x="34" y="10" width="46" height="42" rx="2"/>
     <rect class="load" x="236" y="6" width="50" height="50" rx="2"/>
@@ -19,7 +19,7 @@ export function scheme() {
   <g fill="currentColor" font-size="11" text-anchor="middle">
     <text x="57" y="35" font-style="italic">J\u2081</text><text x="261" y="35" font-style="italic">J\u2082</text>
     <text x="111" y="55" font-style="italic">c, d</text><text x="182" y="44" font-style="italic">\u03b4</text>
-    <text x="8" y="35" font-style="italic">u</text><text x="312" y="35" font-style="italic">Mc</text>
+    <text x="8" y="35" font-style="italic">u</text><text x="317" y="35" font-style="italic">Mc</text>
   </g>
 </svg>`;
   return holder;

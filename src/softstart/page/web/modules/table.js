@@ -1,13 +1,14 @@
 // Strategies side by side: one is selected, any may be drawn; the order changes only when a heading is pressed.
 import { element, fixed, significant } from "./numbers.js";
 
+// key, heading, its index, the text of a cell, what it is
 const COLUMNS = [
-  ["name", "strategy", "", null],
-  ["k_dyn", "K", "dyn", (row) => fixed(row.k_dyn, 3)],
-  ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3)],
-  ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4)],
-  ["start_time", "start, s", "", (row) => fixed(row.start_time, 4)],
-  ["time_lost", "lost, s", "", (row) => fixed(row.time_lost, 4)],
+  ["name", "strategy", "", null, "Names in their alphabetical order"],
+  ["k_dyn", "K", "dyn", (row) => fixed(row.k_dyn, 3), "Peak of the shaft torque over its mean while the drive accelerates"],
+  ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3), "K when wear has made the gap four times as wide, and the controller is as it was"],
+  ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
+  ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
+  ["time_lost", "lost, s", "", (row) => fixed(row.time_lost, 4), "Start time over that of direct"],
 ];
 
 export class Table {
@@ -16,9 +17,10 @@ export class Table {
     this.say = say;
     this.lines = new Map();
     this.by = "";
+    this.asked = -1; // stamp of what was selected last
     this.body = element("tbody");
-    const heads = COLUMNS.map(([key, text, sub]) => {
-      const button = element("button", { type: "button", title: `Sort by ${text}${sub}` }, text);
+    const heads = COLUMNS.map(([key, text, sub, , meaning]) => {
+      const button = element("button", { type: "button", title: `${meaning}; press to sort` }, text);
       if (sub) button.append(element("sub", {}, sub));
       button.addEventListener("click", () => this.sort(key));
       return element("th", { scope: "col", "data-key": key }, button);
@@ -33,7 +35,7 @@ export class Table {
   sort(key) {
     this.by = this.by === key ? "" : key;
     this.sorted = undefined;
-    this.show(this.state);
+    if (this.state) this.show(this.state);
   }
 
   show(state) {
@@ -44,10 +46,9 @@ export class Table {
       const line = this.lines.get(name);
       const row = state.rows.get(name);
       const selected = name === state.selected;
-      if (line.selected !== selected) {
-        line.selected = selected;
+      if (this.asked <= state.stamp) { // as below: an older frame does not know what was pressed last
         line.tr.classList.toggle("selected", selected);
-        line.radio.checked = selected;
+        if (line.radio.checked !== selected) line.radio.checked = selected;
       }
       line.out.hidden = !state.added.includes(name);
       if (line.asked <= state.stamp) line.asked = -1; // the server knows what was pressed last
@@ -101,9 +102,13 @@ export class Table {
     out.addEventListener("click", () => this.say({ what: "remove", name }));
     const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), out));
     const tr = element("tr", { "data-name": name }, element("td", { class: "eye" }, eye), title, ...cells, bar);
-    radio.addEventListener("change", () => this.say({ what: "select", name }));
+    const select = () => {
+      radio.checked = true;
+      this.asked = this.say({ what: "select", name });
+    };
+    radio.addEventListener("change", select);
     tr.addEventListener("click", (event) => {
-      if (!event.target.closest("input, label, button")) this.say({ what: "select", name });
+      if (!event.target.closest("input, label, button")) select();
     });
     const line = { tr, eye, radio, cells, bar, out, asked: -1 };
     eye.addEventListener("change", () => (line.asked = this.say({ what: "show", name, visible: eye.checked })));

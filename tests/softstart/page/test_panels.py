@@ -1,0 +1,137 @@
+"""Panels without a browser: a job is followed to its one end, a closed tab leaves nothing behind."""
+
+from __future__ import annotations
+
+import gc
+import inspect
+import itertools
+import weakref
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from softstart import Drive, InputError
+from softstart.page.bench import Bench
+from softstart.page.jobs import State
+
+pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
+
+
+@pytest.fixture
+def client() -> Iterator[Any]:
+    """A tab that is never opened."""
+    from nicegui import Client
+    from nicegui.page import page
+
+    with Client(page("/never-opened")) as client:
+        yield client
+    if not client.is_deleted:
+        client.delete()
+
+
+class Hasty:
+    """A job that ends in its thread when somebody has looked so often at how often it has changed."""
+
+    def __init__(self) -> None:
+        self.state, self.result, self.parts, self.sentences = State.RUNNING, None, [], ()
+        self.share, self.message, self.ahead, self.stopping = None, "", 0, False
+        self.count, self.looks, self.clock = 1, -1, itertools.count()
+
+    @property
+    def seconds(self) -> float:
+        return next(self.clock)  # another second at each look
+
+    @property
+    def changes(self) -> int:
+        seen = self.count
+        self.looks -= 1
+        if self.looks == 0:
+            self.state, self.result = State.DONE, "the result"
+            self.count += 1
+        return seen
+
+
+@pytest.mark.parametrize("looks", [1, 2, 3, 4])
+def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
+    from softstart.page.job_view import JobView
+
+    class Queue:
+        def begin(self, *args: Any) -> Hasty:
+            return job
+
+    job, given, states = Hasty(), [], []
+    view = JobView(
+        Queue(), "A", "it", on_done=given.append, on_state=lambda: states.append(view.busy)  # type: ignore[arg-type]
+    )  # fmt: skip
+    view.begin("it", print)
+    job.looks = looks
+    for _ in range(looks + 2):
+        view._look()
+    assert given == ["the result"]
+    assert states[-1] is False
+
+
+def test_the_enter_key_does_not_lose_a_job_that_runs(client: Any) -> None:
+    """The button is out of use then; the key in the field of the start time is not."""
+    from softstart.page.jobs import Jobs
+    from softstart.page.optimum_panel import OptimumPanel
+
+    class Queue(Jobs):
+        def begin(self, *args: Any, **keywords: Any) -> Any:
+            begun.append(Hasty())
+            return begun[-1]
+
+    begun: list[Hasty] = []
+    panel = OptimumPanel(Bench(controllers=["direct"]), "A", Queue())
+    panel._begin()
+    panel._time.value = "soon"
+    panel._begin()
+    assert panel._view.busy
+    assert len(begun) == 1
+
+
+def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NiceGUI gives itself to a handler that has a parameter; what fails in one ends the shutdown unseen."""
+    from nicegui import app
+
+    from softstart.page.background import server_jobs
+
+    handlers: list[Any] = []
+    monkeypatch.setattr(app, "on_shutdown", handlers.append)
+    jobs = server_jobs.__wrapped__()
+    (handler,) = handlers
+    assert not inspect.signature(handler).parameters
+    handler()
+    with pytest.raises(InputError, match="ending"):
+        jobs.begin("A", "late", print)
+
+
+def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
+    """The web framework remembers the function of each upload's route."""
+    from softstart.page.files_panel import DriveFiles
+
+    bench = Bench(controllers=["direct"])
+    DriveFiles(bench)
+    kept = weakref.ref(bench)
+    del bench
+    gc.collect()
+    assert kept() is not None
+    client.delete()
+    gc.collect()
+    assert kept() is None
+
+
+def test_a_file_of_mistakes_is_told_in_some_sentences_and_read_at_once() -> None:
+    from softstart.page.files_panel import LARGEST, MOST_SENTENCES, drive_of, few
+
+    with pytest.raises(InputError) as told:
+        drive_of(b"\n".join(b"k%d = 1" % k for k in range(5000)), "mine.toml")
+    assert len(told.value.sentences) > 5000
+    said = few(told.value.sentences)
+    assert len(said) == MOST_SENTENCES + 1
+    assert said[-1].startswith(f"There are {len(told.value.sentences) - MOST_SENTENCES:,} more")
+    with pytest.raises(InputError, match="line 1 has more than 2000 letters"):  # it would be read for 14 s
+        drive_of(b"a." * (LARGEST // 2 - 2) + b"b=1", "mine.toml")
+    named = Drive.load("crane-4amtkf").replace(name="Crane " * 300)
+    assert drive_of(named.to_toml().encode(), "mine.toml") == named
