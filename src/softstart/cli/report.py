@@ -165,6 +165,8 @@ def _check_out(out: str | None, as_json: bool) -> None:
             raise InputError(
                 f'--out = "{out}": this is a folder; name a file in it, as {path / "report.html"}.'
             )
+        if path.exists() and not path.is_file():  # a device or a pipe would be replaced by the file
+            raise InputError(f'--out = "{out}": this is no ordinary file; name one, as report.html.')
         with tempfile.TemporaryFile(dir=path.parent, prefix=f".{path.name}."):
             pass
     except OSError as error:

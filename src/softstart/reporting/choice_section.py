@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from softstart.reporting.choice import ALIKE
 from softstart.reporting.markup import Html, html, table, tag
-from softstart.reporting.values import digits, fixed, percent
+from softstart.reporting.values import digits, fixed, percent, short
 
 if TYPE_CHECKING:
+    from softstart.reporting.choice import Candidate
     from softstart.reporting.result import Report
 
 
@@ -22,8 +23,8 @@ def choice_section(report: Report) -> Html:
         "The rule: among the strategies that work with what a drive itself measures (motor encoder and "
         "motor torque), "
         f"that reach the target speed in all {cells} cells of the map and whose start is at most "
-        f"{percent(choice.slower, 0)} slower {than}, take the one with the least worst-case K_dyn over the "
-        f"map; "
+        f"{short(100.0 * choice.slower)}\N{NO-BREAK SPACE}% slower {than}, take the one with the least "
+        "worst-case K_dyn over the map; "
         f"of several within {percent(ALIKE, 0)}, the one with the least K_dyn on the drive as it is. "
         f"Strategies that "
         "must see the gap or the shaft torque are shown as yardsticks and not recommended: drives have no "
@@ -44,11 +45,26 @@ def choice_section(report: Report) -> Html:
         ])  # fmt: skip
     strong = [index for index, one in enumerate(order) if one in (choice.recommended, choice.ordinary)]
     heads = ["strategy", "worst K_dyn", "at gap, rad", "and J2, kg m²", "K_dyn here", "slower, %", "verdict"]
+    made = table(
+        heads, rows, caption="Every strategy before the rule", text_columns=(0, 6), strong=strong,
+        class_="names",
+    )  # fmt: skip
     return html(
         tag("p", *_found(report)),
         tag("p", rule),
-        table(heads, rows, caption="Every strategy before the rule", text_columns=(0, 6), strong=strong),
+        made,
     )
+
+
+def _next_one(best: Candidate, nearest: Candidate) -> str:
+    """How far the next one in is behind, or why it is not taken though its worst case is no worse."""
+    worst, here = fixed(nearest.worst, 3), fixed(nearest.row.run.k_dyn, 3)
+    if nearest.worst <= best.worst * (1.0 + ALIKE):
+        return (
+            f"; {nearest.name} is as good there within {percent(ALIKE, 0)} ({worst}), but no gentler on the "
+            f"drive as it is ({here}). "
+        )
+    return f"; the next one in, {nearest.name}, reaches {worst}. "
 
 
 def _found(report: Report) -> list[Html | str]:
@@ -65,7 +81,7 @@ def _found(report: Report) -> list[Html | str]:
             tag("strong", f"Recommended: {best.name}. "),
             f"Its K_dyn is {fixed(best.row.run.k_dyn, 3)} on the drive as it is and nowhere on the map above "
             f"{fixed(best.worst, 3)} (gap {digits(gap, 3)} rad, J2 {digits(inertia, 3)} kg m²)",
-            f"; the next one in, {nearest.name}, reaches {fixed(nearest.worst, 3)}. " if nearest else ". ",
+            _next_one(best, nearest) if nearest else ". ",
             f"It measures: {best.means.measures}. "
             f"Can an ordinary inverter do it? {best.means.inverter.capitalize()}. ",
         ]

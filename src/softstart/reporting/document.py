@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 from softstart.reporting.answer import answer
@@ -26,6 +27,12 @@ GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in th
 
 def document(report: Report) -> str:
     """The whole file."""
+    with warnings.catch_warnings():  # a name may have letters that the font of the figures has not
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        return _document(report)
+
+
+def _document(report: Report) -> str:
     figures = Figures()
     sections: list[tuple[str, str, Html]] = [
         ("drive", "The drive", drive_section(report, figures)),

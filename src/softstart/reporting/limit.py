@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,12 +21,15 @@ from softstart.optimal.front_points import FrontPoint
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, OptimumError
+from softstart.reporting.known import KnownStart, known_starts
 
 TERMINAL: Terminal = "reached"
 SHARES = (1.02, 1.05, 1.1, 1.2, 1.35, 1.6)  # of the start time of direct, where optima are looked for
 INSTANTS = 80  # of the curve of the bound
 EARLIER = 0.85  # of the quickest strategy: from where on the curve is drawn
 POLL = 0.1  # s
+GENTLER = 0.999  # times an optimum: what is no more than its last digits is not gentler
+QUICK_SHARE = 0.5  # of the budget, at most, for starts that are good and not proved best
 
 Tell = Callable[[float, str], object]
 
@@ -36,8 +40,8 @@ class Limit:
 
     `times` (s) and `bounds`: a K_dyn that no torque over time within the motor's limits can go below, however
     it is controlled. `shortest`: no torque at all is quicker, s. `points`: optima, each re-simulated exactly;
-    `missing` start times (s) whose optimum was not found within `budget` s. `refusal` says why there is
-    nothing.
+    `missing` start times (s) whose optimum was not found within `budget` s. `known` are starts found by a
+    quick search where there is no optimum, or a less gentle one. `refusal` says why there is nothing.
     """
 
     times: tuple[float, ...] = ()
@@ -45,13 +49,24 @@ class Limit:
     shortest: float = math.nan
     points: tuple[FrontPoint, ...] = ()
     missing: tuple[float, ...] = ()
+    known: tuple[KnownStart, ...] = ()
     budget: float = 0.0
-    method: str = ""
     refusal: str = ""
 
     def optimum_at(self, start_time: float) -> FrontPoint | None:
         """The optimum for a start time, if it was found."""
         return next((p for p in self.points if p.found and p.start_time_bound == start_time), None)
+
+    def gentlest_known(self, start_time: float) -> float | None:
+        """Least K_dyn of all optima and other starts found that take no longer, None without any."""
+        found = [p.k_dyn for p in self.found if p.k_dyn is not None and p.start_time_bound <= start_time]
+        found += [one.k_dyn for one in self.known if one.start_time <= start_time]
+        return min(found, default=None)
+
+    @property
+    def gave_up(self) -> list[FrontPoint]:
+        """Start times at which the search came to its end without an optimum."""
+        return [p for p in self.points if p.status == "NOT_FOUND"]
 
     @property
     def found(self) -> list[FrontPoint]:
@@ -70,6 +85,7 @@ class Limit:
                 for p in self.points
             ],
             "not_found": list(self.missing),
+            "known_starts": [one.summary() for one in self.known],
             "budget": self.budget,
             "refusal": self.refusal,
         }
@@ -111,8 +127,14 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
     bounds = [bound_at(drive, float(t)) for t in times]
     curve = [(float(t), b) for t, b in zip(times, bounds, strict=True) if b is not None]
     points, left = _by_formula(drive, asked)
+    known: list[KnownStart] = []
     if left and budget > 0.0:
-        points += _in_own_process(drive, left, budget, tell)
+        began = time.monotonic()
+        tell(0.0, "looking for gentle starts")
+        known = known_starts(drive, left, QUICK_SHARE * budget)
+        points += _in_own_process(drive, left, max(budget - (time.monotonic() - began), 0.0), tell)
+        best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
+        known = [one for one in known if one.k_dyn < GENTLER * best.get(one.start_time_bound, math.inf)]
     settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
     return Limit(
         times=tuple(t for t, _ in curve),
@@ -120,6 +142,7 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
         shortest=shortest,
         points=tuple(sorted(points, key=lambda p: p.start_time_bound)),
         missing=tuple(sorted(t for t in asked if t not in settled)),
+        known=tuple(known),
         budget=budget,
     )
 
@@ -148,8 +171,8 @@ def _in_own_process(drive: Drive, asked: Sequence[float], budget: float, tell: T
         )  # fmt: skip
         try:
             assert process.stdin is not None
-            process.stdin.write(task)
-            process.stdin.close()
+            with suppress(BrokenPipeError), process.stdin:  # it may have ended already
+                process.stdin.write(task)
             began = time.monotonic()
             while process.poll() is None and (spent := time.monotonic() - began) < budget:
                 tell(spent / budget, f"looking for the optimum, at most {budget:g} s")

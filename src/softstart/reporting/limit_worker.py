@@ -8,6 +8,7 @@ from contextlib import redirect_stdout
 from typing import TextIO
 
 from softstart.drive import Drive
+from softstart.errors import InputError
 from softstart.optimal.front_points import FrontPoint
 
 
@@ -24,7 +25,7 @@ def work(task: str, out: TextIO) -> None:
             point = FrontPoint.of_optimum(optimize(drive, start_time, terminal=terminal), start_time)
         except InfeasibleError as error:
             point = FrontPoint.of_verdict(error.verdict, start_time, terminal)
-        except (OptimumError, NotConverged) as error:
+        except (OptimumError, NotConverged, InputError) as error:  # InputError: of no class it solves
             point = FrontPoint.not_found(str(error), start_time, terminal)
         print(json.dumps(point.record()), file=out, flush=True)
 

@@ -141,6 +141,12 @@ def _made(
     unused = set(parameters) - {one for one in asked if isinstance(one, str)}
     if unused:
         mistakes.append(f"parameters for {', '.join(sorted(unused))}: that controller is not in the report.")
+    labels = [label_of(one) for one in made]
+    mistakes += [
+        f"controllers: two of them are called {label}; give one of the two another name (that of its file)."
+        for label in dict.fromkeys(labels)
+        if labels.count(label) > 1
+    ]
     if mistakes:
         raise InputError(mistakes)
     if not any(label_of(one) == "direct" for one in made):

@@ -24,10 +24,14 @@ WIDE = 7.1  # inches: what an A4 page holds
 MARKERS = "osD^vPX*"
 MAP = "cividis"
 MOST_STAGES = 6  # numbered
+LONGEST = 32  # letters of a name in a figure
 
 
-def traces_figure(runs: Sequence[Run], longest: float, highest: float) -> Any:
-    """Torques (left) and speeds (right) of several starts; grey where the gap is open."""
+def traces_figure(runs: Sequence[Run], longest: float, lowest: float, highest: float) -> Any:
+    """Torques (left) and speeds (right) of several starts; grey where the gap is open.
+
+    Up to `longest` s; torques from `lowest` to `highest` N m, with some room, in all panels.
+    """
     with drawing():
         size = (WIDE, 0.55 + 1.72 * len(runs))
         figure, axes = new_figure(len(runs), 2, size, sharex=True, squeeze=False)
@@ -38,10 +42,13 @@ def traces_figure(runs: Sequence[Run], longest: float, highest: float) -> Any:
             torque.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor torque u")
             torque.plot(run.t, run.T, color=COLOURS[0], lw=1.3, label="shaft torque T")
             torque.plot([run.peak_time], [_peak(run)], "o", ms=3.5, color=COLOURS[0])
-            torque.set_ylim(min(-0.06 * highest, 1.05 * float(np.min(run.T))), 1.12 * highest)
+            torque.set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
             torque.set_ylabel("N m", fontsize=SMALL)
             torque.set_title(
-                f"{label_of(run.controller)}: K_dyn {run.k_dyn:.3f}", loc="left", fontsize=SMALL + 0.5, pad=3
+                f"{_literally(label_of(run.controller))}: K_dyn {run.k_dyn:.3f}",
+                loc="left",
+                fontsize=SMALL + 0.5,
+                pad=3,
             )
             speed.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor speed w1")
             speed.plot(run.t, run.w2, color=COLOURS[0], lw=1.3, label="load speed w2")
@@ -63,6 +70,12 @@ def traces_figure(runs: Sequence[Run], longest: float, highest: float) -> Any:
     return figure
 
 
+def _literally(name: str) -> str:
+    """A name as it is, not set as a formula, and cut where it is too long for a figure."""
+    short = name if len(name) <= LONGEST else name[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    return short.replace("$", r"\$")
+
+
 def _peak(run: Run) -> float:
     return max(run.stages, key=lambda one: abs(one.peak_torque)).peak_torque
 
@@ -81,11 +94,14 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
     placed = [one for one in choice.candidates if not math.isnan(one.row.run.start_time)]
     optima = limit.found
     own = [one.row.run.start_time for one in placed] + [p.start_time_bound for p in optima]
+    own += [one.start_time for one in limit.known]
     left, right = min(own), max(own)
+    right = max(right, 1.001 * left)  # a single start
     values = [one.row.run.k_dyn for one in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
+    values += [one.k_dyn for one in limit.known]
     with drawing():
-        figure, axes = new_figure(1, 1, (WIDE, 3.9))
-        left, right = left - 0.08 * (right - left), right + 0.04 * (right - left)
+        figure, axes = new_figure(1, 1, (WIDE, 3.6))
+        left, right = left - 0.15 * (right - left), right + 0.04 * (right - left)
         if limit.times:
             t, k = _within(limit, left, right, 2.0 * max(values))
             axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
@@ -95,6 +111,12 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], "-", color=COLOURS[0],
                 lw=1.2, marker=".", ms=7, label="optimum found", zorder=3,
+            )  # fmt: skip
+        if limit.known:
+            axes.plot(
+                [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], ls=DASHES[2],
+                color="black", lw=1.0, marker="+", ms=6, label="start found: possible, not proved best",
+                zorder=3,
             )  # fmt: skip
         for index, one in enumerate(placed):
             best = one is choice.recommended or one is choice.ordinary
@@ -110,9 +132,11 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
         axes.set_xlim(left, right)
         axes.set_xlabel("start time, s")
         axes.set_ylabel("K_dyn")
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(loc="upper right", fontsize=SMALL)
-        name_points(figure, axes, [(one.name, one.row.run.start_time, one.row.run.k_dyn) for one in placed])
+        handles = axes.get_legend_handles_labels()[0]
+        if handles:
+            figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=SMALL)
+        points = [(_literally(one.name), one.row.run.start_time, one.row.run.k_dyn) for one in placed]
+        name_points(figure, axes, points)
     return figure
 
 
@@ -146,6 +170,7 @@ def maps_figure(shown: Sequence[Candidate], nominal: tuple[float, float]) -> Any
     high = max(high, low * 1.02)
     scale = LogNorm(low, high) if high > 3.0 * low else Normalize(low, high)
     down = math.ceil(len(shown) / 2)
+    inertia, gap = _thousand(first.inertias), _thousand(first.gaps)
     with drawing():
         size = (WIDE, 0.35 + down * (0.75 + 0.31 * max(rows, 2)))
         figure, axes = new_figure(down, 2, size, squeeze=False)
@@ -162,16 +187,18 @@ def maps_figure(shown: Sequence[Candidate], nominal: tuple[float, float]) -> Any
                 panel.text(j, i, text, ha="center", va="center", fontsize=SMALL - 1.0,
                            color="black" if dark else "white")  # fmt: skip
             _frame(panel, first.gaps.index(nominal[0]), first.inertias.index(nominal[1]))
-            panel.set_title(f"{one.name}: worst {_worst(one)}", loc="left", fontsize=SMALL + 0.5)
-            panel.set_xticks(range(columns), [f"{v:.3g}" for v in first.inertias], fontsize=SMALL - 0.5)
-            panel.set_yticks(range(rows), [f"{v:.3g}" for v in first.gaps], fontsize=SMALL - 0.5)
+            panel.set_title(f"{_literally(one.name)}: {_worst(one)}", loc="left", fontsize=SMALL + 0.5)
+            panel.set_xticks(
+                range(columns), [f"{v / inertia:.3g}" for v in first.inertias], fontsize=SMALL - 0.5
+            )
+            panel.set_yticks(range(rows), [f"{v / gap:.3g}" for v in first.gaps], fontsize=SMALL - 0.5)
             panel.tick_params(length=0)
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
         for panel in axes[:, 0]:
-            panel.set_ylabel("gap, rad", fontsize=SMALL)
+            panel.set_ylabel(f"gap, {_powers(gap)}rad", fontsize=SMALL)
         for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
-            panel.set_xlabel("load inertia J2, kg m²", fontsize=SMALL)
+            panel.set_xlabel(f"load inertia J2, {_powers(inertia)}kg m²", fontsize=SMALL)
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
         bar.set_label("K_dyn", fontsize=SMALL)
         bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
@@ -180,8 +207,20 @@ def maps_figure(shown: Sequence[Candidate], nominal: tuple[float, float]) -> Any
     return figure
 
 
+def _thousand(values: Sequence[float]) -> float:
+    """The power of a thousand in whose multiples small or large numbers are short, 1 for usual ones."""
+    if max(values) == 0.0 or (values[0] >= 1e-2 and max(values) < 1e3):
+        return 1.0
+    return 1e3 ** math.floor(math.log10(max(values)) / 3.0)
+
+
+def _powers(unit: float) -> str:
+    """Such a power, to stand before a unit."""
+    return "" if unit == 1.0 else f"$10^{{{round(math.log10(unit))}}}$ "
+
+
 def _worst(one: Candidate) -> str:
-    return f"K_dyn {one.worst:.3f}" if math.isfinite(one.worst) else "no start in grey cells"
+    return f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
 
 
 def _plain_ticks(bar: Any, low: float, high: float) -> None:

@@ -21,9 +21,9 @@ def provenance_section(report: Report) -> Html:
     ]
     return html(
         table(["what", "which"], rows, caption="Made with", text_columns=(0, 1)),
-        tag("p", "The command that made this report:") if about.command else None,
+        tag("p", "The command that made this report:", class_="lead") if about.command else None,
         tag("pre", about.command, class_="command") if about.command else None,
-        tag("p", "The drive as a file for softstart, with all changes (drive.toml):"),
+        tag("p", "The drive as a file for softstart, with all changes (drive.toml):", class_="lead"),
         tag("pre", about.drive_toml),
         tag(
             "p",

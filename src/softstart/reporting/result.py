@@ -49,6 +49,13 @@ class Report:
         """The K_dyn that no start as quick as this one can go below."""
         return None if math.isnan(row.run.start_time) else bound_at(self.drive, row.run.start_time)
 
+    def gentlest_known(self, row: Row) -> float | None:
+        """Least K_dyn of all starts that this report knows and that take no longer than this one."""
+        time = row.run.start_time
+        own = [other.run for other in self.comparison.rows if other.run.start_time <= time]
+        found = [run.k_dyn for run in own] + [self.limit.gentlest_known(time)]
+        return min((k for k in found if k is not None), default=None)
+
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON, under the names used everywhere."""
         best, plain = self.choice.recommended, self.choice.ordinary
@@ -60,6 +67,7 @@ class Report:
             "start_time": best.row.run.start_time if best else None,
             "peak_torque": best.row.run.peak_torque if best else None,
             "k_dyn_lower_bound": self.lower_bound(best.row) if best else None,
+            "k_dyn_gentlest_known": self.gentlest_known(best.row) if best else None,
             "k_dyn_direct": direct.run.k_dyn if direct else None,
             "start_time_direct": direct.run.start_time if direct else None,
             "ordinary": plain.name if plain else None,

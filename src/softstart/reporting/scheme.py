@@ -11,11 +11,13 @@ from html import escape
 
 from softstart.drive import Drive
 from softstart.reporting.markup import Html, tag
-from softstart.reporting.values import short
+from softstart.reporting.values import MINUS, short
 
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
 _ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
-_LABEL = 124.0  # px: what the gap and its label need
+_LABEL = 124.0  # px: what the gap and its label need at least
+_LETTER = 0.62  # of the size of a font: width of a letter, amply
+_APART = 22.0  # px between labels
 _INK, _GREY, _ORANGE, _BLUE = "#222222", "#666666", "#B34D00", "#00598C"
 _FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 
@@ -27,28 +29,35 @@ def scheme(drive: Drive, prefix: str) -> Html:
     high1, high2 = (max(_LEAST, _TALLEST * (J / tallest) ** 0.25) for J in (J1, J2))
     windup = float(drive.Ms) / c
     coil = max(_LEAST_COIL, _ANGLES * windup / (windup + gap))
-    spring = max(_SHORTEST_SHAFT, coil + 24.0)
+    damper = f"d = {short(d)} N m s/rad" if d > 0.0 else ""
+    inertia = f"{short(J1)} kg m²"  # is wider than its disc, and beside the damper's label
+    spring = max(_SHORTEST_SHAFT, coil + 24.0, _width(damper) + max(_width(inertia) - 64.0, 2.0 * _APART))
     opening = max(_LEAST_GAP, _ANGLES * gap / (windup + gap)) if gap > 0.0 else 0.0
     parts: list[str] = []
-    x = 120.0
-    parts += _disc(x, high1, "#D6E6F2", "J1", "motor", f"{short(J1)} kg m²")
-    parts += _torque(x - 34.0, "u", f"up to {short(float(drive.maximum_torque))} N m", _ORANGE, left=True)
+    motor, load = (
+        f"up to {short(float(drive.maximum_torque))} N m",
+        f"{short(float(drive.Mc))} N m, {drive.load_kind}",
+    )
+    x = max(120.0, 40.0 + _width(motor, 12))
+    parts += _disc(x, high1, "#D6E6F2", "J1", "motor", inertia)
+    parts += _torque(x - 34.0, "u", motor, _ORANGE, left=True)
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high1 - 12.0, "phi1, w1"))
     x += 64.0
-    parts += _shaft(x, spring, coil, c, d)
+    parts += _shaft(x, spring, coil, c, damper)
     x += spring + 24.0
     if gap > 0.0:
-        room = max(opening + 36.0, _LABEL)
-        parts += _claw(x, room, opening, float(drive.start_position) / gap, gap)
+        label = f"gap {gap:.4g} rad".replace("-", MINUS)
+        room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
+        parts += _claw(x, room, opening, float(drive.start_position) / gap, label)
         x += room
     else:
         parts.append(_line(x, x + 60.0))
         parts.append(_text(x + 30.0, _AXIS - 14.0, "no gap"))
         x += 60.0
     parts += _disc(x, high2, "#E3EFE0", "J2", "load", f"{short(J2)} kg m²")
-    parts += _torque(x + 98.0, "Mc", f"{short(float(drive.Mc))} N m, {drive.load_kind}", _BLUE, left=False)
+    parts += _torque(x + 98.0, "Mc", load, _BLUE, left=False)
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high2 - 12.0, "phi2, w2"))
-    width = x + 64.0 + 150.0
+    width = x + max(64.0 + 150.0, 98.0 + 18.0 + _width(load, 12))
     title = (
         f"Two masses and a gap: motor J1 = {short(J1)} kg m², shaft c = {short(c)} N m/rad, "
         f"gap {short(gap)} rad, load J2 = {short(J2)} kg m², load torque Mc = {short(float(drive.Mc))} N m"
@@ -71,7 +80,12 @@ def _disc(x: float, high: float, colour: str, symbol: str, name: str, value: str
     ]
 
 
-def _shaft(x: float, length: float, coil: float, c: float, d: float) -> list[str]:
+def _width(text: str, size: int = 14) -> float:
+    """How wide a text may be, px."""
+    return _LETTER * size * len(text)
+
+
+def _shaft(x: float, length: float, coil: float, c: float, damper: str) -> list[str]:
     """A spring, and below it a damper if there is damping."""
     lead, turns = 0.5 * (length - coil), max(3, round(coil / 16.0))
     step = coil / (2 * turns)
@@ -79,7 +93,7 @@ def _shaft(x: float, length: float, coil: float, c: float, d: float) -> list[str
     points += [(x + lead + (k + 0.5) * step, _AXIS + (14.0 if k % 2 else -14.0)) for k in range(2 * turns)]
     points += [(x + length - lead, _AXIS), (x + length + 24.0, _AXIS)]
     parts = [_polyline(points), _text(x + 0.5 * length + 12.0, _AXIS - 26.0, f"c = {short(c)} N m/rad")]
-    if d > 0.0:
+    if damper:
         middle, low, left, right = x + 0.5 * length, _AXIS + 48.0, x + 6.0, x + length - 6.0
         parts += [
             _polyline([(left, _AXIS), (left, low), (middle - 6.0, low)]),
@@ -87,12 +101,12 @@ def _shaft(x: float, length: float, coil: float, c: float, d: float) -> list[str
                        (middle + 14.0, low + 12.0)]),
             _bar(middle - 6.0, low - 9.0, low + 9.0, 4),
             _polyline([(middle - 6.0, low), (right, low), (right, _AXIS)]),
-            _text(middle, low + 32.0, f"d = {short(d)} N m s/rad"),
+            _text(middle, low + 32.0, damper),
         ]  # fmt: skip
     return parts
 
 
-def _claw(start: float, room: float, opening: float, place: float, gap: float) -> list[str]:
+def _claw(start: float, room: float, opening: float, place: float, label: str) -> list[str]:
     """A claw of the motor's side between two flanks of the load's, where the start finds it."""
     x = start + 0.5 * (room - opening - 12.0)
     left, right = x + 3.0, x + opening + 9.0
@@ -110,7 +124,7 @@ def _claw(start: float, room: float, opening: float, place: float, gap: float) -
             f'<line x1="{at:.1f}" y1="{flank + 6}" x2="{at:.1f}" y2="{flank + 22}" stroke="{_GREY}"/>'
             for at in (left, right)
         ),
-        _text(0.5 * (left + right), flank + 40.0, f"gap {short(gap)} rad"),
+        _text(0.5 * (left + right), flank + 40.0, label),
     ]
 
 

@@ -16,7 +16,7 @@ from softstart.controller import CompiledController, Controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
-from softstart.reporting.strategies import kind_of, label_of
+from softstart.reporting.strategies import ORDINARY, computes_with, kind_of, label_of
 from softstart.run import Run
 from softstart.simulation import simulate
 
@@ -42,7 +42,9 @@ class Setting:
     def coarse(self) -> bool:
         """Whether the step is large against the value."""
         return (
-            self.step is not None and isinstance(self.exact, float) and self.step > COARSE * abs(self.exact)
+            self.step is not None
+            and isinstance(self.exact, float)
+            and self.step > COARSE * abs(self.exact) > 0.0
         )
 
     def off(self, side: int) -> float:
@@ -53,13 +55,36 @@ class Setting:
 
 
 @dataclass(frozen=True, eq=False)
+class FullRise:
+    """A ramp for an inverter that asks for the time from 0 to 100 % of torque, s: exact, and rounded.
+
+    `rise` is the time between the torques of the sheet (s) that comes of the rounded one, `run` the start.
+    """
+
+    exact: float
+    rounded: float
+    rise: float
+    run: Run
+
+    def summary(self) -> dict[str, float]:
+        """As plain data."""
+        return {
+            "exact": self.exact,
+            "rounded": self.rounded,
+            "k_dyn": self.run.k_dyn,
+            "start_time": self.run.start_time,
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class Sheet:
     """What to set for one strategy, and what comes of it.
 
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
     largest K_dyn, `slowest` the longest start time (s) of `variants` starts in which the rounded values are
     half a step off, in the combinations that `corners` says; NaN if one of them fails. `worst_values`
-    belong to it. `own` is the drive whose numbers the strategy works with.
+    belong to it. `own` is the drive whose numbers the strategy works with, `computes_with` says with which
+    of them. `torque_step` (N m) is that of the inverter.
     """
 
     name: str
@@ -74,6 +99,9 @@ class Sheet:
     worst_k_dyn: float
     slowest: float
     worst_values: Mapping[str, float]
+    torque_step: float
+    full_rise: FullRise | None
+    computes_with: Sequence[str] | None
 
     @property
     def varied(self) -> list[Setting]:
@@ -94,6 +122,7 @@ class Sheet:
             "start_time_rounded": self.rounded.start_time if self.rounded else None,
             "k_dyn_half_a_step_off": self.worst_k_dyn,
             "start_time_half_a_step_off": self.slowest,
+            "time_0_to_100_percent": self.full_rise.summary() if self.full_rise else None,
             "variants": self.variants,
             "failure": self.failure,
         }
@@ -108,8 +137,11 @@ def make_sheet(drive: Drive, controller: Controller, exact: Run, resolution: Res
     rounded: Run | None = None
     failure, variants, corners, worst, slowest = "", 0, False, math.nan, math.nan
     worst_values: dict[str, float] = {}
+    full_rise: FullRise | None = None
     try:
         rounded = simulate(drive, replace(ready, **values), fitted_to=own)
+        if kind_of(controller) in ORDINARY:
+            full_rise = _full_rise(drive, replace(ready, **values), own, resolution)
         if varied:
             sides = _sides(len(varied))
             corners = len(varied) <= ALL_CORNERS
@@ -127,7 +159,20 @@ def make_sheet(drive: Drive, controller: Controller, exact: Run, resolution: Res
         name=label_of(exact.controller), kind=kind_of(controller), settings=settings,
         own=own, exact=exact, rounded=rounded, failure=failure, variants=variants, corners=corners,
         worst_k_dyn=worst, slowest=slowest, worst_values=worst_values,
+        torque_step=resolution.step("", "N*m", rated_torque(drive)[0]) or 0.0, full_rise=full_rise,
+        computes_with=computes_with(ready, own),
     )  # fmt: skip
+
+
+def _full_rise(drive: Drive, ready: Any, own: Drive, resolution: Resolution) -> FullRise | None:
+    """The ramp by its time from 0 to 100 % of torque; None where there is no rise."""
+    share = (ready.full_torque - ready.initial) / rated_torque(drive)[0]
+    if not (share > 0.0 and ready.time > 0.0):
+        return None
+    exact = float(ready.time / share)
+    rounded = nearest_step(exact, resolution.time)
+    run = simulate(drive, replace(ready, time=rounded * share), fitted_to=own)
+    return FullRise(exact, rounded, rounded * share, run)
 
 
 def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> list[Setting]:

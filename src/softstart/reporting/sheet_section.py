@@ -9,14 +9,15 @@ import numpy as np
 
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.resolution import rated_torque
-from softstart.reporting.values import RPM, decimals_of, digits, fixed, short, unit
+from softstart.reporting.strategies import DOCUMENTED, ORDINARY
+from softstart.reporting.values import RPM, decimals_of, digits, fixed, listed, short, unit
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
     from softstart.reporting.result import Report
     from softstart.reporting.sheet import Setting, Sheet
 
-RAMPS = ("ramp", "s-curve")
+EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
 
 
 def sheet_section(report: Report) -> Html:
@@ -47,7 +48,9 @@ def _sheet(sheet: Sheet, report: Report) -> Html:
         tag("h3", f"{sheet.name} ({role})"),
         table(
             heads, rows, caption=f"Parameter sheet: {sheet.name}", text_columns=(0, 1, 3, 4), class_="sheet"
-        ),
+        )
+        if rows
+        else tag("p", "This strategy has no parameters."),
         _outcome(sheet),
         tag("ul", joined(tag("li", one) for one in _notes(sheet, drive)), class_="notes"),
         class_="sheet",
@@ -70,7 +73,7 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
         rated, meant = rated_torque(drive)
         share = step and 100.0 * step / rated
         other = f"{_multiple(100.0 * value / rated, share)} % of the {meant}"
-    text = digits(value) if one.unit == "N*m" and step and decimals_of(step) > 3 else _multiple(value, step)
+    text = _multiple(value, step)
     kept = "" if one.step is not None else " (not rounded)" if one.name != "period" else "at most"
     if one.name == "period":
         return [name, one.meaning + " of the control code", f"≤ {short(value)}", shown, "", short(value)]
@@ -78,12 +81,22 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
 
 
 def _multiple(value: float | None, step: float | None) -> str:
-    """A multiple of a step with the decimals that show it."""
+    """A multiple of a step: all its decimals if the step is a short decimal, else those that tell it apart.
+
+    >>> _multiple(62.0, 0.5), _multiple(34.5683, 0.0238732), _multiple(123.4567, 0.0238732)
+    ('62.0', '34.57', '123.46')
+    """
     assert value is not None
-    if step is None:
+    if not step:
         return short(value)
     step = float(f"{step:.9g}")
-    return fixed(value, decimals_of(step)) if decimals_of(step) <= 6 else digits(value)
+    if decimals_of(step) <= 6 and step == float(f"{step:.4g}"):
+        return fixed(value, decimals_of(step))
+    order = math.floor(math.log10(abs(value))) if value else 0
+    if not -4 <= order <= 6:
+        return digits(value, 7)
+    enough = max(math.ceil(-math.log10(step)), 3 - order, 0)
+    return fixed(value, min(enough, max(6 - order, 0)))
 
 
 def _outcome(sheet: Sheet) -> Html:
@@ -108,12 +121,22 @@ def _outcome(sheet: Sheet) -> Html:
 
 
 def _limits(sheet: Sheet, drive: Drive) -> str:
-    """The torque limits that leave this start as it is."""
+    """The torque limits that leave this start as it is, in steps of the inverter."""
     run = sheet.rounded or sheet.exact
     rated, meant = rated_torque(drive)
     low, high = min(float(np.min(run.u)), 0.0), float(np.max(run.u))
-    said = [f"{digits(v)} N m ({fixed(100.0 * v / rated, 1)} % of the {meant})" for v in (high, low) if v]
-    return f"Torque limits of the inverter, not tighter than what this start takes: {' and '.join(said)}."
+    step = sheet.torque_step
+    said = []
+    for torque in (high, low):
+        if torque:
+            limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
+            share = _multiple(100.0 * limit / rated, 100.0 * step / rated)
+            said.append(f"{_multiple(limit, step)} N m ({share} % of the {meant})")
+    current = " A limit of the torque-producing current: the same percentages." if meant[0] == "r" else ""
+    return (
+        f"Torque limits of the inverter, not tighter than what this start takes: {' and '.join(said)}."
+        f"{current}"
+    )
 
 
 def _notes(sheet: Sheet, drive: Drive) -> list[str]:
@@ -127,30 +150,41 @@ def _notes(sheet: Sheet, drive: Drive) -> list[str]:
     coarse = [one.name.replace("_", " ") for one in sheet.settings if one.coarse]
     if coarse:
         notes.append(f"The steps are coarse against {', '.join(coarse)}: look for a finer setting.")
-    values = {one.name: one.rounded for one in sheet.settings}
-    if sheet.kind in RAMPS:
-        low, high, time = (float(values[key]) for key in ("initial", "full_torque", "time"))
+    if sheet.kind in ORDINARY:
+        return notes + _on_ramps(sheet, drive)
+    if sheet.kind != "direct":
+        notes.append(_on_code(sheet, drive))
+    return notes
+
+
+def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
+    """The same rise as inverters ask for it."""
+    notes = []
+    if rise := sheet.full_rise:
         rated, meant = rated_torque(drive)
-        if high > low and time > 0.0:
-            rate = (high - low) / time
-            notes.append(
-                f"Some inverters ask for the time of a ramp from 0 to 100 % of torque "
-                f"({short(float(f'{rated:.4g}'))} "
-                f"N m, the {meant}): that is {digits(1e3 * rated / rate)} ms, a mean rise of "
-                f"{digits(rate)} N m/s."
-            )
-        if sheet.kind == "s-curve":
-            share = float(values["rounding"])
-            notes.append(
-                f"S-curve share {short(100.0 * share)} %: rounded ends of {digits(500.0 * share * time)} "
-                f"ms each at the "
-                "beginning and at the end of the rise."
-            )
-    elif sheet.kind != "direct":
-        known = ["J1", "J2", "c"] + (["d"] if drive.d else []) + ["Mc"]
         notes.append(
-            "The strategy is code of its own (equations: docs/controllers.md of softstart); it also "
-            "computes with "
-            f"{', '.join(known)} and the torque lag from the data of the drive."
+            f"Some inverters ask for the time of a ramp from 0 to 100 % of torque "
+            f"({short(float(f'{rated:.4g}'))} N m, the {meant}): that is {digits(1e3 * rise.exact)} ms, a "
+            f"mean rise of {digits(rated / rise.exact)} N m/s. Set to {short(1e3 * rise.rounded)} ms the "
+            f"rise takes {digits(1e3 * rise.rise)} ms, K_dyn is {fixed(rise.run.k_dyn, 4)} and the start "
+            f"time {digits(rise.run.start_time, 5)} s."
+        )
+    if sheet.kind == "s-curve":
+        values = {one.name: one.rounded for one in sheet.settings}
+        share, time = float(values["rounding"]), float(values["time"])
+        notes.append(
+            f"S-curve share {short(100.0 * share)} %: rounded ends of {digits(500.0 * share * time)} ms each "
+            "at the beginning and at the end of the rise."
         )
     return notes
+
+
+def _on_code(sheet: Sheet, drive: Drive) -> str:
+    """What an inverter must run and know for a strategy that is a program."""
+    said = "The strategy is code of its own"
+    if sheet.kind in DOCUMENTED:
+        said += " (equations: docs/controllers.md of softstart)"
+    if sheet.computes_with:
+        whose = "the drive" if sheet.own == drive else "the drive that its gains were tuned for"
+        said += f"; beside the sheet it computes with {listed(list(sheet.computes_with))} of {whose}"
+    return said + "."

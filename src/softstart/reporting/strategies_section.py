@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from softstart import metrics
 from softstart.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.pictures import traces_figure
 from softstart.reporting.strategies import label_of
-from softstart.reporting.values import digits, fixed, percent, short
+from softstart.reporting.values import digits, fixed, listed, percent, short
 
 if TYPE_CHECKING:
     from softstart.comparison import Row
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from softstart.reporting.result import Report
 
 AT_ONCE = 5  # strategies in one figure of traces: what a page holds
-LATE = 1.6  # times the start of direct, up to which traces are shown
+LATE = 1.6  # times the median start time, up to which traces are shown
 
 
 def ordered(report: Report) -> list[Row]:
@@ -34,15 +36,17 @@ def strategies_section(report: Report) -> Html:
     rows, choice = ordered(report), report.choice
     chosen = [one for one in (choice.recommended, choice.ordinary) if one is not None]
     cells, needs = [], []
+    hard = report.row("direct")
+    direct = hard.run.start_time if hard else math.nan
     for row in rows:
         run, name = row.run, label_of(row.run.controller)
         candidate = choice.of(name)
         assert candidate is not None
-        lost = row.time_lost
+        lost = run.start_time - direct
         cells.append([
             name, fixed(run.k_dyn, 3), fixed(row.k_dyn_worn_gap, 3), fixed(row.k_dyn_light_load, 3),
             digits(run.peak_torque), digits(run.start_time), fixed(lost, _decimals(run.start_time)),
-            fixed(100.0 * lost / (run.start_time - lost), 1), str(run.contacts),
+            fixed(100.0 * lost / direct, 1), str(run.contacts),
         ])  # fmt: skip
         what = run.controller.summary
         needs.append([name, what, candidate.means.measures, candidate.means.inverter])
@@ -69,7 +73,7 @@ def strategies_section(report: Report) -> Html:
             "strategy", "K_dyn", f"K_dyn, gap × {short(WORN_GAP)}", f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
             "peak torque, N m", "start time, s", "time lost, s", "time lost, %", "contacts",
         ],
-        cells, caption="Strategies on this drive, the gentlest first", strong=strong,
+        cells, caption="Strategies on this drive, the gentlest first", strong=strong, class_="names",
     )  # fmt: skip
     second = table(
         ["strategy", "what it does", "what it measures", "can an ordinary inverter do it?"], needs,
@@ -83,8 +87,11 @@ def traces_section(report: Report, figures: Figures) -> Html:
     runs = [row.run for row in ordered(report)]
     times = [run.start_time for run in runs if not math.isnan(run.start_time)]
     ends = [run.end_time for run in runs if not math.isnan(run.start_time)]
-    shown = min(max(ends), LATE * min(times)) if times else max(run.end_time for run in runs)
+    shown = min(max(ends), LATE * float(np.median(times))) if times else max(run.end_time for run in runs)
+    late = [label_of(run.controller) for run in runs if run.start_time > shown]
+    cut = f" The start of {listed(late)} goes on beyond the {digits(shown)} s shown." if late else ""
     highest = max(float(max(run.peak_torque, run.u.max())) for run in runs)
+    lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
     parts = []
     pieces = -(-len(runs) // AT_ONCE)
     size = -(-len(runs) // pieces)
@@ -96,7 +103,7 @@ def traces_section(report: Report, figures: Figures) -> Html:
             f"with the "
             "gap open, even with the gap closed. Dot: the peak. Dotted: target speed and start time. All "
             "torques "
-            "have one scale."
+            f"have one scale.{cut}"
         )
         title = "; ".join(
             f"{label_of(run.controller)}: peak shaft torque {digits(run.peak_torque)} N m, start time "
@@ -104,7 +111,7 @@ def traces_section(report: Report, figures: Figures) -> Html:
             for run in some
         )
         parts.append(
-            figures.drawn(traces_figure(some, shown, highest), f"Traces over time. {title}.", caption)
+            figures.drawn(traces_figure(some, shown, lowest, highest), f"Traces over time. {title}.", caption)
         )
     return html(*parts)
 
@@ -119,4 +126,5 @@ def _decimals(start_time: float) -> int:
 def share_saved(report: Report, row: Row) -> str:
     """What a strategy saves of the peak of direct."""
     direct = report.row("direct")
-    return percent(1.0 - row.run.peak_torque / direct.run.peak_torque, 0) if direct else ""
+    saved = 1.0 - row.run.peak_torque / direct.run.peak_torque if direct else math.nan
+    return percent(saved, 0 if abs(saved) >= 0.1 else 1)

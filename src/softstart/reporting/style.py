@@ -35,6 +35,7 @@ th, td { padding: .28rem .55rem; border-bottom: 1px solid #dde2e6; vertical-alig
 thead th { border-bottom: 1.5px solid #5a6570; vertical-align: bottom; font-weight: 600; line-height: 1.25; }
 .number { text-align: right; white-space: nowrap; }
 thead .number { white-space: normal; }
+table.names tbody th { min-width: 11.5em; }
 tr.strong th, tr.strong td { font-weight: 700; background: #eef5fa; }
 table.words td { font-size: .95em; }
 ul.notes { font-size: .88rem; color: #3a434b; padding-left: 1.2rem; }
@@ -55,10 +56,11 @@ pre { background: #f5f6f7; border: 1px solid #dde2e6; padding: .7rem .9rem; font
 @media print {
   html, body { background: #fff; font-size: 9.6pt; }
   main { max-width: none; margin: 0; padding: 0 1px; box-shadow: none; }
-  h2 { margin-top: 7mm; } h1, h2, h3, caption { break-after: avoid; }
-  figure, tr, .answer, .tiles, nav, section.sheet > .wide { break-inside: avoid; }
+  h2 { margin-top: 7mm; } h1, h2, h3, caption, .lead { break-after: avoid; }
+  figure, tr, .answer, .tiles, nav, section.sheet > .wide, pre { break-inside: avoid; }
   .page { break-before: page; } .page > h2 { margin-top: 0; }
   section.sheet ul { break-before: avoid; }
+  ul.notes { break-inside: avoid; }
   p, ul, figcaption { max-width: none; orphans: 3; widows: 3; }
   thead { display: table-header-group; } .wide { overflow: visible; }
   a { color: inherit; text-decoration: none; }

@@ -1,6 +1,7 @@
 """`softstart report`: the file is written whole or not at all, and bad input is told at once."""
 
 import json
+import os
 
 import pytest
 
@@ -53,6 +54,15 @@ def test_numbers_for_people_without_a_file_are_refused_and_all_mistakes_told(run
         assert words in err
     assert "5 things are wrong" in err
     nothing_left()
+
+
+def test_a_pipe_or_device_is_not_replaced(run, place):
+    pipe = place / "pipe"
+    os.mkfifo(pipe)
+    code, out, err = run("report", "good.toml", *CHEAP, "--out", "pipe")
+    assert (code, out) == (2, "")
+    assert "no ordinary file" in err
+    assert pipe.is_fifo()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from softstart import Command, Drive, PlainController, simulate
 from softstart.reporting import report
 from softstart.reporting.answer import answer
 from softstart.reporting.choice import choose
+from softstart.reporting.choice_section import choice_section
 from softstart.reporting.figure_list import Figures
 from softstart.reporting.limit import bound_at
 from softstart.reporting.limit_section import limit_section
@@ -59,6 +61,25 @@ def test_rule(hostile):
     assert strict.recommended.name == "direct"
     assert strict.too_slow
     assert strict.ordinary.name == choice.ordinary.name
+
+
+def test_direct_start_is_not_praised_where_gentler_ones_are_only_too_slow(hostile):
+    """With next to no time to lose the rule leaves direct start, which is not as good as the others."""
+    maps = [one.map for one in hostile.choice.candidates]
+    strict = replace(hostile, choice=choose(hostile.comparison.rows, maps, 0.0125))
+    said = answer(strict)
+    assert strict.choice.recommended.name == "direct"
+    assert "brings nothing" not in said
+    assert "shaped (K_dyn 1.004, 5.2 % slower)" in said
+    more = "with --slower 6% the rule takes shaped, K_dyn 1.004 after 0.3928 s."
+    assert said.partition(" On an")[0].endswith(f"A slower start is much gentler: {more}")
+    assert more not in answer(hostile)
+    assert choose(hostile.comparison.rows, maps, 0.06).recommended.name == "shaped"
+    assert "s-curve is the best: K_dyn 1.879" in said
+    assert "7.6\N{NO-BREAK SPACE}% slower than direct" in said
+    assert "at most 1.25\N{NO-BREAK SPACE}% slower than direct" in choice_section(strict)
+    alone = replace(hostile, choice=choose(hostile.comparison.rows[:1], maps[:1]))
+    assert answer(alone).startswith("Only direct start was examined")
 
 
 def test_a_drive_for_which_nothing_can_be_recommended():

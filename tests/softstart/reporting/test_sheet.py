@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from fractions import Fraction
 
 import pytest
@@ -10,9 +11,12 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
+from softstart.controller.tuned import RobustGains
 from softstart.reporting import Resolution, report
+from softstart.reporting.answer import answer
 from softstart.reporting.resolution import nearest_step, rated_torque
 from softstart.reporting.sheet import make_sheet
+from softstart.reporting.sheet_section import _limits, _multiple, _notes
 
 
 def sheet_of(name, steps, **parameters):
@@ -69,8 +73,6 @@ def test_finer_steps_bring_the_exact_figures_back():
 
 
 def test_gains_tuned_for_another_drive_keep_its_numbers():
-    from softstart.controller.tuned import RobustGains
-
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     light = crane.replace(load_inertia=0.07)
     gains = RobustGains("mine", make_controller("shaped"), light)
@@ -122,6 +124,8 @@ def test_nearest_step(value, step, most):
         "torque=0%": "above 0",
         "torque=nan%": "not a number",
         "speed=50 Hz": "frequency",
+        "frequency=0.1 kHz": 'no frequency in Hz; write "0.1 Hz"',
+        "frequency=1 rad/s": "no frequency in Hz",
         "time=inf": "finite",
         "time": "write keys and values",
         "": "write keys and values",
@@ -148,6 +152,85 @@ def test_all_mistakes_at_once():
     assert len(caught.value.sentences) == 3
     with pytest.raises(InputError, match="step is a number above 0"):
         Resolution(time=0.0)
+
+
+def test_a_value_of_nothing_is_not_called_coarse():
+    drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, load_torque=0.0)
+    ramp = make_controller("ramp")
+    sheet = make_sheet(drive, ramp, simulate(drive, ramp), Resolution())
+    initial = next(one for one in sheet.settings if one.name == "initial")
+    assert initial.exact == initial.rounded == 0.0
+    assert not initial.coarse
+
+
+@pytest.mark.parametrize("name", ["ramp", "s-curve"])
+def test_the_time_from_0_to_100_percent_is_rounded_and_started_too(name):
+    drive, sheet = sheet_of(name, "time=5ms")
+    values = {one.name: one.rounded for one in sheet.settings}
+    share = (values["full_torque"] - values["initial"]) / rated_torque(drive)[0]
+    rise = sheet.full_rise
+    assert rise.exact * share == pytest.approx(values["time"], rel=1e-12)
+    assert rise.rounded == pytest.approx(0.05, abs=1e-12)  # 48.8 ms
+    assert rise.rise == pytest.approx(rise.rounded * share, rel=1e-12)
+    again = simulate(drive, name, parameters={**values, "time": rise.rise})
+    assert (rise.run.k_dyn, rise.run.start_time) == (again.k_dyn, again.start_time)
+    notes = " ".join(_notes(sheet, drive))
+    assert f"Set to 50 ms the rise takes {1e3 * rise.rise:.1f} ms, K_dyn is {again.k_dyn:.4f}" in notes
+
+
+def test_torque_limits_are_multiples_that_leave_the_start_alone():
+    """Printed limits may be a little wide, never tight: pulse-coast-hold takes the whole of Ms."""
+    drive, sheet = sheet_of("pulse-coast-hold", "torque=0.5%")
+    high = float(sheet.rounded.u.max())
+    said = re.search(r"takes: ([\d.]+) N m \(([\d.]+) % of the rated torque\)", _limits(sheet, drive))
+    limit, share = float(said[1]), float(said[2])
+    step = 0.005 * rated_torque(drive)[0]
+    assert high <= limit <= high + step
+    assert share / 0.5 == pytest.approx(round(share / 0.5), abs=1e-9)
+    assert limit == pytest.approx(share / 100.0 * rated_torque(drive)[0], abs=5e-3)
+
+
+def test_printed_values_tell_one_step_from_the_next():
+    assert _multiple(62.0 + 2.0 * 0.0238732, 0.0238732) != _multiple(62.0 + 3.0 * 0.0238732, 0.0238732)
+    assert float(_multiple(250.28, 0.0238732)) == pytest.approx(250.28, abs=0.5 * 0.0238732)
+    assert _multiple(209.43951023931953, 209.43951023931953) == "209.4"
+    assert _multiple(0.0, 0.0238732) == "0.000"
+    assert _multiple(34.58, 1e-9) == "34.58000"
+
+
+@pytest.mark.parametrize("name", ["pulse-coast-hold", "shaped", "acceleration-delay"])
+def test_what_a_strategy_computes_with_is_what_changes_its_start(name):
+    """Data that are not named may be wrong: set up for a drive with other ones, it runs the same."""
+    drive, sheet = sheet_of(name, "time=1ms")
+    values = {one.name: one.exact for one in sheet.settings}
+    assert set(sheet.computes_with) <= {"J1", "J2", "c", "Ms", "Mc", "the torque lag"}
+    for key, symbol in (
+        ("load_inertia", "J2"),
+        ("stiffness", "c"),
+        ("gap", "the gap"),
+        ("load_torque", "Mc"),
+    ):
+        believed = drive.replace(**{key: 0.9 * getattr(drive, key)})
+        run = simulate(drive, name, parameters=values, fitted_to=believed)
+        if symbol not in sheet.computes_with:
+            assert run.k_dyn == sheet.exact.k_dyn
+
+
+def test_answer_says_what_coarse_steps_do():
+    made = report("crane-4amtkf", controllers=["direct", "s-curve"], resolution="torque=50", budget=0.0)
+    rounded = made.sheets[0].rounded
+    assert rounded.k_dyn > 1.05 * made.choice.recommended.row.run.k_dyn
+    assert f"rounded to the steps given, they make it K_dyn {rounded.k_dyn:.3f}" in answer(made)
+    made = report("crane-4amtkf", controllers=["direct", "s-curve"], resolution="share=300%", budget=0.0)
+    assert made.sheets[0].rounded is None
+    assert "its values cannot be set in the steps given" in answer(made)
+
+
+def test_two_gains_of_one_name_are_refused():
+    crane = Drive.load("crane-4amtkf")
+    two = [RobustGains("mine", make_controller("ramp", {"time": t}), crane) for t in (0.1, 0.2)]
+    with pytest.raises(InputError, match=r"two of them are called ramp \(mine\)"):
+        report(crane, controllers=two, budget=0.0)
 
 
 def test_the_worst_case_counts_the_rounded_values_themselves():

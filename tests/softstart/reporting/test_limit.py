@@ -1,0 +1,107 @@
+"""What the report says of the limit: what is proved, against which starts, and what is only known."""
+
+import json
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+
+from softstart import Drive, simulate
+from softstart.optimal.front_points import FrontPoint
+from softstart.reporting import report
+from softstart.reporting.answer import answer
+from softstart.reporting.figure_list import Figures
+from softstart.reporting.known import known_starts
+from softstart.reporting.limit import bound_at
+from softstart.reporting.limit_section import limit_section
+from softstart.reporting.limit_worker import work
+
+from .test_page import Page, rows_of
+
+LAGGING = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.002)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"torque_lag": 0.003, "load_kind": "reactive", "damping": 0.5},
+        {"minimum_torque": -62.0, "torque_rate": 2000.0},
+        {"gap": 0.0, "load_torque": 0.0},
+    ],
+)
+def test_known_starts_are_possible_and_near_the_bound(change):
+    drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, **change)
+    direct = simulate(drive, "direct").start_time
+    (found,) = known_starts(drive, [1.2 * direct], 60.0)
+    assert found.start_time <= found.start_time_bound == 1.2 * direct
+    bound = bound_at(drive, 1.2 * direct)
+    assert bound <= found.k_dyn <= 1.15 * bound  # the bound knows nothing of lag and rate
+
+
+def test_known_starts_are_repeatable_and_fall_with_the_start_time():
+    drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    found = known_starts(drive, [0.30, 0.29, 0.34], 60.0)
+    assert [one.start_time_bound for one in found] == [0.29, 0.30, 0.34]
+    assert [one.k_dyn for one in found] == sorted((one.k_dyn for one in found), reverse=True)
+    assert known_starts(drive, [0.30, 0.29, 0.34], 60.0) == found
+    assert known_starts(drive, [0.30], 0.0) == []
+
+
+def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypatch):
+    monkeypatch.setattr("softstart.reporting.limit._in_own_process", lambda *_: [])
+    monkeypatch.setattr("softstart.reporting.limit.SHARES", ())
+    made = report(LAGGING, controllers=["direct", "shaped"], budget=30.0)
+    best = made.choice.recommended
+    bound, known, own = made.lower_bound(best.row), made.gentlest_known(best.row), best.row.run.k_dyn
+    assert bound < known < own
+    page = Page(limit_section(made, Figures()))
+    said = "".join(page.text)
+    assert f"between {bound:.3f} (proved) and {known:.3f} (found): {best.name} with {own:.3f}" in said
+    assert "not known to be the gentlest" in said
+    assert "start found: possible, not proved best" not in said  # in the figure letters are paths
+    row = rows_of(page, "times the bound")[best.name]
+    assert float(row["gentlest start known in that time"]) == pytest.approx(known, abs=5e-4)
+    assert float(row["times the bound"]) == pytest.approx(own / bound, abs=5e-3)
+    assert "optimum at that time" not in row
+    assert "; the gentlest start known has" in answer(made)
+    assert made.summary()["k_dyn_gentlest_known"] == known
+    assert [one["k_dyn"] for one in made.summary()["limit"]["known_starts"]]
+
+
+def test_without_a_search_nothing_else_is_claimed():
+    made = report(LAGGING, controllers=["direct", "shaped"], budget=0.0)
+    said = limit_section(made, Figures())
+    assert "none was looked for (--budget 0)" in said
+    assert "the gentlest start known" in said
+    assert made.limit.known == ()
+
+
+def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostile):
+    """Direct start bounces: a bound that covers single contacts says nothing of it."""
+    direct = hostile.row("direct").run
+    single = FrontPoint(
+        direct.start_time, "reached", "OPTIMAL", "", k_dyn=1.3363, k_dyn_lower_bound=1.3356,
+        bound_kind="certificate",
+    )  # fmt: skip
+    points = (*hostile.limit.found, single)
+    page = Page(limit_section(replace(hostile, limit=replace(hostile.limit, points=points)), Figures()))
+    said = "".join(page.text)
+    assert f"{len(points) - 1} of {len(points)} optima are certified against every other start" in said
+    assert "That at 0.3735 s is certified among starts whose gap closes only once" in said
+    assert "is not ruled out" in said
+    row = rows_of(page, "times the bound")["direct"]
+    assert row["optimum at that time"] == "1.336"
+    assert float(row["times the bound"]) == pytest.approx(
+        direct.k_dyn / bound_at(hostile.drive, direct.start_time), abs=5e-3
+    )
+
+
+def test_a_drive_of_no_class_that_is_solved_is_an_answer_not_a_crash():
+    drive = LAGGING.replace(load_kind="reactive", contact_law="modelica", damping=1.0)
+    out = StringIO()
+    task = {"drive": drive.to_toml(), "start_times": [0.3, 0.4], "terminal": "reached"}
+    work(json.dumps(task), out)
+    points = [FrontPoint.of_record(json.loads(line)) for line in out.getvalue().splitlines()]
+    assert [p.status for p in points] == ["NOT_FOUND", "NOT_FOUND"]
+    assert "modelica" in points[0].status_text
