@@ -23,6 +23,9 @@ from softstart.units import RefusedError, nearest, parse, show
 
 __all__ = ["REQUIRED", "Field", "Table", "read_document", "read_table", "text_of"]
 
+# beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
+LEAST, MOST = 1e-30, 1e30
+
 
 class _Required:
     def __repr__(self) -> str:
@@ -66,8 +69,8 @@ class Table:
     required: bool = True
 
 
-def text_of(path: str | os.PathLike[str], what: str) -> str:
-    """The text of a file, or an InputError in one sentence that names it.
+def text_of(path: str | os.PathLike[str], what: str, form: str = "TOML") -> str:
+    """The text of a file, or an InputError in one sentence that names it; `form` is that of the file.
 
     >>> text_of("nowhere.toml", "a chain file")
     Traceback (most recent call last):
@@ -77,13 +80,13 @@ def text_of(path: str | os.PathLike[str], what: str) -> str:
     try:
         return file.read_text("utf-8")
     except FileNotFoundError:
-        reason = f"there is no such file; give the path of {what} (TOML)"
+        reason = f"there is no such file; give the path of {what} ({form})"
     except IsADirectoryError:
-        reason = f"this is a folder; give the path of {what} (TOML)"
+        reason = f"this is a folder; give the path of {what} ({form})"
     except UnicodeDecodeError:
-        reason = f"this file is no UTF-8 text; give the path of {what} (TOML)"
+        reason = f"this file is no UTF-8 text; give the path of {what} ({form})"
     except OSError as error:
-        reason = f"the file cannot be read ({error.strerror or error}); give the path of {what} (TOML)"
+        reason = f"the file cannot be read ({error.strerror or error}); give the path of {what} ({form})"
     raise InputError(f"{show(str(path))}: {reason}.")
 
 
@@ -287,11 +290,22 @@ def _value(field: Field, value: object) -> Any:
             raise RefusedError(f"the {field.meaning} is one list of numbers, such as {field.example}")
     elif np.ndim(number) != 0:
         raise RefusedError(f"the {field.meaning} is one number, not a list")
-    allowed = np.asarray(LIMITS[field.limit](np.asarray(number)))
-    if not allowed.all():
-        reason = f"the {field.meaning} must be {field.limit}"
-        if isinstance(number, float):
-            raise RefusedError(reason)
-        index = tuple(int(i) for i in np.argwhere(~allowed)[0])
-        raise RefusedError(reason, float(number[index]), index)
+    values = np.asarray(number)
+    _refuse(number, LIMITS[field.limit](values), f"the {field.meaning} must be {field.limit}")
+    beyond = np.isfinite(values) & (np.abs(values) > MOST)
+    if field.limit == "above 0":
+        beyond |= values < LEAST
+    size = f"its size in {field.unit}" if field.unit != "1" else "it"
+    _refuse(number, ~beyond, f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit")
     return number
+
+
+def _refuse(number: Any, allowed: Any, reason: str) -> None:
+    """Raise for the first value of a number or list that is not allowed."""
+    allowed = np.asarray(allowed)
+    if allowed.all():
+        return
+    if isinstance(number, float):
+        raise RefusedError(reason)
+    index = tuple(int(i) for i in np.argwhere(~allowed)[0])
+    raise RefusedError(reason, float(number[index]), index)

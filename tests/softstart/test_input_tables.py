@@ -74,6 +74,9 @@ def test_everything_that_is_wrong_is_told_at_once():
         (GOOD.replace("inertia = 0.2", ""), 'needed; write for example inertia = "0.1 kg*m^2"'),
         (GOOD + "[law]\ntimes = [0, -1]", "times[1] = -1.0: the instants of the table must be 0 or more"),
         ("law = 3" + GOOD, "this is one table; write [law] on a line of its own"),
+        (GOOD.replace("0.2", "1e31"), "its size in kg*m^2 must be between 1e-30 and 1e+30; check number"),
+        (GOOD.replace("0.2", "1e-300"), "inertia = 1e-300: its size in kg*m^2 must be between 1e-30"),
+        (GOOD + "[law]\ntimes = [0, 1e-40, 1e40]", "times[2] = 1e+40: its size in s must be between"),
     ],
 )  # fmt: skip
 def test_each_mistake_has_its_sentence(text, said):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, forced_response, natural_vibration, reduce_chain
@@ -14,6 +15,7 @@ from softstart.chain.simulation import simulate_chain
 from softstart.study import Verdict, study_names
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables
 from softstart_studies.paper_r.motion import moved, released
+from softstart_studies.paper_r.pictures import map_figure
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -196,3 +198,13 @@ def test_the_public_forced_response_agrees_with_the_study() -> None:
         assert np.degrees(found.amplitude[0, 0]) == pytest.approx(
             locked._amplitude(chain, w, constant, 6 * 50.8), rel=5e-4
         )
+
+
+def test_the_error_map_draws_its_lines_whole_but_for_their_labels() -> None:
+    """On logarithmic axes: no label cuts more than half a decade out of its line."""
+    figure = map_figure(four_to_two.error_map())
+    lines = [line for line in figure.axes[0].collections if isinstance(line, QuadContourSet)]
+    assert len(lines) == 2
+    for path in (path for line in lines for path in line.get_paths() if path.vertices.size):
+        x = np.sort(np.log10(path.vertices[:, 0]))
+        assert np.diff(x).max() < 0.5

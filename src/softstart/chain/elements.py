@@ -12,7 +12,7 @@ from softstart.drive.parameters import ContactLaw, LoadKind
 from softstart.errors import InputError
 from softstart.input_tables import read_table
 
-__all__ = ["Mass", "Motor", "Quantity", "Shaft", "Side", "gap_of", "shaft_mistakes"]
+__all__ = ["Mass", "Motor", "Quantity", "Shaft", "Side", "gap_of", "mass_mistakes", "shaft_mistakes"]
 
 Quantity = float | str  # a number in SI, or a string with a unit
 Side = Literal["before", "after"]
@@ -48,7 +48,11 @@ class Mass:
     ) -> None:
         given = {"inertia": inertia, "damping": damping, "torque": torque, "kind": kind}
         given |= {"initial_speed": initial_speed} | ({"name": name} if name else {})
-        _fill(self, read_table(given, MASS))
+        values = read_table(given, MASS)
+        wrong = mass_mistakes(values)
+        if wrong:
+            raise InputError(wrong)
+        _fill(self, values)
 
 
 @dataclass(frozen=True, init=False)
@@ -234,6 +238,16 @@ def shaft_mistakes(values: Mapping[str, Any]) -> list[str]:
             f"between {-0.5 * gap!r} and {0.5 * gap!r}."
         )
     return wrong
+
+
+def mass_mistakes(values: Mapping[str, Any]) -> list[str]:
+    """What the values of a mass, each right in itself, say against one another."""
+    if values["kind"] == "reactive" and values["torque"] < 0.0:
+        return [
+            f"torque = {values['torque']!r}: a reactive load torque is friction and must be 0 or more; write "
+            'its size, or kind "active".'
+        ]
+    return []
 
 
 def motor_mistakes(values: Mapping[str, Any]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from softstart.chain import kernel_layout as at
-from softstart.chain.kernel_gears import add_grip, turning
+from softstart.chain.kernel_gears import body_grip, turning
 from softstart.chain.kernel_layout import (
     BEYOND,
     BODY_J,
@@ -206,7 +206,8 @@ def friction(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix, series
         for which in range(2):
             line_of(f, series, HELD, i, n, mass[i, HOLD], -1.0 + 2.0 * which)
             if geared:
-                add_grip(shafts, mass, shaft, series, f, i, 1.0 - 2.0 * which, n)
+                for o in range(n + 1):
+                    f[o] += body_grip(shafts, mass, shaft, series, i, 1.0 - 2.0 * which, o)
             s = first_root(f, n, end, 0, noise, noise)
             if s < NONE:
                 return at.UNSOLVED, 0.0

@@ -24,10 +24,14 @@ from softstart.chain.kernel_layout import (
     GEAR,
     GEARS,
     HALF,
+    HOLD,
     MASK,
+    MC,
     MODE,
+    RUBBING,
     SIGN,
     TORQUE,
+    USED,
     Cube,
     Matrix,
     Vector,
@@ -61,19 +65,47 @@ def set_gears(shafts: Matrix, mass: Matrix, shaft: Matrix) -> None:
 
 
 @compiled
-def add_grip(
-    shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, f: Vector, i: int, direction: float, n: int
-) -> None:
-    """Add to f the friction of the gears of the body that begins with mass i, were it to move so."""
-    for k in range(shafts.shape[0]):
-        j = k + int(shafts[k, GEAR])
+def grip(shafts: Matrix, shaft: Matrix, series: Cube, j: int, direction: float, o: int) -> float:
+    """The coefficient of order o of the friction of the gears at mass j, were it to move so."""
+    total = 0.0
+    for k in range(max(j - 1, 0), min(j + 1, shafts.shape[0])):
         eta = shafts[k, ETA]
-        if eta == 1.0 or int(mass[j, FIRST]) != i:
+        if eta == 1.0 or k + int(shafts[k, GEAR]) != j:
             continue
         driven = shaft[k, SIGN] * direction if j > k else -shaft[k, SIGN] * direction
         share = (1.0 - eta if driven > 0.0 else 1.0 / eta - 1.0) * shaft[k, SIGN]
-        for o in range(n + 1):
-            f[o] += share * series[TORQUE, k, o]
+        total += share * series[TORQUE, k, o]
+    return total
+
+
+@compiled
+def body_grip(
+    shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, i: int, direction: float, o: int
+) -> float:
+    """The same of all gears of the body that begins with mass i."""
+    total = 0.0
+    for j in range(i, mass.shape[0]):
+        if int(mass[j, FIRST]) != i:
+            break
+        total += grip(shafts, shaft, series, j, direction, o)
+    return total
+
+
+@compiled
+def held_by(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, i: int, j: int,
+            held: float, o: int) -> float:  # fmt: skip
+    """What of `held`, the coefficient of order o of what holds the body i, falls to its mass j.
+
+    What each of several holds is not determined. None holds more than it can if each is used to the same
+    share at the beginning of the span, USED; from there on a gear goes with its torque, and reactive loads
+    take what is left.
+    """
+    used = mass[i, USED]
+    direction = 1.0 if used >= 0.0 else -1.0
+    of_gear = abs(used) * direction * grip(shafts, shaft, series, j, direction, o)
+    of_gears = abs(used) * direction * body_grip(shafts, mass, shaft, series, i, direction, o)
+    part = masses[j, MC] / mass[i, HOLD] if mass[i, HOLD] > 0.0 else 1.0 / mass[i, RUBBING]
+    return of_gear + (held - of_gears) * part
 
 
 @compiled

@@ -19,6 +19,10 @@ from softstart.plant.vector import COUNTS_PER_LINE, LAWS
 
 __all__ = ["Numbers", "elastic_period", "numbers"]
 
+SAME_SPEED = (
+    1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet at their own shafts
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
@@ -78,6 +82,9 @@ def numbers(
     beside = (masses[:, at.RUBS] != 0.0) & ~reactive
     masses[beside, at.ACTIVE], masses[beside, at.MC] = arrays.Mc[beside], 0.0
     masses[:, at.W_0] = arrays.w0
+    for k in range(count - 1):
+        if _welded(arrays, k):  # one body has one speed, not two that differ by rounding
+            masses[k + 1, at.W_0] = masses[k, at.W_0]
     shafts = np.zeros((count - 1, at.N_SHAFTS))
     shafts[:, at.C] = np.where(arrays.rigid, 0.0, arrays.c)
     shafts[:, at.D], shafts[:, at.HALF] = arrays.d, 0.5 * arrays.gap
@@ -93,6 +100,11 @@ def numbers(
     return Numbers(_motor(chain, arrays, time_limit, max_events), place, masses, shafts, tones)
 
 
+def _welded(arrays: ChainArrays, k: int) -> bool:
+    """Whether shaft k joins its masses rigidly, without a gap."""
+    return bool(arrays.rigid[k] and arrays.gap[k] == 0.0)
+
+
 def _refuse(chain: Chain, arrays: ChainArrays) -> None:
     wrong = []
     for k, shaft in enumerate(chain.shafts):
@@ -101,10 +113,11 @@ def _refuse(chain: Chain, arrays: ChainArrays) -> None:
                 f"[shaft] {k + 1}, efficiency = {shaft.efficiency}: the loss of a gear goes with the torque "
                 "of a spring, and this shaft is rigid; give it a stiffness, or leave the efficiency out."
             )
-        if arrays.rigid[k] and arrays.gap[k] == 0.0 and arrays.w0[k] != arrays.w0[k + 1]:
+        if _welded(arrays, k) and not math.isclose(arrays.w0[k], arrays.w0[k + 1], rel_tol=SAME_SPEED):
             wrong.append(
                 f"[shaft] {k + 1}: it is rigid, so the masses it joins start with one speed, and they have "
-                f"{arrays.w0[k]:.6g} and {arrays.w0[k + 1]:.6g} rad/s at the motor shaft."
+                f"{arrays.w0[k]:.12g} and {arrays.w0[k + 1]:.12g} rad/s at the motor shaft; give both the "
+                "same initial_speed, divided by the ratio."
             )
     if wrong:
         raise InputError(wrong)

@@ -36,9 +36,10 @@ N_PLACES: Final = 5
 
 # mass[i]: the state. DIRECTION: 0 stuck, +1 or -1 the sign of the speed that friction opposes (+1 always
 # where nothing rubs). A body is what moves as one: FIRST is its first mass, where the others are found;
-# RUBBING and GEARS count its masses on which friction acts and its gears with losses.
-W, DIRECTION, FIRST, BODY_J, HOLD, STUCK, SIZE, INFLUENCE, RUBBING, GEARS = range(10)
-N_MASS: Final = 10
+# RUBBING and GEARS count its masses on which friction acts and its gears with losses; USED is the share of
+# what can hold it that holds it at the beginning of a span, with the sign of what it is held against.
+W, DIRECTION, FIRST, BODY_J, HOLD, STUCK, SIZE, INFLUENCE, RUBBING, GEARS, USED = range(11)
+N_MASS: Final = 11
 # shaft[k]: the state. MASK: how many leading coefficients of the event just fired are zero by its nature;
 # STRUCK: the time of the last impact, BLOWS: how many were at that very instant; SIGN: of the torque, BEFORE
 # and AFTER: the share of it that acts on the mass before and after, not 1 where its gear has losses

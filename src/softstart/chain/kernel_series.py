@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.chain.kernel_gears import set_gears
+from softstart.chain.kernel_gears import body_grip, held_by, set_gears
 from softstart.chain.kernel_layout import (
     ACTIVE,
     AFTER,
@@ -51,6 +51,7 @@ from softstart.chain.kernel_layout import (
     TORQUE,
     TWIST,
     U_LINE,
+    USED,
     WELDED,
     C,
     Cube,
@@ -248,6 +249,10 @@ def expand(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaft
                     size += shaft[i - 1, AFTER] * abs(series[TORQUE, i - 1, 0])
                 if last + 1 < count:
                     size += shaft[last, BEFORE] * abs(series[TORQUE, last, 0])
+                if stuck:
+                    direction = 1.0 if held >= 0.0 else -1.0
+                    most = mass[i, HOLD] + body_grip(shafts, mass, shaft, series, i, direction, 0)
+                    mass[i, USED] = held / most if most > 0.0 else 0.0
                 mass[i, SIZE] = size
                 mass[i, INFLUENCE] = size / mass[i, BODY_J]
             for j in range(i, last + 1):
@@ -255,11 +260,7 @@ def expand(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaft
                 if j < last:  # the joint carries what the masses before it leave
                     carried = series[OUTSIDE, j, o] - masses[j, J] * rise
                     if stuck and masses[j, RUBS] != 0.0:
-                        # what each of several holds is not determined: in proportion, or, with gears, alike
-                        if mass[i, GEARS] == 0.0:
-                            carried -= held * masses[j, MC] / mass[i, HOLD]
-                        else:
-                            carried -= held / mass[i, RUBBING]
+                        carried -= held_by(masses, shafts, mass, shaft, series, i, j, held, o)
                     if j > 0:
                         carried += shaft[j - 1, AFTER] * series[TORQUE, j - 1, o]
                     series[TORQUE, j, o] = carried

@@ -15,7 +15,15 @@ from typing import Any, Self, cast
 
 from softstart.chain import files
 from softstart.chain.arrays import ChainArrays, arrays_at
-from softstart.chain.elements import Mass, Motor, Quantity, Shaft, motor_mistakes, shaft_mistakes
+from softstart.chain.elements import (
+    Mass,
+    Motor,
+    Quantity,
+    Shaft,
+    mass_mistakes,
+    motor_mistakes,
+    shaft_mistakes,
+)
 from softstart.chain.tables import START, TABLES
 from softstart.chain.writing import toml_of
 from softstart.drive import Drive
@@ -106,7 +114,8 @@ class Chain:
         True
         """
         found = read_document(text, TABLES, "a chain file", where=where, also=also)
-        rows = [("[shaft] " + str(i), shaft_mistakes(row)) for i, row in enumerate(found["shaft"], start=1)]
+        rows = [("[mass] " + str(i), mass_mistakes(row)) for i, row in enumerate(found["mass"], start=1)]
+        rows += [("[shaft] " + str(i), shaft_mistakes(row)) for i, row in enumerate(found["shaft"], start=1)]
         if found["motor"] is not None:
             rows.append(("[motor]", motor_mistakes(found["motor"])))
         before = f"{where}: " if where else ""

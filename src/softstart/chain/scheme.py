@@ -8,6 +8,8 @@ elastic shape with its nodes, along the same row.
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
 
@@ -19,6 +21,8 @@ __all__ = ["scheme_svg"]
 
 _AXIS, _TALLEST, _THICK = 215.0, 150.0, 16.0  # px: height of the shaft axis, tallest disc, thickness of discs
 _SHORTEST, _SPRING, _GAP, _LEAST_GAP = 44.0, 420.0, 90.0, 3.0  # px: springs, and what all gaps share
+_LETTER, _LINE = 6.6, 14.0  # px: about what a letter takes in a line of size 12, and a line
+_FOLDED, _LONGEST = 18, 28  # letters: longer names are folded at the joints of merged masses, or cut
 _SHAPE, _SWING = 430.0, 60.0  # px: zero line of the shape, its largest amplitude
 _INK, _STEEL, _RED, _BLUE, _GREY = "#1d2733", "#b9c6d3", "#c2403a", "#2f6da8", "#6b7785"
 _FOOT = (
@@ -39,13 +43,13 @@ def scheme_svg(chain: Chain) -> str:
     parts: list[str] = []
     x = 70.0
     middles = []
-    slanted = len(chain.masses) > 6
-    for k, mass in enumerate(chain.masses):
+    tops = []
+    for k in range(len(chain.masses)):
         parts += _disc(x, float(tall[k]))
         middle = x + 0.5 * _THICK
         middles.append(middle)
-        top, bottom = _AXIS - 0.5 * float(tall[k]), _AXIS + 0.5 * _TALLEST
-        parts.append(_text(middle, top - 8.0, mass.name, slanted=slanted))
+        bottom = _AXIS + 0.5 * _TALLEST
+        tops.append(_AXIS - 0.5 * float(tall[k]) - 8.0)
         parts.append(_text(middle, bottom + 18.0, _number(float(arrays.J[k])), size=11))
         if k == arrays.motor and chain.motor is not None:
             parts += _arrow(middle, bottom + 30.0, "motor", _RED)
@@ -55,14 +59,18 @@ def scheme_svg(chain: Chain) -> str:
         if k < len(chain.shafts):
             x = _shaft(parts, x, chain, arrays, k)
     parts += _shape(vibration, middles)
-    width = x + 110.0
-    lines = [chain.name, *([f"assumed: {chain.assumed}"] if chain.assumed else [])]
-    heading = [
-        _text(24.0, 30.0 + 19.0 * i, line, 12 if i else 16, _GREY if i else _INK, anchor="start")
-        for i, line in enumerate(lines)
-    ]
+    names, right = _names([mass.name for mass in chain.masses], middles, tops)
+    parts += names
+    width = max(x + 110.0, right + 10.0, 1010.0)
+    heading = [_text(24.0, 30.0, chain.name, 16, anchor="start")]
+    if chain.assumed:
+        said = f"assumed: {chain.assumed}"
+        folded = textwrap.wrap(said, int((width - 48.0) / _LETTER), max_lines=2, placeholder=" ...")
+        heading += [
+            _text(24.0, 49.0 + _LINE * i, line, 12, _GREY, anchor="start", whole=said)
+            for i, line in enumerate(folded)
+        ]
     foot = [_text(24.0, 523.0 + 15.0 * i, line, 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)]
-    width = max(width, 1010.0)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="550" '
         f'viewBox="0 0 {width:.0f} 550" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
@@ -70,6 +78,38 @@ def scheme_svg(chain: Chain) -> str:
         + "\n".join([*heading, *parts, *foot])
         + "\n</svg>\n"
     )
+
+
+def _names(names: Sequence[str], middles: Sequence[float], tops: Sequence[float]) -> tuple[list[str], float]:
+    """The names over their discs, slanted where they would meet or leave the page; and where they end."""
+    folded = [_folded(name) for name in names]
+    halves = [0.5 * _LETTER * max(map(len, lines)) for lines in folded]
+    places = list(zip(middles, halves, strict=True))
+    meet = any(a + half > b - other for (a, half), (b, other) in pairwise(places))
+    parts: list[str] = []
+    if len(names) <= 6 and not meet and places[0][0] > places[0][1] + 4.0:
+        for name, lines, x, y in zip(names, folded, middles, tops, strict=True):
+            for i, line in enumerate(reversed(lines)):
+                parts.append(_text(x, y - _LINE * i, line, whole=name))
+        return parts, max(x + half for x, half in places)
+    right = 0.0
+    for name, lines, x, y in zip(names, folded, middles, tops, strict=True):
+        said = _cut(" + ".join(lines if len(lines) < 3 else (lines[0], "...", lines[-1])))
+        parts.append(_text(x, y, said, slanted=True, whole=name))
+        right = max(right, x + 0.82 * _LETTER * len(said))
+    return parts, right
+
+
+def _folded(name: str) -> list[str]:
+    """A long name in lines; of many merged masses the first and the last."""
+    lines = name.split(" + ") if len(name) > _FOLDED else [name]
+    if len(lines) > 4:
+        lines = [lines[0], f"{len(lines) - 2} more", lines[-1]]
+    return [_cut(line) for line in lines]
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3].rstrip()}..."
 
 
 def _disc(x: float, tall: float) -> list[str]:
@@ -185,11 +225,12 @@ def _line(xa: float, ya: float, xb: float, yb: float, *, colour: str = _INK, wid
 
 def _text(
     x: float, y: float, said: str, size: int = 12, colour: str = _INK, *, anchor: str = "middle",
-    slanted: bool = False,
+    slanted: bool = False, whole: str = "",
 ) -> str:  # fmt: skip
     turn = f' transform="rotate(-35 {x:.1f} {y:.1f})"' if slanted else ""
     where = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{"start" if slanted else anchor}"'
-    return f'<text {where} font-size="{size}" fill="{colour}"{turn}>{escape(said)}</text>'
+    title = f"<title>{escape(whole)}</title>" if whole and whole != said else ""
+    return f'<text {where} font-size="{size}" fill="{colour}"{turn}>{escape(said)}{title}</text>'
 
 
 def _number(value: float) -> str:

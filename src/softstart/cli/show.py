@@ -111,12 +111,15 @@ def print_table(
         table.add_row(*row, style="bold" if index in bold else "")
     if title:
         to.print(Text(title, style="bold"))
-    width = max(to.width, needed)
-    if framed:
-        to.print(table, width=width, crop=False)
-        return
-    with to.capture() as captured:
-        to.print(table, width=width, crop=False)
+    before, to.width = to.width, max(to.width, needed)  # print(width=...) keeps to the console's own
+    try:
+        if framed:
+            to.print(table, crop=False)
+            return
+        with to.capture() as captured:
+            to.print(table, crop=False)
+    finally:
+        to.width = before
     print("\n".join(line.rstrip() for line in captured.get().rstrip().splitlines()))
 
 

@@ -92,9 +92,7 @@ def history(clutch: Clutch, law: Law, until: float | None, time_limit: float) ->
 
 
 def _left(clutch: Clutch, event: str, state: State, mode: Mode) -> float:
-    """Energy in J that a damped flank still holds where it comes off; back in contact, what it holds "
-    "again.
-    """
+    """Energy in J that a damped flank still holds where it comes off; back in contact, less by that."""
     if event not in ("open", "pressed") or clutch.damping == 0.0:
         return 0.0
     side = mode.side if event == "open" else mode.pressed

@@ -27,7 +27,7 @@ def read_law(path: str | os.PathLike[str]) -> tuple[list[float], list[float]]:
     where = show(os.fspath(path))
     rows = [
         row
-        for row in enumerate(csv.reader(text_of(path, "a table of the law").splitlines()), 1)
+        for row in enumerate(csv.reader(text_of(path, "a table of the law", "CSV").splitlines()), 1)
         if any(row[1])
     ]
     units = ["", ""]

@@ -25,9 +25,7 @@ LAWS: tuple[LawKind, ...] = get_args(LawKind)
 
 @dataclass(frozen=True)
 class Piece:
-    """M(t) = a + b s + q s^2 + e (exp(s/T) - 1) with s = t - start, from `start` to the next piece; N m, "
-    "s.
-    """
+    """M(t) = a + b s + q s^2 + e (exp(s/T) - 1) with s = t - start, from `start` on; N m, s."""
 
     start: float
     a: float

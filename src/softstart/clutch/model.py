@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -25,6 +25,7 @@ from softstart.units import nearest, show
 __all__ = ["Clutch"]
 
 ABOVE = 1.0 + 1e-9  # a table may lie above MM by rounding
+SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate is no number any more
 
 
 @dataclass(frozen=True)
@@ -130,9 +131,7 @@ class Clutch:
         return dataclasses.replace(self, **changes)
 
     def with_table(self, times: Sequence[float], torques: Sequence[float]) -> Self:
-        """The clutch with a law of its own: friction torques (N m) at instants (s), straight lines "
-        "between.
-        """
+        """The clutch with a law of its own: friction torques (N m) at instants (s), joined by lines."""
         return self.replace(law="table", law_times=list(times), law_torques=list(torques))
 
     # what follows from it ---------------------------------------------------------------------------------
@@ -150,8 +149,8 @@ class Clutch:
 
     @property
     def mean_torque(self) -> float:
-        """(MM Ic + Mc IM)/(IM + Ic): shaft torque in N m about which the shaft swings while the clutch "
-        "slips.
+        """(MM Ic + Mc IM)/(IM + Ic): shaft torque in N m about which the shaft swings while the clutch
+        slips.
         """
         IM, Ic = self.clutch_inertia, self.load_inertia
         return (self.clutch_torque * Ic + self.load_torque * IM) / (IM + Ic)
@@ -229,16 +228,31 @@ class Clutch:
         elif self.law == "exponential" and abs(self.engagement_time / self.time_constant) > 500.0:
             wrong.append(
                 f"time_constant = {self.time_constant:g}: engagement_time is more than 500 of these, which "
-                f"is a "
-                "step and no law; give a longer time constant."
+                "is a step and no law; give a longer time constant."
             )
         if not held > self.load_torque:
             wrong.append(
                 f"load_torque = {self.load_torque:g}: the clutch holds {held:g} N m and cannot bring this "
-                f"load to "
-                "speed; give a smaller load torque or a larger friction torque."
+                "load to speed; give a smaller load torque or a larger friction torque."
             )
-        return wrong
+        return wrong or list(self._too_fast_or_slow())
+
+    def _too_fast_or_slow(self) -> Iterator[str]:
+        """The series of a motion take high powers of its rates."""
+        free = 1.0 / self.clutch_inertia + 1.0 / self.load_inertia
+        rates = {"stiffness": self.B, "load_inertia": self.locked_frequency}
+        if self.damping > 0.0:
+            rates["damping"] = max(self.damping * free, SLOWEST)
+        if self.law == "exponential":
+            rates["time_constant"] = abs(1.0 / self.time_constant)
+        for name, rate in rates.items():
+            if not SLOWEST <= rate <= FASTEST:
+                yield (
+                    f"{name} = {getattr(self, name):g}: with it a rate of the motion is {rate:.3g} 1/s, and "
+                    f"it must be between {SLOWEST:g} and {FASTEST:g}; check the number, the inertias and "
+                    "their units."
+                )
+                return
 
     def _table_mistakes(self) -> list[str]:
         times, torques = self.law_times, self.law_torques

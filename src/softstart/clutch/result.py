@@ -23,12 +23,13 @@ __all__ = ["EnergyBalance", "Engagement", "Phase", "figures_of"]
 Vector = NDArray[np.float64]
 
 SAME = 1.0 + 1e-13
+MANY = 500  # steps, of which each is less than two radians of the fastest swing
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A span in which the clutch slips, or is locked: instants in s, peak |T| in N m with its instant, work "
-    "in J.
+    """A span in which the clutch slips, or is locked: instants in s, peak |T| in N m with its instant, work
+    in J.
     """
 
     kind: str
@@ -120,8 +121,9 @@ class Engagement:
 
     @cached_property
     def t(self) -> Vector:
-        """Instants in s that show all there is to see: eight in each step."""
-        shares = np.arange(8) / 8.0
+        """Instants in s that show all there is to see: 24 in each step, 8 where there are many steps."""
+        count = 24 if len(self.steps) < MANY else 8
+        shares = np.arange(count) / count
         inner = [step.state.t + step.h * shares for step in self.steps]
         return np.concatenate([*inner, [self.end_time]])
 
@@ -226,9 +228,7 @@ class _Book:
 
 
 def peak_of(step: Motion, known: float = 0.0) -> tuple[float, float]:
-    """Largest |T| of the step and its instant; (0, its begin) if it is no larger than what is known "
-    "already.
-    """
+    """Largest |T| of the step and its instant; (0, its begin) if it is no larger than `known`."""
     scaled = step.T * step.h**POWERS
     if np.abs(scaled).sum() <= known:
         return 0.0, step.state.t

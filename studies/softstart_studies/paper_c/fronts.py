@@ -1,5 +1,5 @@
-"""The optimal engagement laws of the clutch of [C], in both classes, and how far the paper's laws are from "
-"them.
+"""The optimal engagement laws of the clutch of [C], in both classes, and how far the paper's laws are from
+them.
 """
 
 from __future__ import annotations
@@ -63,9 +63,7 @@ def distance_table(found: tuple[EngagementFront, ...]) -> Table:
 
 
 def simple_table(found: tuple[EngagementFront, ...]) -> Table:
-    """Laws of two numbers that bring the shaft to its mean torque at rest, against the fronts' first "
-    "points.
-    """
+    """Laws of two numbers that bring the shaft to its mean torque at rest; the fronts' first points."""
     rows = []
     for one, (name, law) in zip(
         found, (("full torque, pause, full torque", pulse_and_pause), ("two steps", two_steps)), strict=True

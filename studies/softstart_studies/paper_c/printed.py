@@ -12,8 +12,8 @@ KGF = 9.80665  # N
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the printed table: law, friction work L in kgf m, peak torque Md in kgf m, our readings of "
-    "the law.
+    """A row of the printed table: law, friction work L in kgf m, peak torque Md in kgf m, our readings of
+    the law.
     """
 
     law: str

@@ -19,6 +19,8 @@ def map_figure(found: ErrorMap) -> Any:
     """The error of the lever rule over inner inertia and stiffnesses, with the condition."""
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 5.0))
+        axes.set_xscale("log")  # before the labels, which cut their gaps into the lines as drawn now
+        axes.set_yscale("log")
         levels = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0]
         drawn = axes.contour(
             STIFFNESSES, SHARES, -100 * found.lever, levels, colors=COLOURS[0], linewidths=1.4
@@ -26,8 +28,6 @@ def map_figure(found: ErrorMap) -> Any:
         axes.clabel(drawn, fmt="%g %%", inline_spacing=1)
         held = axes.contour(STIFFNESSES, SHARES, found.ratio, [10.0], colors=COLOURS[1], linestyles="--")
         axes.clabel(held, fmt="$(w_{(1,2)}/w)^2$ = %g", inline_spacing=1)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
         axes.set_xlabel("$c_1/c_3$")
         axes.set_ylabel("$(I_2 + I_3)/(I_1 + I_4)$")
         axes.set_title(
@@ -90,7 +90,8 @@ def node_figure() -> Any:
                     f"{names[p.shaft]}-{names[p.shaft + 1]}",
                     (p.torque, p.frequency),
                     textcoords="offset points",
-                    xytext=(6, 4),
+                    xytext=(6, 4) if p.torque < 0.9 else (-6, 6),
+                    ha="left" if p.torque < 0.9 else "right",
                     fontsize=8,
                 )
         axes.set_xlabel("torque of the mode in the section, of its largest")

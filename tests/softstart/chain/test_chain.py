@@ -34,15 +34,16 @@ positive = st.floats(1e-3, 1e3)
 @st.composite
 def chains(draw: st.DrawFn) -> Chain:
     n = draw(st.integers(2, 7))
+    kinds = [draw(st.sampled_from(["active", "reactive"])) for _ in range(n)]
     masses = [
         Mass(
             draw(positive),
             damping=draw(st.floats(0.0, 10.0)),
-            torque=draw(st.floats(-5.0, 5.0)),
-            kind=draw(st.sampled_from(["active", "reactive"])),
+            torque=draw(st.floats(0.0 if kind == "reactive" else -5.0, 5.0)),
+            kind=kind,
             initial_speed=draw(st.floats(-3.0, 3.0)),
         )
-        for _ in range(n)
+        for kind in kinds
     ]
     shafts = [
         Shaft(
@@ -205,6 +206,7 @@ def test_what_a_shaft_says_against_itself(change: str, reason: str) -> None:
         ("[motor]\nmass = 'rotr'\nstarting_torque = 5", "did you mean"),
         ("[motor]\nstarting_torque = 5\nmaximum_torque = 4", "at least the starting torque"),
         ("[start]\nload = 'hook'", "its masses are"),
+        ("[[mass]]\ninertia = 1\nkind = 'reactive'\ntorque = -5", "[mass] 3, torque = -5.0: a reactive load"),
         ("[[mass]]\ninertia = 1", "joined by 2 shafts, and there are 1"),
         ("[[shaft]]\nstiffness = 1\n[[mass]]\nname = 'drum'\ninertia = 1", "2 masses have this name"),
     ],

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from xml.etree import ElementTree
 
 import pytest
 
-from softstart.chain import Chain, Mass, Shaft
+from softstart.chain import Chain, Mass, Shaft, reduce_chain
 from softstart.chain.files import names
 from softstart.chain.scheme import scheme_svg
 
@@ -56,3 +57,35 @@ def test_names_cannot_break_the_file() -> None:
         scheme_svg(chain)
     chain = Chain([Mass(1, name="<a & b>"), Mass(1)], [Shaft(1)], name="x < y")
     assert "<a & b>" in [one.text for one in ElementTree.fromstring(scheme_svg(chain)).iter(f"{SVG}text")]
+
+
+def test_names_of_merged_masses_stay_on_the_page_and_apart() -> None:
+    """At the letters' width of the drawing: no name leaves the page, none runs into its neighbour."""
+    chain = reduce_chain(Chain.load("tractor-like"), up_to=70.0).reduced
+    names = [mass.name for mass in chain.masses]
+    assert max(map(len, names)) > 40
+    root = ElementTree.fromstring(scheme_svg(chain))
+    spans: dict[str, list[float]] = {}
+    for one in root.iter(f"{SVG}text"):
+        title = one.find(f"{SVG}title")
+        name = one.text if title is None else title.text
+        if name in names:
+            half = 3.3 * len(one.text or "")
+            x = float(one.attrib["x"])
+            assert one.attrib["text-anchor"] == "middle"
+            spans.setdefault(name, []).extend([x - half, x + half])
+    assert list(spans) == names
+    row = [(min(span), max(span)) for span in spans.values()]
+    assert row[0][0] > 0.0
+    assert row[-1][1] < float(root.attrib["width"])
+    assert all(before[1] < after[0] for before, after in pairwise(row))
+
+
+def test_names_that_would_meet_are_slanted() -> None:
+    masses = [
+        Mass(1, name="the first of the long names"),
+        Mass(1, name="the second of the long names"),
+        Mass(1),
+    ]
+    text = scheme_svg(Chain(masses, [Shaft(1000), Shaft(1)]))
+    assert text.count("rotate(-35") == 3

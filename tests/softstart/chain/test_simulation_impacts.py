@@ -13,6 +13,7 @@ from tests.softstart.plant.pieces import Pieces
 from softstart import Drive
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.simulation import simulate_chain
+from softstart.errors import InputError
 
 CRANE = Drive.load("crane-4amtkf")  # what the pieces are set up for: they take nothing from it
 
@@ -187,6 +188,18 @@ def test_a_rigid_joint_carries_what_moves_the_masses_behind_it():
     assert T[:, 0] == pytest.approx(12.0 - (12.0 - T[:, 1]) / 3.0, rel=1e-12)
 
 
+def test_masses_joined_rigidly_through_a_gear_start_with_one_speed_but_for_rounding():
+    """10/1.7 rad/s, brought back through the ratio, is not quite 10; nor is what one types of it."""
+    joint = Shaft("inf", ratio=1.7)
+    for typed in (10.0 / 1.7, 5.8823529):
+        chain = Chain([Mass(1.0, initial_speed=10.0), Mass(2.0, initial_speed=typed)], [joint])
+        run = simulate_chain(chain, None, 1.0)
+        assert run.at(1.0)["w"].tolist() == [10.0, 10.0]
+    chain = Chain([Mass(1.0, initial_speed=10.0), Mass(2.0, initial_speed=5.8823)], [joint])
+    with pytest.raises(InputError, match=r"they have 10 and 9\.99991 rad/s"):
+        simulate_chain(chain, None, 1.0)
+
+
 def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
     """Two masses with friction 1 and 2 on a rigid joint: they break away at 3 N m, not before."""
     masses = [
@@ -200,6 +213,20 @@ def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
     assert [(e.place, e.time) for e in starts] == [(0, pytest.approx(3.0)), (1, pytest.approx(3.0))]
     # friction is shared as it can hold: a third of the motor's torque stays at mass 1
     assert run.at(1.5)["T"][0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
+    """3 N m press the second mass on the first, which alone can hold them: the gear grips 0.1 N m at most."""
+    masses = [Mass(1.0, torque=10.0, kind="reactive"), Mass(1.0, torque=3.0), Mass(1.0)]
+    flanks = Shaft(gap=0.1, restitution=0.0, start_position=0.05)
+    geared = Shaft(100.0, efficiency=0.5, side="after", start_position=0.001)
+    chain = Chain(masses, [flanks, geared], Motor(4.0, minimum_torque=-4.0), target_speed=1.0)
+    run = simulate_chain(chain, Pieces(pieces=((0.0, -4.0),)), 0.5, fitted_to=CRANE)
+    assert [e.kind for e in run.events] == ["gear lets go", "impacts over, flanks press", "gear holds"]
+    assert run.events[-1].time == 0.0
+    found = run.at(np.linspace(0.0, 0.5, 101))
+    assert not found["w"][:, :2].any()
+    assert np.abs(found["T"][:, 0] - 3.0 - found["T"][:, 1]).max() < 0.1  # but for what the gear holds
 
 
 def test_a_blow_moves_a_stuck_mass():

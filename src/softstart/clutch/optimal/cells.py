@@ -55,8 +55,8 @@ class _Ends:
         self.fall, self.turn = slip.g * before, slip.B * before
 
     def lag(self, s: Vector, p: Vector, q: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-        """Each cut's bound on A + g s^2/2 + kappa s v1, and its slopes over s, p, q: rows boxes, columns "
-        "cuts.
+        """Each cut's bound on A + g s^2/2 + kappa s v1, and its slopes over s, p, q: rows boxes, columns
+        cuts.
         """
         slip, y = self.slip, self.y
         a, b, D = slip.start_of_end(s, p, q)

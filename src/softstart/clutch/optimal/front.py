@@ -1,5 +1,5 @@
-"""`optimize_engagement`: the least friction work for each peak of the shaft torque, and the known laws "
-"beside it.
+"""`optimize_engagement`: the least friction work for each peak of the shaft torque, and the known laws
+beside it.
 """
 
 from __future__ import annotations
@@ -151,8 +151,8 @@ def _beside(search: Search, first: OptimalLaw, name: str, run: Engagement) -> La
 
 
 def _least_peak(search: Search, run: Engagement) -> tuple[float, float]:
-    """(peak found, peak proved) at the work of a run that has less than the law of the least peak: by "
-    "halving.
+    """(peak found, peak proved) at the work of a run that has less than the law of the least peak: by
+    halving.
     """
     low, high = search.slip.Tm, run.slip_peak_torque
     peak = high

@@ -65,9 +65,7 @@ class Program:
         self.scales = np.array([slip.MM, slip.MM, slip.w0])
 
     def solve(self, end: Vector, P: float) -> Answer:
-        """The least A with T <= P that ends at `end` = (a, b, D), or as near to it as the price makes "
-        "worth.
-        """
+        """The least A with T <= P that ends at `end` = (a, b, D), or as near as the price makes worth."""
         n, size = self.T.shape[1], self.slip.w0 * self.slip.tM
         MM = self.slip.MM
         # variables: M/MM, then what is missed of each end upwards and downwards, in its scale

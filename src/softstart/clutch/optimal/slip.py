@@ -111,8 +111,8 @@ class Slip:
 
     @cached_property
     def Tm(self) -> float:
-        """Mean shaft torque under MM, N m. No law of the class has a lower peak: the mean over a period is "
-        "Tm.
+        """Mean shaft torque under MM, N m. No law of the class has a lower peak: the mean over a period is
+        Tm.
         """
         return (self.MM * self.Ic + self.Mc * self.IM) / self.I
 

@@ -111,9 +111,7 @@ class Search:
         self.cuts.append(self.program.solve(np.array([0.0, 0.0, middle]), 1.2 * self.slip.Tm).cut)
 
     def work_bound(self, P: float) -> float:
-        """Work in J below which no law of the class with a peak of P (N m) lies, as far as is proved by "
-        "now.
-        """
+        """Work in J below which no law of the class with a peak of P (N m) lies, as far as proved by now."""
         return least_over_ends(self.slip, self.cuts, P, 0.3 * CLOSE * self._scale).bound
 
     @property
@@ -158,8 +156,8 @@ class Search:
         return OptimalLaw(best.times, best.torques, best.run, bound)
 
     def _engaged(self, answer: Answer) -> OptimalLaw | None:
-        """The law on the exact clutch, checked against what the program says; None if it locks before it "
-        "should.
+        """The law on the exact clutch, checked against what the program says; None if it locks before it
+        should.
         """
         times, torques = merged(self.program.edges, answer.torques, self.slip.MM)
         run = engage(self.clutch.with_table(times, torques))
