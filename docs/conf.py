@@ -33,6 +33,7 @@ exclude_patterns = ["_build", "gallery"]
 nitpicky = True
 default_role = "house"
 highlight_language = "none"
+smartquotes = False  # help texts and docstrings hold things to be typed: shaft.gap='2 rad'
 suppress_warnings = ["toc.empty_glob", "config.cache"]
 
 # ---- Markdown
@@ -91,5 +92,5 @@ html_theme_options = {
     },
     "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#7cc5ee"},
 }
-copybutton_prompt_text = r">>> |\.\.\. "
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True

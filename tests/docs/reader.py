@@ -8,18 +8,22 @@ import resource
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 from tests.docs.shown import among, difference, named
 from tests.docs.steps import Step
 
 ROOT = Path(__file__).parents[2]
 SEEN = 3.0  # s of its processor time for which a long command is watched at work: imports are over then
+SEEN_TOGETHER = 4.0  # the same of all its processes, where others work for it
 WATCHED = 8.0  # s of the clock after which that is enough in any case
+PRINTED = 60.0  # s of the clock after which a long command must have printed what the page shows of it
 PATIENCE = 300.0  # s for a command that is not called long, on a machine that may be busy
 INTERRUPTED = 130
 
@@ -55,7 +59,7 @@ class Reader:
             words = step.text.split("#")[0].split()
             return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0, None)
         if step.long:
-            return _watched(["bash", "-c", step.text], self.folder)
+            return _watched(["bash", "-c", step.text], self.folder, step.output)
         done = _run(["bash", "-c", step.text], self.folder)
         missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
         said = f"not printed: {', '.join(missing)}" if missing else ""
@@ -73,7 +77,7 @@ class Reader:
         name.write_text(code, encoding="utf-8")
         self.python = code
         if step.long:
-            return _watched([sys.executable, str(name)], self.folder)
+            return _watched([sys.executable, str(name)], self.folder, step.output)
         return _ended(_run([sys.executable, str(name)], self.folder), 0, step.output)
 
 
@@ -93,11 +97,13 @@ def _environment() -> dict[str, str]:
 
 
 @contextmanager
-def _started(words: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
+def _started(
+    words: list[str], folder: Path, stdout: int | IO[str] = subprocess.PIPE
+) -> Iterator[subprocess.Popen[str]]:
     """The process, in a group of its own that is gone afterwards."""
     with subprocess.Popen(
         words, cwd=folder, env=_environment(), text=True, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+        stdout=stdout, stderr=subprocess.PIPE, start_new_session=True,
         preexec_fn=_hears_ctrl_c,  # noqa: PLW1509 - there are no threads here
     ) as process:  # fmt: skip
         try:
@@ -131,36 +137,68 @@ def _ended(done: subprocess.CompletedProcess[str], code: int, shown: str | None)
     return difference(shown, printed) if shown is not None else ""
 
 
-def _watched(words: list[str], folder: Path) -> str:
-    """Start, see it at work, interrupt: a command of softstart then ends with 130."""
+def _watched(words: list[str], folder: Path, shown: str | None) -> str:
+    """Start, see it at work, interrupt: a command of softstart then ends with 130.
+
+    Where the page shows what it prints, being at work is to have printed that.
+    """
     if words[0] == "bash":
         words = [*words[:-1], f"exec {words[-1]}"]
-    with _started(words, folder) as process:
-        began = time.perf_counter()
-        while process.poll() is None and time.perf_counter() - began < WATCHED and _work_of(process) < SEEN:
-            time.sleep(0.2)
-        if process.poll() is None:
-            err = _interrupted(process)
-        else:
-            err = process.communicate()[1].strip()
-            if process.returncode == 0:
-                return "ended by itself: it is not long, take the mark away"
-            return f"exit code {process.returncode} at once: {err[-500:]}"
+    with tempfile.NamedTemporaryFile("r", encoding="utf-8") as out:
+        with open(out.name, "w", encoding="utf-8") as written, _started(words, folder, written) as process:
+            began = time.perf_counter()
+            while process.poll() is None and not _seen(process, time.perf_counter() - began, out, shown):
+                time.sleep(0.2)
+            if process.poll() is None:
+                err = _interrupted(process)
+            else:
+                err = process.communicate()[1].strip()
+                if process.returncode == 0:
+                    return "ended by itself: it is not long, take the mark away"
+                return f"exit code {process.returncode} at once: {err[-500:]}"
+        missing = difference(shown, _all_of(out)) if shown is not None else ""
     if err is None:
         return "does not end after Ctrl-C"
     expected = (INTERRUPTED,) if words[0] == "bash" else (INTERRUPTED, 1, -signal.SIGINT)
     if process.returncode in expected:
-        return ""
+        return missing
     return f"exit code {process.returncode} instead of 130 after Ctrl-C: {err.strip()[-500:]}"
 
 
-def _work_of(process: subprocess.Popen[str]) -> float:
-    """Processor time of a process that runs, s; 0 where the system does not tell."""
-    try:
-        fields = Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def _seen(process: subprocess.Popen[str], seconds: float, out: IO[str], shown: str | None) -> bool:
+    """Whether a long command has been watched long enough."""
+    if shown is not None:
+        return not difference(shown, _all_of(out)) or seconds > PRINTED
+    own, together = _work_of(process)
+    return seconds > WATCHED or own > SEEN or together > SEEN_TOGETHER
+
+
+def _all_of(out: IO[str]) -> str:
+    out.seek(0)
+    return out.read()
+
+
+def _work_of(process: subprocess.Popen[str]) -> tuple[float, float]:
+    """Processor time of a process that runs, and of it and all that it has started, s.
+
+    0 where the system does not tell.
+    """
+    known: dict[int, tuple[int, float]] = {}  # by process: its parent, its time
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        except OSError:
+            continue
+        ticks = sum(int(one) for one in fields[11:15])
+        known[int(path.parent.name)] = int(fields[1]), ticks / os.sysconf("SC_CLK_TCK")
+
+    def started_by_it(one: int) -> bool:
+        while one in known and one != process.pid:
+            one = known[one][0]
+        return one == process.pid
+
+    together = sum(time for one, (_, time) in known.items() if started_by_it(one))
+    return known.get(process.pid, (0, 0.0))[1], together
 
 
 def _interrupted(process: subprocess.Popen[str]) -> str | None:

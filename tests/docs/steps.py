@@ -5,8 +5,9 @@ Comments on the lines before a block speak to this runner and are not shown:
 
     <!-- file: mine.toml -->     the block is written to that file
     <!-- exit 3 -->              its last command ends with this exit code
-    <!-- long: 4 min -->         its commands are started, seen at work, and interrupted (but one that
-                                 writes a folder, --out, which the page then uses is run to its end)
+    <!-- long: 4 min -->         its commands are started, seen at work, and interrupted, not before what
+                                 the page shows is printed (but one that writes a folder, --out, which the
+                                 page then uses is run to its end)
     <!-- continued -->           this Python goes on from the Python blocks before it
     <!-- not run: reason -->     nothing of it is run
 
