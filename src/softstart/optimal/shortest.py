@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from softstart.errors import SimulationError
+from softstart.optimal import whole
 from softstart.optimal.ideal import Contact, entry_of
 from softstart.optimal.linear_program import AIM
 from softstart.optimal.linear_search import greatest_speed, not_linear
@@ -23,8 +25,8 @@ def shortest_start_time(problem: Problem) -> float:
     """The shortest t_f in s of any start of the problem whose gap closes once; infinite if there is none, nan
     if the search for it did not converge.
 
-    K_dyn may be anything unless the problem bounds it. For an ideal torque the greatest speed that can be had
-    at a given t_f is a linear program, and it rises with t_f; otherwise collocation minimises t_f.
+    K_dyn may be anything unless the problem bounds it. The greatest speed that can be had at a given t_f is a
+    linear program, and it rises with t_f; where it is not linear, collocation minimises t_f.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -35,6 +37,9 @@ def shortest_start_time(problem: Problem) -> float:
     bounded = problem.k_dyn is not None or problem.heat is not None
     if not bounded and not not_linear(plain):
         return _by_linear_program(plain)
+    if not bounded and not whole.not_linear(plain):
+        found = [_by_whole_program(plain, way) for way in whole.ways(plain)]
+        return min((one for one in found if math.isfinite(one)), default=math.nan)
     from softstart.optimal.collocation import NotConverged, solve
 
     quickest = replace(problem, start_time=None, minimise="start_time")
@@ -47,17 +52,43 @@ def shortest_start_time(problem: Problem) -> float:
 def _by_linear_program(problem: Problem) -> float:
     """The t_f at which the greatest speed is the target: on a coarse grid, then on a fine one near there."""
     entry = entry_of(problem)
+    te = math.nan
+
+    def speed_at(end: float, steps: int) -> float:
+        nonlocal te
+        speed, te = greatest_speed(problem, entry, end, steps, te)
+        if not math.isfinite(speed):
+            te = math.nan
+        return speed
+
+    soonest = max(momentum_shortest_time(problem), entry.earliest)
+    return _quickest(problem, soonest, speed_at)
+
+
+def _by_whole_program(problem: Problem, way: whole.Way) -> float:
+    """The same where the gap part counts too."""
+    near: whole.Instant | None = None
+
+    def speed_at(end: float, steps: int) -> float:
+        nonlocal near
+        speed, found = whole.greatest_speed(problem, way, end, steps, near)
+        near = found if math.isfinite(speed) else near
+        return speed
+
+    return _quickest(problem, max(momentum_shortest_time(problem), way.tb), speed_at)
+
+
+def _quickest(problem: Problem, soonest: float, speed_at: Callable[[float, int], float]) -> float:
+    """The end in s at which `speed_at(end, steps)` is the target; no end before `soonest` will do."""
+    if not math.isfinite(soonest):
+        return math.inf
     contact = Contact.of(problem.drive)
     slope = (problem.highest_torque - contact.Mc) / (contact.J1 + contact.J2)
-    soonest = max(momentum_shortest_time(problem), entry.earliest)
-    end, te = 1.2 * soonest + math.pi / contact.Omega, math.nan
+    end = 1.2 * soonest + math.pi / contact.Omega
     for steps, within in ((COARSE, 1e-3), (FINE, WITHIN)):
         bracket = Bracket()
         for _ in range(MOST_TRIALS):
-            speed, te = greatest_speed(problem, entry, end, steps, te)
-            if not math.isfinite(speed):
-                te = math.nan
-            missing = (problem.target * AIM - speed) / slope
+            missing = (problem.target * AIM - speed_at(end, steps)) / slope
             bracket.take(end, missing)
             if abs(missing) <= within * end:
                 bracket.high = min(bracket.high, end + max(missing, 0.0))

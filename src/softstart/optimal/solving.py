@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.optimal import linear_search, pulse_coast_hold
+from softstart.optimal import linear_search, pulse_coast_hold, whole
 from softstart.optimal.certificate import certified_bound, not_certified
 from softstart.optimal.checking import check
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
@@ -112,9 +113,11 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
                 raise InputError(f"method = closed-form: {reason} Use method = auto.") from None
         else:
             return found, "pulse, coast, hold is optimal here" if method == "auto" else asked
-    no_program = linear_search.not_linear(problem)
-    if method == "lp" or (method == "auto" and not no_program):
-        best = linear_search.solve(problem)
+    linear = [one for one in (linear_search, whole) if not one.not_linear(problem)]
+    if method == "lp" or (method == "auto" and linear):
+        if not linear:
+            raise InputError(f"method = lp: {whole.not_linear(problem)}; use method = collocation.")
+        best = linear[0].solve(problem)
         if best is None:
             raise _refusal(problem)
         return best, f"no closed form: {no_formula}" if method == "auto" else asked
@@ -126,6 +129,7 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
         if problem.start_time is not None and problem.start_time < shortest_start_time(problem):
             raise InfeasibleError(verdict_on(problem)) from None
         raise
+    no_program = whole.not_linear(problem)
     return best, f"no linear program: {no_program}" if method == "auto" else asked
 
 
@@ -153,8 +157,30 @@ def _bound(problem: Problem, candidate: Candidate, profile: Any) -> LowerBound:
     run = replay(problem.drive, profile, candidate.end_time, problem.base)
     if run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
         return by_momentum  # nothing better can be proved
-    bound = certified_bound(problem, run.k_dyn, entry_near=_entry_of(run))
+    k_dyn, entry = (run.k_dyn, _entry_of(run)) if problem.ideal_torque else _ideal(problem, run)
+    within = 5e-4 if problem.ideal_torque else 2e-3  # what a lag costs it does not know anyway
+    bound = certified_bound(problem, k_dyn, entry_near=entry, within=within)
     return bound if bound.k_dyn >= by_momentum.k_dyn else by_momentum
+
+
+def _ideal(problem: Problem, run: Run) -> tuple[float, float | None]:
+    """K_dyn of the best start with an ideal torque, which the certificate is about, and its entry, s."""
+    ideal = problem.drive.replace(torque_lag=0.0, torque_rate=math.inf)
+    without = replace(problem, drive=ideal, torque_speed=(), smoothness=0.0)
+    best = None if pulse_coast_hold.applies(without) else _by_formula(without)
+    if best is None:
+        best = linear_search.solve(without)
+    if best is None or best.claimed >= run.k_dyn:
+        return run.k_dyn, _entry_of(run)
+    start = replay(ideal, best.profile, best.end_time, problem.base)
+    return best.claimed, _entry_of(start)
+
+
+def _by_formula(problem: Problem) -> Candidate | None:
+    try:
+        return pulse_coast_hold.solve(problem)
+    except pulse_coast_hold.NotApplicable:
+        return None
 
 
 def _entry_of(run: Run) -> float:

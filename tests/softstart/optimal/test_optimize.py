@@ -105,7 +105,7 @@ def test_where_constant_torque_is_quicker_with_several_contacts_it_says_so() -> 
         ({"start_time": 0.3, "method": "closed-form", "terminal": "steady"}, "method = closed-form: "),
         (
             {"start_time": 0.3, "method": "lp", "smoothness": 1e-4},
-            "method = lp: the motor torque cannot jump",
+            "method = lp: the weight on the smoothness is not linear",
         ),
     ],
 )

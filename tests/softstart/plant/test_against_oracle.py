@@ -81,7 +81,7 @@ def compare_with_oracle(drawn: dict[str, Any], seed: int) -> None:
     if drawn["gap"] == 0.0 and drawn["w1_0"] == drawn["w2_0"] and drawn["theta0"] == 0.0:
         return  # at rest with no gap at all, the flank of the first instant is a matter of rounding
     run, other = run_of(drawn), integrate(**drawn)
-    # 1e-8 as the issue asks; the floor is the torque of 1e-12 rad
+    # within 1e-8; the floor is the torque of 1e-12 rad
     assert run.peak_torque == pytest.approx(abs(other.peak), rel=1e-8, abs=1e-12 * drawn["c"]), seed
     assert [KINDS[event.kind] for event in run.events] == [kind for _, kind in other.events], seed
     mine = np.array([event.time for event in run.events])

@@ -1,0 +1,334 @@
+"""The linear program of the whole start: search over the instants of contact and breakaway, then the grid.
+
+P over the instants is smooth but for kinks; a scan brackets its minima, golden sections narrow them down, in
+turns where there are two instants, first on a coarse grid, then on grids cut finer where the torque switches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.optimal.ideal import Contact
+from softstart.optimal.linear_program import first_grid as contact_grid
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import Candidate
+from softstart.optimal.whole.answer import Grid, Instants, Kind, WholeAnswer
+from softstart.optimal.whole.program import WholeProgram
+from softstart.optimal.whole.ways import Way, ways
+
+Vector = NDArray[np.float64]
+Instant = tuple[float, float, float]  # see _Instants
+Value = Callable[[Instant], float]
+
+COARSE, MIDDLE, MOST = 40, 80, 260  # steps of the contact: to find the instants, to refine them, at most
+SCANNED, WINDINGS = 14, 4  # instants of the contact, and durations of the winding up, that are tried at first
+LONGEST_WINDING = 6.0  # times the one under full torque
+ROUNDS = 3
+SETTLED, ENOUGH = 2e-5, 5e-6  # a finer grid, other instants that change P by less are good enough
+SOONER = (0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # ends that are tried, as shares of the latest
+TRIALS = 25  # of a better place for the instants
+FINEST = 1e-7  # of t_f, to which they are found
+LOCAL_MINIMA = 3
+EARLIEST = 1.0 + 1e-7  # just later than under full torque: the grid cannot do better
+
+
+def solve(problem: Problem) -> Candidate | None:
+    """The optimum of a problem that `not_linear` has nothing against; None if no torque meets the terms."""
+    best = search(problem)
+    if best is None:
+        return None
+    note = f"{best.edges.size - 1} steps"
+    return Candidate(best.profile(problem), best.at.end, best.P / problem.base_torque, "lp", note)
+
+
+def search(problem: Problem) -> WholeAnswer | None:
+    """The best answer over all instants, on a grid refined where the torque switches."""
+    assert problem.start_time is not None
+    latest = float(problem.start_time)
+    orders = list(ways(problem))
+    found = [(way, best) for way in orders if (best := _coarse(problem, way, latest)) is not None]
+    for share in SOONER:  # with all that time the gap could not close only once
+        if found or any(_too_late(problem, way, latest) for way in orders):
+            break
+        sooner = [(way, _Instants(problem, way, latest, COARSE).best(share * latest)) for way in orders]
+        found = [(way, best) for way, best in sooner if best is not None]
+    return _refined(problem, *min(found, key=lambda one: one[1].P)) if found else None
+
+
+def _coarse(problem: Problem, way: Way, latest: float) -> WholeAnswer | None:
+    """The best answer on a coarse grid, or on a finer one where there is hardly enough time."""
+    for steps in (COARSE, MIDDLE):
+        best = _Instants(problem, way, latest, steps).best(latest)
+        if best is not None:
+            return best
+    return None
+
+
+def _too_late(problem: Problem, way: Way, latest: float) -> bool:
+    """True if the load gets moving, but not to its speed: a start that ends sooner is no help."""
+    speed, _ = greatest_speed(problem, way, latest, COARSE)
+    return -math.inf < speed < problem.target
+
+
+def greatest_speed(
+    problem: Problem, way: Way, end: float, steps: int, near: Instant | None = None
+) -> tuple[float, Instant]:
+    """The greatest load speed at `end`, rad/s, and the instants it needs; -inf where none fit.
+
+    Where `near`, those of a similar end, lead to a start, or were those of a later end, no others are tried.
+    """
+    return _Instants(problem, way, end, steps).greatest_speed(end, near)
+
+
+class _Instants:
+    """Answers over the instants of one order of phases, each computed once.
+
+    The instants are told as (x, w, end): x is when the load begins to be driven, w how long the shaft is
+    wound up before, 0 where it is not; `latest` bounds the end.
+    """
+
+    def __init__(
+        self, problem: Problem, way: Way, latest: float, steps: int, grid: Grid | None = None
+    ) -> None:
+        self.problem, self.way, self.latest, self.steps, self.grid = problem, way, latest, steps, grid
+        self.winds = "stuck" in way.kinds
+        self.waits = "gap" in way.kinds or "resting" in way.kinds
+        self.answers: dict[Instant, WholeAnswer | None] = {}
+        self.speeds: dict[Instant, tuple[float, Vector | None]] = {}
+        self.shortest_winding = max(way.tb - way.tc, 1e-9 * latest) if self.winds else 0.0
+
+    def program(self, at: Instant, grid: Grid | None = None) -> WholeProgram | None:
+        """The program with these instants; None where they are out of order."""
+        x, w, end = at
+        tc = x - w if self.waits else 0.0
+        if (self.waits and tc < self.way.tc) or (self.winds and w <= 0.0) or x >= end:
+            return None
+        instants = Instants(tc, x, end)
+        grid = grid or self.grid or first_grid(self.problem, self.way, instants, self.steps)
+        return WholeProgram(self.problem, instants, grid)
+
+    def peak(self, at: Instant) -> float:
+        """P, N m; inf where there is no start."""
+        if at not in self.answers:
+            program = self.program(at)
+            self.answers[at] = None if program is None else program.solve()
+        answer = self.answers[at]
+        return math.inf if answer is None else answer.P
+
+    def slowness(self, at: Instant) -> float:
+        """Minus the greatest load speed, rad/s; inf where no start fits."""
+        if at not in self.speeds:
+            program = self.program(at)
+            self.speeds[at] = (-math.inf, None) if program is None else program.greatest_speed()
+        return -self.speeds[at][0]
+
+    def best(self, end: float) -> WholeAnswer | None:
+        """The least P over the instants, from this end on; None where there is no start."""
+        start = self._least(end, fast=False)
+        if math.isinf(self.peak(start)):  # little time: a narrow window is left, if any
+            speed, start = self.greatest_speed(end)
+            if not speed >= self.problem.target or math.isinf(self.peak(start)):
+                return None
+            self._down(start, 0.1 * end, fast=False)
+        return self.found()
+
+    def found(self) -> WholeAnswer | None:
+        """The answer with the least P so far."""
+        return self.answers[min(self.answers, key=self.peak)]
+
+    def greatest_speed(self, end: float, near: Instant | None = None) -> tuple[float, Instant]:
+        """The greatest load speed at the end, rad/s, and the instants it needs; -inf where none fit."""
+        if near is not None:
+            start = self._down((near[0], near[1], end), 0.1 * near[0], fast=True)
+            if math.isfinite(self.slowness(start)) or end < near[2]:
+                return -self.slowness(start), start
+        start = self._least(end, fast=True)
+        return -self.slowness(start), start
+
+    def moved(self, start: Instant, width: float) -> WholeAnswer | None:
+        """The least P near a start known, at first within `width` s."""
+        self._down(start, width, fast=False)
+        return self.found()
+
+    def place(self, x: float, w: float, end: float) -> Instant:
+        """A shaft that is touched from the beginning is wound up all the time before x."""
+        return (x, w, end) if self.waits or not self.winds else (x, x, end)
+
+    def _least(self, end: float, fast: bool) -> Instant:
+        """The instants with the least value found: a scan, then down from its lowest points."""
+        value = self.slowness if fast else self.peak
+        tried = self._scan(value, end)
+        xs = sorted({at[0] for at in tried})
+        lowest = {x: min((at for at in tried if at[0] == x), key=lambda at: tried[at]) for x in xs}
+        values = [math.inf, *(tried[lowest[x]] for x in xs), math.inf]
+        minima = [k for k in range(len(xs)) if values[k] >= values[k + 1] <= values[k + 2]]
+        ends = []
+        for k in sorted(minima, key=lambda k: values[k + 1])[:LOCAL_MINIMA]:
+            if math.isfinite(values[k + 1]):
+                width = max(xs[min(k + 1, len(xs) - 1)] - xs[k], xs[k] - xs[max(k - 1, 0)])
+                ends.append(self._down(lowest[xs[k]], min(width, 0.1 * end) or 0.1 * end, fast))
+        return min(ends or tried, key=value)
+
+    def _scan(self, value: Value, end: float) -> dict[Instant, float]:
+        """Values over a coarse net of instants, the earliest first."""
+        windings = [0.0]
+        if self.winds and self.waits:
+            windings = (self.shortest_winding * np.geomspace(1.0, LONGEST_WINDING, WINDINGS)).tolist()
+        tried = {(end, 0.0, end): math.inf}
+        late = 0
+        for x in self._times(end):
+            places = [self.place(x, w, end) for w in windings]
+            here = {at: value(at) for at in places}
+            tried |= here
+            none = math.isinf(min(here.values()))
+            late = late + 1 if none and math.isfinite(min(tried.values())) else 0
+            if late == 2:
+                break  # no time is left
+        return tried
+
+    def _times(self, end: float) -> list[float]:
+        first = self.way.tb * EARLIEST
+        if not (self.waits or self.winds):
+            return [0.0]
+        shares = np.linspace(0.0, 1.0, SCANNED, endpoint=False) ** 2.5
+        return (first + (end - first) * shares).tolist() if first < end else []
+
+    def _down(self, start: Instant, width: float, fast: bool) -> Instant:
+        """From a start known to the best one near it: the program made linear in the instants says where to.
+
+        A step is taken where it helps, and may then be longer; else it is tried again, shorter.
+        """
+        value = self.slowness if fast else self.peak
+        at, least = start, value(start)
+        reach = width
+        for _ in range(TRIALS):
+            if not math.isfinite(least) or reach < FINEST * at[2]:
+                break
+            there = self._shifted(at, reach, fast)
+            if there is None or there == at:
+                break
+            gained = least - value(there)
+            way = max(abs(there[i] - at[i]) for i in range(3))
+            if gained > 0.0:
+                at, least = there, value(there)
+                if gained < ENOUGH * abs(least):
+                    break
+                reach *= 1.5 if way > 0.5 * reach else 0.5
+            else:
+                reach = 0.25 * min(reach, way)
+        return at
+
+    def _shifted(self, at: Instant, reach: float, fast: bool) -> Instant | None:
+        """Where the best instants seem to be, none further than `reach`."""
+        x, w, end = at
+        own = self.program(at)
+        answer = self.answers.get(at)
+        found = self.speeds[at][1] if fast else answer.x if answer is not None else None
+        if own is None or found is None:
+            return None
+        tiny = 1e-6 * end
+        free: list[
+            tuple[int, float, list[float]]
+        ] = []  # which instant, by how much to try, how far it may go
+        if self.waits or self.winds:
+            free.append((0, tiny, [-reach, reach]))
+        if self.waits and self.winds:
+            by = min(tiny, 1e-3 * w)
+            room = x - w - by >= self.way.tc
+            free.append((1, by if room else -by, [-min(reach, 0.3 * w), min(reach, 0.3 * w)]))
+        if not fast:
+            free.append((2, -tiny, [-reach, min(reach, self.latest - end)]))
+        shifts = np.array([by for _, by, _ in free])
+        near = []
+        for i, by, _ in free:
+            moved = [x, w, end]
+            moved[i] += by
+            near.append(self.program(self.place(*moved), own.grid))
+        if not free or any(one is None for one in near):
+            return None
+        weights = np.array([{0: 1.0, 1: -1.0, 2: 0.0}[i] for i, _, _ in free])
+        soonest = self.way.tc - (x - w) if self.waits else -0.5 * x  # no contact before that of full torque
+        ends = np.array([limits for _, _, limits in free])
+        programs = [one for one in near if one is not None]
+        shift = own.shifted(fast, found, programs, shifts, ends, (weights, soonest))
+        if shift is None:
+            return None
+        moved = [x, w, end]
+        for (i, _, _), by in zip(free, shift.tolist(), strict=True):
+            moved[i] += by
+        there = self.place(*moved)
+        while self.waits and there[0] - there[1] < self.way.tc:  # by rounding
+            there = there[0] + 1e-12 * end, there[1], there[2]
+        return there
+
+
+def first_grid(problem: Problem, way: Way, at: Instants, steps: int) -> Grid:
+    """Even steps in the gap and while the shaft is wound up; fine ends in a long contact."""
+    contact = Contact.of(problem.drive)
+    grids: dict[Kind, Vector] = {
+        "gap": np.linspace(0.0, 1.0, steps // 4 + 1),
+        "resting": np.linspace(0.0, 1.0, steps // 4 + 1),
+        "stuck": np.linspace(0.0, 1.0, steps // 8 + 1),
+        "contact": contact_grid(contact, at.end - at.tb, steps),
+    }
+    return tuple((kind, grids[kind]) for kind in way.kinds)
+
+
+def _refined(problem: Problem, way: Way, best: WholeAnswer) -> WholeAnswer:
+    """The same instants, moved a little, on a grid cut finer where the torque switches or T is not kept."""
+    grid = first_grid(problem, way, best.at, MIDDLE)
+    width = 4e-3 * best.at.end
+    for _ in range(ROUNDS):
+        before = best.P
+        best = _moved(problem, way, best, grid, width)
+        if best.edges.size > MOST:
+            break
+        switching = _switching(problem, best)
+        if not best.broken.any() and abs(before - best.P) < SETTLED * best.P:
+            return best
+        grid = cut(best, switching | best.broken)
+        width *= 0.4
+    for _ in range(ROUNDS):
+        best = _moved(problem, way, best, grid, width)
+        if not best.broken.any():
+            break
+        grid = cut(best, best.broken)
+        width *= 0.3
+    return best
+
+
+def _moved(problem: Problem, way: Way, best: WholeAnswer, grid: Grid, width: float) -> WholeAnswer:
+    """The best instants within `width` of those known, on another grid."""
+    assert problem.start_time is not None
+    near = _Instants(problem, way, float(problem.start_time), 0, grid)
+    winding = best.at.tb - best.at.tc if near.winds else 0.0
+    found = near.moved(near.place(best.at.tb, winding, best.at.end), width)
+    return found if found is not None else best
+
+
+def _switching(problem: Problem, answer: WholeAnswer) -> NDArray[np.bool_]:
+    """Steps beside which the torque changes by more than 2 %."""
+    mean = answer.demand.mean(axis=1)
+    jump = np.abs(np.diff(mean)) > 0.02 * problem.highest_torque
+    near = np.zeros(mean.size, dtype=bool)
+    near[:-1] |= jump
+    near[1:] |= jump
+    return near
+
+
+def cut(answer: WholeAnswer, wanted: NDArray[np.bool_]) -> Grid:
+    """The answer's own grid with the wanted steps split in three, but for long ones and the finest."""
+    finer = []
+    at = 0
+    for kind, edges in answer.grid:
+        steps = np.diff(edges)
+        split = wanted[at : at + steps.size] & (steps < 5.0 * np.median(steps)) & (steps > 1e-4)
+        at += steps.size
+        each = zip(edges[:-1], edges[1:], split, strict=True)
+        parts = [np.linspace(a, b, 4)[1:] if more else [b] for a, b, more in each]
+        finer.append((kind, np.concatenate([[0.0], *parts])))
+    return tuple(finer)

@@ -1,0 +1,219 @@
+"""The linear program of the whole start: against an independent integrator, the other methods, and itself.
+
+A torque that lags less, rises faster or may brake more can do all that the other one can: P is ordered.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.softstart.optimal.test_collocation_march import march
+
+from softstart import Drive, optimize
+from softstart.errors import InputError
+from softstart.optimal import collocation, linear_search, pulse_coast_hold, whole
+from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.result import InfeasibleError
+from softstart.optimal.shortest import shortest_start_time
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+REACTIVE = CRANE.replace(load_kind="reactive")
+CURVE = ((0.0, 62.0), (40.0, 62.0), (90.0, 40.0))
+
+CASES: dict[str, tuple[Drive, float, Terminal, tuple[tuple[float, float], ...]]] = {
+    "lag": (CRANE.replace(torque_lag=0.005), 0.29, "synchronous", ()),
+    "lag, reached": (CRANE.replace(torque_lag=0.005), 0.27, "reached", ()),
+    "lag, steady": (CRANE.replace(torque_lag=0.003), 0.3, "steady", ()),
+    "rate": (CRANE.replace(torque_rate=3000.0), 0.3, "synchronous", ()),
+    "lag and rate, reached": (CRANE.replace(torque_rate=4000.0, torque_lag=0.002), 0.29, "reached", ()),
+    "brake": (CRANE.replace(minimum_torque=-30.0), 0.26, "synchronous", ()),
+    "curve": (CRANE, 0.3, "synchronous", CURVE),
+    "damped, lag": (CRANE.replace(damping=0.5, torque_lag=0.004), 0.28, "reached", ()),
+    "dead-zone, brake": (
+        CRANE.replace(damping=0.5, contact_law="dead-zone", minimum_torque=-10.0), 0.27, "synchronous", ()
+    ),
+    "reactive, lag": (REACTIVE.replace(torque_lag=0.005), 0.3, "reached", ()),
+    "reactive, damped": (REACTIVE.replace(damping=0.5), 0.27, "synchronous", ()),
+    "reactive, pressed in at once": (REACTIVE.replace(damping=6.0, load_torque=5.0), 0.29, "steady", ()),
+    "reactive, touching": (
+        REACTIVE.replace(torque_lag=0.004, start_position=0.25), 0.28, "synchronous", ()
+    ),
+    "touching, lag": (CRANE.replace(torque_lag=0.004, start_position=0.25), 0.28, "synchronous", ()),
+}  # fmt: skip
+
+
+@lru_cache
+def solved(case: str) -> tuple[Problem, Any]:
+    drive, end, terminal, curve = CASES[case]
+    problem = Problem(drive, end, terminal, torque_speed=curve)
+    return problem, whole.search(problem)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_an_independent_integrator_sees_the_same_start(case: str) -> None:
+    problem, best = solved(case)
+    profile, end = best.profile(problem), best.at.end
+    assert end <= problem.start_time * (1.0 + 1e-12)
+    path = march(problem.drive, profile, end)
+    assert path.w2 == pytest.approx(problem.target, rel=1e-6)
+    assert path.opened == 0
+    assert path.peak <= best.P * (1.0 + 2e-4)
+    if problem.terminal != "reached":  # else the peak may come after t_f
+        assert path.peak == pytest.approx(best.P, rel=3e-4)
+        assert path.v == pytest.approx(0.0, abs=1e-6 * problem.target)
+    if not problem.drive.start_position >= 0.5 * problem.drive.gap:
+        assert path.contact == pytest.approx(best.at.tc, rel=1e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_exact_plant_and_every_limit_agree(case: str) -> None:
+    """`optimize` takes it, and holds it to all its promises: limits, contacts, terminal, peak after t_f."""
+    drive, end, terminal, curve = CASES[case]
+    best = optimize(drive, end, terminal=terminal, torque_speed=curve)
+    assert best.method == "lp"
+    assert best.run.contacts == 1
+    assert best.claimed == pytest.approx(best.k_dyn, rel=3e-4)
+    assert best.k_dyn >= best.k_dyn_lower_bound * (1.0 - 1e-5)
+
+
+IDEAL: dict[str, tuple[dict[str, Any], float, Terminal]] = {
+    "bang-bang": ({}, 0.2522662, "synchronous"),
+    "reached": ({}, 0.2522662, "reached"),
+    "steady": ({"damping": 0.5}, 0.3, "steady"),
+    "dead-zone": ({"damping": 0.5, "contact_law": "dead-zone"}, 0.27, "synchronous"),
+    "reactive": ({"load_kind": "reactive"}, 0.27, "synchronous"),
+}
+
+
+@pytest.mark.parametrize(("given", "end", "terminal"), IDEAL.values(), ids=IDEAL)
+def test_without_a_lag_it_is_the_program_from_the_contact_on(
+    given: dict[str, Any], end: float, terminal: Terminal
+) -> None:
+    problem = Problem(CRANE.replace(**given), end, terminal)
+    whole_start, from_contact = whole.search(problem), linear_search.search(problem)
+    assert whole_start is not None
+    assert from_contact is not None
+    assert pytest.approx(from_contact.P, rel=3e-4) == whole_start.P
+
+
+def test_pulse_coast_hold_comes_out() -> None:
+    problem = Problem(CRANE, 0.33)
+    best = whole.search(problem)
+    assert best is not None
+    truth = pulse_coast_hold.solve(problem).claimed
+    assert truth * (1.0 - 1e-5) <= best.P / problem.base_torque <= truth * (1.0 + 4e-4)
+
+
+@pytest.mark.parametrize("case", ["lag", "rate", "brake", "reactive, lag"])
+def test_collocation_finds_nothing_better(case: str) -> None:
+    problem, best = solved(case)
+    other = collocation.solve(problem)
+    assert best.P / problem.base_torque <= other.claimed * (1.0 + 3e-4)
+    assert best.P / problem.base_torque >= other.claimed * (1.0 - 5e-3)
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("torque_lag", [1e-7, 0.003, 0.02]),
+        ("torque_rate", [1e7, 5e3, 1.5e3]),
+        ("minimum_torque", [-62.0, -10.0, 0.0]),
+    ],
+)
+def test_what_can_do_less_starts_no_gentler(key: str, values: list[float]) -> None:
+    peaks = []
+    for value in values:
+        best = whole.search(Problem(CRANE.replace(**{key: value}), 0.32))
+        assert best is not None
+        peaks.append(best.P)
+    assert all(after >= before * (1.0 - 1e-4) for before, after in pairwise(peaks))
+    assert peaks[-1] > peaks[0] * 1.002
+    if key != "minimum_torque":  # hardly any lag, hardly any limit of the rate: the ideal torque
+        assert peaks[0] == pytest.approx(pulse_coast_hold.solve(Problem(CRANE, 0.32)).claimed
+                                         * Problem(CRANE, 0.32).base_torque, rel=5e-4)  # fmt: skip
+
+
+def test_units_do_not_matter() -> None:
+    """Torques 1000-fold, times 1/50: the same start, to the accuracy of the search."""
+    k, s = 1e3, 0.02
+    drive = CRANE.replace(torque_lag=0.004)
+    other = drive.replace(
+        motor_inertia=drive.J1 * k * s * s, load_inertia=drive.J2 * k * s * s, stiffness=drive.c * k,
+        starting_torque=drive.Ms * k, maximum_torque=drive.maximum_torque * k, load_torque=drive.Mc * k,
+        target_speed=60.0 / s, torque_lag=0.004 * s,
+    )  # fmt: skip
+    here, there = whole.solve(Problem(drive, 0.29)), whole.solve(Problem(other, 0.29 * s))
+    assert here is not None
+    assert there is not None
+    assert there.claimed == pytest.approx(here.claimed, rel=2e-5)
+
+
+@pytest.mark.parametrize(
+    "given", [{"torque_lag": 0.005}, {"load_kind": "reactive", "damping": 0.5}, {"torque_rate": 3e3}]
+)
+def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[str, Any]) -> None:
+    drive = CRANE.replace(**given)
+    shortest = shortest_start_time(Problem(drive, minimise="start_time"))
+    assert whole.search(Problem(drive, 1.003 * shortest)) is not None
+    assert whole.search(Problem(drive, 0.997 * shortest)) is None
+    with pytest.raises(InfeasibleError) as told:
+        optimize(drive, 0.997 * shortest)
+    assert told.value.verdict.shortest_start_time == pytest.approx(shortest, rel=1e-5)
+
+
+def test_more_time_than_the_load_leaves_is_not_used() -> None:
+    """An active load comes back by itself: however much time there is, the gap is closed after a while."""
+    drive = CRANE.replace(torque_lag=0.004)
+    best, longer = (whole.search(Problem(drive, end)) for end in (1.2, 40.0))
+    assert best is not None
+    assert longer is not None
+    assert longer.at.end <= 40.0
+    assert longer.P <= best.P * (1.0 + 1e-4)
+    assert longer.at.tc < math.sqrt(2.0 * drive.gap * drive.J2 / drive.Mc)
+
+
+def test_finer_grids_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, best = solved("lag")
+    for name, value in (("COARSE", 60), ("MIDDLE", 160), ("MOST", 400)):
+        monkeypatch.setattr(f"softstart.optimal.whole.searching.{name}", value)
+    finer = whole.search(problem)
+    assert finer is not None
+    assert pytest.approx(best.P, rel=2e-4) == finer.P
+    assert finer.P <= best.P * (1.0 + 5e-5)
+
+
+@pytest.mark.parametrize(
+    ("drive", "options", "why"),
+    [
+        (CRANE, {"smoothness": 1e-4}, "the weight on the smoothness is not linear"),
+        (CRANE, {"heat": 1.0}, "a bound on the heat is not linear"),
+        (CRANE, {"minimise": "heat"}, "only K_dyn is linear"),
+        (CRANE.replace(contact_law="modelica", damping=0.5), {}, "modelica"),
+        (CRANE.replace(start_position=-0.3), {}, "far flank"),
+        (CRANE.replace(start_position=0.3, initial_load_speed=1.0), {}, "part at once"),
+        (REACTIVE.replace(initial_load_speed=1.0, initial_motor_speed=1.0), {}, "moves before"),
+        (REACTIVE.replace(start_position=2.0), {}, "wound up"),
+    ],
+)
+def test_what_is_not_linear_is_named(drive: Drive, options: dict[str, Any], why: str) -> None:
+    problem = Problem(drive, 0.4, **options)
+    assert why in whole.not_linear(problem)
+    with pytest.raises(InputError, match=r"method = lp: .*; use method = collocation"):
+        optimize(drive, 0.4, method="lp", **options)
+
+
+@pytest.mark.parametrize("name", ["servo-axis-small", "nordin-servo-60kw"])
+def test_the_drives_with_a_lag_that_come_along_have_optima(name: str) -> None:
+    drive = Drive.load(name)
+    shortest = shortest_start_time(Problem(drive, terminal="reached", minimise="start_time"))
+    ratios = []
+    for share in (1.02, 1.2, 1.6):
+        best = optimize(drive, share * shortest, terminal="reached")
+        ratios.append(best.k_dyn / best.k_dyn_lower_bound)
+    assert np.all(np.array(ratios) >= 1.0 - 1e-5)
+    assert ratios[-1] < 1.03  # with time enough the bound of an ideal torque is nearly met
