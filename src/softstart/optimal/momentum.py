@@ -26,11 +26,12 @@ Two sharper forms, where the twist cannot fall first and the load is active:
 
 - undamped: T is at no instant above that of pulse, coast, hold with the same peak P (pulse_coast_hold.py,
   where the proof stands), and the hold is granted whether or not Ms suffices;
-- damped (`no-pull`, `dead-zone`): no torque of 0 or more makes T(s) lower than coasting does, up to half a
-  damped period after the contact (the answer of T to an impulse is not negative so long, so that T stays
-  above 0 and the contact lasts). So the impact speed v has T_coasting(s; v) <= P for every s, which limits v;
-  and in the gap the soonest contact with at most that speed is an early pulse. A contact that has to be
-  gentle comes later than t_c. Fewer instants s only lower the bound: a grid proves as much as it says.
+- damped (`no-pull`, `dead-zone`): no torque of 0 or more makes T(s) lower than coasting does, up to the
+  first zero of c h + d h' after the contact (the answer of T to an impulse is not negative so long, so that
+  T stays above 0 and the contact lasts). So the impact speed v has T_coasting(s; v) <= P for every s, which
+  limits v; and in the gap the soonest contact with at most that speed is an early pulse. A contact that has
+  to be gentle comes later than t_c. Fewer instants s only lower the bound: a grid proves as much as it
+  says.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 from softstart.errors import SimulationError
 from softstart.optimal import whole
@@ -35,11 +36,8 @@ def shortest_start_time(problem: Problem) -> float:
     """
     plain = replace(problem, start_time=1.0, minimise="k_dyn", k_dyn=None, heat=None)
     bounded = problem.k_dyn is not None or problem.heat is not None
-    if not bounded and not not_linear(plain):
-        return _by_linear_program(plain)
-    if not bounded and not whole.not_linear(plain):
-        found = [_by_whole_program(plain, way) for way in whole.ways(plain)]
-        return min((one for one in found if math.isfinite(one)), default=math.nan)
+    if not bounded and not (not_linear(plain) and whole.not_linear(plain)):
+        return _of_linear(plain)
     from softstart.optimal.collocation import NotConverged, solve
 
     quickest = replace(problem, start_time=None, minimise="start_time")
@@ -47,6 +45,14 @@ def shortest_start_time(problem: Problem) -> float:
         return solve(quickest).end_time
     except NotConverged:
         return math.inf if bounded else math.nan  # without bounds there is always a start
+
+
+@lru_cache(maxsize=128)  # verdicts on several start times of a drive ask for the same ones
+def _of_linear(plain: Problem) -> float:
+    if not not_linear(plain):
+        return _by_linear_program(plain)
+    found = [_by_whole_program(plain, way) for way in whole.ways(plain)]
+    return min((one for one in found if math.isfinite(one)), default=math.nan)
 
 
 def _by_linear_program(problem: Problem) -> float:

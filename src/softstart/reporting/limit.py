@@ -29,7 +29,7 @@ INSTANTS = 80  # of the curve of the bound
 EARLIER = 0.85  # of the quickest strategy: from where on the curve is drawn
 POLL = 0.1  # s
 GENTLER = 0.999  # times an optimum: what is no more than its last digits is not gentler
-QUICK_SHARE = 0.5  # of the budget, at most, for starts that are good and not proved best
+QUICK_SHARE = 0.3  # of the budget is kept for starts that are good and not proved best
 
 Tell = Callable[[float, str], object]
 
@@ -130,10 +130,11 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
     known: list[KnownStart] = []
     if left and budget > 0.0:
         began = time.monotonic()
-        tell(0.0, "looking for gentle starts")
-        known = known_starts(drive, left, QUICK_SHARE * budget)
-        points += _in_own_process(drive, left, max(budget - (time.monotonic() - began), 0.0), tell)
+        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, tell)
+        tell(1.0, "looking for gentle starts")
         best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
+        order = sorted(left, key=lambda t: t in best)  # those without an optimum first
+        known = known_starts(drive, order, budget - (time.monotonic() - began))
         known = [one for one in known if one.k_dyn < GENTLER * best.get(one.start_time_bound, math.inf)]
     settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
     return Limit(

@@ -194,12 +194,12 @@ def _times(times: Sequence[float]) -> str:
 
 
 def _why_hard(report: Report) -> str:
-    from softstart.optimal.linear_search import not_linear
+    from softstart.optimal import linear_search, whole
     from softstart.optimal.problem import Problem
     from softstart.optimal.pulse_coast_hold import applies
 
     problem = Problem(report.drive, 1.0, "reached")
-    if reason := not_linear(problem):
+    if linear_search.not_linear(problem) and (reason := whole.not_linear(problem)):
         return f"they need a numerical search (direct collocation), because {reason}"
     if reason := applies(problem):
         return f"there is no formula ({reason}), only a search by linear programs"

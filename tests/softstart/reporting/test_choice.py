@@ -115,7 +115,7 @@ def test_reactive_damped_lagging_drive_says_what_was_not_found():
     assert len(made.limit.missing) >= 6
     for row in made.comparison.rows:
         assert bound_at(servo, row.run.start_time) <= row.run.k_dyn
-    assert "direct collocation" in limit_section(made, Figures())
+    assert "only a search by linear programs" in limit_section(made, Figures())
 
 
 def test_search_for_optima_ends_when_its_time_is_up():
