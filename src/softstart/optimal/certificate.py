@@ -219,7 +219,7 @@ class _Dual:
         Ms = self.problem.highest_torque
         step = float(np.max(np.diff(s)))
         # q jumps at the kinks of a damped shaft, and at tau: each interval has its own values at its ends
-        after, before = (np.minimum(self._weights(s, tau, before=side), 0.0) for side in (False, True))
+        after, before = (np.minimum(q, 0.0) for q in self._weights(s, tau))
         area = float(np.sum(0.5 * np.diff(s) * (after[:-1] + before[1:])))
         return Ms * (area - self._bend() * step * step / 8.0 * tau)
 
@@ -234,8 +234,8 @@ class _Dual:
             + abs(by.speed) * k["w2"][2]
         )
 
-    def _weights(self, s: Vector, tau: float, *, before: bool) -> Vector:
-        """q(s): what a torque impulse just after s, or just `before` it, adds."""
+    def _weights(self, s: Vector, tau: float) -> tuple[Vector, Vector]:
+        """q(s): what a torque impulse just after s, and just before it, adds."""
         by, contact = self.by, self.contact
         J1, J2, c, d = contact.J1, contact.J2, contact.c, contact.d
         at = np.concatenate([self.share * tau, [tau], tau + by.tail_at])
@@ -244,8 +244,8 @@ class _Dual:
         last = self.share.size
         weight_dh[last] += by.speed / (J1 + J2) - by.rate / J1
         kept = (weight_h != 0.0) | (weight_dh != 0.0)
-        q = contact.sums(s, at[kept], weight_h[kept], weight_dh[kept], before=before)
-        return q - by.speed / (J1 + J2)
+        after, before = contact.sums(s, at[kept], weight_h[kept], weight_dh[kept])
+        return after - by.speed / (J1 + J2), before - by.speed / (J1 + J2)
 
     def curvature(self, tau: float) -> float:
         """M: bound of the second derivative in tau, for a contact of length <= tau."""

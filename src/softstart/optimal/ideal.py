@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,6 +66,7 @@ class Contact:
             return 2.0 / self.Omega
         return 2.0 * (math.acos(share) if share < 1.0 else math.acosh(share)) / q
 
+    @cached_property
     def _exponents(self) -> tuple[complex, complex]:
         q2 = self.Omega**2 - self.zeta**2
         least = (1e-6 * self.Omega) ** 2  # critical damping: the error of moving apart is of order 1e-12
@@ -75,7 +77,7 @@ class Contact:
 
     def _both(self, s: ArrayLike) -> tuple[Vector, Vector]:
         when = np.asarray(s, dtype=np.float64)
-        r1, r2 = self._exponents()
+        r1, r2 = self._exponents
         late = np.maximum(when, 0.0)
         e1, e2 = np.exp(r1 * late), np.exp(r2 * late)
         h = ((e1 - e2) / (r1 - r2)).real
@@ -96,30 +98,36 @@ class Contact:
         settled = (1.0 - dh - 2.0 * self.zeta * h) / self.Omega**2
         return np.where(np.asarray(s) >= 0.0, settled, 0.0)
 
-    def sums(self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector, *, before: bool = False) -> Vector:
+    def sums(self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector) -> tuple[Vector, Vector]:
         """Sum over j with at_j > s of of_h_j h(at_j - s) + of_dh_j dh(at_j - s), for rising s.
 
-        It jumps at every at_j, as dh does at 0: `before` counts at_j = s too, the limit from below. By
-        running sums over the two exponentials of h, so that it costs no more than s.size + at.size.
+        It jumps at every at_j, as dh does at 0: the second answer counts at_j = s too, the limit from below.
+        By running sums over the two exponentials of h, so that it costs no more than s.size + at.size.
         """
-        r1, r2 = self._exponents()
+        r1, r2 = self._exponents
         order = np.argsort(at)
         at, of_h, of_dh = at[order], of_h[order], of_dh[order]
-        first = np.searchsorted(at, s, side="left" if before else "right")
+        after, before = (np.searchsorted(at, s, side=side) for side in ("right", "left"))
         longest = float(max(at[-1], s[-1])) if at.size else 0.0
         if (
             max(abs(r1.real), abs(r2.real)) * longest > 300.0
         ):  # the sums would lose themselves in huge factors
-            counted = np.arange(at.size)[None, :] >= first[:, None]
-            lag = np.where(counted, at[None, :] - s[:, None], -1.0)
-            dense: Vector = self.h(lag) @ of_h + self.dh(lag) @ of_dh
-            return dense
-        total = np.zeros(s.size, dtype=np.complex128)
+
+            def dense(first: NDArray[np.int64]) -> Vector:
+                counted = np.arange(at.size)[None, :] >= first[:, None]
+                lag = np.where(counted, at[None, :] - s[:, None], -1.0)
+                total: Vector = self.h(lag) @ of_h + self.dh(lag) @ of_dh
+                return total
+
+            return dense(after), dense(before)
+        from_above, from_below = np.zeros(s.size, dtype=complex), np.zeros(s.size, dtype=complex)
         for r, sign in ((r1, 1.0), (r2, -1.0)):
             terms = (of_h + r * of_dh) * np.exp(r * at) * sign / (r1 - r2)
             left = np.concatenate([np.cumsum(terms[::-1])[::-1], [0.0]])
-            total += left[first] * np.exp(-r * s)
-        return np.asarray(total.real)
+            decay = np.exp(-r * s)
+            from_above += left[after] * decay
+            from_below += left[before] * decay
+        return from_above.real, from_below.real
 
     def twist(self, s: Vector, edges: Vector) -> tuple[Vector, Vector, Vector, Vector]:
         """z(s) = A u + a_v v + a_0 + a_z z0: (A, a_v, a_0, a_z) for u constant between the edges."""

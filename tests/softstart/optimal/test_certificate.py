@@ -324,7 +324,7 @@ def test_any_numbers_at_all_make_a_bound(given: dict[str, Any], terminal: Termin
         ]
         least = min(ends) - dual.curvature(tau) * width**2 / 8.0
         q = [
-            dual._weights(np.linspace(0.0, tau, 41)[:-1] + tau / 80.0, tau, before=False),
+            dual._weights(np.linspace(0.0, tau, 41)[:-1] + tau / 80.0, tau)[0],
             rng.normal(size=40),
         ]
         for weights in q:  # the torque that presses most, and any
