@@ -14,7 +14,7 @@ from softstart.optimal.linear_program import AIM
 from softstart.optimal.linear_search import greatest_speed, not_linear
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import Verdict
+from softstart.optimal.result import Candidate, Verdict
 from softstart.simulation import simulate
 
 COARSE, FINE = 40, 80  # steps of the linear programs
@@ -34,7 +34,7 @@ def shortest_start_time(problem: Problem) -> float:
     >>> round(shortest_start_time(Problem(drive, 0.3)), 4)
     0.2498
     """
-    plain = replace(problem, start_time=1.0, minimise="k_dyn", k_dyn=None, heat=None)
+    plain = _plain(problem)
     bounded = problem.k_dyn is not None or problem.heat is not None
     if not bounded and not (not_linear(plain) and whole.not_linear(plain)):
         return _of_linear(plain)
@@ -47,12 +47,30 @@ def shortest_start_time(problem: Problem) -> float:
         return math.inf if bounded else math.nan  # without bounds there is always a start
 
 
+def _plain(problem: Problem) -> Problem:
+    return replace(problem, start_time=1.0, minimise="k_dyn", k_dyn=None, heat=None)
+
+
 @lru_cache(maxsize=128)  # verdicts on several start times of a drive ask for the same ones
 def _of_linear(plain: Problem) -> float:
-    if not not_linear(plain):
-        return _by_linear_program(plain)
-    found = [_by_whole_program(plain, way) for way in whole.ways(plain)]
-    return min((one for one in found if math.isfinite(one)), default=math.nan)
+    return _quickest_whole(plain)[0] if not_linear(plain) else _by_linear_program(plain)
+
+
+@lru_cache(maxsize=128)
+def _quickest_whole(plain: Problem) -> tuple[float, whole.Way | None, whole.Instant | None]:
+    """The shortest t_f of all orders of phases, nan if there was none, with the instants of that start."""
+    found = [(*_by_whole_program(plain, way), way) for way in whole.ways(plain)]
+    known = [(end, way, at) for end, at, way in found if math.isfinite(end)]
+    return min(known, key=lambda one: one[0], default=(math.nan, None, None))
+
+
+def from_quickest(problem: Problem) -> Candidate | None:
+    """The optimum of a problem for the whole start's program, looked for from the quickest start on."""
+    assert problem.start_time is not None
+    end, way, at = _quickest_whole(_plain(problem))
+    if way is None or at is None or not end < problem.start_time:
+        return None
+    return whole.solve(problem, (way, (at[0], at[1], min(end * (1.0 + 1e-3), problem.start_time))))
 
 
 def _by_linear_program(problem: Problem) -> float:
@@ -71,8 +89,8 @@ def _by_linear_program(problem: Problem) -> float:
     return _quickest(problem, soonest, speed_at)
 
 
-def _by_whole_program(problem: Problem, way: whole.Way) -> float:
-    """The same where the gap part counts too."""
+def _by_whole_program(problem: Problem, way: whole.Way) -> tuple[float, whole.Instant | None]:
+    """The same where the gap part counts too, and the instants of that start."""
     near: whole.Instant | None = None
 
     def speed_at(end: float, steps: int) -> float:
@@ -81,7 +99,7 @@ def _by_whole_program(problem: Problem, way: whole.Way) -> float:
         near = found if math.isfinite(speed) else near
         return speed
 
-    return _quickest(problem, max(momentum_shortest_time(problem), way.tb), speed_at)
+    return _quickest(problem, max(momentum_shortest_time(problem), way.tb), speed_at), near
 
 
 def _quickest(problem: Problem, soonest: float, speed_at: Callable[[float, int], float]) -> float:

@@ -17,7 +17,7 @@ from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Objective, Problem, Terminal
 from softstart.optimal.replay import replay
 from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum, OptimumError
-from softstart.optimal.shortest import shortest_start_time, verdict_on
+from softstart.optimal.shortest import from_quickest, shortest_start_time, verdict_on
 from softstart.optimal.tail import with_tail
 from softstart.run import Run
 
@@ -118,6 +118,8 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
         if not linear:
             raise InputError(f"method = lp: {whole.not_linear(problem)}; use method = collocation.")
         best = linear[0].solve(problem)
+        if best is None and linear[0] is whole:
+            best = from_quickest(problem)
         if best is None:
             raise _refusal(problem)
         return best, f"no closed form: {no_formula}" if method == "auto" else asked

@@ -29,18 +29,13 @@ class Kind:
 
 
 def kinds(extent: Extent, progress: Progress) -> list[Kind]:
-    """All kinds at all gaps; both together only at the first, where it is quick."""
+    """All kinds at all gaps."""
     found = []
     for name in extent.kinds:
         for index, gap in enumerate(extent.gaps):
-            both = "," in name
-            if both and index > 0:
-                continue
-            multiples = extent.kind_multiples[: 1 if both else None]  # the first is quick to find
-            times = [m * direct_time(gap) for m in multiples]
-            drive = crane(gap, name)
-            beside = extent.kind_controllers if index == 0 and not both else ()
-            found.append(Kind(name, gap, optima(drive, times, "synchronous", progress, beside)))
+            times = [m * direct_time(gap) for m in extent.kind_multiples]
+            beside = extent.kind_controllers if index == 0 else ()
+            found.append(Kind(name, gap, optima(crane(gap, name), times, "synchronous", progress, beside)))
     return found
 
 

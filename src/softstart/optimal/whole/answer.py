@@ -38,6 +38,7 @@ class WholeAnswer:
     edges: Vector  # s, of all steps up to t_f
     demand: Matrix  # (steps, 2), N m
     broken: NDArray[np.bool_]  # steps in which T is not kept between the checks
+    beyond: bool  # the torque that would hold T at t_f is more than the motor has
     x: Vector = field(repr=False)  # all variables of the program
 
     def profile(self, problem: Problem) -> TorqueProfile:

@@ -20,6 +20,7 @@ from softstart.optimal.whole.answer import Grid, Instants, Kind, Matrix, Vector,
 Z, V, W2, U, R, SLOPE, ONE = range(7)
 STATES = 4
 TAIL_STEPS = 12
+SETTLED = 8.0  # lags, after which the torque follows its demand to 0.03 %
 Rows = tuple[Any, Vector]  # sparse matrix over the variables, constants
 
 
@@ -30,9 +31,9 @@ class Motion:
     speed. With a rate limit and `reached`, a few steps follow after t_f, in which only T <= P is asked for.
     """
 
-    def __init__(self, problem: Problem, at: Instants, grid: Grid) -> None:
+    def __init__(self, problem: Problem, at: Instants, grid: Grid, full_tail: bool = False) -> None:
         drive: Any = problem.drive
-        self.problem, self.at, self.grid = problem, at, grid
+        self.problem, self.at, self.grid, self.full_tail = problem, at, grid, full_tail
         self.J1, self.J2, self.c, self.d, self.Mc = (
             float(value) for value in (drive.J1, drive.J2, drive.c, drive.d, drive.Mc)
         )
@@ -141,16 +142,20 @@ class Motion:
     def instants(self, fractions: tuple[float, ...]) -> tuple[NDArray[np.int64], Vector]:
         """Where limits are looked at: (step, time since its beginning), at these fractions of each step.
 
-        In a step longer than an elastic period T swings about a mean, ever less, once the torque has come to
-        rest: its beginning is looked at as finely as a short step would be, and its end.
+        A step longer than a sixth of an elastic period is looked at as often as short ones would be. In one
+        that is longer than a period T swings about a mean, ever less, once the torque has come to rest: that
+        long it is looked at, and at its end.
         """
         period = 2.0 * math.pi / self.Omega
-        watched = period + 3.0 * self.lag
-        count = math.ceil(6 * len(fractions) * watched / period)
-        within = watched * np.arange(1, count + 1) / count
-        parts = [
-            np.append(within, length) if length > watched else np.array(fractions) * length
-            for length in self.length.tolist()
-        ]
+        watched = period + SETTLED * self.lag
+
+        def within(length: float) -> Vector:
+            count = math.ceil(6 * len(fractions) * min(length, watched) / period)
+            if count <= len(fractions):
+                return np.array(fractions) * length
+            looks = min(length, watched) * np.arange(fractions[0] != 0.0, count + 1) / count
+            return np.append(looks, length) if length > watched else looks
+
+        parts = [within(length) for length in self.length.tolist()]
         step = np.repeat(np.arange(self.n), [part.size for part in parts])
         return step, np.concatenate(parts)

@@ -163,13 +163,18 @@ class WholeProgram(Motion):
             yield rows, (u_a - slope * w_a - constant) / self.U
 
     def _tail(self) -> Rows:
-        """T after t_f, from the state there: the torque is held, or the motor coasts."""
+        """T after t_f, from the state there: the torque is held, or the motor coasts.
+
+        With `full_tail` the largest torque stands for one beyond it that would hold T.
+        """
         node = self.steps
         length = self.tail_length()
         times = length * np.arange(1, TAIL_POINTS + 1) / TAIL_POINTS
         weights = self.T @ expm(self.matrix("contact")[None] * times[:, None, None])
         if self.problem.terminal == "reached":
             constant = weights[:, ONE] + weights[:, R] * self.problem.lowest_torque
+        elif self.full_tail:
+            constant = weights[:, ONE] + weights[:, R] * self.U
         else:
             total = (self.J1 + self.J2) / self.J2
             weights = weights.copy()
@@ -208,10 +213,12 @@ class WholeProgram(Motion):
         if found is None:
             return None
         demand = np.column_stack([found[self.first], found[self.second]])[: self.steps] * self.U
+        z, v = found[STATES * self.steps : STATES * self.steps + 2] * self.scale[:2]
+        held = ((self.c * z + self.d * v) * (self.J1 + self.J2) - self.Mc * self.J1) / self.J2
         P = float(found[self.P])
         return WholeAnswer(
             self.at, P * self.U, self.grid, self.edges[: self.steps + 1], demand, self._broken(found, P),
-            found,
+            bool(held > self.U), found,
         )  # fmt: skip
 
     def greatest_speed(self) -> tuple[float, Vector | None]:

@@ -27,8 +27,9 @@ Value = Callable[[Instant], float]
 COARSE, MIDDLE, MOST = 40, 80, 260  # steps of the contact: to find the instants, to refine them, at most
 SCANNED, WINDINGS = 14, 4  # instants of the contact, and durations of the winding up, that are tried at first
 LONGEST_WINDING = 6.0  # times the one under full torque
-ROUNDS = 3
+ROUNDS, MENDING = 3, 6  # of finer grids: for the switches; and until T is kept
 SETTLED, ENOUGH = 2e-5, 5e-6  # a finer grid, other instants that change P by less are good enough
+LATER = (1.05, 1.3)  # times an end
 SOONER = (0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # ends that are tried, as shares of the latest
 TRIALS = 25  # of a better place for the instants
 FINEST = 1e-7  # of t_f, to which they are found
@@ -36,9 +37,12 @@ LOCAL_MINIMA = 3
 EARLIEST = 1.0 + 1e-7  # just later than under full torque: the grid cannot do better
 
 
-def solve(problem: Problem) -> Candidate | None:
-    """The optimum of a problem that `not_linear` has nothing against; None if no torque meets the terms."""
-    best = search(problem)
+def solve(problem: Problem, start: tuple[Way, Instant] | None = None) -> Candidate | None:
+    """The optimum of a problem that `not_linear` has nothing against; None if no torque meets the terms.
+
+    With `start` it is looked for from these instants on, instead of by a scan.
+    """
+    best = search(problem) if start is None else _from(problem, *start)
     if best is None:
         return None
     note = f"{best.edges.size - 1} steps"
@@ -57,6 +61,12 @@ def search(problem: Problem) -> WholeAnswer | None:
         sooner = [(way, _Instants(problem, way, latest, COARSE).best(share * latest)) for way in orders]
         found = [(way, best) for way, best in sooner if best is not None]
     return _refined(problem, *min(found, key=lambda one: one[1].P)) if found else None
+
+
+def _from(problem: Problem, way: Way, at: Instant) -> WholeAnswer | None:
+    assert problem.start_time is not None
+    best = _Instants(problem, way, float(problem.start_time), MIDDLE).moved(at, 0.1 * at[2])
+    return None if best is None else _refined(problem, way, best)
 
 
 def _coarse(problem: Problem, way: Way, latest: float) -> WholeAnswer | None:
@@ -92,9 +102,11 @@ class _Instants:
     """
 
     def __init__(
-        self, problem: Problem, way: Way, latest: float, steps: int, grid: Grid | None = None
-    ) -> None:
+        self, problem: Problem, way: Way, latest: float, steps: int, grid: Grid | None = None,
+        full_tail: bool = False,
+    ) -> None:  # fmt: skip
         self.problem, self.way, self.latest, self.steps, self.grid = problem, way, latest, steps, grid
+        self.full_tail = full_tail
         self.winds = "stuck" in way.kinds
         self.waits = "gap" in way.kinds or "resting" in way.kinds
         self.answers: dict[Instant, WholeAnswer | None] = {}
@@ -109,7 +121,7 @@ class _Instants:
             return None
         instants = Instants(tc, x, end)
         grid = grid or self.grid or first_grid(self.problem, self.way, instants, self.steps)
-        return WholeProgram(self.problem, instants, grid)
+        return WholeProgram(self.problem, instants, grid, self.full_tail)
 
     def peak(self, at: Instant) -> float:
         """P, N m; inf where there is no start."""
@@ -131,6 +143,11 @@ class _Instants:
         start = self._least(end, fast=False)
         if math.isinf(self.peak(start)):  # little time: a narrow window is left, if any
             speed, start = self.greatest_speed(end)
+            for share in LATER if self.steps > COARSE else ():  # where the window is wider, and from there on
+                if not speed >= self.problem.target:
+                    near = self.greatest_speed(share * end)
+                    if math.isfinite(near[0]):
+                        speed, start = self.greatest_speed(end, near[1])
             if not speed >= self.problem.target or math.isinf(self.peak(start)):
                 return None
             self._down(start, 0.1 * end, fast=False)
@@ -292,7 +309,7 @@ def _refined(problem: Problem, way: Way, best: WholeAnswer) -> WholeAnswer:
             return best
         grid = cut(best, switching | best.broken)
         width *= 0.4
-    for _ in range(ROUNDS):
+    for _ in range(MENDING):
         best = _moved(problem, way, best, grid, width)
         if not best.broken.any():
             break
@@ -304,7 +321,7 @@ def _refined(problem: Problem, way: Way, best: WholeAnswer) -> WholeAnswer:
 def _moved(problem: Problem, way: Way, best: WholeAnswer, grid: Grid, width: float) -> WholeAnswer:
     """The best instants within `width` of those known, on another grid."""
     assert problem.start_time is not None
-    near = _Instants(problem, way, float(problem.start_time), 0, grid)
+    near = _Instants(problem, way, float(problem.start_time), 0, grid, best.beyond)
     winding = best.at.tb - best.at.tc if near.winds else 0.0
     found = near.moved(near.place(best.at.tb, winding, best.at.end), width)
     return found if found is not None else best
@@ -321,12 +338,14 @@ def _switching(problem: Problem, answer: WholeAnswer) -> NDArray[np.bool_]:
 
 
 def cut(answer: WholeAnswer, wanted: NDArray[np.bool_]) -> Grid:
-    """The answer's own grid with the wanted steps split in three, but for long ones and the finest."""
+    """The answer's own grid, the wanted steps split in three, but for the finest and long unbroken ones."""
     finer = []
     at = 0
     for kind, edges in answer.grid:
         steps = np.diff(edges)
-        split = wanted[at : at + steps.size] & (steps < 5.0 * np.median(steps)) & (steps > 1e-4)
+        here = slice(at, at + steps.size)
+        short = (steps < 5.0 * np.median(steps)) | answer.broken[here]
+        split = wanted[here] & short & (steps > 1e-4)
         at += steps.size
         each = zip(edges[:-1], edges[1:], split, strict=True)
         parts = [np.linspace(a, b, 4)[1:] if more else [b] for a, b, more in each]
