@@ -30,7 +30,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.optimal.ideal import Contact, Entry, ThroughStandstill, entry_of, no_ideal
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import Entry, ThroughStandstill, entry_of, no_ideal
 from softstart.optimal.linear_program import HALVES, Answer, LinearProgram, Multipliers
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound

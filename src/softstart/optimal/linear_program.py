@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import entry_of
 from softstart.optimal.problem import Problem
 
 Vector = NDArray[np.float64]

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.optimal.ideal import Contact, Entry, entry_of, no_ideal
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import Entry, entry_of, no_ideal
 from softstart.optimal.linear_program import FINE_ENDS, Answer, LinearProgram, first_grid
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate

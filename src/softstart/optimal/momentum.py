@@ -41,7 +41,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.optimal.ideal import Contact
+from softstart.optimal.contact import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
 from softstart.optimal.result import LowerBound

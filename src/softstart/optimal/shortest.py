@@ -9,7 +9,8 @@ from functools import lru_cache
 
 from softstart.errors import SimulationError
 from softstart.optimal import whole
-from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import entry_of
 from softstart.optimal.linear_program import AIM
 from softstart.optimal.linear_search import greatest_speed, not_linear
 from softstart.optimal.momentum import momentum_shortest_time

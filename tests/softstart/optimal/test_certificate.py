@@ -15,7 +15,8 @@ from scipy.optimize import linprog
 from softstart import Drive, TorqueProfile
 from softstart.optimal import certificate
 from softstart.optimal.certificate import _Dual, _Envelope, _Search, certified_bound, not_certified
-from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import entry_of
 from softstart.optimal.linear_program import Multipliers
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.replay import replay

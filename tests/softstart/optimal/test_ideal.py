@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile
+from softstart.optimal.contact import Contact
 from softstart.optimal.ideal import (
-    Contact,
     Entry,
     FromContact,
     ThroughGap,

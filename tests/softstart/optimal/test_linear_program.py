@@ -11,7 +11,8 @@ from softstart import Drive, optimize
 from softstart.errors import InputError
 from softstart.optimal import linear_search, pulse_coast_hold
 from softstart.optimal.certificate import _Dual, _Envelope
-from softstart.optimal.ideal import Contact, entry_of
+from softstart.optimal.contact import Contact
+from softstart.optimal.ideal import entry_of
 from softstart.optimal.linear_program import Answer, LinearProgram
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.replay import replay

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.optimal.ideal import Contact
+from softstart.optimal.contact import Contact
 from softstart.optimal.linear_program import first_grid as contact_grid
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
