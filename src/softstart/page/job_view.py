@@ -120,6 +120,12 @@ class JobView:
             self.job.cancel()
             self._look()
 
+    def settle(self, go: Any, result: Any) -> None:
+        """Let a button begin no second job, and hide a result that answers another question."""
+        go.set_enabled(not self.busy)
+        if self.failed:
+            result.set_visibility(False)
+
     def _look(self) -> None:
         job = self.job
         if job is None:

@@ -88,9 +88,7 @@ class OptimumPanel:
         self._view.begin("optimal start", works.gentlest, self._drive, text, terminal)
 
     def _state(self) -> None:
-        self._go.set_enabled(not self._view.busy)
-        if self._view.failed:
-            self._result.set_visibility(False)  # what is left there answers another question
+        self._view.settle(self._go, self._result)
 
     def _done(self, found: works.Gentlest) -> None:
         self._found = found

@@ -101,9 +101,7 @@ class TuningPanel:
         )  # fmt: skip
 
     def _state(self) -> None:
-        self._go.set_enabled(not self._view.busy)
-        if self._view.failed:
-            self._result.set_visibility(False)  # what is left there answers another question
+        self._view.settle(self._go, self._result)
 
     def _done(self, found: works.Tuned) -> None:
         self._found = found

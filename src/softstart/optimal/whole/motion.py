@@ -107,8 +107,8 @@ class Motion:
         for kind in set(kinds.tolist()):
             here = kinds == kind
             # steps of one length are computed once
-            lengths, back = np.unique(s[here].round(15), return_inverse=True)
-            out[here] = expm(self.matrix(kind)[None] * lengths[:, None, None])[back]
+            shares, back = np.unique((s[here] / self.edges[-1]).round(14), return_inverse=True)
+            out[here] = expm(self.matrix(kind)[None] * (shares * self.edges[-1])[:, None, None])[back]
         return out
 
     def rows(self, step: NDArray[np.int64], weights: Matrix) -> Rows:

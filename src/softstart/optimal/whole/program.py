@@ -14,7 +14,8 @@ linear in the demand r on a grid, and so are its limits. HiGHS solves
         after t_f             T <= P while the torque is held or (reached) the motor coasts
         everywhere            lowest <= r <= highest, |dr/dt| <= rate, u <= torque_speed(w1)
 
-with limits looked at in four instants of each step. What is found is exact for this grid: no integration.
+with limits looked at in four instants of each step or more. What is found is exact for this grid: nothing is
+integrated.
 """
 
 from __future__ import annotations

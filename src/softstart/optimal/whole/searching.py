@@ -1,7 +1,8 @@
 """The linear program of the whole start: search over the instants of contact and breakaway, then the grid.
 
-P over the instants is smooth but for kinks; a scan brackets its minima, golden sections narrow them down, in
-turns where there are two instants, first on a coarse grid, then on grids cut finer where the torque switches.
+P over the instants is smooth but for kinks. A scan finds where its minima are; from there the program
+itself, made linear in the instants, says where to go, first on a coarse grid, then on grids cut finer where
+the torque switches or T is not kept.
 """
 
 from __future__ import annotations
@@ -248,9 +249,8 @@ class _Instants:
         if own is None or found is None:
             return None
         tiny = 1e-6 * end
-        free: list[
-            tuple[int, float, list[float]]
-        ] = []  # which instant, by how much to try, how far it may go
+        # which instant, by how much it is tried, how far it may go
+        free: list[tuple[int, float, list[float]]] = []
         if self.waits or self.winds:
             free.append((0, tiny, [-reach, reach]))
         if self.waits and self.winds:
