@@ -22,11 +22,13 @@ class _Late(ModuleType):
     """Stands for a module until one of its attributes is needed."""
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # inspection, by doctest or a debugger, imports nothing
+            raise AttributeError(name)
         return getattr(import_module(self.__name__), name)
 
 
 def late(module: str) -> Any:
-    """Return a stand-in for `module` (a full dotted name) that imports it at the first access to an attribute.
+    """Return a stand-in for `module` (a full dotted name), which is imported when first used.
 
     >>> json = late("json")
     >>> json.dumps([1, 2])
