@@ -20,7 +20,7 @@ from softstart.controller.compiled import (
     Vector,
 )
 from softstart.drive import Drive
-from softstart.metrics import base_torque
+from softstart.start.metrics import base_torque
 from softstart_controllers.reduced import reduced_torque
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,

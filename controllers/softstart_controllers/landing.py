@@ -38,9 +38,9 @@ from softstart.controller.compiled import (
     inlined,
 )
 from softstart.drive import Drive
-from softstart.metrics import base_torque
 from softstart.plant.jit import compiled
 from softstart.plant.vector import encoder_count
+from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
 from softstart_controllers.sampled import mean_torque, pulling_load
 from softstart_controllers.shaping import swing

@@ -10,8 +10,8 @@ import numpy as np
 from softstart.controller import CompiledController, parameter, stack
 from softstart.controller.compiled import Vector
 from softstart.drive import Drive
-from softstart.metrics import base_torque
 from softstart.plant.vector import encoder_count
+from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains
 from softstart_controllers.sampled import (

@@ -9,7 +9,7 @@ at its peak.
 
 # %%
 # Crane drive of [G], gap 0.5 rad, to 60 rad/s; 1.05, 1.2 and 1.5 times the start time of constant torque.
-from softstart.metrics import base_torque
+from softstart.start.metrics import base_torque
 from softstart_studies.optimal_starts import pictures, profiles
 from softstart_studies.optimal_starts.crane import CRANE, TARGET, Extent
 

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
     from softstart.reporting.making import report
     from softstart.reporting.result import Report
-    from softstart.run import Run
-    from softstart.simulation import simulate
-    from softstart.status import Status
+    from softstart.start.run import Run
+    from softstart.start.simulation import simulate
+    from softstart.start.status import Status
     from softstart.sweeping.entry import sweep
     from softstart.tuning.outcome import Tuning
     from softstart.tuning.solving import tune
@@ -79,10 +79,10 @@ _HOME = {
     "Problem": "softstart.optimal.problem",
     "Report": "softstart.reporting.result",
     "RobustOptimum": "softstart.optimal.robust",
-    "Run": "softstart.run",
+    "Run": "softstart.start.run",
     "Sensor": "softstart.controller",
     "SimulationError": "softstart.errors",
-    "Status": "softstart.status",
+    "Status": "softstart.start.status",
     "TorqueProfile": "softstart.profile",
     "Tuning": "softstart.tuning.outcome",
     "balance": "softstart.balancing",
@@ -94,7 +94,7 @@ _HOME = {
     "optimize_robust": "softstart.optimal.robust",
     "pareto": "softstart.optimal.front",
     "report": "softstart.reporting.making",
-    "simulate": "softstart.simulation",
+    "simulate": "softstart.start.simulation",
     "sweep": "softstart.sweeping.entry",
     "tune": "softstart.tuning.solving",
     "worth_of_contact_sensor": "softstart.optimal.robust",

@@ -11,8 +11,8 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.run import Run
-from softstart.simulation import simulate
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 DEFAULT_DRIVE = "crane-4amtkf"
 WORN_GAP = 4.0

@@ -6,15 +6,9 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import IO, Any
 
 from softstart.errors import InputError
-
-if TYPE_CHECKING:
-    from softstart.run import Run
 
 
 def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = False) -> None:
@@ -46,16 +40,3 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-
-
-def write_run(run: Run, path: Path, times: ArrayLike | None) -> None:
-    """Traces of a run as CSV with units in the header."""
-    when = run.t if times is None else np.asarray(times, dtype=np.float64).ravel()
-    states = run.at(when)
-    columns = [when, *(states[name] for name in ("phi1", "phi2", "w1", "w2", "u", "T"))]
-    header = "t [s],phi1 [rad],phi2 [rad],w1 [rad/s],w2 [rad/s],u [N*m],T [N*m]"
-
-    def write(stream: IO[Any]) -> None:
-        np.savetxt(stream, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.17g")
-
-    write_whole(path, write)

@@ -14,7 +14,7 @@ import pytest
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, simulate
-from softstart.metrics import base_torque
+from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
 from softstart_controllers.shaft_observer import DISTURBANCE, OUTPUT, TRANSITION, design, observer, predict

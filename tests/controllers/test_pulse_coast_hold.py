@@ -18,10 +18,10 @@ from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, 
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.batch import array_starts, figures
 from softstart.controller.compiled import STATE
-from softstart.metrics import base_torque
 from softstart.optimal.solving import optimize
+from softstart.start.batch import array_starts, figures
+from softstart.start.metrics import base_torque
 from softstart_controllers import pulse_coast_hold_step as stepping
 from softstart_controllers import shaft_filter as sf
 from softstart_controllers.contact import (

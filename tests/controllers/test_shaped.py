@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.metrics import base_torque
 from softstart.profile import TorqueProfile
+from softstart.start.metrics import base_torque
 from softstart_controllers import landing, shaped_step
 from softstart_controllers.profile import Profile
 from softstart_controllers.shaped import Shaped

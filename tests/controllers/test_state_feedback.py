@@ -13,7 +13,7 @@ from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.drive.library import names
-from softstart.metrics import base_torque
+from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback_step as at
 from softstart_controllers.contact_designs import (

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, SimulationError, compare, simulate
-from softstart.batch import array_starts
 from softstart.controller import make_controller
 from softstart.plant.layout import GAP_EVENTS
+from softstart.start.batch import array_starts
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -62,7 +62,9 @@ def test_a_large_batch_ends_soon_when_it_is_interrupted() -> None:
 def test_turns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     many, ramp = CRANE.replace(gap=np.linspace(0.1, 4.0, 41)), make_controller("ramp")
     whole = array_starts(many, ramp)
-    monkeypatch.setattr("softstart.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)])
+    monkeypatch.setattr(
+        "softstart.start.batch._parts", lambda count: [slice(i, i + 7) for i in range(0, count, 7)]
+    )
     np.testing.assert_array_equal(array_starts(many, ramp), whole)
 
 

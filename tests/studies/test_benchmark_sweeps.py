@@ -7,8 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from softstart import metrics, sweep
+from softstart import sweep
 from softstart.drive import Drive
+from softstart.start import metrics
 from softstart.study import Verdict, find_study
 from softstart_studies.benchmarks import lsoda
 from softstart_studies.benchmarks.sweeps.study import BenchmarkSweeps, _same

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from softstart import TorqueProfile
-from softstart.metrics import base_torque
 from softstart.optimal.pictures import front_figure
 from softstart.optimal.replay import replay
 from softstart.optimal.robust import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
+from softstart.start.metrics import base_torque
 from softstart.study import Verdict, find_study
 from softstart_studies.optimal_starts import OptimalStarts, find, limits, pictures, present, sensor, smooth
 from softstart_studies.optimal_starts.crane import (

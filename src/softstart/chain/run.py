@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softstart import metrics
 from softstart.chain import kernel_layout as at
 from softstart.chain import kernel_record as record
 from softstart.chain.kernel_input import Numbers
@@ -18,7 +17,8 @@ from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.plant import layout as plant
-from softstart.status import Status
+from softstart.start import metrics
+from softstart.start.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,11 +18,11 @@ from softstart.chain.run import ChainRun
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
-from softstart.engine import answer_of
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as plant
 from softstart.plant import start as sensing
-from softstart.status import Status, status_of
+from softstart.start.engine import answer_of
+from softstart.start.status import Status, status_of
 
 __all__ = ["MAX_EVENTS", "drive_of", "simulate_chain"]
 

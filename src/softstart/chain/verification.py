@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from softstart import metrics
 from softstart.chain.model import Chain
 from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
@@ -14,8 +13,9 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.run import Run
-from softstart.simulation import simulate
+from softstart.start import metrics
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 __all__ = ["Verification", "verify_on_chain"]
 

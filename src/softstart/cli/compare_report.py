@@ -13,7 +13,7 @@ from softstart.cli.folder import file_stem, write_table, write_text
 if TYPE_CHECKING:
     from softstart.comparison import Comparison
     from softstart.drive import Drive
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 FITTED_TO = "fitted-to.toml"
 

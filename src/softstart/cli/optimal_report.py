@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from softstart.optimal.front import Front
     from softstart.optimal.result import Optimum
     from softstart.optimal.robust.outcome import SensorWorth
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 PLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"
 

@@ -44,7 +44,7 @@ from softstart.optimal.direct import start_time_of_direct
 if TYPE_CHECKING:
     from softstart.drive import Drive
     from softstart.optimal.result import Optimum
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 
 @click.command(cls=Command)
@@ -220,7 +220,7 @@ def runs_beside(best: Optimum) -> list[Run]:
     """The same drive under every controller that runs without being given a parameter, and does not fail."""
     from softstart.cli.running import Attributed
     from softstart.controller import ready_controller_names
-    from softstart.simulation import simulate
+    from softstart.start.simulation import simulate
 
     drive, base = best.problem.drive, best.problem.base
     runs = []

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.optimal.result import Optimum
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
 

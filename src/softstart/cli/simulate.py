@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.drive import Drive
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
@@ -87,7 +87,7 @@ def simulate(
 
         with working("starting the drive ..."):
             (made,) = make_controllers([controller], {controller: given}, prefix=False)
-            from softstart.simulation import simulate as simulate_start
+            from softstart.start.simulation import simulate as simulate_start
 
             with Attributed():
                 run = simulate_start(one, made, end, fitted_to=nominal)

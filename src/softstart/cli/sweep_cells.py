@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.status import Status
+from softstart.start.status import Status
 
 if TYPE_CHECKING:
     import xarray

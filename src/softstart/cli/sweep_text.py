@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from softstart.status import Status
+from softstart.start.status import Status
 
 if TYPE_CHECKING:
     import xarray

@@ -15,8 +15,8 @@ from softstart.linear.operating_point import OperatingPoint, closed
 from softstart.linear.realisation import TOLERANCE, System, minimal, scaled, unscaled
 from softstart.linear.response import Vector
 from softstart.linear.sampled_plant import Continuous, SampledPlant, in_contact, sampled
-from softstart.metrics import base_torque
 from softstart.plant.start import M_MOTOR_TORQUE
+from softstart.start.metrics import base_torque
 
 if TYPE_CHECKING:
     import control

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.engine import Book
 from softstart.linear.harmonic_balance import Cycle, Outside
 from softstart.linear.operating_point import OperatingPoint
 from softstart.linear.response import Vector, at_points
 from softstart.linear.sampled_start import Sample, SampledStart
 from softstart.plant import layout as at
 from softstart.plant import record
+from softstart.start.engine import Book
 
 SETTLING, MEASURED = 60, 10  # periods
 POINTS = 200  # a period

@@ -19,8 +19,8 @@ from softstart.linear.differences import STEP, Derivative, Smoothness, derivativ
 from softstart.linear.realisation import System, moved, part, shown
 from softstart.linear.sampled_plant import SampledPlant, in_contact, sampled
 from softstart.linear.sampled_start import Sample, SampledStart
-from softstart.metrics import base_torque
 from softstart.plant import layout as at
+from softstart.start.metrics import base_torque
 
 Vector = NDArray[np.float64]
 

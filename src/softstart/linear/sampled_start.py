@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
 from softstart.drive import Drive
-from softstart.engine import Book
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.advance import advance
 from softstart.plant.vector import plant_vector
+from softstart.start.engine import Book
 
 Vector = NDArray[np.float64]
 FAR = 1e9  # target speeds: never reached

@@ -12,14 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import metrics
 from softstart.optimal.problem import Problem
 from softstart.optimal.replay import heat_of, replay
 from softstart.optimal.result import LowerBound, OptimumError
 from softstart.optimal.tail import torque_allowed
 from softstart.plant import layout as at
 from softstart.profile import TorqueProfile
-from softstart.run import Run
+from softstart.start import metrics
+from softstart.start.run import Run
 
 Vector = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ def start_time_of_direct(drive: Drive) -> float:
     >>> round(start_time_of_direct(Drive.load("crane-4amtkf")), 4)
     0.3735
     """
-    from softstart.simulation import simulate
+    from softstart.start.simulation import simulate
 
     run = simulate(drive, "direct")
     if math.isnan(run.start_time):

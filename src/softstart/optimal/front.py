@@ -20,8 +20,8 @@ from softstart.optimal.front_points import ControllerPoint, FrontPoint, label_of
 from softstart.optimal.front_saved import SavedPoints
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, OptimumError
-from softstart.run import Run
-from softstart.simulation import simulate
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
 SHORT, LONG, COUNT = 1.02, 1.6, 12

@@ -9,9 +9,9 @@ from itertools import pairwise
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from softstart import metrics
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.start import metrics
 
 Terminal = Literal["synchronous", "steady", "reached"]
 Objective = Literal["k_dyn", "heat", "start_time"]

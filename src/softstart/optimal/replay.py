@@ -7,8 +7,8 @@ import numpy as np
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.profile import TorqueProfile
-from softstart.run import Run
-from softstart.simulation import simulate
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 
 def replay(drive: Drive, profile: TorqueProfile, until: float, base: Drive | None = None) -> Run:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from softstart import metrics
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
-from softstart.run import Run
+from softstart.start import metrics
+from softstart.start.run import Run
 
 Method = Literal["closed-form", "lp", "collocation"]
 BoundKind = Literal["certificate", "momentum", "none"]

@@ -16,7 +16,7 @@ from softstart.optimal.linear_search import greatest_speed, not_linear
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate, Verdict
-from softstart.simulation import simulate
+from softstart.start.simulation import simulate
 
 COARSE, FINE = 40, 80  # steps of the linear programs
 WITHIN = 2e-6  # of the start time

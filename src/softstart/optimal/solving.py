@@ -19,7 +19,7 @@ from softstart.optimal.replay import replay
 from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum, OptimumError
 from softstart.optimal.shortest import from_quickest, shortest_start_time, verdict_on
 from softstart.optimal.tail import with_tail
-from softstart.run import Run
+from softstart.start.run import Run
 
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)

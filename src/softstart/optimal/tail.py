@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from softstart.optimal.problem import Problem
 from softstart.optimal.replay import replay
 from softstart.profile import TorqueProfile
-from softstart.run import Run
+from softstart.start.run import Run
 
 Vector = NDArray[np.float64]
 

@@ -16,13 +16,13 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.trouble import sentence_of
-from softstart.simulation import simulate
+from softstart.start.simulation import simulate
 from softstart.units import nearest
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
     from softstart.page.traces import Traces
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 REFERENCE = "direct"  # the strategy whose start time the others are compared with
 MAX_STRATEGIES = 24

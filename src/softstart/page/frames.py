@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any
 
-from softstart import metrics
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.drive.parameters import PARAMETERS
@@ -17,6 +16,7 @@ from softstart.page.live import Frame
 from softstart.page.map import Axes, axes_about, k_dyn_row
 from softstart.page.scales import Scale, scales_about
 from softstart.page.traces import traces_of
+from softstart.start import metrics
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows

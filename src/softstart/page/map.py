@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import metrics
-from softstart.batch import array_starts, figures
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.page.scales import rounded
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
 
 Vector = NDArray[np.float64]
 

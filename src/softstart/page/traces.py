@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.plant import layout as at
-from softstart.run import Run
+from softstart.start.run import Run
 
 Vector = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from softstart.errors import SimulationError
 from softstart.optimal.direct import start_time_of_direct
 from softstart.page.downloads import text_of
 from softstart.page.job_process import Tell
-from softstart.simulation import simulate
+from softstart.start.simulation import simulate
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller

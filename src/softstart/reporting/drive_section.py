@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from softstart import metrics
 from softstart.drive import PARAMETERS, Drive
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.resolution import rated_torque
 from softstart.reporting.scheme import scheme
 from softstart.reporting.values import RPM, digits, short, unit
+from softstart.start import metrics
 
 if TYPE_CHECKING:
     from softstart.reporting.figure_list import Figures

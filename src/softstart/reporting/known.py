@@ -15,7 +15,7 @@ from softstart.errors import SimulationError
 from softstart.optimal.robust.plays import Plays
 from softstart.optimal.robust.shape import Matrix, Player, Staircase
 from softstart.profile import Vector
-from softstart.simulation import simulate
+from softstart.start.simulation import simulate
 
 SEED = 0  # the same question has the same answer
 SPREAD, MEMBERS, ROUNDS = 4000, 64, 400

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from softstart.reporting.choice import Candidate, Choice
     from softstart.reporting.limit import Limit
-    from softstart.run import Run
+    from softstart.start.run import Run
 
 GREY, SMALL = "#666666", 8.5
 WIDE = 7.1  # inches: what an A4 page holds

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import metrics
-from softstart.batch import array_starts, figures
 from softstart.controller import Controller
 from softstart.drive import Drive
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
 
 Matrix = NDArray[np.float64]
 

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from softstart import metrics
-from softstart.batch import array_starts, figures
 from softstart.controller import CompiledController, Controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, computes_with, kind_of, label_of
-from softstart.run import Run
-from softstart.simulation import simulate
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started

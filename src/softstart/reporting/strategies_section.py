@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softstart import metrics
 from softstart.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.pictures import traces_figure
 from softstart.reporting.strategies import label_of
 from softstart.reporting.values import digits, fixed, listed, percent, short
+from softstart.start import metrics
 
 if TYPE_CHECKING:
     from softstart.comparison import Row

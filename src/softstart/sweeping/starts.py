@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from softstart import __version__, metrics
-from softstart.batch import array_starts, figures
+from softstart import __version__
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.plant import layout as at
-from softstart.status import Status
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
+from softstart.start.status import Status
 from softstart.sweeping.axes import Axis, Column
 from softstart.sweeping.maker import Maker
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.status import Status
+from softstart.start.status import Status
 from softstart.sweeping.plan import Plan, plan_for
 from softstart.sweeping.variables import NOT_COMPUTED, STATUS
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softstart import __version__
-from softstart.status import Status
+from softstart.start.status import Status
 from softstart.sweeping.axes import Axis
 from softstart.sweeping.plan import Plan
 from softstart.sweeping.starts import Question, known_figures

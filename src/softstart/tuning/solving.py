@@ -67,7 +67,7 @@ def tune(
     free : names of the parameters to tune, or name -> (low, high) with ends in SI, with a unit, or as
         multiples of the default ("0.5x", "2x"). By default all that the controller says may be tuned,
         within the ranges that it names.
-    metric : what is made small: a figure of `softstart.batch.figures`, or a function of those figures.
+    metric : what is made small: a figure of `softstart.start.batch.figures`, or a function of those figures.
     start_time : bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x").
         By default each start is to be no slower than with the controller's own defaults.
     tolerances : what drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity,

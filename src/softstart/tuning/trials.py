@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart import metrics
-from softstart.batch import array_starts, figures
 from softstart.controller import Controller, PlainController, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
 from softstart.tuning.question import Question
 from softstart.units import nearest
 

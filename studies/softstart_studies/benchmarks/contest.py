@@ -7,7 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from softstart import metrics
+from softstart.start import metrics
 from softstart_studies.benchmarks.host import Host
 from softstart_studies.benchmarks.problem import Problem, crane, gaps
 

@@ -12,7 +12,7 @@ from softstart.drive import Drive
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
-from softstart.run import Run
+from softstart.start.run import Run
 from softstart_studies.benchmarks.problem import Problem, Vector, controller_of, crane
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from softstart.metrics import base_torque
 from softstart.optimal.front import Front
+from softstart.start.metrics import base_torque
 from softstart.study import Progress, Study, StudyResult
 from softstart_studies.optimal_starts import fronts, kinds, limits, profiles, sensor, smooth, terminals
 from softstart_studies.optimal_starts.crane import CRANE, TARGET, Extent

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from softstart.metrics import base_torque
 from softstart.optimal.front import Front
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 from softstart.optimal.solving import optimize
+from softstart.start.metrics import base_torque
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import crane, direct_time, rounded
 

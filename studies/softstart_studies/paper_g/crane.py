@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from softstart import Drive, Run, simulate, stages
 from softstart.controller import Controller
-from softstart.metrics import base_torque
+from softstart.start.metrics import base_torque
 
 Vector = NDArray[np.float64]
 Method = Literal[1, 2]

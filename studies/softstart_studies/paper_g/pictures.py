@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from softstart.figures import COLOURS, DASHES, drawing, new_figure, shade_open_gap
-from softstart.run import Run
+from softstart.start.run import Run
 from softstart_studies.paper_g.curves import Curve
 from softstart_studies.paper_g.frequency import Detuned
 from softstart_studies.paper_g.invariance import GAPS, INERTIAS, STIFFNESSES, Spread

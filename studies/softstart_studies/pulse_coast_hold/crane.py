@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart import Drive
-from softstart.batch import array_starts, figures
 from softstart.controller import Controller, make_controller
 from softstart.drive.parameters import LoadKind
-from softstart.metrics import base_torque
 from softstart.optimal.result import OptimumError
 from softstart.optimal.solving import optimize
+from softstart.start.batch import array_starts, figures
+from softstart.start.metrics import base_torque
 
 TARGET = 60.0  # rad/s
 LAG = 0.002  # s

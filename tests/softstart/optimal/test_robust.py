@@ -16,11 +16,11 @@ from tests.oracle import integrate
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.metrics import base_torque
 from softstart.optimal.result import InfeasibleError, Verdict
 from softstart.optimal.robust import RobustOptimum, SensorWorth, families, optimize_robust, pursuit, solving
 from softstart.optimal.robust.scenarios import reached
 from softstart.profile import TorqueProfile
+from softstart.start.metrics import base_torque
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 START_TIME = 0.2883042

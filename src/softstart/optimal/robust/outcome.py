@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from softstart import metrics
 from softstart.drive import Drive
 from softstart.optimal.result import LowerBound
 from softstart.profile import TorqueProfile
-from softstart.run import Run
+from softstart.start import metrics
+from softstart.start.run import Run
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from softstart.controller.base import Sensor
 from softstart.drive import Drive
-from softstart.engine import Book
 from softstart.optimal.robust.differences import all_moved
 from softstart.optimal.robust.shape import Matrix, Player, Staircase
 from softstart.plant import layout as at
@@ -19,6 +18,7 @@ from softstart.plant import record
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.profile import Vector
+from softstart.start.engine import Book
 
 AIM = 1e-9  # the load's target is raised by so much, so that no rounding lets it miss
 PER_PERIOD = 40  # samples of the shaft torque in one elastic period

@@ -15,7 +15,7 @@ from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
 from softstart.optimal.robust.pursuit import Progress, Pursuit
 from softstart.optimal.robust.scenarios import check_scenarios, limits, reached
 from softstart.profile import TorqueProfile
-from softstart.simulation import simulate
+from softstart.start.simulation import simulate
 
 BoundOf = Callable[[Drive], LowerBound]
 UNUSED = (

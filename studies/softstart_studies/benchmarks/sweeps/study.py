@@ -149,8 +149,8 @@ class BenchmarkSweeps(Study):
 
 def _by_lsoda(results: xarray.Dataset, count: int) -> Peer:
     """A plain loop over some of the starts."""
-    from softstart import metrics
     from softstart.drive import Drive
+    from softstart.start import metrics
 
     chosen = list(sample(results, count))
     begin = time.process_time()

@@ -6,20 +6,19 @@ import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softstart import metrics
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.energy import Energy, energy_balance
-from softstart.export import write_run
+from softstart.export import write_whole
 from softstart.figures import run_figure
 from softstart.plant import layout as at
 from softstart.plant import record
-from softstart.status import Status
+from softstart.start import metrics
+from softstart.start.status import Status
 
 Vector = NDArray[np.float64]
 
@@ -256,18 +255,25 @@ class Run:
         Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
         torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant.
         """
-        from softstart.settling import settling_time  # imports scipy.optimize: only when asked
-
-        return settling_time(self, band)
+        return metrics.settling_time(self, band)
 
     @cached_property
-    def energy(self) -> Energy:
+    def energy(self) -> metrics.Energy:
         """Energy balance of the run."""
-        return energy_balance(self)
+        return metrics.energy_balance(self)
 
     def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
         """Write t, phi1, phi2, w1, w2, u, T under a header with units, at `times` or the plot's instants."""
-        write_run(self, Path(path), times)
+        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
+        states = self.at(when)
+        columns = [when, *(states[name] for name in ("phi1", "phi2", "w1", "w2", "u", "T"))]
+        header = "t [s],phi1 [rad],phi2 [rad],w1 [rad/s],w2 [rad/s],u [N*m],T [N*m]"
+
+        def write(stream: IO[Any]) -> None:
+            table = np.column_stack(columns)
+            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
+
+        write_whole(Path(path), write)
 
     def plot(self) -> Any:
         """Torques, speeds and twist over time, stages shaded."""

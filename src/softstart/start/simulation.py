@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, overload
 
-from softstart.batch import MAX_EVENTS, simulate_many
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
-from softstart.engine import Book, run_one
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant.vector import plant_vector
-from softstart.run import Run
-from softstart.status import Status, status_of
+from softstart.start.batch import MAX_EVENTS, simulate_many
+from softstart.start.engine import Book, run_one
+from softstart.start.run import Run
+from softstart.start.status import Status, status_of
 
 if TYPE_CHECKING:
     import xarray
@@ -75,7 +75,7 @@ def simulate(
 
     Returns
     -------
-    A Run for one drive; for many an xarray.Dataset with one entry a start (see `softstart.batch`).
+    A Run for one drive; for many an xarray.Dataset with one entry a start (see `softstart.start.batch`).
 
     Raises InputError for bad input and SimulationError for a start that cannot be finished.
 

@@ -1,22 +1,87 @@
-"""Where the energy of a start went, by quadrature over the exact states."""
+"""The figures by which starts are judged: K_dyn, settling time, energy balance.
+
+Every K_dyn comes from `stages.dynamic_coefficient`.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart import stages
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.late import late
 from softstart.plant import layout as at
 
 if TYPE_CHECKING:
-    from softstart.run import Run
+    from scipy import optimize
 
+    from softstart.start.run import Run
+else:
+    optimize = late("scipy.optimize")
+
+# settling is looked for at this many points an elastic period, then located
+POINTS_PER_PERIOD = 64
 # Gauss-Legendre on pieces of at most an eighth of the elastic period: 2e-14 of the swing and better
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 PIECES_PER_PERIOD = 8.0
+
+
+def base_torque(drive: Drive) -> Any:
+    """M12avg_base = (Ms J2 + J1 Mc)/(J1 + J2) in N m, [G](16): the mean shaft torque under full torque.
+
+    >>> round(base_torque(Drive.load("crane-4amtkf")), 2)
+    52.86
+    """
+    return stages.mean_shaft_torque(drive.Ms, drive.J1, drive.J2, drive.Mc)
+
+
+def k_dyn(peak_torque: Any, drive: Drive) -> Any:
+    """Dynamic coefficient K_dyn = peak |T| / M12avg_base, [G](16); `drive` gives the base.
+
+    >>> round(k_dyn(105.72, Drive.load("crane-4amtkf")), 3)
+    2.0
+    """
+    return stages.dynamic_coefficient(peak_torque, base_torque(drive))
+
+
+def settling_time(run: Run, band: float) -> float:
+    """First instant from which |T - M12avg(u)| <= band * M12avg_base holds with the gap closed, s.
+
+    It must hold for one elastic period at least, to the end of the run; NaN otherwise.
+    Scanned at 64 points an elastic period, the crossing itself located by root finding.
+    """
+    if not 0.0 < band < math.inf:
+        raise InputError(f"band = {band}: the settling band is a share of the mean torque above 0, e.g. 0.1.")
+    drive = run.drive
+    if not run.stages or run.stages[-1].side == 0:
+        return math.nan
+    limit = band * float(base_torque(run.base))
+
+    def excess(times: float | np.ndarray) -> np.ndarray:
+        state = run.at(times)
+        return np.abs(state["T"] - stages.mean_shaft_torque(state["u"], drive.J1, drive.J2, drive.Mc)) - limit
+
+    begin = run.stages[-1].start
+    period = float(drive.elastic_period)
+    if run.end_time - begin < period:
+        return math.nan  # too short to be called settled
+    count = max(2, math.ceil((run.end_time - begin) / period * POINTS_PER_PERIOD))
+    grid = np.linspace(begin, run.end_time, count)
+    outside = np.flatnonzero(excess(grid) > 0.0)
+    if outside.size == 0:
+        return float(begin)
+    last = int(outside[-1])
+    if last == count - 1 or run.end_time - grid[last + 1] < period:
+        return math.nan
+    if excess(grid[last + 1]) == 0.0:
+        return float(grid[last + 1])
+    return float(optimize.brentq(lambda time: float(excess(time)), grid[last], grid[last + 1], xtol=1e-12))
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart import metrics, stages
+from softstart import stages
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.drive import Drive
-from softstart.engine import Book, run_plain
 from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
-from softstart.status import status_of
+from softstart.start import metrics
+from softstart.start.engine import Book, run_plain
+from softstart.start.status import status_of
 
 if TYPE_CHECKING:
     import xarray
