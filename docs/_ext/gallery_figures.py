@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from softstart.figures import drawing
+from softstart.views.drawing import drawing
 
 SEEN = "__seen_figures__"
 FIRST = ("paper_g", "optimal", "pulse", "wear", "gaps", "paper_r", "paper_c", "paper_b")  # others follow

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -80,7 +80,7 @@ class Backbone:
 
     def plot(self) -> Figure:
         """The frequencies, over that without gaps, against the largest torque."""
-        from softstart.figures import COLOURS, drawing, new_figure
+        from softstart.views.drawing import COLOURS, drawing, new_figure
 
         with drawing():
             figure, axes = new_figure(size=(6.5, 4.0))

@@ -67,7 +67,7 @@ class ForcedResponse:
 
     def plot(self, mass: str | int = 0) -> Figure:
         """The amplitude of one mass against the frequency, with gaps and without."""
-        from softstart.figures import COLOURS, drawing, new_figure
+        from softstart.views.drawing import COLOURS, drawing, new_figure
 
         index = self.chain.index(mass)
         with drawing():

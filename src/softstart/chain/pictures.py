@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.figures import COLOURS, drawing, new_figure
+from softstart.views.drawing import COLOURS, drawing, new_figure
 
 if TYPE_CHECKING:
     from softstart.chain.reduction import Reduction

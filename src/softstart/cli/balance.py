@@ -9,10 +9,10 @@ import click
 
 from softstart.cli.completing import Keys, names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
-from softstart.cli.folder import output_folder
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command
 from softstart.errors import InputError
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from softstart.balancing import Engine
@@ -83,7 +83,7 @@ def balance(
             write_balance(found, folder, command_line())
 
     from softstart.cli.balance_text import show_balance
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(found.summary())

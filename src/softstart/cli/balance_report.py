@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart import __version__
-from softstart.cli.compare_report import markdown, markdown_table
-from softstart.cli.folder import write_table, write_text
+from softstart.views.markdown import markdown, markdown_table, write_table, write_text
 
 if TYPE_CHECKING:
     from softstart.balancing import Balance
@@ -25,7 +24,7 @@ def write_balance(found: Balance, folder: Path, command: str) -> None:
     from softstart.balancing import MeasuredCycle
     from softstart.balancing.writing import INDICATOR, indicator_csv
     from softstart.cli.balance_text import conclusion, engine_lines, footnotes, tables
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     engine = found.engine
     figures = found.figures()

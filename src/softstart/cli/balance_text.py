@@ -27,7 +27,7 @@ class Shown(NamedTuple):
 def engine_lines(found: Balance) -> list[str]:
     """The engine in a few lines; a star marks what is assumed."""
     from softstart.balancing import MeasuredCycle
-    from softstart.cli.show import printable, short
+    from softstart.views.numbers import printable, short
 
     engine = found.engine
     cylinders, masses, weights = engine.cylinders, engine.masses, engine.counterweights
@@ -82,7 +82,7 @@ def tables(found: Balance) -> list[Shown]:
 
 def orders_table(found: Balance) -> Shown:
     """The orders at the tuning speed."""
-    from softstart.cli.show import column_of
+    from softstart.views.numbers import column_of
 
     rows = found.orders()
     columns = {
@@ -102,7 +102,7 @@ def orders_table(found: Balance) -> Shown:
 
 def designs_table(found: Balance) -> Shown:
     """What each design needs and leaves."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     i, all_of = found.tuning_index, found.residuals
     columns = {
@@ -125,7 +125,7 @@ def _at(values: np.ndarray[tuple[int], np.dtype[np.float64]] | None, index: int)
 
 def speeds_table(found: Balance) -> Shown:
     """The first-order moment over the speeds asked for."""
-    from softstart.cli.show import number
+    from softstart.views.numbers import number
 
     where = [int(np.argmin(np.abs(found.speeds - speed))) for speed in found.shown]
     headings = ["speed\nrpm", *(one.name.replace("-", "\n", 1) for one in found.residuals)]
@@ -173,7 +173,8 @@ def footnotes(found: Balance) -> list[str]:
 
 def show_balance(to: Console, found: Balance) -> None:
     """All of it."""
-    from softstart.cli.show import Column, print_table, sentence
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(engine_lines(found)):
         sentence(to, line, "bold" if index == 0 else "")

@@ -9,10 +9,10 @@ import click
 
 from softstart.cli.completing import Keys, names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
-from softstart.cli.folder import output_folder
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from softstart.clutch import Clutch
@@ -103,7 +103,7 @@ def clutch(
     mistakes.settle()
     assert one is not None
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if optimal:
         from softstart.cli.clutch_report import write_front

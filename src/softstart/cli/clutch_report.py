@@ -14,9 +14,8 @@ from softstart.cli.clutch_text import (
     law_columns,
     point_columns,
 )
-from softstart.cli.compare_report import markdown, markdown_table
-from softstart.cli.folder import write_table, write_text
-from softstart.figures import save_figure
+from softstart.views.drawing import save_figure
+from softstart.views.markdown import markdown, markdown_table, write_table, write_text
 
 if TYPE_CHECKING:
     from softstart.clutch import Clutch, Engagement, EngagementFront

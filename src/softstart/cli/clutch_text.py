@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from softstart.cli.show import Column, column_of, number, print_table, printable, sentence, short
+from softstart.views.numbers import Column, column_of, number, printable, short
+from softstart.views.terminal import print_table, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from softstart.cli.folder import output_folder
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -29,12 +28,13 @@ from softstart.cli.options import (
     until_option,
 )
 from softstart.cli.usage import Command
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.cli.show import Column
     from softstart.comparison import Comparison, Row
+    from softstart.views.numbers import Column
 
 
 @click.command(cls=Command)
@@ -102,7 +102,7 @@ def compare(
             with working("drawing the figures ..."):
                 write_comparison(comparison, folder, command_line())
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(comparison.summary())
@@ -119,7 +119,7 @@ def name_of(row: Row) -> str:
 
 def columns_and_rows(rows: Sequence[Row]) -> tuple[list[Column], list[list[str]]]:
     """The table: first the columns that judge, then those about what happens at the gap."""
-    from softstart.cli.show import Column, column_of, number
+    from softstart.views.numbers import Column, column_of, number
 
     runs = [row.run for row in rows]
     columns = {
@@ -150,7 +150,7 @@ def share_lost(row: Row) -> float:
 
 def conclusion(comparison: Comparison) -> str:
     """Which strategy is the gentlest, and what it costs in time."""
-    from softstart.cli.show import column_of
+    from softstart.views.numbers import column_of
 
     best = comparison.gentlest
     others = [row for row in comparison.rows if row is not best]
@@ -191,7 +191,8 @@ def footnotes(comparison: Comparison) -> list[str]:
 
 
 def _show(to: Console, comparison: Comparison, by_peak: bool) -> None:
-    from softstart.cli.show import drive_lines, fits, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.terminal import fits, print_table, sentence
 
     rows = list(comparison.rows)
     if by_peak:

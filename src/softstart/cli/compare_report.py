@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softstart import __version__
-from softstart.cli.folder import file_stem, write_table, write_text
+from softstart.views.markdown import (
+    drive_table,
+    file_stem,
+    markdown,
+    markdown_table,
+    provenance,
+    write_fitted_to,
+    write_table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from softstart.comparison import Comparison
     from softstart.drive import Drive
     from softstart.start.run import Run
 
-FITTED_TO = "fitted-to.toml"
-
 
 def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
     """Everything about a comparison."""
     from softstart.cli.compare import columns_and_rows, conclusion, footnotes, name_of
-    from softstart.figures import comparison_figure, save_figure, trade_off_figure
+    from softstart.views.drawing import save_figure
+    from softstart.views.starts import comparison_figure, trade_off_figure
 
     rows = comparison.rows
     runs = [row.run for row in rows]
@@ -88,7 +93,7 @@ def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -
 
 
 def _write_run(run: Run, folder: Path, stem: str) -> None:
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     save_figure(run.plot(), folder, f"run-{stem}")
     run.to_csv(folder / f"trace-{stem}.csv")
@@ -102,57 +107,3 @@ def _strategy(run: Run, stem: str) -> str:
         f"### {markdown(stem)}\n\n{markdown(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
         f"![{stem}](run-{stem}.svg)\n\nTraces: [trace-{stem}.csv](trace-{stem}.csv)"
     )
-
-
-def drive_table(drive: Drive) -> str:
-    """All parameters of a drive that are set."""
-    from softstart.drive import PARAMETERS
-
-    rows = []
-    for parameter in PARAMETERS.values():
-        value = getattr(drive, parameter.name)
-        if value is not None and value != "" and parameter.name != "name":
-            shown = f"{value:.10g}" if isinstance(value, float) else str(value)
-            unit = "" if parameter.unit == "1" else parameter.unit
-            rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
-    return markdown_table(["key", "symbol", "value", "unit", "meaning"], rows)
-
-
-def write_fitted_to(fitted_to: Drive | None, folder: Path) -> None:
-    """The drive for which the controllers are set up, beside the one that runs."""
-    if fitted_to is not None:
-        write_text(folder / FITTED_TO, fitted_to.to_toml())
-
-
-def provenance(drive: Drive, command: str, fitted_to: Drive | None = None, one: bool = True) -> str:
-    """What was run, by what, on which input: enough to do it again. `one`: no parameter of it is varied."""
-    other, shown = "", drive if one else None
-    if fitted_to is not None:
-        from softstart.cli.show import controllers_set_up
-
-        other = (
-            f"\n\nThe {markdown(controllers_set_up(shown, fitted_to))}. That drive is in "
-            f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
-        )
-    return (
-        "## Where this comes from\n\n"
-        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
-        f"```sh\n{command}\n```\n\n"
-        "on the drive of [drive.toml](drive.toml), which holds all changes:\n\n"
-        f"```toml\n{drive.to_toml()}```{other}"
-    )
-
-
-def markdown_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None
-) -> str:
-    """A table in Markdown; columns from `numbers_from` on are set to the right."""
-    first = len(headings) if numbers_from is None else numbers_from
-    rule = ["---" if index < first else "---:" for index in range(len(headings))]
-    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
-
-
-def markdown(text: str) -> str:
-    """Text that Markdown leaves as it is, within a table too."""
-    flat = " ".join(text.split())
-    return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")

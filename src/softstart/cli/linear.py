@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from softstart.cli.folder import output_folder, write_table, write_text
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -25,6 +24,7 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.usage import Command
+from softstart.views.markdown import output_folder, write_table, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -85,7 +85,7 @@ def linear(
             with working("drawing the figure ..."):
                 write_linear(view, folder, command_line())
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(view.summary())
@@ -96,7 +96,7 @@ def linear(
 
 
 def _frequency(value: float) -> str:
-    from softstart.cli.show import short
+    from softstart.views.numbers import short
 
     return "-" if math.isnan(value) else f"{short(float(f'{value:.5g}'))} rad/s"
 
@@ -133,7 +133,7 @@ def margin_rows(view: LinearView) -> list[list[str]]:
 
 def mode_columns(view: LinearView) -> dict[str, list[str]]:
     """The closed loop's modes; a pair counts once."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     modes = [mode for mode in view.modes if mode.value.imag >= 0.0][:SHOWN_MODES]
     return {
@@ -148,7 +148,7 @@ def mode_columns(view: LinearView) -> dict[str, list[str]]:
 
 def variation_columns(view: LinearView) -> dict[str, list[str]]:
     """The same controller on other drives."""
-    from softstart.cli.show import number
+    from softstart.views.numbers import number
 
     def each(read: str, scale: float, decimals: int) -> list[str]:
         values = [getattr(one.margins, read) for one in view.variations]
@@ -167,7 +167,7 @@ def variation_columns(view: LinearView) -> dict[str, list[str]]:
 
 def cycle_columns(view: LinearView) -> dict[str, list[str]]:
     """Limit cycles foretold."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     found = [one.cycle for one in view.cycles]
     said = [cycle_sentence(one.verdict.sentence, one.beyond_limits) for one in view.cycles]
@@ -208,7 +208,9 @@ def gap_sentence(view: LinearView) -> str:
 
 
 def _show(to: Console, view: LinearView) -> None:
-    from softstart.cli.show import Column, drive_lines, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(drive_lines(view.drive)):
         sentence(to, line, "bold" if index == 0 else "")
@@ -231,13 +233,13 @@ def _show(to: Console, view: LinearView) -> None:
 
 def write_linear(view: LinearView, folder: Path, command: str) -> None:
     """The files of --out."""
-    from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
+    from softstart.views.markdown import drive_table, markdown, markdown_table, provenance
 
     parts = [f"# {markdown(view.drive.name)}: loop of {markdown(view.name)}"]
     if view.margins is None:
         parts.append(markdown(view.notes[0]))
     else:
-        from softstart.figures import save_figure
+        from softstart.views.drawing import save_figure
 
         save_figure(view.plot(), folder, "linear")
         _write_response(view, view.margins, folder)

@@ -24,8 +24,9 @@ def drives(name: str | None, as_json: bool) -> None:
 
     An own drive begins with: softstart drives crane-4amtkf > mine.toml
     """
-    from softstart.cli.show import Column, console, print_json, print_table, printable, sentence
     from softstart.drive import Drive, library
+    from softstart.views.numbers import Column, printable
+    from softstart.views.terminal import console, print_json, print_table, sentence
 
     if name is not None and name not in drive_names():
         raise InputError(
@@ -66,7 +67,7 @@ def controllers(name: str | None, as_json: bool) -> None:
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
     """
     from softstart.cli.running import Attributed, working
-    from softstart.cli.show import console, print_json, sentence
+    from softstart.views.terminal import console, print_json, sentence
 
     if name is not None:
         check_name(name, "controller")
@@ -119,7 +120,8 @@ def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
 
 
 def _show_all(found: dict[str, type[Controller]]) -> None:
-    from softstart.cli.show import Column, console, print_table, printable, sentence
+    from softstart.views.numbers import Column, printable
+    from softstart.views.terminal import console, print_table, sentence
 
     to = console()
     rows = [
@@ -135,7 +137,8 @@ def _show_all(found: dict[str, type[Controller]]) -> None:
 
 
 def _show_one(name: str, cls: type[Controller]) -> None:
-    from softstart.cli.show import Column, console, print_table, sentence
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import console, print_table, sentence
 
     to = console()
     about = _described(name, cls)

@@ -6,8 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
-from softstart.cli.folder import write_table, write_text
+from softstart.views.markdown import (
+    drive_table,
+    markdown,
+    markdown_table,
+    provenance,
+    write_table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from softstart.optimal.front import Front
@@ -21,9 +27,9 @@ PLAY = "softstart simulate drive.toml --controller profile --param file=profile.
 def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: str) -> None:
     """Everything about an optimal start."""
     from softstart.cli.optimum_text import bound_sentence, comparison, figure_rows, name_of, question
-    from softstart.cli.show import number
-    from softstart.figures import save_figure
     from softstart.optimal.pictures import optimum_figure
+    from softstart.views.drawing import save_figure
+    from softstart.views.numbers import number
 
     drive = best.problem.drive
     save_figure(optimum_figure(best), folder, "optimum")
@@ -66,7 +72,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
 def write_front(front: Front, folder: Path, command: str) -> None:
     """Everything about a curve over start times, but its saved state."""
     from softstart.cli.pareto import conclusion, controller_columns, footnotes, point_columns
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     save_figure(front.plot(), folder, "pareto")
     front.to_csv(folder / "pareto.csv")
@@ -98,8 +104,8 @@ def write_front(front: Front, folder: Path, command: str) -> None:
 def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
     """Everything about one profile for several drives, without and with a contact sensor."""
     from softstart.cli.optimize_robust import bound_sentence, conclusion, scenario_columns
-    from softstart.figures import save_figure
     from softstart.optimal.pictures import worth_figure
+    from softstart.views.drawing import save_figure
 
     base = worth.blind.base
     save_figure(worth_figure(worth), folder, "contact-sensor")

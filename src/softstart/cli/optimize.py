@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.folder import output_folder
 from softstart.cli.optimal_options import (
     METHODS,
     OPTION_OF,
@@ -40,6 +39,7 @@ from softstart.cli.options import (
 from softstart.cli.usage import Command
 from softstart.errors import InputError, SimulationError
 from softstart.optimal.direct import start_time_of_direct
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
@@ -206,7 +206,7 @@ def _optimize_one(
             with working("drawing the figure ..."):
                 write_optimum(best, others, folder, command_line())
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json({**best.summary(), "controllers": [controller_summary(run) for run in others]})

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from softstart.cli.folder import output_folder
 from softstart.cli.optimal_options import Asked, named_as_options, no_solution_told
 from softstart.cli.options import command_line
 from softstart.optimal.direct import start_time_of_direct
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,7 +43,7 @@ def optimize_for_all(
             with working("drawing the figure ..."):
                 write_worth(worth, folder, command_line())
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(worth.summary())
@@ -55,7 +55,7 @@ def optimize_for_all(
 
 def scenario_columns(worth: SensorWorth) -> dict[str, list[str]]:
     """The table: what is different in each drive, and its start without and with a sensor."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     blind, reacting = worth.blind, worth.reacting
     drives = blind.scenarios
@@ -90,7 +90,9 @@ def bound_sentence(optimum: RobustOptimum) -> str:
 
 
 def _show(to: Console, worth: SensorWorth) -> None:
-    from softstart.cli.show import Column, drive_lines, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     blind = worth.blind
     for index, line in enumerate(drive_lines(blind.base)):

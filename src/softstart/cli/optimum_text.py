@@ -27,7 +27,7 @@ def controller_summary(run: Run) -> dict[str, Any]:
 
 def figure_rows(best: Optimum) -> list[list[str]]:
     """The figures of the optimum, as words and numbers."""
-    from softstart.cli.show import NOTHING, number, short
+    from softstart.views.numbers import NOTHING, number, short
 
     run, bound, problem = best.run, best.bound, best.problem
     bounded = bound.kind != "none"
@@ -98,7 +98,9 @@ def bound_sentence(best: Optimum) -> str:
 
 def show_optimum(to: Console, best: Optimum, others: Sequence[Run]) -> None:
     """All of it, on the terminal or into a pipe."""
-    from softstart.cli.show import Column, drive_lines, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(drive_lines(best.problem.drive)):
         sentence(to, line, "bold" if index == 0 else "")

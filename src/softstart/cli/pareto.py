@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.folder import kept_state, output_folder
 from softstart.cli.optimal_options import (
     METHODS,
     Asked,
@@ -38,6 +37,7 @@ from softstart.cli.options import (
 from softstart.cli.usage import Command
 from softstart.errors import SimulationError
 from softstart.optimal.direct import start_time_of_direct
+from softstart.views.markdown import kept_state, output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -128,7 +128,7 @@ def pareto(
             with working("drawing the figure ..."):
                 write_front(front, folder, command_line())
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(front.summary())
@@ -170,7 +170,7 @@ def _computed(
 
 def point_columns(front: Front) -> dict[str, list[str]]:
     """The table of the curve."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     points = front.points
     return {
@@ -187,7 +187,7 @@ def point_columns(front: Front) -> dict[str, list[str]]:
 
 def controller_columns(front: Front) -> dict[str, list[str]]:
     """The table of the controllers, the one nearest to the limit first."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     order = sorted(front.controllers, key=lambda one: one.ratio or math.inf)
     return {
@@ -250,7 +250,9 @@ def _why_apart(one: ControllerPoint) -> str:
 
 
 def _show(to: Console, front: Front) -> None:
-    from softstart.cli.show import Column, drive_lines, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(drive_lines(front.drive)):
         sentence(to, line, "bold" if index == 0 else "")

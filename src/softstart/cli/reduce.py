@@ -9,7 +9,6 @@ import click
 
 from softstart.cli.completing import Keys, names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
-from softstart.cli.folder import output_folder
 from softstart.cli.optimal_options import read_choice, read_positive
 from softstart.cli.options import (
     Mistakes,
@@ -24,6 +23,7 @@ from softstart.cli.options import (
 )
 from softstart.cli.usage import Command
 from softstart.errors import InputError
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from softstart.chain import Chain, Reduction
@@ -156,7 +156,7 @@ def reduce(
                 write_reduction(found, beside, done, folder, command_line())
 
     from softstart.cli.reduce_text import show_reduction
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         verification = {"verified": [one.summary() for one in done], "verdict": verdict(done)}

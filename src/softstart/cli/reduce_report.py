@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softstart import __version__
-from softstart.cli.compare_report import markdown, markdown_table
-from softstart.cli.folder import write_table, write_text
+from softstart.views.markdown import markdown, markdown_table, write_table, write_text
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
@@ -24,7 +23,7 @@ def write_reduction(
     from softstart.cli.reduce import makes_drive
     from softstart.cli.reduce_text import chain_lines, conclusion, footnotes, tables
     from softstart.cli.reduce_verify import caution
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     vibration = found.whole_vibration
     write_text(folder / "scheme.svg", scheme_svg(found.chain))

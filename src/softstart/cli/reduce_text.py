@@ -27,7 +27,7 @@ class Shown(NamedTuple):
 
 def chain_lines(chain: Chain) -> list[str]:
     """The chain in a few lines."""
-    from softstart.cli.show import printable, short
+    from softstart.views.numbers import printable, short
 
     arrays = chain.at_motor_shaft()
     gaps = int((arrays.gap > 0.0).sum())
@@ -58,7 +58,7 @@ def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verificati
 
 def frequencies_table(vibration: Vibration) -> Shown:
     """The lowest natural frequencies with their nodes."""
-    from softstart.cli.show import column_of
+    from softstart.views.numbers import column_of
 
     count = min(vibration.Omega.size, MOST_MODES)
     nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) for m in range(count)]
@@ -82,7 +82,7 @@ def frequencies_table(vibration: Vibration) -> Shown:
 
 def steps_table(found: Reduction) -> Shown:
     """What went, at which frequency, and what it did to the kept frequencies."""
-    from softstart.cli.show import number
+    from softstart.views.numbers import number
 
     what = {"joint": "rigid joint", "mass": "shared", "pair": "joined", "modal": "first mode of"}
     rows = []
@@ -118,7 +118,7 @@ def kept_table(found: Reduction) -> Shown:
 
 def two_masses_table(found: Reduction, beside: Reduction | None) -> Shown:
     """The chain and the two masses of both methods."""
-    from softstart.cli.show import short
+    from softstart.views.numbers import short
 
     columns = [("chain", found.figures[0], None), (found.method, found.figures[1], found)]
     if beside is not None:
@@ -188,7 +188,8 @@ def show_reduction(
 ) -> None:
     """All of it."""
     from softstart.cli.reduce_verify import caution
-    from softstart.cli.show import Column, print_table, sentence
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(chain_lines(found.chain)):
         sentence(to, line, "bold" if index == 0 else "")

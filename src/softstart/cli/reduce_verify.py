@@ -56,7 +56,7 @@ def check(found: Reduction, names: Sequence[str] | None) -> None:
 
 def columns(done: Sequence[Verification]) -> dict[str, list[str]]:
     """The table of them."""
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     return {
         "strategy": [one.name for one in done],

@@ -116,7 +116,7 @@ def report(
 
         write_whole(Path(out), lambda stream: stream.write(page))
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(made.summary())
@@ -209,8 +209,9 @@ def _seconds(text: str) -> float:
 
 
 def _show(to: Console, made: Report, out: str) -> None:
-    from softstart.cli.show import drive_lines, sentence
     from softstart.reporting.answer import answer
+    from softstart.views.drives import drive_lines
+    from softstart.views.terminal import sentence
 
     for index, line in enumerate(drive_lines(made.drive)):
         sentence(to, line, "bold" if index == 0 else "")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from softstart.cli.folder import output_folder
 from softstart.cli.options import (
     Mistakes,
     check_name,
@@ -27,6 +26,7 @@ from softstart.cli.options import (
     until_option,
 )
 from softstart.cli.usage import Command
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -97,7 +97,7 @@ def simulate(
             with working("drawing the figure ..."):
                 write_start(run, folder, command_line(), nominal)
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
@@ -118,7 +118,7 @@ def simulate(
 
 def figure_rows(run: Run) -> list[list[str]]:
     """The figures of the start, as words and numbers."""
-    from softstart.cli.show import number, short
+    from softstart.views.numbers import number, short
 
     def with_unit(value: float, unit: str) -> str:
         return f"{short(value)} {unit}" if not math.isnan(value) else "-"
@@ -153,7 +153,9 @@ def event_rows(run: Run) -> list[list[object]]:
 
 
 def _show(to: Console, run: Run, fitted_to: Drive | None) -> None:
-    from softstart.cli.show import Column, column_of, drive_lines, print_table, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.numbers import Column, column_of
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(drive_lines(run.drive, fitted_to)):
         sentence(to, line, "bold" if index == 0 else "")

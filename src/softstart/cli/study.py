@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.completing import studies
-from softstart.cli.folder import file_stem, output_folder, write_table
 from softstart.cli.options import Mistakes, json_option, out_option
 from softstart.cli.usage import Command
 from softstart.errors import InputError
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
+from softstart.views.markdown import file_stem, output_folder, write_table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +51,7 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
                 progress("writing")
                 write_study(found, result, folder)
 
-    from softstart.cli.show import console, print_json
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json({"study": found.name, "title": found.title, **result.summary()})
@@ -65,7 +65,7 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
 def write_study(found: Study, result: StudyResult, folder: Path) -> None:
     """Pictures as SVG and PNG, each table and the claims as CSV."""
     if result.figures:
-        from softstart.figures import save_figure
+        from softstart.views.drawing import save_figure
 
         for stem, figure in result.figures.items():
             save_figure(figure, folder, stem)
@@ -85,7 +85,8 @@ def _listed(one: Study) -> dict[str, Any]:
 
 
 def _list(as_json: bool) -> None:
-    from softstart.cli.show import Column, console, print_json, print_table, sentence
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import console, print_json, print_table, sentence
 
     found: list[Study] = []
     broken = Mistakes()
@@ -105,7 +106,7 @@ def _list(as_json: bool) -> None:
 
 
 def _show(to: Console, found: Study, result: StudyResult) -> None:
-    from softstart.cli.show import sentence
+    from softstart.views.terminal import sentence
 
     sentence(to, f"{found.name}: {found.title}", "bold")
     for table in result.tables:
@@ -117,7 +118,8 @@ def _show(to: Console, found: Study, result: StudyResult) -> None:
 
 
 def _show_table(to: Console, table: Table) -> None:
-    from softstart.cli.show import Column, print_table, printable
+    from softstart.views.numbers import Column, printable
+    from softstart.views.terminal import print_table
 
     numeric = [
         all(isinstance(row[i], int | float | None) for row in table.rows) for i in range(len(table.columns))
@@ -139,7 +141,7 @@ def _show_claims(to: Console, claims: Sequence[Claim]) -> None:
 
     from rich.text import Text
 
-    from softstart.cli.show import printable
+    from softstart.views.numbers import printable
 
     to.print(Text("Claims", style="bold"))
     for number, claim in enumerate(claims, start=1):

@@ -14,7 +14,6 @@ import click
 
 from softstart.cli.completing import axes as axes_known
 from softstart.cli.completing import files_only
-from softstart.cli.folder import output_folder
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -35,6 +34,7 @@ from softstart.cli.options import (
 )
 from softstart.cli.usage import Command
 from softstart.errors import InputError
+from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     import xarray
@@ -145,9 +145,9 @@ def sweep(
 
                 write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
 
-    from softstart.cli.show import console, print_json
     from softstart.cli.sweep_cells import MOST_SHOWN, cell_rows
     from softstart.cli.sweep_text import axis_summary, show
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(

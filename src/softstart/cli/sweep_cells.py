@@ -54,7 +54,8 @@ def cell_table(results: xarray.Dataset, to: Console | None = None) -> tuple[list
     Figures without a place on the screen are left out from the right. The status is among them only where
     not every start reached its target speed.
     """
-    from softstart.cli.show import Column, fits
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import fits
 
     columns = cell_columns(results)
     ended = columns.pop(STATUS)
@@ -80,7 +81,7 @@ def cell_table(results: xarray.Dataset, to: Console | None = None) -> tuple[list
 
 def write_cells(results: xarray.Dataset, folder: Path) -> bool:
     """All starts as CSV, with all digits; nothing for a grid that is too large for it."""
-    from softstart.cli.folder import write_table
+    from softstart.views.markdown import write_table
 
     if results[STATUS].size > MOST_WRITTEN:
         return False
@@ -92,7 +93,7 @@ def write_cells(results: xarray.Dataset, folder: Path) -> bool:
 
 
 def _figures(values: list[float]) -> list[str]:
-    from softstart.cli.show import column_of, number
+    from softstart.views.numbers import column_of, number
 
     whole = all(math.isnan(value) or value.is_integer() for value in values)
     return [number(value, 0) for value in values] if whole else column_of(values, 5)

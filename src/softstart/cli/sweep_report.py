@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softstart.cli.compare_report import (
+from softstart.views.markdown import (
     drive_table,
     markdown,
     markdown_table,
     provenance,
     write_fitted_to,
+    write_table,
+    write_text,
 )
-from softstart.cli.folder import write_table, write_text
 
 if TYPE_CHECKING:
     import xarray
@@ -39,8 +40,8 @@ def write_sweep(
     """Everything that sums a sweep up."""
     from softstart.cli.sweep_cells import FILE, MOST_SHOWN, cell_table, write_cells
     from softstart.cli.sweep_text import axis_columns, conclusion, endings, figure_columns
-    from softstart.figures import save_figure
     from softstart.sweeping.pictures import sweep_figure
+    from softstart.views.drawing import save_figure
 
     picture = sweep_figure(results, summary.judged) if summary.judged else None
     if picture is not None:

@@ -42,7 +42,7 @@ def axis_columns(results: xarray.Dataset) -> dict[str, list[str]]:
 
 def figure_columns(results: xarray.Dataset, summary: Summary) -> dict[str, list[str]]:
     """The table of the figures."""
-    from softstart.cli.show import column_of
+    from softstart.views.numbers import column_of
 
     names = list(summary.spreads)
     rows = [
@@ -108,8 +108,10 @@ def show(
     last: Progress | None,
 ) -> None:
     """Print everything."""
-    from softstart.cli.show import Column, controllers_set_up, drive_lines, print_table, sentence
     from softstart.cli.sweep_cells import MOST_SHOWN, cell_table
+    from softstart.views.drives import controllers_set_up, drive_lines
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import print_table, sentence
 
     for index, line in enumerate(drive_lines(drive)):
         sentence(to, line, "bold" if index == 0 else "")

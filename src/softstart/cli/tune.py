@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.folder import kept_state, output_folder
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -25,6 +24,7 @@ from softstart.cli.options import (
 from softstart.cli.tune_options import named_as_options, read_free, read_grid, read_tolerances
 from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError, SimulationError
+from softstart.views.markdown import kept_state, output_folder
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
@@ -154,8 +154,8 @@ def tune(
             with working("drawing the figures ..."):
                 write_tuning(tuning, folder, command_line())
 
-    from softstart.cli.show import console, print_json
     from softstart.cli.tune_text import any_in_time, show
+    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(tuning.summary())

@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.cli.compare_report import drive_table, markdown, markdown_table, provenance
-from softstart.cli.folder import write_table, write_text
+from softstart.views.markdown import (
+    drive_table,
+    markdown,
+    markdown_table,
+    provenance,
+    write_table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -20,7 +26,7 @@ if TYPE_CHECKING:
 def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
     """Everything about a tuning, but its saved state."""
     from softstart.cli.tune_text import cell_columns, conclusions, map_columns, notes, question, set_columns
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     write_text(folder / "drive.toml", tuning.drive.to_toml())
     parts = [

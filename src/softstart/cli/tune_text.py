@@ -40,7 +40,7 @@ def _said(tuning: Tuning) -> str:
 
 def cell_columns(tuning: Tuning) -> dict[str, list[str]]:
     """The schedule, one row a cell."""
-    from softstart.cli.show import column_of
+    from softstart.views.numbers import column_of
 
     table = tuning.schedule
     assert table is not None
@@ -65,7 +65,7 @@ def cell_columns(tuning: Tuning) -> dict[str, list[str]]:
 
 def set_columns(tuning: Tuning) -> dict[str, list[str]]:
     """The robust set, one row a parameter."""
-    from softstart.cli.show import short
+    from softstart.views.numbers import short
 
     found = tuning.robust
     assert found is not None
@@ -80,7 +80,7 @@ def set_columns(tuning: Tuning) -> dict[str, list[str]]:
 
 def map_columns(tuning: Tuning, table: Any, name: str) -> dict[str, list[str]]:
     """A figure over the grid, one row a gap."""
-    from softstart.cli.show import column_of, short
+    from softstart.views.numbers import column_of, short
 
     values = np.asarray(table[name], dtype=np.float64)
     columns = {"gap rad": [short(gap) for gap in tuning.question.gaps]}
@@ -175,7 +175,8 @@ def notes(tuning: Tuning) -> list[str]:
 
 def show(to: Console, tuning: Tuning) -> None:
     """All of it on a terminal or in a pipe."""
-    from softstart.cli.show import drive_lines, sentence
+    from softstart.views.drives import drive_lines
+    from softstart.views.terminal import sentence
 
     for index, line in enumerate(drive_lines(tuning.drive)):
         sentence(to, line, "bold" if index == 0 else "")
@@ -201,7 +202,8 @@ def show(to: Console, tuning: Tuning) -> None:
 
 def _table(to: Console, title: str, columns: dict[str, list[str]], texts: Sequence[str] = ()) -> None:
     """A table, in two where there is no room for one."""
-    from softstart.cli.show import Column, fits, print_table
+    from softstart.views.numbers import Column
+    from softstart.views.terminal import fits, print_table
 
     headings = [Column(name, name not in texts) for name in columns]
     rows = [list(row)[: len(headings)] for row in zip(*columns.values(), strict=True)][:SHOWN]

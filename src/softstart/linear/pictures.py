@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
 from softstart.linear.harmonic_balance import Outside, frequency_grid
 from softstart.linear.response import at_points, frequencies, poles
 from softstart.linear.telling import delay_text, gain_text, phase_text
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

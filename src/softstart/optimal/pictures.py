@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.optimal.labels import name_points
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

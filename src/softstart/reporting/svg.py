@@ -6,8 +6,8 @@ import io
 import re
 from typing import Any
 
-from softstart.figures import drawing
 from softstart.reporting.markup import Html, html, tag
+from softstart.views.drawing import drawing
 
 _ID = re.compile(r'\bid="([^"]+)"')
 _REFERENCE = re.compile(r'(?:xlink:)?href="#([^"]+)"')

@@ -14,13 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.export import write_whole
-from softstart.figures import run_figure
+from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.start import metrics
 from softstart.start.status import Status
 
 Vector = NDArray[np.float64]
+starts = late("softstart.views.starts")  # above this module; see softstart.late
 
 EVENT_NAMES = {
     at.CLOSED: "gap closed",
@@ -277,7 +278,7 @@ class Run:
 
     def plot(self) -> Any:
         """Torques, speeds and twist over time, stages shaded."""
-        return run_figure(self)
+        return starts.run_figure(self)
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.drive import PARAMETERS
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
 from softstart.sweeping.summary import plan_of
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
 if TYPE_CHECKING:
     import xarray

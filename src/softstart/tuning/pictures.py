@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.figures import drawing, new_figure
+from softstart.views.drawing import drawing, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.figures import drawing, new_figure
+from softstart.views.drawing import drawing, new_figure
 from softstart_studies.gaps_and_inertias.cells import Grid
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.optimal_starts.profiles import OptimalStart
 from softstart_studies.optimal_starts.sensor import Sensed
 from softstart_studies.optimal_starts.smooth import Price

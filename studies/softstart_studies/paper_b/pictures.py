@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.paper_b.over_speed import Course
 from softstart_studies.paper_b.vaz import MOMENTS, TUNING
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.start.run import Run
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart_studies.paper_g.curves import Curve
 from softstart_studies.paper_g.frequency import Detuned
 from softstart_studies.paper_g.invariance import GAPS, INERTIAS, STIFFNESSES, Spread

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.paper_r.findings import normal, widened
 from softstart_studies.paper_r.four_to_two import SHARES, STIFFNESSES, ErrorMap
 from softstart_studies.paper_r.free import placed, tractor

@@ -9,8 +9,8 @@ import numpy as np
 
 from softstart import simulate
 from softstart.drive.parameters import LoadKind
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
 from softstart.start.metrics import base_torque
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER, Cell
 from softstart_studies.pulse_coast_hold.crane import TOLD, Extent
 from softstart_studies.pulse_coast_hold.tolerances import Case

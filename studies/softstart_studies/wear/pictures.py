@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from softstart.figures import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.wear.life import WAYS, Life
 
 if TYPE_CHECKING:

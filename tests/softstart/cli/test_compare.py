@@ -10,7 +10,7 @@ import pytest
 
 from softstart import Drive, compare, simulate
 from softstart.cli.compare import conclusion, share_lost
-from softstart.cli.show import column_of, number, printable, short
+from softstart.views.numbers import column_of, number, printable, short
 
 THREE = ("--controllers", "direct,reduced-first-stage,reduced-two-stage")
 

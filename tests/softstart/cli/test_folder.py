@@ -5,7 +5,7 @@ import os
 import pytest
 
 from softstart import InputError
-from softstart.cli.folder import file_stem, output_folder, write_table, write_text
+from softstart.views.markdown import file_stem, output_folder, write_table, write_text
 
 
 def fill(target, *names, fail=False):
@@ -70,7 +70,7 @@ def test_a_folder_without_rights(tmp_path, monkeypatch):
     def refuse(**options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("softstart.cli.folder.tempfile.mkdtemp", refuse)
+    monkeypatch.setattr("softstart.views.markdown.tempfile.mkdtemp", refuse)
     with pytest.raises(InputError, match="Permission denied"), output_folder(str(tmp_path / "x")):
         pass
 

@@ -6,8 +6,8 @@ import pytest
 
 from softstart import InputError, SimulationError, plugins
 from softstart import study as studies
-from softstart.figures import new_figure
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study
+from softstart.views.drawing import new_figure
 
 ROWS = [(0.5, 3.1179, "[G]"), (2.0, None, "")]
 

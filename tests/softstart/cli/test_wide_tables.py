@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from softstart.cli.show import Column, console, print_table
+from softstart.views.numbers import Column
+from softstart.views.terminal import console, print_table
 
 
 def test_a_wide_table_keeps_its_names(capsys) -> None:

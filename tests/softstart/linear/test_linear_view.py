@@ -286,7 +286,7 @@ def test_the_start_is_the_one_of_simulate():
 
 
 def test_a_drive_file_by_name_and_the_figure(tmp_path):
-    from softstart.figures import save_figure
+    from softstart.views.drawing import save_figure
 
     view = linear_view("nordin-servo-60kw", "current-limit-feedback")
     assert isinstance(view.drive, Drive)

@@ -7,7 +7,6 @@ import pytest
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.figures import save_figure
 from softstart.optimal.front import Front
 from softstart.optimal.front_points import ControllerPoint, FrontPoint
 from softstart.optimal.labels import name_points, shared
@@ -17,6 +16,7 @@ from softstart.optimal.replay import replay
 from softstart.optimal.result import LowerBound, Optimum
 from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
 from softstart.profile import TorqueProfile
+from softstart.views.drawing import save_figure
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -139,7 +139,7 @@ def test_a_tall_front_has_a_logarithmic_axis_a_flat_one_begins_at_zero():
 
 
 def test_points_at_one_place_share_a_label():
-    from softstart.figures import new_figure
+    from softstart.views.drawing import new_figure
 
     figure, axes = new_figure()
     axes.plot([0, 1], [0, 1])

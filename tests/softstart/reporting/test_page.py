@@ -150,7 +150,7 @@ def test_figures_are_vector_named_and_the_same_each_time(read, page):
     assert "data:image" not in page
 
     def drawn():
-        from softstart.figures import new_figure
+        from softstart.views.drawing import new_figure
 
         figure, axes = new_figure()
         axes.plot([0, 1], [0, 1], "o")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
-from softstart.figures import COLOURS, drawing, new_figure
+from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.benchmarks.optima.entries import ENTRIES
 from softstart_studies.benchmarks.optima.verdicts import Outcome
 

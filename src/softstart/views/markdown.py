@@ -1,9 +1,13 @@
-"""The folder of --out: everything is made ready beside it and then put in place, or nothing is."""
+"""The files of --out: the folder, tables, texts and what every report.md holds.
+
+Everything is made ready beside the folder and then put in place, or nothing is.
+"""
 
 from __future__ import annotations
 
 import csv
 import os
+import platform
 import shutil
 import sys
 import tempfile
@@ -12,7 +16,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from softstart import __version__
+from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
+from softstart.export import write_whole
+from softstart.views.drives import controllers_set_up
+
+FITTED_TO = "fitted-to.toml"
 
 
 @contextmanager
@@ -37,7 +47,6 @@ def output_folder(asked: str | None) -> Iterator[Path | None]:
 
 def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """A table as CSV; numbers with all their digits, None as an empty cell."""
-    from softstart.export import write_whole
 
     def write(stream: IO[Any]) -> None:
         writer = csv.writer(stream, lineterminator="\n")
@@ -49,8 +58,6 @@ def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[obje
 
 def write_text(path: Path, text: str) -> None:
     """A text file."""
-    from softstart.export import write_whole
-
     write_whole(path, lambda stream: stream.write(text))
 
 
@@ -150,3 +157,53 @@ def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
         if state is not None and state.exists():
             print(f"softstart: {what} are kept in {state}; the same command goes on.", file=sys.stderr)
         raise
+
+
+def markdown(text: str) -> str:
+    """Text that Markdown leaves as it is, within a table too."""
+    flat = " ".join(text.split())
+    return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+
+
+def markdown_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None
+) -> str:
+    """A table in Markdown; columns from `numbers_from` on are set to the right."""
+    first = len(headings) if numbers_from is None else numbers_from
+    rule = ["---" if index < first else "---:" for index in range(len(headings))]
+    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
+
+
+def drive_table(drive: Drive) -> str:
+    """All parameters of a drive that are set."""
+    rows = []
+    for parameter in PARAMETERS.values():
+        value = getattr(drive, parameter.name)
+        if value is not None and value != "" and parameter.name != "name":
+            shown = f"{value:.10g}" if isinstance(value, float) else str(value)
+            unit = "" if parameter.unit == "1" else parameter.unit
+            rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
+    return markdown_table(["key", "symbol", "value", "unit", "meaning"], rows)
+
+
+def write_fitted_to(fitted_to: Drive | None, folder: Path) -> None:
+    """The drive for which the controllers are set up, beside the one that runs."""
+    if fitted_to is not None:
+        write_text(folder / FITTED_TO, fitted_to.to_toml())
+
+
+def provenance(drive: Drive, command: str, fitted_to: Drive | None = None, one: bool = True) -> str:
+    """What was run, by what, on which input: enough to do it again. `one`: no parameter of it is varied."""
+    other, shown = "", drive if one else None
+    if fitted_to is not None:
+        other = (
+            f"\n\nThe {markdown(controllers_set_up(shown, fitted_to))}. That drive is in "
+            f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
+        )
+    return (
+        "## Where this comes from\n\n"
+        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
+        f"```sh\n{command}\n```\n\n"
+        "on the drive of [drive.toml](drive.toml), which holds all changes:\n\n"
+        f"```toml\n{drive.to_toml()}```{other}"
+    )

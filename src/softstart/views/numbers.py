@@ -1,0 +1,82 @@
+"""Numbers and text as people and programs read them: decimals, dashes, JSON. Imports nothing heavy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+NOTHING = "-"
+
+
+class Column(NamedTuple):
+    """A column: its heading (may hold line breaks), and whether its cells are numbers, set to the right."""
+
+    heading: str
+    number: bool = True
+
+    def width(self, cells: Sequence[str]) -> int:
+        """Letters that the column needs."""
+        return max(len(line) for text in (self.heading, *cells) for line in text.split("\n"))
+
+
+def number(value: float | None, decimals: int) -> str:
+    """A number with so many decimals; a dash for what there is not.
+
+    >>> number(0.01661, 4), number(float("nan"), 4), number(-0.00001, 3)
+    ('0.0166', '-', '0.000')
+    """
+    if value is None or math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if not text.strip("-0.") else text
+
+
+def column_of(values: Sequence[float | None], digits: int = 4) -> list[str]:
+    """Numbers of one column: as many decimals for all, `digits` significant ones in the largest.
+
+    >>> column_of([0.36774, 0.0166, float("nan")]), column_of([164.83, 62.0]), column_of([2e-7, 1e-9])
+    (['0.3677', '0.0166', '-'], ['164.8', '62.0'], ['2.000e-07', '1.000e-09'])
+    """
+    finite = [abs(v) for v in values if v is not None and math.isfinite(v) and v != 0.0]
+    if not finite:
+        return [number(v, 0) for v in values]
+    order = math.floor(math.log10(max(finite)))
+    if not -4 <= order <= 6:
+        return [NOTHING if v is None or math.isnan(v) else f"{v:.{digits - 1}e}" for v in values]
+    return [number(v, max(0, digits - 1 - order)) for v in values]
+
+
+def short(value: float) -> str:
+    """One number for a line of text, at most six digits.
+
+    >>> short(368.465), short(0.175), short(92.15338450)
+    ('368.465', '0.175', '92.1534')
+    """
+    return f"{value:.6g}"
+
+
+def printable(text: str) -> str:
+    """The text without control characters, which could steer the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+
+
+def plain(value: Any) -> Any:
+    """Results as JSON has them: NaN and infinity become null, numpy's numbers and arrays plain ones.
+
+    >>> plain({"k_dyn": float("nan"), "stages": (1, 2)})
+    {'k_dyn': None, 'stages': [1, 2]}
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int | bool):
+        return value
+    return str(value)
