@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         verify_on_chain,
     )
     from softstart.clutch import Clutch, Engagement, EngagementFront, engage, optimize_engagement
-    from softstart.comparison import Comparison, compare
     from softstart.controller import (
         Command,
         CompiledController,
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
     from softstart.reporting.making import report
     from softstart.reporting.result import Report
+    from softstart.start.comparison import Comparison, compare
     from softstart.start.run import Run
     from softstart.start.simulation import simulate
     from softstart.start.status import Status
@@ -60,7 +60,7 @@ _HOME = {
     "verify_on_chain": "softstart.chain",
     "Clutch": "softstart.clutch",
     "Command": "softstart.controller",
-    "Comparison": "softstart.comparison",
+    "Comparison": "softstart.start.comparison",
     "CompiledController": "softstart.controller",
     "Controller": "softstart.controller",
     "Drive": "softstart.drive",
@@ -86,7 +86,7 @@ _HOME = {
     "TorqueProfile": "softstart.profile",
     "Tuning": "softstart.tuning.outcome",
     "balance": "softstart.balancing",
-    "compare": "softstart.comparison",
+    "compare": "softstart.start.comparison",
     "engage": "softstart.clutch",
     "linear_view": "softstart.linear.view",
     "optimize": "softstart.optimal.solving",

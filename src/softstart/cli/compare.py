@@ -33,7 +33,7 @@ from softstart.views.markdown import output_folder
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.comparison import Comparison, Row
+    from softstart.start.comparison import Comparison, Row
     from softstart.views.numbers import Column
 
 
@@ -92,7 +92,7 @@ def compare(
 
                 names = ready_controller_names(given)
             made = make_controllers(names, given, prefix=True)
-            from softstart.comparison import compare as compare_controllers
+            from softstart.start.comparison import compare as compare_controllers
 
             with Attributed():
                 comparison = compare_controllers(one, made, until=end, fitted_to=nominal)

@@ -17,8 +17,8 @@ from softstart.views.markdown import (
 )
 
 if TYPE_CHECKING:
-    from softstart.comparison import Comparison
     from softstart.drive import Drive
+    from softstart.start.comparison import Comparison
     from softstart.start.run import Run
 
 

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from softstart.comparison import DEFAULT_DRIVE, WORN_GAP
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.trouble import sentence_of
+from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, WORN_GAP
 from softstart.start.simulation import simulate
 from softstart.units import nearest
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from softstart.page.traces import Traces
     from softstart.start.run import Run
 
-REFERENCE = "direct"  # the strategy whose start time the others are compared with
 MAX_STRATEGIES = 24
 MOST_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
 

@@ -10,9 +10,9 @@ from softstart.reporting.strategies import kind_of
 from softstart.reporting.values import RPM, digits, fixed, percent, short
 
 if TYPE_CHECKING:
-    from softstart.comparison import Row
     from softstart.reporting.choice import Candidate
     from softstart.reporting.result import Report
+    from softstart.start.comparison import Row
 
 SAME = 0.005  # a peak within this share of that of direct is no saving
 MENTIONED = 3  # strategies that are gentler than direct start and out

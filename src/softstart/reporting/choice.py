@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from softstart.comparison import Row
 from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import Means, label_of, means_of
+from softstart.start.comparison import Row
 
 SLOWER = 0.15  # of the start time of direct
 ALIKE = 0.01  # worst K_dyn within this share of the least count as equal: then K_dyn on the drive as it is

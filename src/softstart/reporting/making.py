@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 
-from softstart.comparison import Comparison, Row, compare
-from softstart.controller import Controller, make_controller, ready_controller_names
+from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.choice import SLOWER, choose
@@ -17,6 +16,8 @@ from softstart.reporting.result import Report
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import make_sheet
 from softstart.reporting.strategies import label_of
+from softstart.start.comparison import REFERENCE, Comparison, Row, compared, make_controllers
+from softstart.start.simulation import simulate
 
 BUDGET = 20.0  # s for optima that take a search
 
@@ -67,14 +68,15 @@ def report(
     rows: list[Row] = []
     failed: list[tuple[str, str]] = []
     maps = []
+    reference = simulate(drive, REFERENCE).start_time
     for number, one in enumerate(made):
         tell(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
         try:
-            row = compare(drive, [one]).rows[0]
+            row = compared(drive, one, reference)
             maps.append(robustness(drive, one))
             rows.append(row)
         except SimulationError as error:
-            if label_of(one) == "direct":
+            if label_of(one) == REFERENCE:
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     used = [one for one in made if label_of(one) not in dict(failed)]
@@ -86,7 +88,7 @@ def report(
         controller = used[rows.index(candidate.row)]
         sheets.append(make_sheet(drive, controller, candidate.row.run, steps))
     times = [one.row.run.start_time for one in chosen]
-    direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == "direct")
+    direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
     reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
     tell(0.5, "looking for the limit")
     found = limit(
@@ -128,27 +130,15 @@ def _checked(
 def _made(
     controllers: Sequence[str | Controller] | None, parameters: Mapping[str, Mapping[str, object]]
 ) -> list[Controller]:
-    asked = list(ready_controller_names(parameters) if controllers is None else controllers)
-    if not asked:
-        raise InputError("controllers: name at least one; `softstart controllers` lists them.")
-    mistakes: list[str] = []
-    made: list[Controller] = []
-    for one in asked:
-        try:
-            made.append(make_controller(one, parameters.get(one) if isinstance(one, str) else None))
-        except InputError as error:
-            mistakes.extend(error.sentences)
-    unused = set(parameters) - {one for one in asked if isinstance(one, str)}
-    if unused:
-        mistakes.append(f"parameters for {', '.join(sorted(unused))}: that controller is not in the report.")
+    made = make_controllers(controllers, parameters)
     labels = [label_of(one) for one in made]
-    mistakes += [
+    mistakes = [
         f"controllers: two of them are called {label}; give one of the two another name (that of its file)."
         for label in dict.fromkeys(labels)
         if labels.count(label) > 1
     ]
     if mistakes:
         raise InputError(mistakes)
-    if not any(label_of(one) == "direct" for one in made):
-        made.append(make_controller("direct"))
+    if not any(label_of(one) == REFERENCE for one in made):
+        made.append(make_controller(REFERENCE))
     return made

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from softstart.comparison import Comparison, Row
 from softstart.drive import Drive
 from softstart.export import write_whole
 from softstart.reporting.choice import Choice
@@ -16,6 +15,7 @@ from softstart.reporting.provenance import Provenance
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.sheet import Sheet
 from softstart.reporting.strategies import label_of
+from softstart.start.comparison import Comparison, Row
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softstart.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.pictures import traces_figure
 from softstart.reporting.strategies import label_of
 from softstart.reporting.values import digits, fixed, listed, percent, short
 from softstart.start import metrics
+from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
 
 if TYPE_CHECKING:
-    from softstart.comparison import Row
     from softstart.reporting.figure_list import Figures
     from softstart.reporting.result import Report
+    from softstart.start.comparison import Row
 
 AT_ONCE = 5  # strategies in one figure of traces: what a page holds
 LATE = 1.6  # times the median start time, up to which traces are shown

@@ -15,6 +15,7 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
 DEFAULT_DRIVE = "crane-4amtkf"
+REFERENCE = "direct"  # the strategy whose start time the others are compared with
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
 
@@ -85,19 +86,43 @@ def compare(
     until: float | None = None,
     fitted_to: Drive | None = None,
 ) -> Comparison:
-    """Start the drive under each controller and compare.
+    """Start the drive under each controller and compare K_dyn, start time and robustness.
 
-    By default these are all installed ones that run as they are, and those that are given parameters.
-    `parameters` maps a controller's name to its parameters. `fitted_to` is the drive for which the
-    controllers are set up, if not `drive`: how they fare on one that is not what they believe. Raises
-    InputError for bad input.
+    Parameters
+    ----------
+    drive : Drive or str
+        One drive, or the name or file of one.
+    controllers : sequence of str or Controller, optional
+        Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
+        installed controllers that need no parameter, and those that are given parameters.
+    parameters : mapping, optional
+        A controller's name -> its parameters (SI numbers or strings with a unit).
+    until : float, optional
+        End of each start, s. By default one elastic period after the start time.
+    fitted_to : Drive, optional
+        The drive for which the controllers are set up, if not `drive`: how they fare on a drive that is not
+        the one they assume.
 
+    Returns
+    -------
+    Comparison
+        One row for each controller, in the order given.
+
+    Raises
+    ------
+    InputError
+        Bad input; all its mistakes at once.
+    SimulationError
+        A start on `drive` that cannot be finished.
+
+    Examples
+    --------
     >>> from softstart import compare
     >>> row = compare("crane-4amtkf", ["direct"]).rows[0]
     >>> round(row.run.k_dyn, 3), round(row.k_dyn_worn_gap, 3)
     (3.118, 4.865)
-    >>> believed = row.run.drive.replace(stiffness=0.5 * row.run.drive.stiffness)
-    >>> table = compare("crane-4amtkf", ["shaped", "pulse-coast-hold"], fitted_to=believed)
+    >>> assumed = row.run.drive.replace(stiffness=0.5 * row.run.drive.stiffness)
+    >>> table = compare("crane-4amtkf", ["shaped", "pulse-coast-hold"], fitted_to=assumed)
     >>> [round(row.run.k_dyn, 3) for row in table.rows]
     [1.678, 1.274]
     """
@@ -111,46 +136,76 @@ def compare(
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
     if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
+    made = make_controllers(controllers, parameters or {})
+    reference = simulate(drive, REFERENCE, until).start_time
+    rows = tuple(compared(drive, one, reference, until, fitted_to) for one in made)
+    return Comparison(drive, rows, fitted_to)
+
+
+def make_controllers(
+    controllers: Sequence[str | Controller] | str | Controller | None,
+    parameters: Mapping[str, Mapping[str, object]],
+) -> list[Controller]:
+    """The controllers to compare, by default all that are ready; InputError holds all mistakes at once."""
     if isinstance(controllers, str | Controller):
         controllers = [controllers]
-    asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters or {}))
+    asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters))
     if not asked:
         raise InputError("controllers: name at least one; `softstart controllers` lists them.")
-    unused = set(parameters or {}) - {name for name in asked if isinstance(name, str)}
+    wrong: list[str] = []
+    unused = set(parameters) - {one for one in asked if isinstance(one, str)}
     if unused:
-        raise InputError(
+        wrong.append(
             f"parameters for {', '.join(sorted(unused))}: that controller is not among those compared."
         )
-    mistakes: list[str] = []
     made: list[Controller] = []
     for one in asked:
         try:
-            made.append(make_controller(one, (parameters or {}).get(one) if isinstance(one, str) else None))
+            made.append(make_controller(one, parameters.get(one) if isinstance(one, str) else None))
         except InputError as error:
-            mistakes.extend(error.sentences)
-    if mistakes:
-        raise InputError(mistakes)
-    reference = simulate(drive, "direct", until).start_time
-    worn = drive.replace(gap=WORN_GAP * drive.gap)
-    light = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
-    rows = []
-    for controller in made:
-        run = simulate(drive, controller, until, fitted_to=fitted_to)
-        rows.append(
-            Row(
-                run,
-                run.start_time - reference,
-                _k_dyn_elsewhere(worn, controller, fitted_to or drive, drive, until),
-                _k_dyn_elsewhere(light, controller, fitted_to or drive, drive, until),
-            )
-        )
-    return Comparison(drive, tuple(rows), fitted_to)
+            wrong.extend(error.sentences)
+    if wrong:
+        raise InputError(wrong)
+    return made
 
 
-def _k_dyn_elsewhere(
-    other: Drive, controller: Controller, fitted_to: Drive, base: Drive, until: float | None
+def compared(
+    drive: Drive,
+    controller: Controller,
+    reference: float,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+) -> Row:
+    """The row of one controller; `reference` is the start time of `direct`, s."""
+    run = simulate(drive, controller, until, fitted_to=fitted_to)
+    return Row(
+        run,
+        run.start_time - reference,
+        k_dyn_worn_gap(drive, controller, until, fitted_to),
+        k_dyn_light_load(drive, controller, until, fitted_to),
+    )
+
+
+def k_dyn_worn_gap(
+    drive: Drive, controller: Controller, until: float | None = None, fitted_to: Drive | None = None
 ) -> float:
+    """K_dyn of a controller set up for `drive` at 4 times its gap; NaN where that start fails."""
+    return _k_dyn_changed(drive, drive.replace(gap=WORN_GAP * drive.gap), controller, until, fitted_to)
+
+
+def k_dyn_light_load(
+    drive: Drive, controller: Controller, until: float | None = None, fitted_to: Drive | None = None
+) -> float:
+    """K_dyn of a controller set up for `drive` with 0.4 of its load inertia; NaN where that start fails."""
+    light = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
+    return _k_dyn_changed(drive, light, controller, until, fitted_to)
+
+
+def _k_dyn_changed(
+    drive: Drive, changed: Drive, controller: Controller, until: float | None, fitted_to: Drive | None
+) -> float:
+    """K_dyn of the changed drive, over the mean torque of `drive`."""
     try:
-        return simulate(other, controller, until, fitted_to=fitted_to, base=base).k_dyn
+        return simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive).k_dyn
     except SimulationError:
         return math.nan
