@@ -15,7 +15,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.trouble import sentence_of
-from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, WORN_GAP
+from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
 from softstart.start.simulation import simulate
 from softstart.units import nearest
 
@@ -260,20 +260,12 @@ class Bench:
     def worn(self, label: str) -> float:
         """K_dyn of a strategy, set up for this drive, when the gap is 4 times as wide; NaN where it fails.
 
-        The same figure as `k_dyn_worn_gap` of `softstart.compare`.
+        The same figure, with the same cap on events, as `k_dyn_worn_gap` of `softstart.compare`.
         """
         if label not in self._worn:
             self._known(label)
-            nominal = self._drive
             try:
-                worn = nominal.replace(gap=WORN_GAP * nominal.gap)
-                self._worn[label] = simulate(
-                    worn,
-                    self._controllers[label],
-                    fitted_to=nominal,
-                    base=nominal,
-                    max_events=MOST_EVENTS,
-                ).k_dyn
+                self._worn[label] = k_dyn_worn_gap(self._drive, self._controllers[label])
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
                 self._worn[label] = math.nan
