@@ -12,7 +12,7 @@ from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.page import works
-from softstart.page.bench import REFERENCE, Bench
+from softstart.page.bench import Bench
 from softstart.page.downloads import file_name
 from softstart.page.job_view import LOOK, JobView
 from softstart.page.jobs import Jobs
@@ -29,6 +29,7 @@ from softstart.page.panel_parts import (
     percent,
     save,
 )
+from softstart.start.comparison import REFERENCE
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
