@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.completing import Keys, names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
-from softstart.cli.usage import Command
 from softstart.errors import InputError
 from softstart.views.markdown import output_folder
 

@@ -1,26 +1,60 @@
-"""All commands under `softstart`, and what it says when called alone."""
+"""The commands under `softstart`, loaded by name when called, and what is said of a wrong command line."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
+
 import click
+from click.shell_completion import CompletionItem
 
 from softstart import __version__
-from softstart.cli.balance import balance
-from softstart.cli.clutch import clutch
-from softstart.cli.compare import compare
-from softstart.cli.completion import completion
-from softstart.cli.linear import linear
-from softstart.cli.lists import controllers, drives
-from softstart.cli.optimize import optimize
-from softstart.cli.pareto import pareto
-from softstart.cli.reduce import reduce
-from softstart.cli.report import report
-from softstart.cli.serve import serve
-from softstart.cli.simulate import simulate
-from softstart.cli.study import study
-from softstart.cli.sweep import sweep
-from softstart.cli.tune import tune
-from softstart.cli.usage import HELP_NAMES, Commands
+
+# name: the module in this package that defines it, and the first sentence of its help
+COMMANDS = {
+    "compare": ("compare", "Start a drive under several controllers and compare them."),
+    "simulate": ("simulate", "Start a drive once under one controller."),
+    "optimize": (
+        "optimize",
+        "Find the torque profile with the least K_dyn for a start time, and prove how good it is.",
+    ),
+    "pareto": (
+        "pareto",
+        "Find the least K_dyn for many start times, and show how near the controllers come to it.",
+    ),
+    "tune": (
+        "tune",
+        "Find the gains of a controller for each gap and load inertia, and one set of gains for all.",
+    ),
+    "sweep": ("sweep", "Simulate every start of a grid of drives and controllers, of any size."),
+    "linear": ("linear", "Linearise a controller as it runs, and show margins, modes and limit cycles."),
+    "reduce": (
+        "reduce",
+        "Find the natural frequencies of a chain of masses, and reduce it to the drive that stands for it.",
+    ),
+    "clutch": ("clutch", "Engage a slipping clutch: peak of the shaft torque, friction work, slip time."),
+    "balance": (
+        "balance",
+        "Find the forces and moments of a piston engine by order, and design a two-shaft balancer.",
+    ),
+    "report": (
+        "report",
+        "Write a report on the start of a drive: one HTML file that opens offline and prints to A4.",
+    ),
+    "serve": (
+        "serve",
+        "Design a soft start in the browser: sliders, traces that follow, strategies side by side.",
+    ),
+    "drives": ("lists", "List the shipped drives, or print one as TOML."),
+    "controllers": ("lists", "List the controllers, or tell the parameters of one."),
+    "study": ("study", "List the studies, or run one."),
+    "completion": (
+        "completion",
+        "Print what makes the Tab key complete commands, drives, controllers, keys and studies.",
+    ),
+}
 
 GREETING = f"""\
 softstart {__version__}: start a drive with a gap in its transmission gently and fast.
@@ -40,10 +74,81 @@ The Tab key completes names after: eval "$(softstart completion bash)", or zsh, 
 """
 
 
+class Words(click.types.StringParamType):
+    """Text of which the words in the option's metavar, `a|b|c`, are known; in capitals it is a placeholder.
+
+    >>> option = click.Option(["--terminal"], metavar="synchronous|steady|FILE", type=Words())
+    >>> [item.value for item in option.shell_complete(click.Context(click.Command("x")), "s")]
+    ['synchronous', 'steady']
+    """
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """The words that begin so."""
+        words = (param.metavar or "").strip("[]").split("|")
+        found = [word for word in words if word.islower() and word.startswith(incomplete)]
+        return [CompletionItem(word) for word in found] if len(words) > 1 else []
+
+
+class Command(click.Command):
+    """A command that names itself in its usage errors, and whose options complete their words."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        for parameter in self.params:
+            if parameter.type is click.STRING:
+                parameter.type = Words()
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """The arguments read; a UsageError always has its context."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            error.ctx = error.ctx or ctx
+            raise
+
+
+class Commands(Command, click.Group):
+    """The group: it lists its commands without importing them, and imports one when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The names, in the order of the table."""
+        return [*COMMANDS, *self.commands]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of this name, imported; None if there is none."""
+        if cmd_name not in COMMANDS:
+            return super().get_command(ctx, cmd_name)
+        found: click.Command = getattr(import_module(f"softstart.cli.{COMMANDS[cmd_name][0]}"), cmd_name)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands in the help."""
+        limit = formatter.width - 6 - max(map(len, COMMANDS))
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, short_help(name, limit)) for name in COMMANDS])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Commands and options that begin so."""
+        found = [CompletionItem(n, help=short_help(n)) for n in COMMANDS if n.startswith(incomplete)]
+        return found + click.Command.shell_complete(self, ctx, incomplete)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command asked for; an unknown one is a UsageError in one sentence."""
+        name, known = args[0], self.list_commands(ctx)
+        if name not in known and not name.startswith("-"):
+            hint = did_you_mean(name, known, "softstart ")
+            raise click.UsageError(f'there is no command "{name}"; {hint}', ctx)
+        return super().resolve_command(ctx, args)
+
+
 @click.group(
     cls=Commands,
     invoke_without_command=True,
-    context_settings=HELP_NAMES,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=EPILOG,
     no_args_is_help=False,
 )
@@ -55,22 +160,82 @@ def cli(context: click.Context) -> None:
         print(GREETING)
 
 
-for command in (
-    compare,
-    simulate,
-    optimize,
-    pareto,
-    tune,
-    sweep,
-    linear,
-    reduce,
-    clutch,
-    balance,
-    report,
-    serve,
-    drives,
-    controllers,
-    study,
-    completion,
-):
-    cli.add_command(command)
+def short_help(name: str, limit: int = 45) -> str:
+    """The help of a command in at most `limit` letters, as click shortens it."""
+    return click.Command(name, help=COMMANDS[name][1]).get_short_help_str(limit)
+
+
+def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
+    """The end of a sentence about an unknown name: the nearest valid one, or all of them.
+
+    >>> did_you_mean("compre", ["compare", "drives"], "softstart ")
+    'did you mean softstart compare?'
+    >>> did_you_mean("zzz", ["compare", "drives"])
+    'there are compare and drives.'
+    """
+    known = list(valid)
+    near = get_close_matches(name.lower(), known, n=1, cutoff=0.5)
+    if near:
+        return f"did you mean {before}{near[0]}?"
+    return f"there are {listed(known)}." if known else "there are none."
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words in a row.
+
+    >>> listed(["a", "b", "c"]), listed(["a"])
+    ('a, b and c', 'a')
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def usage_sentence(error: click.UsageError) -> str:
+    """One sentence for what click refused, with the command it was about and where help is.
+
+    >>> usage_sentence(click.UsageError("there is no such thing."))
+    'there is no such thing. "softstart --help" tells more.'
+    """
+    command = error.ctx.command_path if error.ctx else "softstart"
+    place = command.removeprefix("softstart").strip()
+    reason = _reason(error).strip()
+    if reason[-1:] not in (".", "?"):
+        reason += "."
+    return f'{place + ": " if place else ""}{reason} "{command} --help" tells more.'
+
+
+def _reason(error: click.UsageError) -> str:
+    if isinstance(error, click.NoSuchOption):
+        return f"there is no option {error.option_name}; {did_you_mean(error.option_name, _options(error))}"
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        return _missing(error.param)
+    if isinstance(error, click.BadOptionUsage):
+        option = _option(error)
+        if option is not None and not option.is_flag:
+            return f"{error.option_name} needs a value, as {error.option_name} {option.metavar or 'VALUE'}."
+        return f"{error.option_name} takes no value."
+    message = error.format_message()
+    return message[:1].lower() + message[1:]
+
+
+def _missing(parameter: click.Parameter) -> str:
+    if isinstance(parameter, click.Option):
+        return f"{parameter.opts[-1]} {parameter.metavar or 'VALUE'} is missing."
+    return f"{parameter.metavar or str(parameter.name).upper()} is missing."
+
+
+def _options(error: click.UsageError) -> list[str]:
+    if error.ctx is None:
+        return []
+    parameters = error.ctx.command.get_params(error.ctx)
+    return [
+        name for p in parameters if isinstance(p, click.Option) for name in p.opts if name.startswith("--")
+    ]
+
+
+def _option(error: click.BadOptionUsage) -> click.Option | None:
+    if error.ctx is None:
+        return None
+    for parameter in error.ctx.command.get_params(error.ctx):
+        if isinstance(parameter, click.Option) and error.option_name in parameter.opts:
+            return parameter
+    return None

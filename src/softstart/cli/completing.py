@@ -115,23 +115,6 @@ def _parameters_of(name: str, before: str) -> Iterator[CompletionItem]:
         yield CompletionItem(f"{before}{field.name}=", help=_with_unit(meaning, unit))
 
 
-class Words(click.types.StringParamType):
-    """Text of which the words in the option's metavar, `a|b|c`, are known; in capitals it is a placeholder.
-
-    >>> option = click.Option(["--terminal"], metavar="synchronous|steady|FILE", type=Words())
-    >>> [item.value for item in option.shell_complete(click.Context(click.Command("x")), "s")]
-    ['synchronous', 'steady']
-    """
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """The words that begin so."""
-        words = (param.metavar or "").strip("[]").split("|")
-        found = [word for word in words if word.islower() and word.startswith(incomplete)]
-        return [CompletionItem(word) for word in found] if len(words) > 1 else []
-
-
 def drive_keys() -> Keys:
     """The parameters of a drive as `--set` names them."""
     from softstart.drive import PARAMETERS

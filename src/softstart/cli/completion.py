@@ -23,8 +23,8 @@ from click.shell_completion import (
     split_arg_string,
 )
 
+from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.completing import files
-from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError
 
 BASH = """\
@@ -155,8 +155,12 @@ def _one_line(item: CompletionItem) -> str:
 
 
 SHELLS: dict[str, type[_Line]] = {one.name: one for one in (Bash, Zsh, Fish)}
-for _shell in SHELLS.values():
-    add_completion_class(_shell)
+
+
+def register_shells() -> None:
+    """Make click answer the Tab key by these classes."""
+    for shell in SHELLS.values():
+        add_completion_class(shell)
 
 
 @click.command(cls=Command)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -23,7 +24,6 @@ from softstart.cli.options import (
     read_params,
     set_option,
 )
-from softstart.cli.usage import Command
 from softstart.views.markdown import output_folder, write_table, write_text
 
 if TYPE_CHECKING:

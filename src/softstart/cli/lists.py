@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.completing import controllers as controllers_known
 from softstart.cli.completing import names_or_files
 from softstart.cli.options import Mistakes, check_name, controller_names, drive_names, json_option
-from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError
 
 if TYPE_CHECKING:

@@ -10,9 +10,11 @@ from types import FrameType, TracebackType
 
 import click
 
-from softstart.cli.commands import cli
-from softstart.cli.usage import usage_sentence
+from softstart.cli.commands import cli, usage_sentence
 from softstart.errors import InputError, SimulationError
+from softstart.late import late
+
+completion = late("softstart.cli.completion")
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
@@ -70,6 +72,7 @@ def _said_interrupted() -> int:
 
 def _run(arguments: list[str]) -> int:
     if "_SOFTSTART_COMPLETE" in os.environ:
+        completion.register_shells()
         cli.main(arguments, prog_name="softstart")
     try:
         with cli.make_context("softstart", list(arguments), obj=tuple(arguments)) as context:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from softstart.cli.commands import did_you_mean
 from softstart.cli.options import Decorator, Mistakes
-from softstart.cli.usage import did_you_mean
 from softstart.errors import InputError, SimulationError
 
 if TYPE_CHECKING:

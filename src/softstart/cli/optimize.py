@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
     OPTION_OF,
@@ -36,7 +37,6 @@ from softstart.cli.options import (
     read_drive,
     set_option,
 )
-from softstart.cli.usage import Command
 from softstart.errors import InputError, SimulationError
 from softstart.optimal.direct import start_time_of_direct
 from softstart.views.markdown import output_folder

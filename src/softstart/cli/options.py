@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import did_you_mean
 from softstart.cli.completing import controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completing import settings as settings_of
-from softstart.cli.usage import did_you_mean
 from softstart.errors import InputError
 from softstart.plugins import registered
 

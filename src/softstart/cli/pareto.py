@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
     Asked,
@@ -34,7 +35,6 @@ from softstart.cli.options import (
     read_names,
     set_option,
 )
-from softstart.cli.usage import Command
 from softstart.errors import SimulationError
 from softstart.optimal.direct import start_time_of_direct
 from softstart.views.markdown import kept_state, output_folder

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.completing import Keys, names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
 from softstart.cli.optimal_options import read_choice, read_positive
@@ -21,7 +22,6 @@ from softstart.cli.options import (
     read_names,
     read_params_of,
 )
-from softstart.cli.usage import Command
 from softstart.errors import InputError
 from softstart.views.markdown import output_folder
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -23,7 +24,6 @@ from softstart.cli.options import (
     read_params_of,
     set_option,
 )
-from softstart.cli.usage import Command
 from softstart.errors import InputError
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import os
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_drive, set_option
-from softstart.cli.usage import Command
 
 
 @click.command(cls=Command)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.options import (
     Mistakes,
     check_name,
@@ -25,7 +26,6 @@ from softstart.cli.options import (
     set_option,
     until_option,
 )
-from softstart.cli.usage import Command
 from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.completing import studies
 from softstart.cli.options import Mistakes, json_option, out_option
-from softstart.cli.usage import Command
 from softstart.errors import InputError
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
 from softstart.views.markdown import file_stem, output_folder, write_table

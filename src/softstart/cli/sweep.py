@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command
 from softstart.cli.completing import axes as axes_known
 from softstart.cli.completing import files_only
 from softstart.cli.options import (
@@ -32,7 +33,6 @@ from softstart.cli.options import (
     set_option,
     until_option,
 )
-from softstart.cli.usage import Command
 from softstart.errors import InputError
 from softstart.views.markdown import output_folder
 

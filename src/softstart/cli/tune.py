@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -22,7 +23,6 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.tune_options import named_as_options, read_free, read_grid, read_tolerances
-from softstart.cli.usage import Command, did_you_mean
 from softstart.errors import InputError, SimulationError
 from softstart.views.markdown import kept_state, output_folder
 

@@ -9,10 +9,11 @@ import subprocess
 import sys
 import time
 
+import click
 import pytest
 
 from softstart import __version__
-from softstart.cli.commands import cli
+from softstart.cli.commands import COMMANDS, cli
 from softstart.cli.running import COMPILING, working
 
 HEAVY = ("casadi", "control", "matplotlib", "nicegui", "numba", "scipy.linalg", "xarray")
@@ -95,7 +96,7 @@ def test_greeting_names_three_things_and_each_is_there(spawn):
     things = re.findall(r"^  softstart (\w+)", ended.stdout, flags=re.MULTILINE)
     assert len(things) == 3
     for name in [*things, *re.findall(r"softstart ([a-z]+)", ended.stdout)]:
-        assert name in cli.commands
+        assert name in COMMANDS
     assert "softstart drives crane-4amtkf > mine.toml" in ended.stdout
 
 
@@ -107,6 +108,13 @@ def test_help_and_version(run):
         assert words in told
     for command in commands:
         assert run(command, "-h").out.startswith(f"Usage: softstart {command}")
+
+
+def test_the_listed_help_of_each_command_is_its_own():
+    context = click.Context(cli)
+    for name, (_, sentence) in COMMANDS.items():
+        command = cli.get_command(context, name)
+        assert (command.name, " ".join(command.help.split("\n\n")[0].split())) == (name, sentence)
 
 
 def test_streams_and_exit_codes_of_the_process(spawn):
