@@ -3,7 +3,9 @@
 #   make test           the whole test suite
 #   make serve          the interactive page, in the browser
 # and for those who work on it (CONTRIBUTING.md):
+#   make check                 lint, types, layers and the tests of what has changed: under two minutes
 #   make lint types layers     ruff, mypy, import-linter
+#   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium)
 #   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
 #   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
@@ -14,13 +16,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: compare test serve lint types layers page package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test check fuzz serve lint types layers page package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
 
 test: $(VENV)/.installed-test
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal  # a worker a core: more threads spin
+
+check: $(VENV)/.installed-dev lint types layers
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python .ci/touched.py | xargs $(BIN)/python -m pytest -q -n auto -m "not slow"
+
+fuzz: $(VENV)/.installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n auto -m hypothesis --hypothesis-profile=fuzz tests
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

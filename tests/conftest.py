@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import CompiledController, make_controller, ready_controller_names
+
+# the suite draws the same examples every time; `make fuzz` draws new ones (--hypothesis-profile=fuzz)
+settings.register_profile("suite", derandomize=True, database=None, deadline=None)
+settings.register_profile("fuzz", deadline=None, print_blob=True)
+settings.load_profile("suite")
 
 PAGE = Path(__file__).parent / "page"
 DOCS = Path(__file__).parent / "docs"
@@ -20,6 +27,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """
     parser.addoption("--page", action="store_true", help="with the tests of the page in Chromium")
     parser.addoption("--docs-commands", action="store_true", help="with the commands of the documentation")
+
+
+def pytest_configure() -> None:
+    """Handle SIGINT even where it is ignored, as in a background job: commands under test inherit that."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -1,7 +1,8 @@
 """The docstrings of this house as reStructuredText: they are written for the reader of the code.
 
-`name` in single backticks is a link where it is a public name of softstart, else code. The parts *Parameters*
-and *Returns* become fields. Indented lines after a blank one are equations, kept as they are.
+`name` in single backticks is a link where it is a public name of softstart, else code. Of the numpydoc
+sections, *Parameters*, *Attributes*, *Returns* and *Raises* become fields, the others headings. Indented
+lines after a blank one are equations, kept as they are.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from sphinx.application import Sphinx
 
 import softstart
 
-TITLES = ("Parameters", "Returns")
-ENTRY = re.compile(r"^(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*) : (?P<text>.*)$")
+FIELDS = ("Parameters", "Attributes", "Returns", "Raises")
+HEADINGS = ("Notes", "Examples", "References", "See Also", "Warnings")
+ENTRY = re.compile(r"^(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*)(?: : (?P<text>.*))?$")
 FORWARD = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
 CODE = re.compile(r"(`[^`]*`)")
 
@@ -38,19 +40,23 @@ def _sections(lines: list[str]) -> Iterator[str]:
     for i in left:
         line = lines[i]
         ahead = lines[i + 1].strip() if i + 1 < len(lines) else ""
-        if line.strip() in TITLES and re.fullmatch(r"-{3,}", ahead):
-            part = line.strip()
-            yield f":{part}:"
+        if re.fullmatch(r"-{3,}", ahead) and line.strip() in FIELDS + HEADINGS:
+            heading = line.strip()
+            part = heading if heading in FIELDS else ""
+            yield from [f":{heading}:"] if part else [f".. rubric:: {heading}", ""]
             next(left)
             continue
         if not line.strip():
             part = ""
         entry = ENTRY.match(line) if part else None
-        if entry:
+        if entry and part != "Returns":
             names = entry["names"].replace("*", "")
-            yield f"    - **{names}**: {entry['text']}"
+            yield f"    - **{names}**" + (f": {entry['text']}" if entry["text"] else "")
+        elif part == "Returns":
+            typed = line[:1] != " " and lines[i + 1 : i + 2] and lines[i + 1][:1] == " "
+            yield f"    {line.strip()}" + (":" if typed else "")
         elif part:
-            yield f"      {line.strip()}" if part == "Parameters" else f"    {line.strip()}"
+            yield f"      {line.strip()}"
         else:
             yield line
 
