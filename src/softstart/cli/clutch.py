@@ -109,7 +109,7 @@ def clutch(
         from softstart.cli.clutch_report import write_front
         from softstart.cli.clutch_text import show_front
         from softstart.cli.running import working
-        from softstart.clutch.optimal.front import optimize_engagement
+        from softstart.clutch.front import optimize_engagement
 
         with output_folder(out) as folder, working("looking for the best laws ...") as status:
 
@@ -132,7 +132,7 @@ def clutch(
     else:
         from softstart.cli.clutch_report import write_engagement
         from softstart.cli.clutch_text import show_engagement
-        from softstart.clutch.start import engage
+        from softstart.clutch.engagement import engage
 
         with output_folder(out) as folder:
             run = engage(one, until=end)

@@ -29,7 +29,7 @@ from softstart.views.markdown import output_folder, write_table, write_text
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.linear.margins import Crossing, Margins
+    from softstart.linear.loop import Crossing, Margins
     from softstart.linear.view import LinearView
 
 SHOWN_MODES = 16
@@ -108,7 +108,7 @@ def _frequencies(crossings: Sequence[Crossing]) -> str:
 
 def margin_rows(view: LinearView) -> list[list[str]]:
     """The figures of the loop, as words and numbers."""
-    from softstart.linear.telling import delay_text, gain_text, phase_text
+    from softstart.linear.pictures import delay_text, gain_text, phase_text
 
     m = view.margins
     assert m is not None
@@ -262,7 +262,7 @@ def write_linear(view: LinearView, folder: Path, command: str) -> None:
 def _write_response(view: LinearView, m: Margins, folder: Path) -> None:
     import numpy as np
 
-    from softstart.linear.response import at_points, frequencies, poles
+    from softstart.linear.systems import at_points, frequencies, poles
 
     assert view.own_loop is not None
     loop = view.own_loop.broken

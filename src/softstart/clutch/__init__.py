@@ -8,10 +8,9 @@
 
 from __future__ import annotations
 
+from softstart.clutch.engagement import Engagement, engage
+from softstart.clutch.front import EngagementFront, optimize_engagement
 from softstart.clutch.laws import LAWS, Law
 from softstart.clutch.model import Clutch
-from softstart.clutch.optimal.front import EngagementFront, optimize_engagement
-from softstart.clutch.result import Engagement
-from softstart.clutch.start import engage
 
 __all__ = ["LAWS", "Clutch", "Engagement", "EngagementFront", "Law", "engage", "optimize_engagement"]

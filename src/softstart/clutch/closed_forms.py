@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softstart.arrays import Vector
 from softstart.clutch.model import Clutch
 
 __all__ = ["linear_torque", "pulse_and_pause", "two_steps"]
 
 
-def linear_torque(clutch: Clutch, t: ArrayLike) -> NDArray[np.float64]:
+def linear_torque(clutch: Clutch, t: ArrayLike) -> Vector:
     """T(t) in N m while the clutch slips under the linear law, [C] (4) and (5).
 
     With kappa = Ic/(IM + Ic) and T0 = Mc IM/(IM + Ic), up to tM
@@ -32,7 +33,7 @@ def linear_torque(clutch: Clutch, t: ArrayLike) -> NDArray[np.float64]:
     IM, Ic, B, tM = clutch.clutch_inertia, clutch.load_inertia, clutch.B, clutch.engagement_time
     slope = Ic / (IM + Ic) * clutch.clutch_torque / tM
 
-    def ramp(s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ramp(s: Vector) -> Vector:
         return np.where(s > 0.0, s - np.sin(B * s) / B, 0.0)
 
     swing = clutch.load_torque * IM / (IM + Ic) * (1.0 - np.cos(B * times))

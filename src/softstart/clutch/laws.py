@@ -15,7 +15,9 @@ from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from softstart.arrays import Vector
 
 __all__ = ["LAWS", "Law", "LawKind", "Piece", "shaped_law", "table_law"]
 
@@ -60,7 +62,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Law:
-    """Friction torque over time: `pieces` in order from t = 0 on, the last of them constant and for ever.
+    """Friction torque over time: `pieces` in order from t = 0 on, the last of them constant from there on.
 
     `label` says what it is; `engaged_at` is the instant in s from which the torque is held.
     """
@@ -87,7 +89,7 @@ class Law:
         """Number of the piece that acts from the instant t on."""
         return max(bisect_right(self.starts, t) - 1, 0)
 
-    def torque(self, t: ArrayLike) -> NDArray[np.float64]:
+    def torque(self, t: ArrayLike) -> Vector:
         """M at the instants t (s), in N m; at a step, the torque behind it.
 
         >>> shaped_law("linear", 60.0, 2.0).torque([0.0, 1.0, 5.0]).tolist()

@@ -11,8 +11,8 @@ import numpy as np
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
 if TYPE_CHECKING:
-    from softstart.clutch.optimal.front import EngagementFront
-    from softstart.clutch.result import Engagement
+    from softstart.clutch.engagement import Engagement
+    from softstart.clutch.front import EngagementFront
 
 GREY = "#666666"
 SMALL = 9.5

@@ -10,11 +10,10 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+
+from softstart.arrays import Vector
 
 __all__ = ["definite", "definite_integral", "first_root", "leading", "roots", "value"]
-
-Vector = NDArray[np.float64]
 
 NOTHING = 1e-13  # a term below this share of the largest one is rounding
 DEEPEST = 48

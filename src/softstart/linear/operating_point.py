@@ -1,43 +1,53 @@
-"""Where the controller is linearised: an instant of its own start at which the linear law holds.
+"""The operating point: an instant of the controller's own start at which its linear law holds.
 
-The start is run on the exact plant until the shaft torque is steady. Along the contact several samples are
-tried. At each the loop of the linearised controller and the sampled plant must foretell how the exact plant,
-under the controller itself, answers to small displacements of twist and speeds. The steady instant is taken
-if it does there, else the instant at which it does best: a controller whose demand rests exactly on a limit
-has no linear law at that point, but it has one on the way there.
+The start is run on the exact plant until the shaft torque is steady. Several samples along the contact are
+tried. At each, the loop of the linearised controller and the sampled plant must predict the response of the
+exact plant, under the controller itself, to small displacements of twist and speeds. The steady instant is
+taken if the prediction is good there, otherwise the instant with the best prediction: a controller whose
+demand lies exactly on a limit has no linear law at that point, but it has one before it gets there.
+
+The law is the derivative of the controller's step, a function (measured, state) -> (demand, new state), by
+differences. Each component is displaced both ways by a step and by half of it, with ever smaller steps until
+both sides agree. Richardson's extrapolation of the central difference is then taken (error of fourth order).
+Where the sides never agree: if only one side is linear, as at a switch that lies exactly at the sample, that
+side is taken; if each is linear but they differ (a corner: the demand on a limit), the steeper; if neither
+is (a jump: the number of a mode), none. All these cases are reported.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softstart.linear.differences import STEP, Derivative, Smoothness, derivative, seen
-from softstart.linear.realisation import System, moved, part, shown
+from softstart.arrays import Matrix, Vector
 from softstart.linear.sampled_plant import SampledPlant, in_contact, sampled
-from softstart.linear.sampled_start import Sample, SampledStart
-from softstart.plant import layout as at
+from softstart.linear.sampled_start import Sample, SampledStart, Step
+from softstart.linear.systems import System, moved, part, shown
+from softstart.plant import layout
+from softstart.plant import start as kernel
 from softstart.start.metrics import base_torque
-
-Vector = NDArray[np.float64]
 
 LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
 MOST_SAMPLES = 20_000
 STEADY = 1e-6  # of M12avg_base: spread of shaft torque and demand over two elastic periods
 WINDOW = 16  # samples over which the linear loop is compared with the exact plant
 LEAST = 0.01  # of a state: its smallest scale, for rounding's sake
-GOOD = 1e-3  # relative mismatch up to which a law counts as well told
+GOOD = 1e-3  # relative mismatch up to which a linear law counts as good
+STEP = 2.0**-13  # of a component's scale
+STEPS = (STEP, 2.0**-17, 2.0**-21)
+SAME = 1e-4  # of a column's largest entry, in scales: the two sides agree, or the two step sizes do
+NOTHING = 1e-10  # an entry below this, in scales, is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """The samples of a start, and the last ones of them that are in one contact at one sample period."""
+class SampledRun:
+    """The samples of a start, and the longest stretch of them in one contact at one sample period."""
 
     samples: tuple[Sample, ...]
-    first: int  # of the contact; no more than `last` if there is none
+    first: int  # of the contact; above `last` if there is none
     last: int
     period: float
     steady: bool
@@ -47,8 +57,8 @@ class Course:
 class OperatingPoint:
     """An instant, the derivative of the step there, and the controller's part in the loop.
 
-    `law` has the states `states` of the controller: those that something measured moves and that the demand
-    shows. `mismatch` is the largest difference between linear and exact response, relative to the exact.
+    `law` has the states `states` of the controller: those that a measured quantity moves and that show in the
+    demand. `mismatch` is the largest difference between linear and exact response, relative to the exact.
     """
 
     sample: Sample
@@ -66,8 +76,8 @@ class OperatingPoint:
         return tuple((i, kinds[i]) for i in self.states if kinds[i] is not Smoothness.SMOOTH)
 
 
-def course(start: SampledStart) -> Course:
-    """Run the start until it is steady, or for good."""
+def run_until_steady(start: SampledStart) -> SampledRun:
+    """Run the start until it is steady, at most for LONGEST and STIFF."""
     drive = start.drive
     period = float(drive.elastic_period)
     stiff = (drive.J1 + drive.J2) * drive.target_speed / (drive.Ms - drive.Mc)
@@ -82,7 +92,7 @@ def course(start: SampledStart) -> Course:
             back = max(WINDOW, math.ceil(2.0 * period / (sample.ask_again - sample.time)))
             recent = samples[-back:]
             if len(recent) == back and all(one.pressing for one in recent):
-                torques = [torque(start, one) for one in recent]
+                torques = [shaft_torque(start, one) for one in recent]
                 demands = [one.demand for one in recent]
                 steady = max(np.ptp(torques), np.ptp(demands)) <= enough
                 if steady:
@@ -90,7 +100,7 @@ def course(start: SampledStart) -> Course:
     return _in_contact(tuple(samples), steady)
 
 
-def _in_contact(samples: tuple[Sample, ...], steady: bool) -> Course:
+def _in_contact(samples: tuple[Sample, ...], steady: bool) -> SampledRun:
     """The longest stretch of samples in one contact at one period; the last of equals."""
     best = (1, 0, 0.0)
     first, period = 0, math.nan
@@ -102,17 +112,17 @@ def _in_contact(samples: tuple[Sample, ...], steady: bool) -> Course:
             first = index if not math.isnan(period) else index + 1
         if index - first >= best[1] - best[0] and not math.isnan(period):
             best = (first, index, period)
-    return Course(samples, *best, steady)
+    return SampledRun(samples, *best, steady)
 
 
-def torque(start: SampledStart, sample: Sample) -> float:
+def shaft_torque(start: SampledStart, sample: Sample) -> float:
     """Shaft torque at a sample on the driving flank, N m."""
     p, x = start.p, sample.x
-    return float(p[at.C] * (x[at.THETA] - 0.5 * p[at.GAP]) + p[at.D] * x[at.V])
+    return float(p[layout.C] * (x[layout.THETA] - 0.5 * p[layout.GAP]) + p[layout.D] * x[layout.V])
 
 
-def operating_points(start: SampledStart, run: Course) -> list[OperatingPoint]:
-    """The candidates along the contact, the one best told first; empty if there are no samples in contact."""
+def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoint]:
+    """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
     if run.last - run.first < 2:
         return []
     plant = sampled(
@@ -122,11 +132,11 @@ def operating_points(start: SampledStart, run: Course) -> list[OperatingPoint]:
     ends = {run.first + 1, run.last}
     offsets = {round(1.5**k) for k in range(1, 30)}
     ends |= {run.first + offset for offset in offsets if run.first + offset < run.last}
-    found = [_at(start, run, index, plant) for index in sorted(ends)]
+    found = [_linearised_at(start, run, index, plant) for index in sorted(ends)]
     return sorted(found, key=lambda one: one.mismatch)
 
 
-def _at(start: SampledStart, run: Course, index: int, plant: SampledPlant) -> OperatingPoint:
+def _linearised_at(start: SampledStart, run: SampledRun, index: int, plant: SampledPlant) -> OperatingPoint:
     sample = run.samples[index]
     drive = start.drive
     base = float(base_torque(drive))
@@ -147,8 +157,8 @@ def _at(start: SampledStart, run: Course, index: int, plant: SampledPlant) -> Op
     return replace(point, mismatch=_mismatch(start, point, run.period, base, windup, speed))
 
 
-def _scales(run: Course, index: int, elastic_period: float) -> Vector:
-    """The size of each state: how far it goes within an elastic period, a share of itself, or 1."""
+def _scales(run: SampledRun, index: int, elastic_period: float) -> Vector:
+    """The size of each state: how far it moves within an elastic period, a share of itself, or 1."""
     back = math.ceil(elastic_period / run.period)
     states = np.array([one.state for one in run.samples[max(run.first, index - back) : index + 1]])
     with np.errstate(invalid="ignore"):
@@ -165,10 +175,10 @@ def _mismatch(
     rows = point.plant.rows
     worst = 0.0
     displacements = (
-        ({at.THETA: windup}, {"phi1": windup, "z": windup}),
-        ({at.V: speed}, {"w1": speed}),
-        ({at.W2: speed}, {"w1": speed, "w2": speed}),
-        ({at.PHI2: windup}, {"phi1": windup}),
+        ({layout.THETA: windup}, {"phi1": windup, "z": windup}),
+        ({layout.V: speed}, {"w1": speed}),
+        ({layout.W2: speed}, {"w1": speed, "w2": speed}),
+        ({layout.PHI2: windup}, {"phi1": windup}),
     )
     loop, read = closed(point.plant, point.law)
     read = np.vstack([np.hstack([rows["T"], np.zeros((1, point.law.A.shape[0]))]), read])
@@ -176,9 +186,9 @@ def _mismatch(
         state = np.zeros(loop.shape[0])
         for name, size in same.items():
             state[: rows["T"].shape[1]] += size * rows[name][0]
-        foretold = np.zeros((WINDOW, 2))
+        predicted = np.zeros((WINDOW, 2))
         for k in range(WINDOW):
-            foretold[k] = read @ state
+            predicted[k] = read @ state
             state = loop @ state
         there, back = (
             _replayed(start, point.sample, {i: side * by for i, by in moves.items()}, period)
@@ -188,7 +198,7 @@ def _mismatch(
             return math.inf
         response = (there - back) / (2.0 * STEP)
         size = max(float(np.max(np.abs(response))), 1e-3 * base)
-        worst = max(worst, float(np.max(np.abs(response - foretold))) / size)
+        worst = max(worst, float(np.max(np.abs(response - predicted))) / size)
     return worst
 
 
@@ -203,8 +213,116 @@ def closed(plant: SampledPlant, law: System) -> tuple[Vector, Vector]:
 def _replayed(start: SampledStart, sample: Sample, moves: dict[int, float], period: float) -> Vector | None:
     """Shaft torque and demand at the samples from here on; None if the contact does not last."""
     rows = []
-    for one in start.from_sample(sample.elsewhere(moves), sample.time + (WINDOW - 0.5) * period):
+    for one in start.from_sample(sample.displaced(moves), sample.time + (WINDOW - 0.5) * period):
         if not one.pressing:
             return None
-        rows.append((torque(start, one), one.demand))
+        rows.append((shaft_torque(start, one), one.demand))
     return np.array(rows) if len(rows) == WINDOW else None
+
+
+class Smoothness(Enum):
+    """How the step depends on one component."""
+
+    SMOOTH = "smooth"
+    ONE_SIDED = "linear on one side only"
+    CORNER = "a corner: each side has its own slope"
+    JUMP = "a jump: no slope at all"
+
+
+ORDER = list(Smoothness)
+
+
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """x+ = A x + B y, demand = C x + D y: small changes of state x and measured y about a sample.
+
+    `inputs` are the indices of `measured`; `scales` and `input_scales` the sizes of x and y that the
+    tolerances refer to, `base` that of the demand. `rates` are the rows of the demand's slope and of the
+    instant of the next sample: both must be zero, or the controller is not a sampled loop.
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    rates: Matrix
+    inputs: tuple[int, ...]
+    smoothness: tuple[Smoothness, ...]  # of the states, then of the inputs
+    scales: Vector
+    input_scales: Vector
+    base: float
+
+
+def derivative(
+    step: Step, sample: Sample, inputs: tuple[int, ...], scales: Vector, input_scales: Vector, base: float
+) -> Derivative:
+    """The derivative of the step at a sample, by differences."""
+    size = sample.state.size
+
+    def response(point: Vector) -> Vector:
+        measured = sample.measured.copy()
+        measured[list(inputs)] = point[size:]
+        demand, ask_again, slope, after = step(measured, point[:size])
+        return np.array([*after, demand, slope, ask_again])
+
+    centre = np.concatenate([sample.state, sample.measured[list(inputs)]])
+    widths = np.concatenate([scales, input_scales])
+    period = max(sample.ask_again - sample.time, 1e-300)
+    heights = np.concatenate([scales, [base, base / period, period]])
+    now = response(centre)
+    columns, kinds = [], []
+    for index, width in enumerate(widths):
+        move = np.zeros_like(centre)
+        move[index] = width
+        tried = []
+        for step_size in STEPS:
+            with np.errstate(invalid="ignore"):  # "never again" is an infinite instant
+                wide, near = (
+                    [(response(centre + by * move) - now) / (by * heights) for by in (share, -share)]
+                    for share in (step_size, 0.5 * step_size)
+                )
+            tried.append(_slope(wide, near))
+            if tried[-1][1] is Smoothness.SMOOTH:
+                break
+        column, kind = min(tried, key=lambda one: ORDER.index(one[1]))
+        column[np.abs(column) < NOTHING] = 0.0
+        columns.append(column * heights / width)
+        kinds.append(kind)
+    whole = np.array(columns).T
+    return Derivative(
+        whole[:size, :size], whole[:size, size:],
+        whole[size : size + 1, :size], whole[size : size + 1, size:],
+        whole[size + 1 :], inputs, tuple(kinds), scales, input_scales, base,
+    )  # fmt: skip
+
+
+def _slope(wide: list[Vector], near: list[Vector]) -> tuple[Vector, Smoothness]:
+    """The slope from differences over a step and half of it, each forward and backward."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        forward, backward = sides = [2.0 * half - whole for half, whole in zip(near, wide, strict=True)]
+        tolerance = SAME * max(float(np.max(np.abs(near))), NOTHING)
+        straight = [
+            bool(np.all(np.abs(half - whole) <= tolerance)) for half, whole in zip(near, wide, strict=True)
+        ]
+        if all(straight):
+            if np.all(np.abs(forward - backward) <= tolerance):
+                return (2.0 * (near[0] + near[1]) - 0.5 * (wide[0] + wide[1])) / 3.0, Smoothness.SMOOTH
+            return max(sides, key=lambda column: float(np.sum(np.abs(column)))), Smoothness.CORNER
+    for column, linear in zip(sides, straight, strict=True):
+        if linear:
+            return column, Smoothness.ONE_SIDED
+    return np.zeros_like(forward), Smoothness.JUMP
+
+
+def seen(sees: int) -> tuple[int, ...]:
+    """The indices of `measured` that a small motion changes, for the sensors that are read.
+
+    >>> seen(0)
+    (1, 2, 3)
+    """
+    found = [kernel.M_MOTOR_ANGLE, kernel.M_MOTOR_SPEED, kernel.M_MOTOR_TORQUE]
+    if sees & kernel.SEES_SHAFT_TORQUE:
+        found.append(kernel.M_SHAFT_TORQUE)
+    if sees & kernel.SEES_LOAD_SPEED:
+        found.append(kernel.M_LOAD_SPEED)
+    return tuple(found)

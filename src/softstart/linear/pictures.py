@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.linear.harmonic_balance import Outside, frequency_grid
-from softstart.linear.response import at_points, frequencies, poles
-from softstart.linear.telling import delay_text, gain_text, phase_text
+from softstart.linear.limit_cycles import Outside, frequency_grid
+from softstart.linear.systems import at_points, frequencies, poles
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.linear.margins import Margins
+    from softstart.linear.loop import Margins
     from softstart.linear.view import LinearView
 
 GREY = "#666666"
@@ -24,6 +23,36 @@ DECADES = 2.0  # shown below the elastic frequency
 WIDEST = 3.0  # of the plane about -1
 DEEPEST, HIGHEST = 1e-3, 1e3  # of |L|
 MARKED = 100.0  # gain margins up to which a crossing is marked
+
+
+def conclusion(view: LinearView) -> str:
+    """One sentence: the margins and the elastic mode, or why there are none."""
+    if view.margins is None:
+        return view.notes[0]
+    if not view.stable:
+        return "the closed loop is unstable in contact"
+    m = view.margins
+    sentence = f"gain margin {gain_text(m)}, phase margin {phase_text(m)}, delay margin {delay_text(m)}"
+    if view.elastic_mode is not None:
+        sentence += f"; elastic mode damped by {view.elastic_mode.damping_ratio:.3g}"
+    return sentence
+
+
+def gain_text(m: Margins) -> str:
+    """The gain margin in words."""
+    if math.isinf(m.gain_margin):
+        return "not limited"
+    return f"{m.gain_margin:.3g} ({20.0 * math.log10(m.gain_margin):.1f} dB)"
+
+
+def phase_text(m: Margins) -> str:
+    """The phase margin in degrees; where the loop gain is nowhere 1, that."""
+    return "not limited" if math.isinf(m.phase_margin) else f"{math.degrees(m.phase_margin):.1f} degrees"
+
+
+def delay_text(m: Margins) -> str:
+    """The delay margin in ms."""
+    return "not limited" if math.isinf(m.delay_margin) else f"{1e3 * m.delay_margin:.3g} ms"
 
 
 def linear_figure(view: LinearView) -> Any:
@@ -120,18 +149,18 @@ def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
     axes.plot([-3.0 * reach, -1.0], [0.0, 0.0], color=COLOURS[3], lw=1.6, label="-1/n of the gap")
     axes.plot([-1.0], [0.0], "+", ms=9, mew=1.8, color=COLOURS[3])
     for one in view.cycles:
-        look: dict[str, Any] = {"mfc": COLOURS[1] if one.cycle.stable else "none", "color": COLOURS[1]}
-        axes.plot([-1.0 / _n(outside, one.cycle.frequency)], [0.0], "o", ms=6, **look)
+        style: dict[str, Any] = {"mfc": COLOURS[1] if one.cycle.stable else "none", "color": COLOURS[1]}
+        axes.plot([-1.0 / _n(outside, one.cycle.frequency)], [0.0], "o", ms=6, **style)
         axes.annotate(f"{one.cycle.frequency:.3g} rad/s", (-1.0 / _n(outside, one.cycle.frequency), 0.0),
                       xytext=(0, 8), textcoords="offset points", ha="center")  # fmt: skip
     axes.set_xlim(-reach, 0.4 * reach)
     axes.set_ylim(-0.7 * reach, 0.7 * reach)
     axes.legend(loc="lower left")
     count = len(view.cycles)
-    told = "no limit cycle foretold" if count == 0 else f"{count} limit cycle{'s' * (count > 1)} foretold"
-    _headed(axes, f"Gap as describing function n: {told}", "Re M", "Im M")
+    predicted = "no limit cycle" if count == 0 else f"{count} limit cycle{'s' * (count > 1)}"
+    _headed(axes, f"Gap as describing function n: {predicted} predicted", "Re M", "Im M")
 
 
 def _n(outside: Outside, frequency: float) -> float:
-    """The share of the shaft that the balance asks for."""
+    """The value of n at which the harmonic balance holds."""
     return -1.0 / float(outside.contact(np.array([frequency]))[0].real)

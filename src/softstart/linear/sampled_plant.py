@@ -1,7 +1,7 @@
 """The drive at the sample instants: exact, with held demand, torque lag and computing delay.
 
 In contact, while the driving flank presses, the drive is linear (`softstart.drive.control_systems`). A demand
-answered at t_k acts from t_k + computing_delay on, through the torque lag. Between those instants the motion
+made at t_k acts from t_k + computing_delay on, through the torque lag. Between those instants the motion
 is a matrix exponential, so the sampled system is exact:
 
     x+ = Ad x + G1 d[k-n-1] + G0 d[k-n],   computing_delay = n h + f, 0 <= f < h,
@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart.arrays import Matrix
 from softstart.drive import Drive
-from softstart.linear.realisation import Matrix, System
+from softstart.linear.systems import System
 from softstart.plant import start as kernel
 
 TERMS = 18  # of the exponential's series: 2^-18/18! is below rounding
@@ -63,7 +64,7 @@ def _row(n: int, index: int) -> Matrix:
 def _with_lag(drive: Drive, A: Matrix, B: Matrix, rows: dict[str, Matrix]) -> Continuous:
     lag = float(drive.torque_lag)
     n = A.shape[0]
-    if lag <= 1e-12 * float(drive.elastic_period):  # the exact plant takes such a lag for none, too
+    if lag <= 1e-12 * float(drive.elastic_period):  # the exact plant neglects such a lag, too
         return Continuous(A, B, rows)
     whole = np.block([[A, B], [np.zeros((1, n)), np.array([[-1.0 / lag]])]])
     rows = {name: np.hstack([row, [[0.0]]]) for name, row in rows.items()}
@@ -73,7 +74,7 @@ def _with_lag(drive: Drive, A: Matrix, B: Matrix, rows: dict[str, Matrix]) -> Co
 
 @dataclass(frozen=True, eq=False)
 class SampledPlant:
-    """The plant from demand to what is measured, at the sample instants, just before each answer.
+    """The plant from demand to measured quantities, at the sample instants, just before each new demand.
 
     States: those of `Continuous`, then the last demands, the latest first, then the last angle if the speed
     is a difference of angles. `rows` reads w1, z, T, ... off the states.

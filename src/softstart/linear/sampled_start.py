@@ -1,7 +1,7 @@
-"""A start on the exact plant, kept sample by sample, from any of which it can be gone on with.
+"""A start on the exact plant, recorded sample by sample, that can be continued from any of them.
 
 The encoder is taken as infinitely fine and the torque as measured without noise: a linear view has no steps.
-Where the drive has an encoder its speed is still the difference of two angles over a sample, as on the drive.
+With an encoder the speed is still the difference of two angles over a sample, as on the drive.
 """
 
 from __future__ import annotations
@@ -12,27 +12,26 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.plant import layout as at
+from softstart.plant import layout
 from softstart.plant import start as kernel
 from softstart.plant.advance import advance
 from softstart.plant.vector import plant_vector
 from softstart.start.engine import Book
 
-Vector = NDArray[np.float64]
-FAR = 1e9  # target speeds: never reached
+FAR = 1e9  # in target speeds: never reached
 
-Answer = tuple[float, float, float, Vector]  # demand N m, when to be asked again s, slope N m/s, new state
+Answer = tuple[float, float, float, Vector]  # demand N m, next sample s, slope N m/s, new state
 Step = Callable[[Vector, Vector], Answer]
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One asking: the plant just before it (`x`, `m`), what was measured, the state then, the answer."""
+    """One sample: the plant just before it (`x`, `m`), the measured quantities, the state, the answer."""
 
     x: Vector
     m: Vector
@@ -44,33 +43,35 @@ class Sample:
 
     @property
     def time(self) -> float:
-        """When, s."""
-        return float(self.x[at.TIME])
+        """Instant, s."""
+        return float(self.x[layout.TIME])
 
     @property
     def pressing(self) -> bool:
         """The driving flank presses and the load moves, so that the plant is linear."""
-        return bool(self.x[at.SIDE] == 1.0 and self.x[at.LOAD] != 0.0 and self.x[at.DOUBLED] == 0.0)
+        return bool(
+            self.x[layout.SIDE] == 1.0 and self.x[layout.LOAD] != 0.0 and self.x[layout.DOUBLED] == 0.0
+        )
 
-    def elsewhere(self, moves: dict[int, float], state: Vector | None = None) -> Sample:
-        """The same instant with numbers of the plant added to (by index of `x`), and another state."""
+    def displaced(self, changes: dict[int, float], state: Vector | None = None) -> Sample:
+        """The same instant with `changes` added to the plant (by index of `x`), and perhaps another state."""
         x = self.x.copy()
-        for index, by in moves.items():
+        for index, by in changes.items():
             x[index] += by
-        return replace(self, x=x, m=_forgotten(self.m), state=self.state if state is None else state)
+        return replace(self, x=x, m=_without_memo(self.m), state=self.state if state is None else state)
 
 
-def _forgotten(m: Vector) -> Vector:
-    """Without what the kernel remembers of the last contact, which no longer holds."""
+def _without_memo(m: Vector) -> Vector:
+    """Without the kernel's memory of the last contact, which no longer applies."""
     m = m.copy()
-    m[at.MEMO_V] = math.nan
-    m[at.MEMO_DONE] = 0.0
+    m[layout.MEMO_V] = math.nan
+    m[layout.MEMO_DONE] = 0.0
     return m
 
 
 @dataclass(frozen=True, eq=False)
 class SampledStart:
-    """A drive and a controller that is set up, ready to run."""
+    """A drive and a controller that is set up for it."""
 
     drive: Drive
     controller: Controller
@@ -83,9 +84,9 @@ class SampledStart:
         """The controller set up for this (or that) drive; no rounding or noise, the target speed far away."""
         fitted, own = controller.set_up(fitted_to or drive)
         p = plant_vector(drive)[0].copy()
-        p[at.TARGET] *= FAR
-        p[at.ENCODER] = 0.0
-        p[at.TORQUE_NOISE] = 0.0
+        p[layout.TARGET] *= FAR
+        p[layout.ENCODER] = 0.0
+        p[layout.TORQUE_NOISE] = 0.0
         if isinstance(fitted, CompiledController):
             return cls(drive, fitted, _compiled(fitted, own), p, np.zeros(fitted.state_size))
         if isinstance(fitted, PlainController):
@@ -97,7 +98,7 @@ class SampledStart:
 
     @property
     def sees(self) -> int:
-        """What the controller has declared to see."""
+        """The sensors that the controller reads."""
         return int(self.controller.sensors)
 
     @property
@@ -109,45 +110,47 @@ class SampledStart:
         """The start from its beginning."""
         book = Book(self.sees, recording=False)
         kernel.begin(self.p, book.x, until, book.events)
-        book.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
-        yield from self._going_on(book, self.first_state)
+        book.x[layout.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        yield from self._continued(book, self.first_state)
 
     def from_sample(self, sample: Sample, until: float, book: Book | None = None) -> Iterator[Sample]:
-        """The start from a sample on, whose plant or state may have been changed; `book` may record."""
+        """The start from a sample on, whose plant or state may have been changed; `book` may record it."""
         book = book or Book(self.sees, recording=False)
         book.x[:] = sample.x
-        book.x[[at.N_SEGMENTS, at.N_EVENTS, at.N_STAGES]] = 0.0
-        book.x[at.T_END] = until
+        book.x[[layout.N_SEGMENTS, layout.N_EVENTS, layout.N_STAGES]] = 0.0
+        book.x[layout.T_END] = until
         book.m[:] = sample.m
-        yield from self._going_on(book, sample.state)
+        yield from self._continued(book, sample.state)
 
-    def _going_on(self, book: Book, state: Vector) -> Iterator[Sample]:
+    def _continued(self, book: Book, state: Vector) -> Iterator[Sample]:
         while True:
             reason = advance(self.p, book.x, book.m, book.segments, book.events, book.stages)
-            if reason == at.BUFFER_FULL:
+            if reason == layout.BUFFER_FULL:
                 book.grow()
                 continue
-            if reason == at.ENDED:
+            if reason == layout.ENDED:
                 return
-            if reason != at.ASK:
-                raise SimulationError(f"{self._name}: the start was given up at t = {book.x[at.TIME]:.6g} s.")
+            if reason != layout.ASK:
+                raise SimulationError(
+                    f"{self._name}: the start was given up at t = {book.x[layout.TIME]:.6g} s."
+                )
             x, m = book.x.copy(), book.m.copy()
             measured = self._measured(book)
             demand, ask_again, slope, after = self.step(measured, state)
             yield Sample(x, m, measured, state, demand, ask_again, slope)
-            if kernel.obey(self.p, book.x, book.m, demand, ask_again, slope) != at.ASK:
+            if kernel.obey(self.p, book.x, book.m, demand, ask_again, slope) != layout.ASK:
                 raise SimulationError(
-                    f"{self._name}: at t = {book.x[at.TIME]:.6g} s the controller's answer was no command "
-                    f"(torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
+                    f"{self._name}: at t = {book.x[layout.TIME]:.6g} s the controller's answer was no "
+                    f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
                 )
             state = after
 
     def _measured(self, book: Book) -> Vector:
-        before, when = book.x[at.SAMPLE_ANGLE], book.x[at.SAMPLE_TIME]
+        before, when = book.x[layout.SAMPLE_ANGLE], book.x[layout.SAMPLE_TIME]
         kernel.measure(self.p, book.x, self.sees, book.measured)
         measured = book.measured.copy()
         now = measured[kernel.M_TIME]
-        if self.differencing and book.x[at.ASKED] != 0.0 and now > when:
+        if self.differencing and book.x[layout.ASKED] != 0.0 and now > when:
             measured[kernel.M_MOTOR_SPEED] = (measured[kernel.M_MOTOR_ANGLE] - before) / (now - when)
         return measured
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +13,31 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.linear.assembly import Loop
-from softstart.linear.cycle_check import Verdict, checked
-from softstart.linear.harmonic_balance import Cycle, Outside, cycles
-from softstart.linear.margins import Margins
-from softstart.linear.modes import Mode
-from softstart.linear.operating_point import GOOD, Course, OperatingPoint, course, operating_points, torque
+from softstart.late import late
+from softstart.linear.limit_cycles import Cycle, Outside, Verdict, check_cycle, cycles
+from softstart.linear.loop import Loop, Margins
+from softstart.linear.operating_point import (
+    GOOD,
+    OperatingPoint,
+    SampledRun,
+    operating_points,
+    run_until_steady,
+    shaft_torque,
+)
 from softstart.linear.sampled_start import SampledStart
+from softstart.linear.systems import Mode
 from softstart.plant import start as kernel
 
 if TYPE_CHECKING:
     import control
+else:
+    control = late("control")
+
+views = late("softstart.linear.pictures")
 
 INERTIAS = (0.4, 1.0, 2.5)
 STIFFNESSES = (0.9, 1.1)
-POOR = 0.02  # mismatch above which the view is said to be doubtful
+POOR = 0.02  # mismatch above which a note says that the view is doubtful
 NAMES = {
     kernel.M_MOTOR_ANGLE: "motor_angle",
     kernel.M_MOTOR_SPEED: "motor_speed",
@@ -39,7 +49,7 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Variation:
-    """The loop of the same controller on a drive that is not the one it was set up for."""
+    """The loop of the same controller on a drive that it was not set up for."""
 
     name: str
     drive: Drive = field(repr=False)
@@ -49,20 +59,51 @@ class Variation:
 
 
 @dataclass(frozen=True)
-class Foretold:
-    """A limit cycle by the describing function, and what the exact plant says about it."""
+class PredictedCycle:
+    """A limit cycle by the describing function, and the result of the check on the exact plant."""
 
     cycle: Cycle
     verdict: Verdict
-    beyond_limits: bool  # the torque demand it asks for is beyond what the motor can give
+    beyond_limits: bool  # its torque demand exceeds what the motor can deliver
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinearView:
-    """What `linear_view` found. Without a loop (`kind` is not "loop") margins do not apply and are None.
+    """The result of `linear_view`. Without a loop (`kind` is not "loop") margins do not apply and are None.
 
-    `kind` is "loop", "open loop" (nothing measured changes the demand in contact) or "events" (the
-    controller is not asked at samples there); `notes` are the sentences that belong to the numbers.
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    controller : Controller
+        The controller, set up.
+    kind : str
+        "loop", "open loop" (nothing measured changes the demand in contact) or "events" (the controller does
+        not run at samples there).
+    notes : tuple of str
+        Sentences that belong to the numbers.
+    point : OperatingPoint, optional
+        The instant at which the controller is linearised, and its linear law.
+    own_loop : Loop, optional
+        The loop on this drive.
+    outside : Outside, optional
+        Everything but the shaft, for limit cycles.
+    margins : Margins, optional
+        Margins and crossings of the loop: rad, s, rad/s.
+    modes : tuple of Mode
+        Modes of the closed loop, by frequency.
+    stable : bool, optional
+        Whether the closed loop in contact is stable.
+    variations : tuple of Variation
+        The same controller on other drives.
+    cycles : tuple of PredictedCycle
+        Limit cycles through the gap, predicted and checked.
+
+    Examples
+    --------
+    >>> view = linear_view("crane-4amtkf", "current-limit-feedback", limit_cycles=False)
+    >>> view
+    <LinearView: current-limit-feedback on ...: gain margin ..., phase margin ..., delay margin ...>
     """
 
     drive: Drive
@@ -76,10 +117,10 @@ class LinearView:
     modes: tuple[Mode, ...] = ()
     stable: bool | None = None
     variations: tuple[Variation, ...] = ()
-    cycles: tuple[Foretold, ...] = ()
+    cycles: tuple[PredictedCycle, ...] = ()
 
     def __repr__(self) -> str:
-        """One line that says what came out."""
+        """One line with the conclusion."""
         return f"<LinearView: {self.name} on {self.drive.name}: {self.conclusion}>"
 
     @property
@@ -94,14 +135,12 @@ class LinearView:
 
     @property
     def loop(self) -> control.StateSpace:
-        """L(z), minimal: the negative of the demand answered to a demand put in; -1 is critical."""
+        """L(z), minimal: the negative of the demand in response to a demand fed in; -1 is critical."""
         return self._loop().control_system("demand", "minus_answer")
 
     @property
     def controller_system(self) -> control.StateSpace:
-        """The controller's law, minimal: from what is measured to the demand in N m."""
-        import control
-
+        """The controller's law, minimal: from the measured quantities to the demand in N m."""
         point = self._point()
         law = self._loop().minimal_law
         return control.StateSpace(
@@ -118,7 +157,7 @@ class LinearView:
 
     @property
     def gain_margin(self) -> float | None:
-        """Least factor above 1 on the demand that the loop does not stand."""
+        """Least factor above 1 on the demand that makes the loop unstable."""
         return None if self.margins is None else self.margins.gain_margin
 
     @property
@@ -128,7 +167,7 @@ class LinearView:
 
     @property
     def delay_margin(self) -> float | None:
-        """Least further dead time that the loop does not stand, s."""
+        """Least further dead time that makes the loop unstable, s."""
         return None if self.margins is None else self.margins.delay_margin
 
     @property
@@ -139,22 +178,73 @@ class LinearView:
     @property
     def conclusion(self) -> str:
         """One sentence."""
-        from softstart.linear.telling import conclusion
-
-        return conclusion(self)
+        sentence: str = views.conclusion(self)
+        return sentence
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
-        from softstart.linear.telling import summary
-
-        return summary(self)
+        found: dict[str, Any] = {
+            "drive": self.drive.name,
+            "controller": self.name,
+            "parameters": self.controller.parameters,
+            "kind": self.kind,
+            "conclusion": self.conclusion,
+            "notes": list(self.notes),
+        }
+        if self.margins is None or self.point is None or self.own_loop is None:
+            return found
+        point = self.point
+        elastic = self.elastic_mode
+        return found | {
+            "stable": self.stable,
+            "period": self.period,
+            "operating_point": {
+                "time": point.sample.time,
+                "steady": point.steady,
+                "demand": point.sample.demand,
+                "states": list(point.states),
+                "mismatch": point.mismatch,
+            },
+            "order_of_loop": self.own_loop.broken.A.shape[0],
+            "order_of_controller": self.own_loop.minimal_law.A.shape[0],
+            **_margin_figures(self.margins),
+            "elastic_frequency": elastic.frequency if elastic else None,
+            "elastic_damping_ratio": elastic.damping_ratio if elastic else None,
+            "modes": [
+                {
+                    "frequency": mode.frequency,
+                    "damping_ratio": mode.damping_ratio,
+                    "real": mode.value.real,
+                    "imag": mode.value.imag,
+                }
+                for mode in self.modes
+            ],
+            "variations": [
+                {
+                    "name": one.name,
+                    "stable": one.stable,
+                    "least_damping": one.least_damping,
+                    **_margin_figures(one.margins),
+                }
+                for one in self.variations
+            ],
+            "limit_cycles": [
+                {
+                    **asdict(one.cycle),
+                    "beyond_limits": one.beyond_limits,
+                    "measured_frequency": one.verdict.frequency,
+                    "measured_amplitude": one.verdict.amplitude,
+                    "confirmed": one.verdict.confirmed,
+                    "verdict": one.verdict.sentence,
+                }
+                for one in self.cycles
+            ],
+        }
 
     def plot(self) -> Any:
         """Bode diagram with the margins marked, and Nyquist diagram with the describing function's locus."""
-        from softstart.linear.pictures import linear_figure
-
         self._loop()
-        return linear_figure(self)
+        return views.linear_figure(self)
 
     def _loop(self) -> Loop:
         if self.own_loop is None:
@@ -177,20 +267,42 @@ def linear_view(
     stiffnesses: Sequence[float] = STIFFNESSES,
     limit_cycles: bool = True,
 ) -> LinearView:
-    """Linearise a controller as it runs, in contact, and read its loop: margins, modes, limit cycles.
+    """Linearise a controller as it runs, in contact, and analyse its loop: margins, modes, limit cycles.
 
     Parameters
     ----------
-    drive : a Drive, or the name or file of one.
-    controller : a name, `path/to/file.py:ClassName`, or a Controller object, built in or not.
-    parameters : parameters of a controller given by name.
-    fitted_to : the drive for which the controller is set up, if not `drive`.
-    inertias, stiffnesses : factors on J2 and c at which the margins of the same controller are shown too.
-    limit_cycles : whether limit cycles through the gap are looked for and tried on the exact plant.
+    drive : Drive or str
+        A drive, or the name or file of one.
+    controller : str or Controller
+        A name, `path/to/file.py:ClassName`, or a Controller object, built in or not.
+    parameters : mapping, optional
+        Parameters of a controller given by name; numbers in SI, or text with units.
+    fitted_to : Drive, optional
+        The drive for which the controller is set up, if not `drive`.
+    inertias, stiffnesses : sequence of float, optional
+        Factors on J2 and c with which the margins of the same controller are computed too.
+    limit_cycles : bool, optional
+        Whether limit cycles through the gap are predicted and tried on the exact plant.
 
-    Raises InputError for bad input (a batch of drives, an unknown controller), SimulationError where the
-    start cannot be run.
+    Returns
+    -------
+    LinearView
+        Angles in rad, delays in s, frequencies in rad/s, torques in N m.
 
+    Raises
+    ------
+    InputError
+        If the input is wrong (a batch of drives, an unknown controller).
+    SimulationError
+        If the start cannot be simulated.
+
+    References
+    ----------
+    M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
+    1633-1649, doi:10.1016/S0005-1098(02)00047-X.
+
+    Examples
+    --------
     >>> view = linear_view("crane-4amtkf", "current-limit-feedback", limit_cycles=False)
     >>> view.kind, view.stable, round(view.elastic_mode.damping_ratio, 1)
     ('loop', True, 0.7)
@@ -202,7 +314,7 @@ def linear_view(
     made = make_controller(controller, parameters)
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
     start = SampledStart.of(drive, made, fitted_to)
-    run = course(start)
+    run = run_until_steady(start)
     name = start.controller.name or type(start.controller).__name__
     points = operating_points(start, run)
     if not points:
@@ -217,7 +329,7 @@ def linear_view(
     if np.any(point.derivative.rates[:, list(point.states)]) or _timed_by(point):
         sentence = (
             f"{name} has no linear loop of this kind: what it measures changes the slope of its demand or "
-            "the instant at which it wants to be asked again; margins do not apply."
+            "the instant of its next sample; margins do not apply."
         )
         return LinearView(drive, start.controller, "events", (sentence,), point)
     own = Loop(drive, point, start.differencing)
@@ -232,16 +344,21 @@ def linear_view(
     )  # fmt: skip
 
 
+def _margin_figures(m: Margins) -> dict[str, Any]:
+    """The margins: angles in rad, delays in s, frequencies in rad/s."""
+    return {**asdict(m), "sensitivity_peak": m.sensitivity_peak}
+
+
 def _feeds_back(point: OperatingPoint) -> bool:
     return bool(point.states) or bool(np.any(point.law.D))
 
 
 def _chosen(points: Sequence[OperatingPoint]) -> OperatingPoint:
-    """The steady one if it is told well and feeds back; else the best told that feeds back; else the best."""
-    well = [one for one in points if one.mismatch < GOOD]
-    feeding = [one for one in well if _feeds_back(one)]
+    """The steady one if its law is good and feeds back; else the best that feeds back; else the best."""
+    good = [one for one in points if one.mismatch < GOOD]
+    feeding = [one for one in good if _feeds_back(one)]
     steady = [one for one in feeding if one.steady]
-    return (steady or feeding or well or [one for one in points if _feeds_back(one)] or list(points))[0]
+    return (steady or feeding or good or [one for one in points if _feeds_back(one)] or list(points))[0]
 
 
 def _timed_by(point: OperatingPoint) -> bool:
@@ -270,10 +387,10 @@ def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[floa
         raise InputError(wrong)
 
 
-def _no_samples(name: str, run: Course) -> tuple[str, tuple[str, ...]]:
+def _no_samples(name: str, run: SampledRun) -> tuple[str, tuple[str, ...]]:
     if any(one.pressing for one in run.samples) and any(math.isfinite(one.ask_again) for one in run.samples):
         return "events", (
-            f"{name} is not asked at one sample period throughout a contact of its start: it has no sampled "
+            f"{name} does not keep one sample period throughout a contact of its start: it has no sampled "
             "loop there, and margins do not apply.",
         )
     return "events", (
@@ -282,23 +399,24 @@ def _no_samples(name: str, run: Course) -> tuple[str, tuple[str, ...]]:
     )
 
 
-def _notes(name: str, run: Course, point: OperatingPoint, own: Loop) -> tuple[str, ...]:
+def _notes(name: str, run: SampledRun, point: OperatingPoint, own: Loop) -> tuple[str, ...]:
     notes = []
     if not point.steady:
         why = "the start does not become steady in contact"
         if run.steady:
-            why = "where the start is steady a linear law holds less well (a limit or a switch is there)"
-        notes.append(f"Linearised at t = {point.sample.time:.4g} s, on the way: {why}.")
+            why = "where the start is steady, a linear law is less accurate (a limit or a switch)"
+        notes.append(f"Linearised at t = {point.sample.time:.4g} s, during the start: {why}.")
     if point.mismatch > POOR:
         notes.append(
-            f"{name} is not well told by one linear law: the exact plant answers a small displacement up to "
-            f"{100.0 * point.mismatch:.2g} % otherwise than the linear loop; take the margins with caution."
+            f"{name} is poorly approximated by one linear law: after small displacements the exact plant "
+            f"and the linear loop differ by up to {100.0 * point.mismatch:.2g} %; take the margins with "
+            "caution."
         )
     notes += [
         f"State {index} of the controller is {kind.value} at this instant." for index, kind in point.rough
     ]
     if not own.stable:
-        notes.append("The closed loop is unstable in contact: the margins tell crossings, not reserves.")
+        notes.append("The closed loop is unstable in contact: the margins are crossings, not reserves.")
     return tuple(notes)
 
 
@@ -310,18 +428,18 @@ def _varied(start: SampledStart, point: OperatingPoint, name: str, change: Mappi
 
 
 def _cycles(
-    start: SampledStart, run: Course, point: OperatingPoint, outside: Outside
-) -> tuple[Foretold, ...]:
+    start: SampledStart, run: SampledRun, point: OperatingPoint, outside: Outside
+) -> tuple[PredictedCycle, ...]:
     drive = start.drive
     holds = outside.holds_speed()
     rest = run.samples[run.last if not holds else -1]
     back = max(1, round(float(drive.elastic_period) / run.period))
     recent = run.samples[max(run.first, run.last - back) : run.last + 1]
-    mean = float(drive.Mc) if holds else float(np.mean([torque(start, one) for one in recent]))
+    mean = float(drive.Mc) if holds else float(np.mean([shaft_torque(start, one) for one in recent]))
     demand = mean if holds else float(np.mean([one.demand for one in recent]))
     room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
     return tuple(
-        Foretold(cycle, checked(start, point, rest, outside, cycle), cycle.demand_amplitude > room)
+        PredictedCycle(cycle, check_cycle(start, point, rest, outside, cycle), cycle.demand_amplitude > room)
         for cycle in cycles(outside, mean)
     )
 

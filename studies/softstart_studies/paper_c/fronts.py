@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from softstart.clutch import EngagementFront, optimize_engagement
 from softstart.clutch.closed_forms import pulse_and_pause, two_steps
-from softstart.clutch.optimal.collocation import collocated
-from softstart.clutch.start import engage
+from softstart.clutch.collocation import collocated
+from softstart.clutch.engagement import engage
 from softstart.study import Progress, Table
 from softstart_studies.paper_c.printed import KGF, clutch
 

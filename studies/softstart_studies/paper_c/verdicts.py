@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from softstart.clutch import Engagement, EngagementFront
-from softstart.clutch.optimal.slip import Slip
+from softstart.clutch.least_work import Slip
 from softstart.study import Claim, Table
 from softstart_studies.paper_c.printed import KGF, PRINTED, clutch
 

@@ -7,11 +7,9 @@ import pytest
 
 from softstart.clutch import LAWS, Clutch, engage, optimize_engagement
 from softstart.clutch.closed_forms import pulse_and_pause, two_steps
-from softstart.clutch.optimal.cells import least_over_ends
-from softstart.clutch.optimal.collocation import collocated
-from softstart.clutch.optimal.program import Program
-from softstart.clutch.optimal.slip import Slip
-from softstart.clutch.optimal.solving import CLOSE, Search
+from softstart.clutch.collocation import collocated
+from softstart.clutch.front import CLOSE, Search
+from softstart.clutch.least_work import Program, Slip, least_over_ends
 from softstart.errors import InputError, SimulationError
 
 PAPER = Clutch.load("paper-c")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from softstart import Command, Drive, PlainController, simulate
-from softstart.linear.dead_zone import bias_for, free_vibration, mean_twist_beyond, share
+from softstart.linear.limit_cycles import bias_for, free_vibration, mean_twist_beyond, share
 
 AMPLITUDES = st.floats(0.01, 50.0)
 BIASES = st.floats(-5.0, 5.0)

@@ -1,4 +1,4 @@
-"""Limit cycles through the gap: foretold by the describing function, seen on the exact plant."""
+"""Limit cycles through the gap: predicted by the describing function, seen on the exact plant."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from tests.softstart.linear.speed_loops import FREE, SpeedPI, loop_of
 
 from softstart import linear_view
-from softstart.linear.dead_zone import share
-from softstart.linear.harmonic_balance import n_at
+from softstart.linear.limit_cycles import n_at, share
 
 # speed control behind a slow actuator: stable while the flank presses, not with the load let go
 SLOW = FREE.replace(
@@ -24,7 +23,7 @@ def unbiased():
 
 
 def test_a_known_cycle_without_load_torque(unbiased):
-    """Measured on the exact plant, from the foretold cycle on, after 60 periods."""
+    """Measured on the exact plant, from the predicted cycle on, after 60 periods."""
     assert unbiased.stable
     (found,) = unbiased.cycles
     assert found.cycle.stable
@@ -43,7 +42,7 @@ def test_harmonic_balance_holds_at_the_cycle(unbiased):
 
 
 def test_the_cycle_is_reached_from_the_start_itself():
-    """A start of the same drive, without any help, ends in the cycle that was foretold."""
+    """A start of the same drive, without any help, ends in the cycle that was predicted."""
     from softstart import simulate
 
     view = linear_view(SLOW, SpeedPI(4.0, 20.0, reference=60.0))
@@ -65,10 +64,10 @@ def test_with_a_load_torque_the_cycle_is_biased():
         n = n_at(one.cycle.amplitude, 0.25, SLOW.c, 7.16)
         contact = complex(view.outside.contact(np.array([one.cycle.frequency]))[0])
         assert abs(1.0 + n * contact) < 1e-7
-    assert "watershed" in small.verdict.sentence
+    assert "boundary" in small.verdict.sentence
 
 
-def test_a_watershed_between_rest_and_vibration():
+def test_a_boundary_between_rest_and_vibration():
     drive = SLOW.replace(damping=0.5)
     view = linear_view(drive, SpeedPI(1.0, 20.0))
     low, high = view.cycles
@@ -77,7 +76,7 @@ def test_a_watershed_between_rest_and_vibration():
     # the large one is there, but with so little damping a small part of the energy decides about it, which
     # one harmonic does not tell well: the verdict says so, and by how much
     assert not high.verdict.confirmed
-    assert high.verdict.sentence.startswith("there is one, less near")
+    assert high.verdict.sentence.startswith("there is a limit cycle, further off")
     assert f"{100 * (high.verdict.frequency / high.cycle.frequency - 1):+.1f} %" in high.verdict.sentence
 
 

@@ -9,10 +9,9 @@ import pytest
 from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI, loop_of
 
 from softstart import Command, Drive, InputError, PlainController, Sensor, SimulationError, linear_view
-from softstart.linear.differences import Smoothness, derivative
-from softstart.linear.operating_point import course, torque
-from softstart.linear.response import at_points
+from softstart.linear.operating_point import Smoothness, derivative, run_until_steady, shaft_torque
 from softstart.linear.sampled_start import Sample, SampledStart
+from softstart.linear.systems import at_points
 from softstart.plant import layout as at
 
 
@@ -65,8 +64,8 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
     count = 12
 
     def torques(moves):
-        rows = start.from_sample(sample.elsewhere(moves), sample.time + (count - 0.5) * h)
-        return np.array([torque(start, one) for one in rows])
+        rows = start.from_sample(sample.displaced(moves), sample.time + (count - 0.5) * h)
+        return np.array([shaft_torque(start, one) for one in rows])
 
     response = (torques({at.THETA: twist}) - torques({at.THETA: -twist})) / (2.0 * twist)
     assert response.size == count
@@ -80,8 +79,8 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
     whole, _ = closed(plant, view.point.law)
     read = np.concatenate([plant.rows["T"][0], np.zeros(len(view.point.states))])
     first = np.concatenate([(plant.rows["phi1"] + plant.rows["z"])[0], np.zeros(len(view.point.states))])
-    foretold = np.array([read @ np.linalg.matrix_power(whole, k) @ first for k in range(count)])
-    assert np.max(np.abs(response - foretold)) < 1e-5 * np.max(np.abs(response))
+    predicted = np.array([read @ np.linalg.matrix_power(whole, k) @ first for k in range(count)])
+    assert np.max(np.abs(response - predicted)) < 1e-5 * np.max(np.abs(response))
     # and every mode shown is an eigenvalue of that closed loop
     poles = np.linalg.eigvals(whole)
     for mode in view.modes:
@@ -97,8 +96,8 @@ def test_the_least_damped_mode_is_what_rings_on():
     twist, count = 1e-4 * sample.x[at.THETA], 400
     ends = []
     for side in (twist, -twist):
-        rows = start.from_sample(sample.elsewhere({at.THETA: side}), sample.time + (count - 0.5) * h)
-        ends.append(np.array([torque(start, one) for one in rows]))
+        rows = start.from_sample(sample.displaced({at.THETA: side}), sample.time + (count - 0.5) * h)
+        ends.append(np.array([shaft_torque(start, one) for one in rows]))
     ring = (ends[0] - ends[1]) / (2.0 * twist)
     assert ring.size == count
     # a sampled ring obeys y[k+2] = 2 Re z y[k+1] - |z|^2 y[k]; the slow turning is differenced away
@@ -278,7 +277,7 @@ def test_the_start_is_the_one_of_simulate():
 
     drive = CRANE.replace(encoder_lines=0)
     start = SampledStart.of(drive, linear_view(drive, "ramp").controller)
-    run = course(start)
+    run = run_until_steady(start)
     plain = simulate(drive, "ramp", 0.09)
     at_samples = [one for one in run.samples if one.time < 0.09]
     times = np.array([one.time for one in at_samples])

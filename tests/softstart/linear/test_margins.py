@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from tests.softstart.linear.speed_loops import CRANE, FREE, SpeedPI, loop_of
 
 from softstart import Command, PlainController
-from softstart.linear.margins import margins
-from softstart.linear.realisation import System
-from softstart.linear.response import at_points
+from softstart.linear.loop import margins
+from softstart.linear.systems import System, at_points
 
 
 def closed_poles(loop):

@@ -8,8 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart.linear.realisation import System, minimal, moved, observable, part, scaled, shown, unscaled
-from softstart.linear.response import at_points
+from softstart.linear.systems import (
+    System,
+    at_points,
+    minimal,
+    moved,
+    observable,
+    part,
+    scaled,
+    shown,
+    unscaled,
+)
 
 Z = np.exp(1j * np.linspace(0.05, 3.1, 40)) * 1.02
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from tests.softstart.linear.speed_loops import CRANE
 
-from softstart.linear.response import at_points
 from softstart.linear.sampled_plant import exponential, in_contact, motor_alone, sampled
+from softstart.linear.systems import at_points
 
 Z = np.exp(1j * np.linspace(0.05, 3.0, 30)) * 1.01
 

@@ -1,5 +1,4 @@
-"""The same optimum by direct collocation: CasADi and IPOPT, from the linear law. It shares no formula with
-the rest.
+"""The optimal law by direct collocation: CasADi and IPOPT, from the linear law, with no formula in common.
 
 States z = phiM - phic, wM, wc and the work W, at Radau points of third degree; one torque an interval before
 tM, MM behind it, the slip time free:
@@ -15,14 +14,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
+from softstart.clutch.engagement import engage
+from softstart.clutch.least_work import Slip
 from softstart.clutch.model import Clutch
-from softstart.clutch.optimal.slip import Slip
-from softstart.clutch.start import engage
 from softstart.errors import SimulationError
+from softstart.late import late
 
 __all__ = ["Collocated", "collocated"]
+
+ca = late("casadi")
 
 DEGREE = 3
 
@@ -33,7 +35,7 @@ class Collocated:
 
     slip_work: float
     slip_time: float
-    torques: NDArray[np.float64]
+    torques: Vector
 
 
 def collocated(
@@ -43,8 +45,6 @@ def collocated(
 
     Raises SimulationError with IPOPT's verdict if it finds none.
     """
-    import casadi as ca
-
     slip = Slip.of(clutch)
     guess = engage(clutch.replace(law="linear", law_times=None, law_torques=None))
     opti: Any = ca.Opti()
@@ -104,7 +104,7 @@ def collocated(
     )
 
 
-def _basis(points: NDArray[np.float64], j: int) -> np.poly1d:
+def _basis(points: Vector, j: int) -> np.poly1d:
     """Lagrange polynomial that is 1 at point j and 0 at the others."""
     others = np.delete(points, j)
     return np.poly1d(others, r=True) / float(np.prod(points[j] - others))
