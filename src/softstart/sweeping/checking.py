@@ -14,6 +14,7 @@ from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
+from softstart.controller.base import CompiledController
 from softstart.errors import InputError
 from softstart.sweeping.axes import Axis, Column
 from softstart.sweeping.starts import Question, Task, compute
@@ -37,14 +38,21 @@ def check_corners(question: Question, axes: tuple[Axis, ...]) -> None:
         raise InputError(list(told.values())[:TOLD])
 
 
-def first_start(question: Question, axes: tuple[Axis, ...]) -> None:
-    """Make the first start of the grid: compiles what is to be compiled, and finds controllers that fail."""
+def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
+    """Make the first start of the grid: compiles what is to be compiled, and finds controllers that fail.
+
+    Returns whether all controllers are compiled, so that threads serve as well as processes.
+    """
+    compiled = True
     controllers = next((c.values for axis in axes for c in axis.columns if c.owner == "controller"), ("",))
     for controller in controllers:
         first = tuple(
             Axis(axis.name, tuple(_one(column, controller) for column in axis.columns)) for axis in axes
         )
         compute(Task(0, question, first, tuple(slice(0, 1) for _ in axes)))
+        ready, _ = question.maker.make({}, controller).set_up(question.fitted_to or question.drive)
+        compiled = compiled and isinstance(ready, CompiledController)
+    return compiled
 
 
 def _one(column: Column, controller: str) -> Column:

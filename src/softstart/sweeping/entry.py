@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, closing, nullcontext
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, nullcontext
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.processes import Pool, checked_workers, why_not_sendable
 from softstart.sweeping import netcdf as netcdf_file
 from softstart.sweeping.axes import Axis, read_grid
 from softstart.sweeping.checking import check_corners, first_start
@@ -22,8 +24,7 @@ from softstart.sweeping.memory import Memory
 from softstart.sweeping.plan import Plan, checked_chunk, plan_for
 from softstart.sweeping.progress import Told, Watch
 from softstart.sweeping.starts import Question, Task, cut, known_figures
-from softstart.sweeping.store import Folder, open_folder, write_block
-from softstart.sweeping.workers import Dones, checked_workers, computed_by_processes, computed_here
+from softstart.sweeping.store import Folder, compute_and_keep, open_folder, write_block
 from softstart.units import nearest, show
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ def sweep(
     netcdf : also write the finished results into this netCDF file.
     figures : those to keep, by name; the status always is.
     chunk : most starts of a chunk; memory and what an interruption loses go with it.
-    workers : processes of this machine, by default one a processor; 1 computes in this process.
+    workers : how many starts are computed at once on this machine, by default one for each processor: by
+        threads where the controllers are compiled, else by processes. 1 computes in this thread.
     scheduler : address of a dask scheduler whose workers compute instead.
     progress : called with a `Progress` at the beginning and after each chunk.
 
@@ -93,27 +95,32 @@ def sweep(
     question = Question(
         drive, maker, tuple(dict.fromkeys(figures)), _time(until), fitted_to, base, _time(time_limit)
     )
-    most, count = checked_chunk(chunk), checked_workers(workers)
-    if scheduler is not None and workers is not None:
-        raise InputError("workers, scheduler: a cluster has workers of its own; give one of the two.")
+    most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
     target = None if to is None else Path(to)
     if netcdf is not None:
         netcdf_file.check_place(Path(netcdf))
     check_corners(question, axes)
     single = [not axis.numeric for axis in axes]
     plan = plan_for([axis.size for axis in axes], single, most)
-    if scheduler is not None or min(count, plan.chunks) > 1:
-        maker.check_travels()
-    first_start(question, axes)
+    threads = first_start(question, axes)
+    if scheduler is not None or (min(count, plan.chunks) > 1 and not threads):
+        if workers is None and scheduler is None and why_not_sendable(maker.given):
+            count = 1
+        else:
+            maker.check_sendable()
+    pool = partial(
+        Pool, min(count, plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
+        advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
+    )  # fmt: skip
     with nullcontext() if target is None else locked(target):
         if target is None:
             memory = Memory(plan, axes, question)
-            _run(memory, None, plan, axes, question, count, scheduler, progress)
+            _run(memory, None, plan, axes, question, pool, progress)
             results = memory.dataset()
         else:
             folder = Folder(target, plan, axes, question, most)
             plan = folder.plan
-            _run(None, folder, plan, axes, question, count, scheduler, progress)
+            _run(None, folder, plan, axes, question, pool, progress)
             results = open_folder(target)
         if netcdf is not None:
             netcdf_file.write_netcdf(Path(netcdf), results, plan, axes, question)
@@ -126,8 +133,7 @@ def _run(
     plan: Plan,
     axes: tuple[Axis, ...],
     question: Question,
-    count: int,
-    scheduler: str | None,
+    make_pool: Callable[[], Pool],
     progress: Told | None,
 ) -> None:
     """Compute what is not finished, and keep it."""
@@ -135,17 +141,17 @@ def _run(
     watch = Watch(plan.starts, before, progress)
     if before == plan.starts:
         return
-    keep_in = "" if folder is None or scheduler is not None else str(folder.path.resolve())
-    tasks = (
-        Task(number, question, cut(axes, plan.place(number)), plan.place(number), keep_in)
-        for number in range(plan.chunks)
-        if folder is None or not folder.finished(number)
-    )
     with ExitStack() as stack:
         if folder is not None:
             stack.callback(folder.sweep_up)
-        done = stack.enter_context(closing(_computed(tasks, min(count, plan.chunks), scheduler, stack)))
-        for task, block in done:
+        pool = stack.enter_context(make_pool())
+        keep_in = "" if folder is None or pool.scheduler is not None else str(folder.path.resolve())
+        tasks = (
+            Task(number, question, cut(axes, plan.place(number)), plan.place(number), keep_in)
+            for number in range(plan.chunks)
+            if folder is None or not folder.finished(number)
+        )
+        for task, block in pool.results(compute_and_keep, tasks):
             if block is not None and memory is not None:
                 memory.keep(task.place, block)
             elif block is not None and folder is not None:
@@ -153,13 +159,8 @@ def _run(
             watch.add(math.prod(task.shape))
 
 
-def _computed(tasks: Iterator[Task], count: int, scheduler: str | None, stack: ExitStack) -> Dones:
-    """The finished chunks, by whoever computes them."""
-    if scheduler is not None:
-        from softstart.sweeping.cluster import computed_by_cluster, connect
-
-        return computed_by_cluster(tasks, stack.enter_context(connect(scheduler)))
-    return computed_by_processes(tasks, count) if count > 1 else computed_here(tasks)
+def _described(task: Task) -> str:
+    return f"chunk {task.number} of the sweep"
 
 
 def _maker(controller: object, parameters: Mapping[str, object] | None) -> Maker:

@@ -17,6 +17,7 @@ from softstart.controller.gain_files import SUFFIXES
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.processes import why_not_sendable
 from softstart.units import show
 
 
@@ -97,21 +98,14 @@ class Maker:
         values = {name: _digested(value) for name, value in self.values.items()}
         return {**about_name(self.given), "parameters": values}
 
-    def check_travels(self) -> None:
+    def check_sendable(self) -> None:
         """Raise InputError for a controller that no other process can load."""
-        if not isinstance(self.given, Controller):
-            return
-        cls = type(self.given)
-        try:
-            there = cls.__module__ != "__main__" and not cls.__module__.startswith("softstart_loose_")
-            if there and type(pickle.loads(pickle.dumps(self.given))) is cls:
-                return
-        except (pickle.PicklingError, AttributeError, TypeError, ImportError):
-            pass
-        raise InputError(
-            f"controller = {self.shown}: another process cannot load this object of class "
-            f"{cls.__qualname__}; give it as path/to/file.py:ClassName with parameters, or say workers=1."
-        )
+        if why_not_sendable(self.given):
+            raise InputError(
+                f"controller = {self.shown}: another process cannot load this object of class "
+                f"{type(self.given).__qualname__}; give it as path/to/file.py:ClassName with parameters, or "
+                "say workers=1."
+            )
 
 
 def with_whole_path(name: str) -> str:

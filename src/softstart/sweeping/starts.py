@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from softstart import __version__
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive
-from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -61,7 +59,6 @@ class Task:
     axes: tuple[Axis, ...]
     place: tuple[slice, ...]
     keep_in: str = ""
-    version: str = __version__
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -76,11 +73,6 @@ def cut(axes: tuple[Axis, ...], place: tuple[slice, ...]) -> tuple[Axis, ...]:
 
 def compute(task: Task) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
-    if task.version != __version__:
-        raise InputError(
-            f"softstart {task.version} asks and softstart {__version__} is to compute; install one version "
-            "on all machines."
-        )
     question, shape = task.question, task.shape
     count = math.prod(shape)
     changes: dict[str, Any] = {"gap": np.full(count, question.drive.gap)}  # every drive of a chunk is a batch

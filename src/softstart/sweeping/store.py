@@ -23,7 +23,7 @@ from softstart.errors import InputError
 from softstart.sweeping.axes import Axis
 from softstart.sweeping.maker import about_name
 from softstart.sweeping.plan import Plan
-from softstart.sweeping.starts import Block, Question
+from softstart.sweeping.starts import Block, Question, Task, compute
 from softstart.sweeping.variables import STATUS, Variable, about, coordinate_variables, figure_variables
 
 if TYPE_CHECKING:
@@ -96,6 +96,15 @@ class Folder:
             for name in names:
                 if name.endswith(".partial"):
                     Path(root, name).unlink(missing_ok=True)
+
+
+def compute_and_keep(task: Task) -> Block | None:
+    """Compute a chunk; write it if the task says where, return it otherwise."""
+    block = compute(task)
+    if not task.keep_in:
+        return block
+    write_block(task.keep_in, task.place, block)
+    return None
 
 
 def write_block(path: str, place: tuple[slice, ...], block: Block) -> None:

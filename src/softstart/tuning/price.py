@@ -3,48 +3,61 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
+from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.processes import Pool
 from softstart.tuning.log import Log
+from softstart.tuning.question import Question
 from softstart.tuning.saved import SavedParts
-from softstart.tuning.trials import Trials
-from softstart.tuning.workers import Workers
 
 Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
 
 
-def optima(workers: Workers, saved: SavedParts, log: Log, bounds: list[tuple[int, float]]) -> Optima:
+class Asked(NamedTuple):
+    """An optimum: its cell, the bound on the start time in s, the drive, and that to which K_dyn refers."""
+
+    cell: int
+    bound: float
+    drive: Drive
+    base: Drive | None
+
+
+def optima(
+    pool: Pool, question: Question, saved: SavedParts, log: Log, bounds: list[tuple[int, float]]
+) -> Optima:
     """The least K_dyn of cells within bounds on the start time, each with its lower bound."""
     asked = list(dict.fromkeys((cell, bound) for cell, bound in bounds if math.isfinite(bound)))
     found: Optima = {}
-    for one in asked:
-        record = saved.find(("optimum", *one))
+    for cell, bound in asked:
+        record = saved.find(("optimum", cell, bound))
         if record is not None:
-            found[one] = record
-    missing = [one for one in asked if one not in found]
+            found[cell, bound] = record
+    missing = [
+        Asked(cell, bound, question.drive_of(cell), question.base)
+        for cell, bound in asked
+        if (cell, bound) not in found
+    ]
     log.begin("certified optima", len(asked), len(found))
-    for k, record in workers.each(optimum_of, missing):
-        found[missing[k]] = record
+    for one, record in pool.results(optimum_of, missing):
+        found[one.cell, one.bound] = record
         if record["status"] != "NOT_FOUND":  # another attempt may find it
-            saved.add(("optimum", *missing[k]), record)
+            saved.add(("optimum", one.cell, one.bound), record)
         log.did(0)
     return found
 
 
-def optimum_of(trials: Trials, cell: int, bound: float) -> dict[str, Any]:
-    """The optimum of a cell's drive, its motor without torque lag and rate limit: the harder yardstick."""
+def optimum_of(asked: Asked) -> dict[str, Any]:
+    """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick."""
     from softstart.optimal.collocation import NotConverged
     from softstart.optimal.result import InfeasibleError, OptimumError
     from softstart.optimal.solving import optimize
 
-    question = trials.question
-    ideal = question.drive_of(cell).replace(
-        torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0
-    )
+    ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
-        best = optimize(ideal, bound, terminal="reached", base=question.base)
+        best = optimize(ideal, asked.bound, terminal="reached", base=asked.base)
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
     except (OptimumError, NotConverged, InputError):

@@ -9,10 +9,11 @@ from typing import Any
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.processes import Pool, checked_workers
 from softstart.tuning.grid import gaps_of, inertias_of
 from softstart.tuning.log import Log, Progress
 from softstart.tuning.outcome import Tuning
-from softstart.tuning.price import Optima, optima
+from softstart.tuning.price import Asked, Optima, optima
 from softstart.tuning.question import Metric, Question, bound_of
 from softstart.tuning.ranges import Free, check_number, ranges_of
 from softstart.tuning.recipe import recipe_of
@@ -22,11 +23,10 @@ from softstart.tuning.schedule import schedule as tuned_schedule
 from softstart.tuning.tables import between_table, check_metric, price_table, robust_outcome, schedule_table
 from softstart.tuning.tolerances import scenarios_of
 from softstart.tuning.trials import Trials
-from softstart.tuning.workers import Workers, count_of
+from softstart.tuning.workers import Workers, pool_for
 
 GENERATIONS = 40
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
-WORTH_SHARING = 20_000  # starts from which on other processes are begun
 
 
 def tune(
@@ -50,6 +50,7 @@ def tune(
     population: int | None = None,
     generations: int = GENERATIONS,
     workers: int | None = None,
+    scheduler: str | None = None,
     save_to: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Tuning:
@@ -80,7 +81,9 @@ def tune(
     base : the drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
     seed, restarts, population, generations : of the search. The same ones give the same bits, however many
         workers there are.
-    workers : processes; by default one a processor. Scripts need `if __name__ == "__main__":` then.
+    workers : how many parts of the work are done at once on this machine, by default one for each processor:
+        by threads where the controller is compiled, else by processes. 1 computes in this thread.
+    scheduler : address of a dask scheduler whose workers compute instead.
     save_to : a file in which each finished part is kept at once, from which the same call goes on.
     progress : told what is being done, how many starts were made, and how many a second.
 
@@ -110,26 +113,19 @@ def tune(
     log.begin("starts with the defaults")
     trials = Trials(question)
     check_metric(trials)
-    count = count_of(workers, trials)
     size = len(question.cells) * len(question.scenarios) * question.restarts
-    planned = size * question.population * question.generations
     kept = SavedParts(None if save_to is None else Path(save_to), question.inputs())
     found, one = None, None
     best: Optima = {}
-    certified = certified and metric == "k_dyn"
-    with Workers(trials, count if planned >= WORTH_SHARING or certified else 1) as pool:
+    with pool_for(trials, workers, scheduler, size * question.population * question.generations) as pool:
+        work = Workers(trials, pool)
         if schedule:
-            found = tuned_schedule(pool, kept, log)
+            found = tuned_schedule(work, kept, log)
         if robust:
-            one = robust_set(pool, kept, log, found)
-        if certified:
-            yardstick = trials.yardstick
-            bounds = [
-                *(yardstick.own_bound[:, 0] if schedule else ()),
-                *(yardstick.nominal_bound[:, 0] if robust else ()),
-            ]
-            cells = [*range(len(question.cells))] * (int(schedule) + int(robust))
-            best = optima(pool, kept, log, [(c, float(b)) for c, b in zip(cells, bounds, strict=True)])
+            one = robust_set(work, kept, log, found)
+    if certified and metric == "k_dyn":
+        with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
+            best = optima(pool, question, kept, log, _bounds(trials, schedule, robust))
     return Tuning(
         question,
         None if found is None else schedule_table(trials, found),
@@ -139,6 +135,10 @@ def tune(
         log.starts,
         log.seconds,
     )
+
+
+def _described(asked: Asked) -> str:
+    return f"the optimum of cell {asked.cell + 1}"
 
 
 def _bounds(trials: Trials, schedule: bool, robust: bool) -> list[tuple[int, float]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -70,6 +72,7 @@ class Trials:
             name: float(value[0]) for name, value in self._defaults(question.drive, 1).items()
         }
         self.time_limit: float | None = None
+        self.stopping: threading.Event | None = None  # set when nobody wants the answer any more
         self.batched = not isinstance(self.controller, PlainController) and self._takes_arrays()
         self.yardstick = self._measured() if yardstick is None else yardstick
         self.time_limit = self.yardstick.time_limit
@@ -148,6 +151,8 @@ class Trials:
         return self._judged(values, np.tile(np.arange(self.gap.size), (count, 1)), own=False)
 
     def _judged(self, values: Values, which: Cells, own: bool) -> Judged:
+        if self.stopping is not None and self.stopping.is_set():
+            raise CancelledError
         if self.batched:
             try:
                 return self._batch(values, which, own)

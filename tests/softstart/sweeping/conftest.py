@@ -15,6 +15,11 @@ LONG = (
     "sweep('crane-4amtkf', 'current-limit-feedback', GRID, to=sys.argv[1], chunk=CHUNK,\n"
     "      workers=int(sys.argv[2]), progress=lambda now: print(now.done, flush=True))\n"
 )
+PROCESSES = (
+    "from softstart.sweeping import entry\n"
+    "first_start = entry.first_start\n"
+    "entry.first_start = lambda *asked: first_start(*asked) and False  # as if not compiled\n"
+)
 
 
 class Sweeping:
@@ -37,10 +42,13 @@ class Sweeping:
             " 'load_inertia': np.linspace(0.07, 0.35, 100)}",
         )
 
-    def begin(self, folder: Path, workers: int) -> subprocess.Popen[str]:
-        """Start it."""
+    def begin(self, folder: Path, workers: int, processes: bool) -> subprocess.Popen[str]:
+        """Start it, with processes in the place of threads if asked."""
         return subprocess.Popen(
-            [sys.executable, "-W", "error", "-c", self.code, str(folder), str(workers)],
+            [
+                sys.executable, "-W", "error", "-c", PROCESSES + self.code if processes else self.code,
+                str(folder), str(workers),
+            ],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
 

@@ -12,8 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, SimulationError, sweep
-from softstart.sweeping import cluster as room
+from softstart import Drive, InputError, SimulationError, processes, sweep
 
 pytest.importorskip("distributed")
 CRANE = Drive.load("crane-4amtkf")
@@ -64,7 +63,7 @@ def test_two_workers_of_which_one_is_killed_find_the_same(
 ):
     address = cluster.address()
     with monkeypatch.context() as patched:
-        patched.setattr(room, "PATIENCE", 1.0)
+        patched.setattr(processes, "CLUSTER_TIMEOUT", 1.0)
         with pytest.raises(InputError, match="it has no worker; start some"):
             sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, scheduler=address)
 
@@ -103,7 +102,7 @@ def test_two_workers_of_which_one_is_killed_find_the_same(
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch):
-    monkeypatch.setattr(room, "PATIENCE", 0.5)
+    monkeypatch.setattr(processes, "CLUSTER_TIMEOUT", 0.5)
     with pytest.raises(
         InputError, match=r'scheduler = "tcp://127\.0\.0\.1:9": no dask scheduler answers there'
     ):

@@ -27,16 +27,16 @@ def test_killed_at_random_instants_it_goes_on(sweeping, uninterrupted, tmp_path)
     folder = tmp_path / "results"
     instants = random.Random(7)
     before: dict[str, int] = {}
-    for workers in (1, 2):
-        process = sweeping.begin(folder, workers)
+    for workers, processes in ((1, 0), (2, 0), (2, 2)):
+        process = sweeping.begin(folder, workers, bool(processes))
         sweeping.wait_for(folder, len(before) + instants.randint(2, 12), process)
         time.sleep(instants.uniform(0.0, 0.08))
         helpers = children(process.pid)
-        assert len(helpers) == (workers if workers > 1 else 0)
+        assert len(helpers) == processes
         process.send_signal(signal.SIGKILL)
         process.communicate()
         deadline = time.monotonic() + 20
-        while any(map(alive, helpers)):  # they end by themselves, their chunk finished
+        while any(map(alive, helpers)):  # they end by themselves
             assert time.monotonic() < deadline
             time.sleep(0.01)
         after = sweeping.finished(folder)

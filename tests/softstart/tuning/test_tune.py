@@ -10,9 +10,8 @@ from scipy.optimize import brentq
 
 from softstart import Command, Drive, InputError, PlainController, optimize, simulate, stages, tune
 from softstart.controller import controller_class, controller_names, make_controller, parameter
-from softstart.tuning import solving
+from softstart.processes import Pool
 from softstart.tuning.ranges import tunable
-from softstart.tuning.workers import Workers
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 GRID = {"gaps": [0.5, 2.0], "inertias": ["2 J1", "5 J1"]}
@@ -159,16 +158,25 @@ def test_the_same_seed_gives_the_same_bits(alone):
     assert told(other) != told(alone)
 
 
-def test_the_number_of_workers_changes_nothing(alone, monkeypatch):
-    monkeypatch.setattr(solving, "WORTH_SHARING", 0)
+@pytest.mark.parametrize("threads", [True, False])
+def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
+    monkeypatch.setattr("softstart.tuning.workers.WORTH_SHARING", 0)
     monkeypatch.setattr("softstart.tuning.schedule.LARGEST_BLOCK", 3)  # so that there is something to share
     monkeypatch.setattr("softstart.tuning.robust_set.STARTS_A_CALL", 48)
     begun = []
-    start_pool = Workers._pool
-    monkeypatch.setattr(Workers, "_pool", lambda self: begun.append(self) or start_pool(self))
+    results = Pool.results
+
+    def noted(pool, *arguments):
+        begun.append((pool.count, pool.threads))
+        return results(pool, *arguments)
+
+    monkeypatch.setattr(Pool, "results", noted)
+    if not threads:
+        monkeypatch.setattr("softstart.tuning.solving.pool_for", lambda *asked: Pool(2))
     shared = tune(CRANE, "ramp", **GRID, **(SMALL | {"workers": 2}), **SURE)
     assert told(shared) == told(alone)
     assert len(begun) > 10
+    assert set(begun) == {(2, threads)}
 
 
 @pytest.mark.parametrize("word", ["schedule, searches 5", "neighbours", "robust set, search 2"])

@@ -1,0 +1,247 @@
+"""Work done aside: results, errors, deaths, ends, and scripts that need no guard."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart.drive import Drive
+from softstart.errors import InputError, SimulationError
+from softstart.processes import DiedError, Pool, Tell, Worker, checked_workers, why_not_sendable
+
+HERE = Path(__file__).parent
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+
+
+@pytest.fixture
+def importable(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """This file as a module that workers can import too."""
+    monkeypatch.syspath_prepend(str(HERE))
+    import test_processes
+
+    return test_processes
+
+
+def environment() -> tuple[str, int, int]:
+    """Threads of linear algebra, the process, and the group that it leads."""
+    return os.environ["OPENBLAS_NUM_THREADS"], os.getpid(), os.getpgrp()
+
+
+def printing(number: int) -> int:
+    print("this is not an answer")
+    os.write(1, b"nor this")
+    return number + len(sys.stdin.read())
+
+
+def failing(kind: str) -> Any:
+    if kind == "input":
+        raise InputError(["gap = -1: a gap is 0 or more.", "c = 0: it must be above 0."])
+    if kind == "local":
+
+        class LocalError(Exception):
+            pass
+
+        raise LocalError("of a class that nobody else knows")
+    if kind == "unsendable":
+        return lambda: None
+    if kind == "exit":
+        os._exit(3)
+    os.kill(os.getpid(), signal.SIGKILL)
+    return None
+
+
+def sleeping(file: str) -> None:
+    other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
+    Path(file).write_text(f"{os.getpid()} {other.pid}")
+    time.sleep(60)
+
+
+def reporting(*, tell: Tell) -> str:
+    tell(0.5, "half of it")
+    tell.part([1, 2])
+    return "done"
+
+
+def dies_once(file: str) -> int:
+    if not Path(file).exists():
+        Path(file).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 7
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
+    latest = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < latest
+        time.sleep(0.01)
+
+
+def test_a_worker_runs_functions_one_after_another(importable: Any) -> None:
+    worker = Worker()
+    try:
+        threads, pid, group = worker.run(importable.environment)
+        assert (threads, pid, group) == ("1", worker.pid, worker.pid)
+        assert worker.run(importable.printing, 4) == 4
+        os.kill(pid, signal.SIGINT)  # Ctrl-C is for the parent
+        assert worker.receive(0.05) is None
+        worker.submit(importable.reporting, tells=True)
+        found = [worker.receive() for _ in range(3)]
+        assert [(one.kind, one.content) for one in found if one] == [
+            ("progress", (0.5, "half of it")), ("part", [1, 2]), ("result", "done")
+        ]  # fmt: skip
+    finally:
+        worker.end()
+    assert not alive(pid)
+    with pytest.raises(DiedError):
+        worker.run(importable.printing, 4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "text"),
+    [
+        ("input", InputError, "gap = -1"),
+        ("local", RuntimeError, "LocalError: of a class that nobody else knows"),
+        ("unsendable", Exception, "lambda"),
+        ("exit", DiedError, "exit code 3"),
+        ("kill", DiedError, "signal 9"),
+    ],
+)
+def test_what_goes_wrong_reaches_the_caller(importable: Any, kind: str, error: Any, text: str) -> None:
+    worker = Worker()
+    try:
+        with pytest.raises(error, match=text) as caught:
+            worker.run(importable.failing, kind)
+        if kind == "input":
+            assert len(caught.value.sentences) == 2
+            assert "Traceback" in "".join(caught.value.__notes__)
+    finally:
+        worker.end()
+
+
+def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> None:
+    worker, file = Worker(quiet=True), tmp_path / "started"
+    worker.submit(importable.sleeping, str(file))
+    until(lambda: file.exists() and " " in file.read_text())
+    pids = [int(word) for word in file.read_text().split()]
+    began = time.monotonic()
+    worker.end()
+    assert time.monotonic() - began < 1.0
+    until(lambda: not any(map(alive, pids)), 1.0)
+
+
+PARENT = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+import test_processes
+from softstart.processes import Worker
+worker = Worker()
+worker.submit(test_processes.sleeping, sys.argv[2])
+time.sleep(60)
+"""
+
+
+def test_workers_end_with_a_parent_that_was_killed(tmp_path: Path) -> None:
+    file = tmp_path / "started"
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, str(HERE), str(file)])
+    try:
+        until(lambda: file.exists() and " " in file.read_text())
+    finally:
+        parent.kill()
+        parent.wait()
+    pids = [int(word) for word in file.read_text().split()]
+    until(lambda: not any(map(alive, pids)), 2.0)
+
+
+def test_a_pool_tries_the_task_of_a_dead_process_once_more(importable: Any, tmp_path: Path) -> None:
+    with Pool(2) as pool:
+        tasks = [str(tmp_path / name) for name in "abc"]
+        assert sorted(pool.results(importable.dies_once, tasks)) == [(task, 7) for task in tasks]
+        with pytest.raises(SimulationError, match=r"died 2 times \(signal 9\) while it computed kill"):
+            list(pool.results(importable.failing, ["kill"]))
+
+
+def test_a_pool_that_is_left_stops_what_runs(importable: Any, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in "ab"]
+    began = time.monotonic()
+
+    def tasks() -> Any:
+        yield from map(str, files)
+        until(lambda: all(file.exists() and " " in file.read_text() for file in files))
+        raise KeyboardInterrupt
+
+    with Pool(2) as pool, pytest.raises(KeyboardInterrupt):
+        list(pool.results(importable.sleeping, tasks()))
+    assert time.monotonic() - began < 20.0
+    assert not any(alive(int(file.read_text().split()[0])) for file in files)
+
+
+def test_numbers_of_workers() -> None:
+    assert checked_workers(3) == 3
+    assert checked_workers(None) >= 1
+    for wrong in (0, -1, 2.0, True, "2", 5000):
+        with pytest.raises(InputError, match=r"workers = .*whole number from 1 to 1024"):
+            checked_workers(wrong)
+    with pytest.raises(InputError, match="give one of the two"):
+        checked_workers(2, "tcp://x:1")
+
+
+def test_what_another_process_cannot_load() -> None:
+    assert why_not_sendable(lambda: None)
+    assert why_not_sendable(Drive) == ""
+
+
+SCRIPTS = {
+    "tune": (
+        "from softstart import tune\n"
+        "tuned = tune('crane-4amtkf', 'ramp', ['1x'], ['1x', '2x'], generations=2, restarts=1)\n"
+        "print(tuned.robust.cells.k_dyn.size)\n"
+    ),
+    "tune a controller of its own": (
+        "from dataclasses import dataclass\n"
+        "from softstart import Command, PlainController, tune\n"
+        "@dataclass(frozen=True)\n"
+        "class Wait(PlainController):\n"
+        "    wait: float = 0.06\n"
+        "    def step(self, measured, state):\n"
+        "        return Command(15.0 if measured.time < self.wait else 62.0, measured.time + 0.005)\n"
+        "tuned = tune('crane-4amtkf', Wait(), ['1x'], ['1x', '2x'], free={'wait': (0.03, 0.1)},\n"
+        "             generations=2, population=5, restarts=1, certified=False)\n"
+        "print(tuned.robust.cells.k_dyn.size)\n"
+    ),
+    "sweep": (
+        "from softstart import sweep\n"
+        "print(sweep('crane-4amtkf', 'ramp', {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
+    ),
+    "sweep a controller of its own": (
+        "from softstart import Command, PlainController, sweep\n"
+        "class Half(PlainController):\n"
+        "    def step(self, measured, state):\n"
+        "        return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.01)\n"
+        "print(sweep('crane-4amtkf', Half(), {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_plain_script_needs_no_guard(name: str, tmp_path: Path) -> None:
+    script = tmp_path / "mine.py"
+    script.write_text(SCRIPTS[name])
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "2\n")
