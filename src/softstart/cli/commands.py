@@ -14,8 +14,8 @@ from softstart import __version__
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
-    "compare": ("compare", "Start a drive under several controllers and compare them."),
-    "simulate": ("simulate", "Start a drive once under one controller."),
+    "compare": ("starts", "Start a drive under several controllers and compare them."),
+    "simulate": ("starts", "Start a drive once under one controller."),
     "optimize": (
         "optimize",
         "Find the torque profile with the least K_dyn for a start time, and prove how good it is.",

@@ -9,18 +9,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from softstart.cli.commands import did_you_mean
 from softstart.cli.completing import controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completing import settings as settings_of
+from softstart.drive import Drive, library
 from softstart.errors import InputError
 from softstart.plugins import registered
-
-if TYPE_CHECKING:
-    from softstart.drive import Drive
+from softstart.units import to_si
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -61,8 +60,6 @@ class Mistakes:
 
 def drive_names() -> tuple[str, ...]:
     """Names of the shipped drives."""
-    from softstart.drive import library
-
     return tuple(library.names())
 
 
@@ -132,8 +129,6 @@ def command_line() -> str:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
-    from softstart.drive import Drive
-
     drive = Drive.load(name)
     if settings:
         drive = drive.with_settings(settings)
@@ -163,8 +158,6 @@ def read_until(text: str | None) -> float | None:
     """
     if text is None:
         return None
-    from softstart.units import to_si
-
     value = float(to_si(text, "s", name="--until"))
     if not value > 0.0:
         raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 0.5 or "500 ms".')

@@ -10,13 +10,18 @@ from typing import TYPE_CHECKING
 
 from softstart.cli.options import CONTROLLER_GROUP, Mistakes
 from softstart.errors import InputError, SimulationError
+from softstart.late import late
 from softstart.plugins import registered
 
 if TYPE_CHECKING:
-    from numba.core.event import Event
+    import rich.console as rich_console
+    from numba.core import event
     from rich.status import Status
 
-    from softstart.controller import Controller
+    from softstart import controller
+else:
+    rich_console, event = late("rich.console"), late("numba.core.event")
+    controller = late("softstart.controller")
 
 LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 COMPILING = "compiling the simulation kernel: this may take half a minute, once, and is kept on disk ..."
@@ -28,9 +33,7 @@ def working(doing: str) -> Iterator[Status | None]:
 
     Whatever is compiled meanwhile is announced, on a terminal or not: a first start takes a while.
     """
-    from rich.console import Console
-
-    console = Console(stderr=True, highlight=False, markup=False)
+    console = rich_console.Console(stderr=True, highlight=False, markup=False)
     with redirect_stdout(sys.stderr):
         if not console.is_terminal:
             with _announced(None):
@@ -42,14 +45,12 @@ def working(doing: str) -> Iterator[Status | None]:
 
 @contextmanager
 def _announced(status: Status | None) -> Iterator[None]:
-    from numba.core import event
-
     class Notice(event.Listener):
         """Speaks when numba compiles for the first time; what comes from its cache is not compiled."""
 
         said = False
 
-        def on_start(self, event: Event) -> None:
+        def on_start(self, event: event.Event) -> None:
             if not self.said:
                 self.said = True
                 if status is not None:
@@ -57,7 +58,7 @@ def _announced(status: Status | None) -> Iterator[None]:
                 else:
                     print(f"softstart: {COMPILING}", file=sys.stderr, flush=True)
 
-        def on_end(self, event: Event) -> None:
+        def on_end(self, event: event.Event) -> None:
             pass
 
     notice = Notice()
@@ -110,21 +111,20 @@ class Attributed:
 
 
 def make_controllers(
-    names: Sequence[str], parameters: Mapping[str, Mapping[str, str]], prefix: bool
-) -> list[Controller]:
-    """The controllers of these names with their parameters; all mistakes at once.
+    names: Sequence[str] | None, parameters: Mapping[str, Mapping[str, str]], prefix: bool
+) -> list[controller.Controller]:
+    """The controllers of these names with their parameters; all errors at once.
 
-    `prefix` puts the controller's name before each key in the sentences.
+    `names`: None stands for all installed ones that need no further parameter. `prefix` puts the controller's
+    name before each key in the sentences.
     """
-    from softstart.controller import make_controller
-
     mistakes = Mistakes()
-    made: list[Controller] = []
-    for name in names:
+    made: list[controller.Controller] = []
+    for name in controller.ready_controller_names(parameters) if names is None else names:
         given = parameters.get(name, {})
         try:
             with Attributed(name):
-                made.append(make_controller(name, given))
+                made.append(controller.make_controller(name, given))
         except InputError as error:
             mistakes.sentences += [
                 f"--param {name + '.' if prefix else ''}{s}" if s.startswith(tuple(given)) else s

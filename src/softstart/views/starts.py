@@ -1,19 +1,83 @@
-"""What is shown of a start and of a comparison of starts."""
+"""What is shown of a start and of a comparison: words, tables, figures and the files of --out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softstart.drive import Drive
+from softstart.start.comparison import Comparison, Row
 from softstart.start.run import Run
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, save_figure, shade_open_gap
+from softstart.views.markdown import (
+    drive_table,
+    file_stem,
+    markdown,
+    markdown_table,
+    provenance,
+    write_fitted_to,
+    write_table,
+    write_text,
+)
+from softstart.views.numbers import Column, column_of, number, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Cells = list[list[str]]  # of a table, row by row
+
+STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
+EVENT_COLUMNS = ("time s", "event", "value")
+SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
+
+
+def name_of(run: Run) -> str:
+    """The controller's name, or that of its class."""
+    return run.controller.name or type(run.controller).__name__
+
+
+# one start -----------------------------------------------------------------------------------------------
+
+
+def figure_rows(run: Run) -> list[list[str]]:
+    """The figures of the start, as words and numbers."""
+
+    def with_unit(value: float, unit: str) -> str:
+        return f"{short(value)} {unit}" if not math.isnan(value) else "-"
+
+    first, second = run.stage_durations
+    return [
+        ["K_dyn", number(run.k_dyn, 6)],
+        ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
+        ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
+        ["start time", with_unit(run.start_time, "s")],
+        ["settled from", with_unit(run.settling_time(), "s")],
+        ["first contact", with_unit(run.first_contact, "s")],
+        ["speed of impact", with_unit(run.impact_speed, "rad/s")],
+        ["motor torque at contact", with_unit(run.torque_at_contact, "N m")],
+        ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}"],
+        ["contacts", str(run.contacts)],
+        ["end of the run", with_unit(run.end_time, "s")],
+    ]
+
+
+def stage_rows(run: Run) -> list[list[object]]:
+    """The stages, full numbers."""
+    return [
+        [stage.number, SIDES[stage.side], stage.start, stage.duration, stage.peak_torque, stage.peak_time]
+        for stage in run.stages
+    ]
+
+
+def event_rows(run: Run) -> list[list[object]]:
+    """The events, full numbers."""
+    return [[event.time, event.kind, event.value] for event in run.events]
+
 
 def run_figure(run: Run) -> Any:
-    """Torques, speeds and the place in the gap over time; grey where the gap is open."""
+    """Torques, speeds and twist over time; grey where the gap is open."""
     with drawing():
         figure, (torque, speed, twist) = new_figure(3, 1, (8.0, 7.5), sharex=True)
         for axes in (torque, speed, twist):
@@ -28,8 +92,7 @@ def run_figure(run: Run) -> Any:
         twist.set_ylabel("rad")
         twist.set_xlabel("time, s     (grey: gap open)")
         twist.set_xlim(0.0, run.end_time)
-        name = run.controller.name or type(run.controller).__name__
-        figure.suptitle(f"{run.drive.name}: {name}", x=0.01, ha="left", fontsize=11)
+        figure.suptitle(f"{run.drive.name}: {name_of(run)}", x=0.01, ha="left", fontsize=11)
     return figure
 
 
@@ -63,6 +126,160 @@ def _signed_peak(run: Run) -> float:
     return stage.peak_torque
 
 
+def stage_table(run: Run, most: int) -> tuple[list[Column], Cells]:
+    """The first stages as a table: columns, and cells as text."""
+    stages = run.stages[:most]
+    numbers = zip(
+        column_of([stage.start for stage in stages], 5),
+        column_of([stage.duration for stage in stages]),
+        column_of([stage.peak_torque for stage in stages], 5),
+        column_of([stage.peak_time for stage in stages], 5),
+        strict=True,
+    )
+    cells = [[str(stage.number), SIDES[stage.side], *row] for stage, row in zip(stages, numbers, strict=True)]
+    return [Column(heading, heading != "gap") for heading in STAGE_COLUMNS], cells
+
+
+def event_table(run: Run, most: int) -> tuple[list[Column], Cells]:
+    """The first events as a table: time and what happened."""
+    events = run.events[:most]
+    times = column_of([event.time for event in events], 6)
+    cells = [[time, event.kind] for time, event in zip(times, events, strict=True)]
+    return [Column("time s"), Column("event", False)], cells
+
+
+def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
+    """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
+    stem = file_stem(name_of(run))
+    _write_run(run, folder, stem)
+    write_text(folder / "drive.toml", run.drive.to_toml())
+    write_fitted_to(fitted_to, folder)
+    write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
+    write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
+    summary = {key: value for key, value in run.summary().items() if key != "parameters"}
+    write_table(folder / "figures.csv", list(summary), [list(summary.values())])
+    parts = [
+        f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
+        run.status.value,
+        markdown_table(["figure", "value"], figure_rows(run), numbers_from=1),
+        _strategy(run, stem),
+        "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
+        "## The drive",
+        drive_table(run.drive),
+        provenance(run.drive, command, fitted_to),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+def _write_run(run: Run, folder: Path, stem: str) -> None:
+    save_figure(run.plot(), folder, f"run-{stem}")
+    run.to_csv(folder / f"trace-{stem}.csv")
+
+
+def _strategy(run: Run, stem: str) -> str:
+    cls = type(run.controller)
+    values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
+    summary = f": {markdown(cls.summary)}" if cls.summary else ""
+    return (
+        f"### {markdown(stem)}\n\n{markdown(cls.__name__)}{summary}.\n\nParameters: {values or 'none'}.\n\n"
+        f"![{stem}](run-{stem}.svg)\n\nTraces: [trace-{stem}.csv](trace-{stem}.csv)"
+    )
+
+
+# a comparison --------------------------------------------------------------------------------------------
+
+
+class Figure(NamedTuple):
+    """A figure of a strategy in the tables of a comparison: with `decimals`, or `digits` significant ones."""
+
+    heading: str
+    of: Callable[[Row], float]
+    decimals: int | None = None
+    digits: int = 4
+
+
+def share_lost(row: Row) -> float:
+    """Time lost in per cent of the start time of `direct`."""
+    direct = row.run.start_time - row.time_lost
+    return 100.0 * row.time_lost / direct if direct > 0.0 else math.nan
+
+
+JUDGING = (
+    Figure("K_dyn", lambda row: row.run.k_dyn, 3),
+    Figure("K\ngap x4", lambda row: row.k_dyn_worn_gap, 3),
+    Figure("K\nJ2 x0.4", lambda row: row.k_dyn_light_load, 3),
+    Figure("peak\nN m", lambda row: row.run.peak_torque),
+    Figure("start\ntime s", lambda row: row.run.start_time),
+    Figure("time\nlost s", lambda row: row.time_lost, digits=3),
+    Figure("time\nlost %", share_lost, 1),
+)
+AT_THE_GAP = (
+    Figure("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
+    Figure("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
+    Figure("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
+    Figure("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
+    Figure("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
+    Figure("contacts", lambda row: row.run.contacts, 0),
+)
+
+
+def comparison_table(
+    rows: Sequence[Row], figures: Sequence[Figure] = (*JUDGING, *AT_THE_GAP)
+) -> tuple[list[Column], Cells]:
+    """The strategies and these figures of them as a table: columns, and cells as text."""
+    texts = [[name_of(row.run) for row in rows]]
+    for figure in figures:
+        values = [figure.of(row) for row in rows]
+        if figure.decimals is None:
+            texts.append(column_of(values, figure.digits))
+        else:
+            texts.append([number(value, figure.decimals) for value in values])
+    columns = [Column("strategy", False), *(Column(figure.heading) for figure in figures)]
+    return columns, [list(row) for row in zip(*texts, strict=True)]
+
+
+def conclusion(comparison: Comparison) -> str:
+    """Which strategy is the gentlest, and what it costs in time."""
+    best = comparison.gentlest
+    others = [row for row in comparison.rows if row is not best]
+    k, name = best.run.k_dyn, name_of(best.run)
+    if math.isnan(best.run.start_time):
+        return f"None reaches the target speed within the run; the gentlest so far is {name}, K_dyn {k:.3f}."
+    said = f"Gentlest: {name}, K_dyn {k:.3f}"
+    direct = next((row for row in others if name_of(row.run) == "direct"), None)
+    if direct is not None:
+        said += f" against {direct.run.k_dyn:.3f} of direct"
+    lost = best.time_lost
+    if math.isnan(lost):
+        return said + "; direct does not reach the target speed within the run."
+    share = abs(share_lost(best))
+    all_lost = [row.time_lost for row in comparison.rows]
+    seconds = column_of(all_lost, digits=3)[comparison.rows.index(best)].lstrip("-")
+    if abs(lost) < 1e-6 * best.run.start_time:
+        return said + "; it takes no more time than direct."
+    if lost < 0.0:
+        return said + f"; it is even {seconds} s ({share:.1f} %) quicker than direct."
+    return said + f"; it costs {seconds} s of start time, {share:.1f} % more than direct."
+
+
+def notes(comparison: Comparison) -> list[str]:
+    """What the columns mean, and which starts did not end as they should."""
+    run = comparison.rows[0].run
+    base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
+    own = "this drive" if comparison.fitted_to is None else f'"{comparison.fitted_to.name}"'
+    found = [
+        f"K_dyn = peak shaft torque / {base:.4g} N m, the mean shaft torque under full starting torque. "
+        f"K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or "
+        "the load inertia 0.4 times as large."
+    ]
+    found += [
+        f"{name_of(row.run)}: {row.run.status.value}"
+        for row in comparison.rows
+        if math.isnan(row.run.start_time)
+    ]
+    return found
+
+
 def comparison_figure(runs: Sequence[Run], title: str) -> Any:
     """Shaft torque (above) and motor torque (below) of several starts, one row of panels each."""
     with drawing():
@@ -74,9 +291,8 @@ def comparison_figure(runs: Sequence[Run], title: str) -> Any:
             shade_open_gap(panel, run)
             panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
             panel.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
-            name = run.controller.name or type(run.controller).__name__
             panel.set_title(
-                f"{name}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
+                f"{name_of(run)}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
                 loc="left",
                 fontsize=9.5,
                 pad=3,
@@ -115,3 +331,44 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
         axes.set_title(title, loc="left")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
+
+
+def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
+    """Everything about a comparison."""
+    rows = comparison.rows
+    runs = [row.run for row in rows]
+    name = comparison.drive.name
+    pictures = {"comparison": comparison_figure(runs, name)}
+    points = [
+        (name_of(r.run), r.run.start_time, r.run.k_dyn) for r in rows if r.run.start_time == r.run.start_time
+    ]
+    if points:
+        pictures["trade-off"] = trade_off_figure(points, name)
+    for stem, figure in pictures.items():
+        save_figure(figure, folder, stem)
+    stems: list[str] = []
+    for row in rows:
+        stems.append(file_stem(name_of(row.run), stems))
+        _write_run(row.run, folder, stems[-1])
+
+    summaries = [row.summary() for row in rows]
+    keys = [key for key in summaries[0] if key not in ("parameters", "status_text")]
+    write_text(folder / "drive.toml", comparison.drive.to_toml())
+    write_fitted_to(comparison.fitted_to, folder)
+    write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
+
+    columns, cells = comparison_table(rows)
+    headings = [" ".join(column.heading.split()) for column in columns]
+    parts = [
+        f"# {markdown(name)}: soft-start strategies compared",
+        conclusion(comparison),
+        markdown_table(headings, cells, numbers_from=1),
+        *notes(comparison),
+        *(f"![{stem}]({stem}.svg)" for stem in pictures),
+        "## The drive",
+        drive_table(comparison.drive),
+        "## The strategies",
+        *(_strategy(run, stem) for run, stem in zip(runs, stems, strict=True)),
+        provenance(comparison.drive, command, comparison.fitted_to),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")

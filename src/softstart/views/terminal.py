@@ -106,3 +106,9 @@ def sentence(to: rich_console.Console, text: str, style: str = "") -> None:
     indent = " " * (len(clean) - len(clean.lstrip()))
     lines = wrap(clean, to.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     to.print(rich_text.Text("\n".join(lines), style=style), soft_wrap=True)
+
+
+def print_lines(to: rich_console.Console, lines: Sequence[str]) -> None:
+    """Paragraphs of which the first one is a title."""
+    for index, line in enumerate(lines):
+        sentence(to, line, "bold" if index == 0 else "")

@@ -9,8 +9,8 @@ import tomllib
 import pytest
 
 from softstart import Drive, compare, simulate
-from softstart.cli.compare import conclusion, share_lost
 from softstart.views.numbers import column_of, number, printable, short
+from softstart.views.starts import conclusion, share_lost
 
 THREE = ("--controllers", "direct,reduced-first-stage,reduced-two-stage")
 

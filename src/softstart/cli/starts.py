@@ -1,0 +1,221 @@
+"""`softstart compare` and `softstart simulate`: strategies side by side, and one start in detail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import click
+
+import softstart
+from softstart.cli.commands import Command
+from softstart.cli.options import (
+    DEFAULT_DRIVE,
+    Mistakes,
+    check_name,
+    command_line,
+    controller_names,
+    controller_option,
+    drive_argument,
+    fitted_to_option,
+    json_option,
+    out_option,
+    param_option,
+    read_drive,
+    read_fitted_to,
+    read_names,
+    read_params,
+    read_params_of,
+    read_until,
+    set_option,
+    until_option,
+)
+from softstart.cli.running import Attributed, make_controllers, working
+from softstart.late import late
+from softstart.views.drives import drive_lines
+from softstart.views.markdown import output_folder
+from softstart.views.numbers import Column
+from softstart.views.terminal import console, fits, print_json, print_lines, print_table, sentence
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from softstart.drive import Drive
+    from softstart.start.comparison import Comparison
+    from softstart.start.run import Run
+    from softstart.views import starts
+else:
+    starts = late("softstart.views.starts")
+
+SHOWN = 24  # rows of stages and events shown; files and JSON hold all
+
+
+@click.command(cls=Command)
+@drive_argument(default=DEFAULT_DRIVE)
+@controller_option(
+    "--controllers",
+    "A,B,...",
+    "Controllers, with commas between. By default all installed ones that need no parameter.",
+)
+@set_option
+@fitted_to_option
+@param_option(
+    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
+)
+@until_option
+@json_option
+@out_option("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
+def compare(
+    *,
+    drive: str,
+    controllers: str | None,
+    settings: tuple[str, ...],
+    fitted_to: str | None,
+    params: tuple[str, ...],
+    until: str | None,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Start a drive under several controllers and compare them.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. A controller is a name (see: softstart controllers), path/to/file.py:Class,
+    or a file of tuned gains.
+    """
+    mistakes = Mistakes()
+    names: Sequence[str] = controller_names()
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    with mistakes.noted():
+        names = read_names(controllers) or names
+    with mistakes.noted():
+        given = read_params_of(params, names)
+    with mistakes.noted():
+        nominal = read_fitted_to(fitted_to)
+    with mistakes.noted():
+        end = read_until(until)
+    mistakes.settle()
+
+    with output_folder(out) as folder:
+        with working("starting the drive ..."):
+            made = make_controllers(names if controllers is not None else None, given, prefix=True)
+            with Attributed():
+                comparison = softstart.compare(one, made, until=end, fitted_to=nominal)
+        if folder is not None:
+            with working("drawing the figures ..."):
+                starts.write_comparison(comparison, folder, command_line())
+
+    if as_json:
+        print_json(comparison.summary())
+    else:
+        _show_comparison(console(), comparison, by_peak=controllers is None)
+        if out is not None:
+            print(f"\nWritten to {out}: report.md, figures, traces and the table.")
+
+
+def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None:
+    rows = list(comparison.rows)
+    if by_peak:
+        rows.sort(key=lambda row: row.run.k_dyn)
+    best = [rows.index(comparison.gentlest)]
+    print_lines(to, drive_lines(comparison.drive, comparison.fitted_to))
+    to.print()
+    columns, cells = starts.comparison_table(rows)
+    if fits(to, columns, cells):
+        print_table(to, columns, cells, bold=best)
+    else:
+        print_table(
+            to, *starts.comparison_table(rows, starts.JUDGING), title="How gentle, how quick", bold=best
+        )
+        to.print()
+        print_table(
+            to, *starts.comparison_table(rows, starts.AT_THE_GAP), title="What happens at the gap", bold=best
+        )
+    to.print()
+    sentence(to, starts.conclusion(comparison), "bold")
+    for note in starts.notes(comparison):
+        sentence(to, note, "dim")
+
+
+@click.command(cls=Command)
+@drive_argument()
+@controller_option(
+    "--controller",
+    "NAME",
+    "A controller's name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).",
+    required=True,
+)
+@param_option("KEY=VALUE", "Set a parameter of the controller, as time='200 ms'. May be repeated.")
+@set_option
+@fitted_to_option
+@until_option
+@json_option
+@out_option("Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.")
+def simulate(
+    *,
+    drive: str,
+    controller: str,
+    params: tuple[str, ...],
+    settings: tuple[str, ...],
+    fitted_to: str | None,
+    until: str | None,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Start a drive once under one controller.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives).
+    """
+    mistakes = Mistakes()
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    with mistakes.noted():
+        check_name(controller, "--controller", "several are compared: softstart compare --controllers ")
+    with mistakes.noted():
+        given = read_params(params)
+    with mistakes.noted():
+        nominal = read_fitted_to(fitted_to)
+    with mistakes.noted():
+        end = read_until(until)
+    mistakes.settle()
+
+    with output_folder(out) as folder:
+        with working("starting the drive ..."):
+            (made,) = make_controllers([controller], {controller: given}, prefix=False)
+            with Attributed():
+                run = softstart.simulate(one, made, end, fitted_to=nominal)
+        if folder is not None:
+            with working("drawing the figure ..."):
+                starts.write_start(run, folder, command_line(), nominal)
+
+    if as_json:
+        stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
+        events = [asdict(event) for event in run.events]
+        named = nominal.name if nominal else None
+        print_json({**run.summary(), "fitted_to": named, "stages": stages, "events": events})
+    else:
+        _show_start(console(), run, nominal)
+        if out is not None:
+            print(f"\nWritten to {out}: report.md, figure, traces, stages and events.")
+
+
+def _show_start(to: Console, run: Run, fitted_to: Drive | None) -> None:
+    print_lines(to, drive_lines(run.drive, fitted_to))
+    values = ", ".join(f"{key} = {_value(value)}" for key, value in run.controller.parameters.items())
+    sentence(to, f"  under  {starts.name_of(run)}{' (' + values + ')' if values else ''}")
+    to.print()
+    sentence(to, run.status.value, "bold")
+    print_table(to, [Column("", False), Column("", False)], starts.figure_rows(run), headings=False)
+    to.print()
+    print_table(to, *starts.stage_table(run, SHOWN), title=f"Stages{_part(len(run.stages))}")
+    to.print()
+    print_table(to, *starts.event_table(run, SHOWN), title=f"Events{_part(len(run.events))}")
+
+
+def _part(count: int) -> str:
+    return f" (the first {SHOWN} of {count}; --json and --out give all)" if count > SHOWN else ""
+
+
+def _value(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
