@@ -7,6 +7,7 @@
 #   make lint types layers     ruff, mypy, import-linter
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium)
+#   make pictures              the pictures of the README (needs chromium)
 #   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
 #   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
 #                              whole suite from both, each in an empty folder
@@ -16,7 +17,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: compare test check fuzz serve lint types layers page package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test check fuzz serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
@@ -45,6 +46,9 @@ serve: $(VENV)/.installed-ui
 
 page: $(VENV)/.installed-page
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page
+
+pictures: $(VENV)/.installed-page
+	SOFTSTART_PICTURES=docs/_static $(BIN)/python -m pytest -q tests/page/test_pictures.py --page
 
 docs: $(VENV)/.installed-docs
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -b html -n -W --keep-going docs docs/_build/html

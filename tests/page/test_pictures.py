@@ -1,0 +1,40 @@
+"""The two pictures of the README: `make pictures` writes them to docs/_static."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from tests.page.conftest import SOFTSTART
+
+LARGEST = 90_000  # bytes: they are part of every clone
+COLOURS = 128
+
+
+def small(path: Path) -> int:
+    """Reduce the picture to a palette; returns its size in bytes."""
+    Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    return path.stat().st_size
+
+
+def test_the_page_for_the_readme(visit: Any, screenshot: Any) -> None:
+    page = visit(width=1180, height=720)
+    page.locator('tr[data-name="direct"] input[type=checkbox]').check()
+    page.locator('tr[data-name="pulse-coast-hold"] input[type=radio]').check()
+    page.wait_for_function("document.querySelector('#k-dyn').dataset.value < 1")
+    page.wait_for_timeout(3000)  # the map and the worn gap are computed when nothing changes any more
+    path = screenshot(page, "page")
+    assert small(path) < LARGEST
+
+
+def test_the_figure_of_the_report_for_the_readme(browser: Any, screenshot: Any, tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    subprocess.run([SOFTSTART, "report", "--out", str(report)], check=True, capture_output=True)
+    page = browser.new_page(viewport={"width": 1000, "height": 900}, color_scheme="light")
+    page.goto(report.as_uri())
+    figure = page.locator("h2:has-text('How gentle could a start be') >> xpath=following::figure[1]")
+    path = screenshot(figure, "report")
+    assert small(path) < LARGEST
+    page.close()
