@@ -38,8 +38,7 @@ if TYPE_CHECKING:
     from softstart.optimal.robust import RobustOptimum, optimize_robust, worth_of_contact_sensor
     from softstart.optimal.solving import optimize
     from softstart.profile import TorqueProfile
-    from softstart.reporting.making import report
-    from softstart.reporting.result import Report
+    from softstart.reporting.result import Report, report
     from softstart.start.comparison import Comparison, compare
     from softstart.start.run import Run
     from softstart.start.simulation import simulate
@@ -93,7 +92,7 @@ _HOME = {
     "optimize_engagement": "softstart.clutch",
     "optimize_robust": "softstart.optimal.robust",
     "pareto": "softstart.optimal.front",
-    "report": "softstart.reporting.making",
+    "report": "softstart.reporting.result",
     "simulate": "softstart.start.simulation",
     "sweep": "softstart.sweeping.entry",
     "tune": "softstart.tuning.solving",

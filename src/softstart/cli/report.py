@@ -209,7 +209,7 @@ def _seconds(text: str) -> float:
 
 
 def _show(to: Console, made: Report, out: str) -> None:
-    from softstart.reporting.answer import answer
+    from softstart.reporting.document import answer
     from softstart.views.drives import drive_lines
     from softstart.views.terminal import sentence
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from softstart.reporting.making import report
 from softstart.reporting.resolution import Resolution
-from softstart.reporting.result import Report
+from softstart.reporting.result import Report, report
 
 __all__ = ["Report", "Resolution", "report"]

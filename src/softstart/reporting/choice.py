@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import Means, label_of, means_of
-from softstart.start.comparison import Row
+from softstart.reporting.values import digits, fixed, percent, short
+from softstart.start.comparison import REFERENCE, Row
 
 SLOWER = 0.15  # of the start time of direct
 ALIKE = 0.01  # worst K_dyn within this share of the least count as equal: then K_dyn on the drive as it is
+
+MOST_MAPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +58,24 @@ class Choice:
     slower: float
     reference: str
 
+    @property
+    def rows(self) -> list[Row]:
+        """The rows of all candidates."""
+        return [one.row for one in self.candidates]
+
     def of(self, name: str) -> Candidate | None:
         """The candidate of this name."""
         return next((one for one in self.candidates if one.name == name), None)
+
+    @property
+    def mapped(self) -> list[Candidate]:
+        """Those whose maps are shown: the two chosen, direct, and others with the least worst case."""
+        others = sorted(
+            (one for one in self.candidates if one.means.realisable),
+            key=lambda one: math.inf if math.isnan(one.worst) else one.worst,
+        )
+        first = [self.recommended, self.ordinary, self.of(REFERENCE)]
+        return list(dict.fromkeys([one for one in first if one is not None] + others))[:MOST_MAPS]
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""
@@ -88,8 +107,8 @@ def choose(rows: Sequence[Row], maps: Sequence[RobustnessMap], slower: float = S
     the quickest strategy takes its place.
     """
     times = {label_of(row.run.controller): row.run.start_time for row in rows}
-    direct = times.get("direct", math.nan)
-    reference = "direct"
+    direct = times.get(REFERENCE, math.nan)
+    reference = REFERENCE
     if math.isnan(direct):
         reached = {name: time for name, time in times.items() if not math.isnan(time)}
         reference = min(reached, key=lambda name: reached[name]) if reached else ""
@@ -127,3 +146,94 @@ def _best(inside: Sequence[Candidate]) -> Candidate | None:
     least = min(one.worst for one in inside)
     alike = [one for one in inside if one.worst <= least * (1.0 + ALIKE)]
     return min(alike, key=lambda one: one.row.run.k_dyn)
+
+
+def choice_section(choice: Choice) -> Html:
+    """The rule, what it finds, and every strategy before it."""
+    cells = choice.candidates[0].map.k_dyn.size
+    than = f"than {choice.reference}" if choice.reference else ""
+    rule = (
+        "The rule: among the strategies that work with what a drive itself measures (motor encoder and "
+        "motor torque), "
+        f"that reach the target speed in all {cells} cells of the map and whose start is at most "
+        f"{short(100.0 * choice.slower)}\N{NO-BREAK SPACE}% slower {than}, take the one with the least "
+        "worst-case K_dyn over the map; "
+        f"of several within {percent(ALIKE, 0)}, the one with the least K_dyn on the drive as it is. "
+        f"Strategies that "
+        "must see the gap or the shaft torque are shown as yardsticks and not recommended: drives have no "
+        "such "
+        "sensor."
+    )
+    order = sorted(
+        choice.candidates, key=lambda one: (bool(one.out), math.inf if math.isnan(one.worst) else one.worst)
+    )
+    rows = []
+    for one in order:
+        verdict = "recommended" if one is choice.recommended else f"out: {one.out}" if one.out else "in"
+        if one is choice.ordinary and one is not choice.recommended:
+            verdict += "; best of an ordinary inverter"
+        rows.append([
+            one.name, fixed(one.worst, 3), digits(one.map.worst_at[0], 3), digits(one.map.worst_at[1], 3),
+            fixed(one.row.run.k_dyn, 3), fixed(100.0 * one.slower, 1), verdict,
+        ])  # fmt: skip
+    strong = [index for index, one in enumerate(order) if one in (choice.recommended, choice.ordinary)]
+    heads = ["strategy", "worst K_dyn", "at gap, rad", "and J2, kg m²", "K_dyn here", "slower, %", "verdict"]
+    made = table(
+        heads, rows, caption="Every strategy before the rule", text_columns=(0, 6), strong=strong,
+        class_="names",
+    )  # fmt: skip
+    return html(
+        tag("p", *_found(choice)),
+        tag("p", rule),
+        made,
+    )
+
+
+def _next_one(best: Candidate, nearest: Candidate) -> str:
+    """How far the next one in is behind, or why it is not taken though its worst case is no worse."""
+    worst, here = fixed(nearest.worst, 3), fixed(nearest.row.run.k_dyn, 3)
+    if nearest.worst <= best.worst * (1.0 + ALIKE):
+        return (
+            f"; {nearest.name} is as good there within {percent(ALIKE, 0)} ({worst}), but no gentler on the "
+            f"drive as it is ({here}). "
+        )
+    return f"; the next one in, {nearest.name}, reaches {worst}. "
+
+
+def _found(choice: Choice) -> list[Html | str]:
+    best, plain = choice.recommended, choice.ordinary
+    said: list[Html | str] = []
+    if best is None:
+        said.append("No strategy fulfils the rule below, so none is recommended. ")
+    else:
+        second = [one for one in choice.candidates if not one.out and one is not best]
+        nearest = min(second, key=lambda one: one.worst, default=None)
+        gap, inertia = best.map.worst_at
+        said += [
+            tag("strong", f"Recommended: {best.name}. "),
+            f"Its K_dyn is {fixed(best.row.run.k_dyn, 3)} on the drive as it is and nowhere on the map above "
+            f"{fixed(best.worst, 3)} (gap {digits(gap, 3)} rad, J2 {digits(inertia, 3)} kg m²)",
+            _next_one(best, nearest) if nearest else ". ",
+            f"It measures: {best.means.measures}. "
+            f"Can an ordinary inverter do it? {best.means.inverter.capitalize()}. ",
+        ]
+    if plain is None:
+        said.append("No ramp was examined, so nothing is said for an ordinary inverter.")
+        if any(one.means.ordinary for one in choice.candidates):
+            said[-1] = (
+                "No torque ramp reaches the target speed everywhere, so none is offered for an ordinary "
+                "inverter."
+            )
+    elif plain is not best:
+        slow = (
+            f", though {percent(plain.slower)} slower, beyond the limit of the rule"
+            if choice.too_slow
+            else ""
+        )
+        said += [
+            tag("strong", f"On an ordinary inverter: {plain.name}"),
+            f"{slow}. K_dyn {fixed(plain.row.run.k_dyn, 3)}, worst {fixed(plain.worst, 3)}.",
+        ]
+    else:
+        said.append("It is also the best that an ordinary inverter offers.")
+    return said

@@ -1,27 +1,33 @@
-"""The drive: its scheme and its data."""
+"""The drive: its scheme as SVG, drawn from its numbers, and its data.
+
+In the scheme the height of a disc goes with the fourth root of its inertia, as that of steel discs of one
+thickness. The lengths of the spring and of the gap share one scale of angles: the twist of the shaft under
+the starting torque, Ms/c, and the gap, from a least length on that their labels need.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from html import escape
 
 from softstart.drive import PARAMETERS, Drive
-from softstart.reporting.markup import Html, html, table, tag
+from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.resolution import rated_torque
-from softstart.reporting.scheme import scheme
-from softstart.reporting.values import RPM, digits, short, unit
+from softstart.reporting.values import MINUS, RPM, digits, short, unit
 from softstart.start import metrics
 
-if TYPE_CHECKING:
-    from softstart.reporting.figure_list import Figures
-    from softstart.reporting.result import Report
-
 HIDDEN = ("name", "source", "noise_seed", "encoder_phase")
+_AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
+_ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
+_LABEL = 124.0  # px: what the gap and its label need at least
+_LETTER = 0.62  # of the size of a font: width of a letter, amply
+_APART = 22.0  # px between labels
+_INK, _GREY, _ORANGE, _BLUE = "#222222", "#666666", "#B34D00", "#00598C"
+_FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 
 
-def drive_section(report: Report, figures: Figures) -> Html:
+def drive_section(drive: Drive, figures: Figures) -> Html:
     """Scheme, data, and what follows from them."""
-    drive = report.drive
     prefix = figures.prefix()
     caption = (
         "The drive, everything brought to the motor shaft. The height of a disc goes with the fourth root "
@@ -81,3 +87,162 @@ def _derived(drive: Drive) -> Html:
         [f"100 % of torque in the parameter sheets: the {meant}", digits(rated), "N m"],
     ]
     return table(["figure", "value", "unit"], rows, caption="Derived figures", text_columns=(0, 2))
+
+
+def scheme(drive: Drive, prefix: str) -> Html:
+    """The scheme as an <svg> element."""
+    J1, J2, gap, c, d = (float(v) for v in (drive.J1, drive.J2, drive.gap, drive.c, drive.d))
+    tallest = max(J1, J2)
+    high1, high2 = (max(_LEAST, _TALLEST * (J / tallest) ** 0.25) for J in (J1, J2))
+    windup = float(drive.Ms) / c
+    coil = max(_LEAST_COIL, _ANGLES * windup / (windup + gap))
+    damper = f"d = {short(d)} N m s/rad" if d > 0.0 else ""
+    inertia = f"{short(J1)} kg m²"  # is wider than its disc, and beside the damper's label
+    spring = max(_SHORTEST_SHAFT, coil + 24.0, _width(damper) + max(_width(inertia) - 64.0, 2.0 * _APART))
+    opening = max(_LEAST_GAP, _ANGLES * gap / (windup + gap)) if gap > 0.0 else 0.0
+    parts: list[str] = []
+    motor, load = (
+        f"up to {short(float(drive.maximum_torque))} N m",
+        f"{short(float(drive.Mc))} N m, {drive.load_kind}",
+    )
+    x = max(120.0, 40.0 + _width(motor, 12))
+    parts += _disc(x, high1, "#D6E6F2", "J1", "motor", inertia)
+    parts += _torque(x - 34.0, "u", motor, _ORANGE, left=True)
+    parts.append(_text(x + 32.0, _AXIS - 0.5 * high1 - 12.0, "phi1, w1"))
+    x += 64.0
+    parts += _shaft(x, spring, coil, c, damper)
+    x += spring + 24.0
+    if gap > 0.0:
+        label = f"gap {gap:.4g} rad".replace("-", MINUS)
+        room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
+        parts += _claw(x, room, opening, float(drive.start_position) / gap, label)
+        x += room
+    else:
+        parts.append(_line(x, x + 60.0))
+        parts.append(_text(x + 30.0, _AXIS - 14.0, "no gap"))
+        x += 60.0
+    parts += _disc(x, high2, "#E3EFE0", "J2", "load", f"{short(J2)} kg m²")
+    parts += _torque(x + 98.0, "Mc", load, _BLUE, left=False)
+    parts.append(_text(x + 32.0, _AXIS - 0.5 * high2 - 12.0, "phi2, w2"))
+    width = x + max(64.0 + 150.0, 98.0 + 18.0 + _width(load, 12))
+    title = (
+        f"Two masses and a gap: motor J1 = {short(J1)} kg m², shaft c = {short(c)} N m/rad, "
+        f"gap {short(gap)} rad, load J2 = {short(J2)} kg m², load torque Mc = {short(float(drive.Mc))} N m"
+    )
+    head = tag("title", title, id=f"{prefix}-title")
+    return Html(
+        f'<svg class="scheme" viewBox="0 0 {width:.0f} 300" role="img" aria-labelledby="{prefix}-title" '
+        f'font-family="{_FONT}" font-size="14">{head}' + "".join(parts) + "</svg>"
+    )
+
+
+def _disc(x: float, high: float, colour: str, symbol: str, name: str, value: str) -> list[str]:
+    box = f'x="{x:.1f}" y="{_AXIS - 0.5 * high:.1f}" width="64" height="{high:.1f}"'
+    low = _AXIS + 0.5 * high
+    return [
+        f'<rect {box} fill="{colour}" stroke="{_INK}" stroke-width="2"/>',
+        _text(x + 32.0, _AXIS + 5.0, symbol),
+        _text(x + 32.0, low + 20.0, name, colour=_GREY),
+        _text(x + 32.0, low + 39.0, value),
+    ]
+
+
+def _width(text: str, size: int = 14) -> float:
+    """How wide a text may be, px."""
+    return _LETTER * size * len(text)
+
+
+def _shaft(x: float, length: float, coil: float, c: float, damper: str) -> list[str]:
+    """A spring, and below it a damper if there is damping."""
+    lead, turns = 0.5 * (length - coil), max(3, round(coil / 16.0))
+    step = coil / (2 * turns)
+    points = [(x, _AXIS), (x + lead, _AXIS)]
+    points += [(x + lead + (k + 0.5) * step, _AXIS + (14.0 if k % 2 else -14.0)) for k in range(2 * turns)]
+    points += [(x + length - lead, _AXIS), (x + length + 24.0, _AXIS)]
+    parts = [_polyline(points), _text(x + 0.5 * length + 12.0, _AXIS - 26.0, f"c = {short(c)} N m/rad")]
+    if damper:
+        middle, low, left, right = x + 0.5 * length, _AXIS + 48.0, x + 6.0, x + length - 6.0
+        parts += [
+            _polyline([(left, _AXIS), (left, low), (middle - 6.0, low)]),
+            _polyline([(middle + 14.0, low - 12.0), (middle - 14.0, low - 12.0), (middle - 14.0, low + 12.0),
+                       (middle + 14.0, low + 12.0)]),
+            _bar(middle - 6.0, low - 9.0, low + 9.0, 4),
+            _polyline([(middle - 6.0, low), (right, low), (right, _AXIS)]),
+            _text(middle, low + 32.0, damper),
+        ]  # fmt: skip
+    return parts
+
+
+def _claw(start: float, room: float, opening: float, place: float, label: str) -> list[str]:
+    """A claw of the motor's side between two flanks of the load's, where the start finds it."""
+    x = start + 0.5 * (room - opening - 12.0)
+    left, right = x + 3.0, x + opening + 9.0
+    middle = 0.5 * (left + right) + min(max(place, -0.5), 0.5) * opening
+    top, flank = _AXIS - 44.0, _AXIS + 34.0
+    return [
+        _polyline([(start + room, _AXIS), (right, _AXIS)]),
+        _polyline(
+            [(right, flank), (right, top), (left, top), (left, flank)], broken=(_AXIS - 10.0, _AXIS + 10.0)
+        ),
+        _line(start - 24.0, middle),
+        _bar(middle, _AXIS - 28.0, _AXIS + 28.0, 6),
+        f'<line x1="{left:.1f}" y1="{flank + 14}" x2="{right:.1f}" y2="{flank + 14}" stroke="{_GREY}"/>',
+        *(
+            f'<line x1="{at:.1f}" y1="{flank + 6}" x2="{at:.1f}" y2="{flank + 22}" stroke="{_GREY}"/>'
+            for at in (left, right)
+        ),
+        _text(0.5 * (left + right), flank + 40.0, label),
+    ]
+
+
+def _torque(x: float, symbol: str, value: str, colour: str, *, left: bool) -> list[str]:
+    bend, tip = (-1.0, 1.0) if left else (1.0, -1.0)
+    start, end = _AXIS + 34.0, _AXIS - 34.0
+    if not left:
+        start, end = end, start
+    arc = f"M {x:.1f} {start} A 42 42 0 0 1 {x:.1f} {end}"
+    head = [(x + bend * 9.0, end + tip * 6.0), (x, end), (x + bend * -3.0, end + tip * 12.0)]
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in head)
+    at = x + bend * 24.0
+    return [
+        f'<path d="{arc}" fill="none" stroke="{colour}" stroke-width="2.5"/>',
+        f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2.5"/>',
+        _text(at, _AXIS + 5.0, symbol, colour=colour, anchor="end" if left else "start"),
+        _text(
+            x + (12.0 if left else 0.0), _AXIS + 62.0, value, 12, colour, anchor="end" if left else "start"
+        ),
+    ]
+
+
+def _line(left: float, right: float) -> str:
+    return (
+        f'<line x1="{left:.1f}" y1="{_AXIS}" x2="{right:.1f}" y2="{_AXIS}" stroke="{_INK}" stroke-width="2"/>'
+    )
+
+
+def _bar(x: float, top: float, bottom: float, width: int) -> str:
+    ends = f'x1="{x:.1f}" y1="{top}" x2="{x:.1f}" y2="{bottom}"'
+    return f'<line {ends} stroke="{_INK}" stroke-width="{width}"/>'
+
+
+def _polyline(points: list[tuple[float, float]], broken: tuple[float, float] | None = None) -> str:
+    """A line through points; `broken`: its last piece leaves out these heights, where another part passes."""
+    runs = [points]
+    if broken is not None:
+        (x, y0), (_, y1) = points[-2:]
+        runs = [[*points[:-1], (x, broken[0])], [(x, broken[1]), (x, y1)]]
+        assert y0 < broken[0] < broken[1] < y1
+    return "".join(
+        f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in run)}" fill="none" stroke="{_INK}" '
+        'stroke-width="2"/>'
+        for run in runs
+    )
+
+
+def _text(
+    x: float, y: float, said: str, size: int = 14, colour: str = _INK, *, anchor: str = "middle"
+) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}" fill="{colour}">'
+        f"{escape(said)}</text>"
+    )

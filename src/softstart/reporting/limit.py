@@ -11,18 +11,36 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
+from softstart.optimal import linear_search, whole
 from softstart.optimal.front_points import FrontPoint
+from softstart.optimal.labels import name_points
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.pulse_coast_hold import applies
 from softstart.optimal.result import InfeasibleError, OptimumError
-from softstart.reporting.known import KnownStart, known_starts
+from softstart.optimal.solving import optimize
+from softstart.reporting.choice import Choice
+from softstart.reporting.gentle_starts import GentleStart, gentle_starts
+from softstart.reporting.markup import Figures, Html, html, joined, table, tag
+from softstart.reporting.strategies import GREY, SMALL, WIDE, label_of, name_in_figure, ordered
+from softstart.reporting.values import digits, fixed, listed, percent, short
+from softstart.start.comparison import REFERENCE, Row
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 
+if TYPE_CHECKING:
+    from matplotlib import ticker
+    from matplotlib.axes import Axes
+else:
+    ticker = late("matplotlib.ticker")
+
+TIGHT = 1.0  # per cent between an optimum and its bound that counts as certified
 TERMINAL: Terminal = "reached"
 SHARES = (1.02, 1.05, 1.1, 1.2, 1.35, 1.6)  # of the start time of direct, where optima are looked for
 INSTANTS = 80  # of the curve of the bound
@@ -49,7 +67,7 @@ class Limit:
     shortest: float = math.nan
     points: tuple[FrontPoint, ...] = ()
     missing: tuple[float, ...] = ()
-    known: tuple[KnownStart, ...] = ()
+    known: tuple[GentleStart, ...] = ()
     budget: float = 0.0
     refusal: str = ""
 
@@ -57,10 +75,11 @@ class Limit:
         """The optimum for a start time, if it was found."""
         return next((p for p in self.points if p.found and p.start_time_bound == start_time), None)
 
-    def gentlest_known(self, start_time: float) -> float | None:
-        """Least K_dyn of all optima and other starts found that take no longer, None without any."""
+    def gentlest_known(self, start_time: float, rows: Sequence[Row] = ()) -> float | None:
+        """Least K_dyn of `rows`, optima and other starts found that take no longer, None without any."""
         found = [p.k_dyn for p in self.found if p.k_dyn is not None and p.start_time_bound <= start_time]
         found += [one.k_dyn for one in self.known if one.start_time <= start_time]
+        found += [row.run.k_dyn for row in rows if row.run.start_time <= start_time]
         return min(found, default=None)
 
     @property
@@ -127,14 +146,14 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
     bounds = [bound_at(drive, float(t)) for t in times]
     curve = [(float(t), b) for t, b in zip(times, bounds, strict=True) if b is not None]
     points, left = _by_formula(drive, asked)
-    known: list[KnownStart] = []
+    known: list[GentleStart] = []
     if left and budget > 0.0:
         began = time.monotonic()
         points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, tell)
         tell(1.0, "looking for gentle starts")
         best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
         order = sorted(left, key=lambda t: t in best)  # those without an optimum first
-        known = known_starts(drive, order, budget - (time.monotonic() - began))
+        known = gentle_starts(drive, order, budget - (time.monotonic() - began))
         known = [one for one in known if one.k_dyn < GENTLER * best.get(one.start_time_bound, math.inf)]
     settled = {p.start_time_bound for p in points if p.status != "NOT_FOUND"}
     return Limit(
@@ -150,8 +169,6 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
 
 def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint], list[float]]:
     """Optima of the closed form, and the start times for which there is none."""
-    from softstart.optimal.solving import optimize
-
     points, left = [], []
     for start_time in asked:
         try:
@@ -184,3 +201,250 @@ def _in_own_process(drive: Drive, asked: Sequence[float], budget: float, tell: T
         told.seek(0)
         lines = told.read().split("\n")[:-1]  # what follows the last line break was cut off
     return [FrontPoint.of_record(json.loads(line)) for line in lines]
+
+
+def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:
+    """Figure, table and what can and cannot be said."""
+    if limit.refusal:
+        return tag("p", "For this drive there is no limit to compare with. ", limit.refusal)
+    caption = (
+        "Every strategy (filled: recommended, and best of an ordinary inverter) by its start time and "
+        "K_dyn. Below "
+        "the dashed line (hatched) no start is possible, with whatever motor torque within its limits and "
+        "however it is controlled."
+    )
+    if limit.found:
+        caption += " The solid line joins optimal starts, each simulated exactly."
+    if limit.known:
+        caption += " The dash-dotted line joins starts that a quick search found: possible, not proved best."
+    title = "K_dyn against start time: " + "; ".join(
+        f"{one.name} {fixed(one.row.run.k_dyn, 3)} at {digits(one.row.run.start_time)} s"
+        for one in choice.candidates
+    )
+    return html(
+        figures.drawn(limit_figure(choice, limit), title, caption) if choice.of(REFERENCE) else None,
+        _how_near(drive, choice, limit),
+        tag("ul", joined(tag("li", one) for one in _notes(drive, choice, limit)), class_="notes"),
+    )
+
+
+def _how_near(drive: Drive, choice: Choice, limit: Limit) -> Html:
+    """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
+    in_doubt = any(limit.optimum_at(row.run.start_time) is None for row in choice.rows)
+    heads = ["strategy", "start time, s", "K_dyn", "lower bound at that time"]
+    heads += ["optimum at that time", "times the optimum"] if limit.found else []
+    heads += ["gentlest start known in that time"] if in_doubt else []
+    heads.append("times the bound")
+    rows = []
+    for row in ordered(choice.rows):
+        run, bound = row.run, bound_at(drive, row.run.start_time)
+        cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3), fixed(bound, 3)]
+        if limit.found:
+            best = limit.optimum_at(run.start_time)
+            cells.append(fixed(best.k_dyn if best else None, 3))
+            cells.append(fixed(run.k_dyn / best.k_dyn if best and best.k_dyn else None, 2))
+        if in_doubt:
+            cells.append(fixed(limit.gentlest_known(run.start_time, choice.rows), 3))
+        rows.append([*cells, fixed(run.k_dyn / bound if bound else None, 2)])
+    caption = "How near each strategy comes to the limit in its own start time"
+    return table(heads, rows, caption=caption, class_="names")
+
+
+def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
+    return [
+        "Lower bound: proved from the momentum of the load, for every torque from "
+        f"{short(float(drive.minimum_torque))} to {short(float(min(drive.Ms, drive.maximum_torque)))} N m "
+        "over time and any number of contacts. A dash: no bound at that start time.",
+        *_on_optima(drive, limit),
+        *_on_the_shortest(choice, limit),
+        *_on_missing(drive, limit),
+        *_on_the_recommended(drive, choice, limit),
+    ]
+
+
+def _on_optima(drive: Drive, limit: Limit) -> list[str]:
+    """Of how many optima it is proved that nothing is gentler, and among which starts."""
+    every, single, loose = [], [], []
+    for p in limit.found:
+        bound, above = bound_at(drive, p.start_time_bound), p.gap_percent
+        if bound and p.k_dyn is not None and 100.0 * (p.k_dyn / bound - 1.0) <= TIGHT:
+            every.append(100.0 * (p.k_dyn / bound - 1.0))
+        elif above is not None and above <= TIGHT:
+            single.append(p)
+        else:
+            loose.append(math.inf if above is None else above)
+    notes = []
+    if every:
+        notes.append(
+            f"{len(every)} of {len(limit.found)} optima are certified against every other start: none lies "
+            f"more than {digits(max(*every, 0.001), 1)} % above the lower bound."
+        )
+    if single:
+        notes.append(
+            f"{'That' if len(single) == 1 else 'Those'} at {_times([p.start_time_bound for p in single])} "
+            f"{'is' if len(single) == 1 else 'are'} certified among starts whose gap closes only once, to "
+            f"{digits(max(*(p.gap_percent or 0.0 for p in single), 0.001), 1)} %. That a start that bounces "
+            "in the gap is gentler, down to the lower bound, is not ruled out."
+        )
+    if loose:
+        far = f", up to {digits(max(loose), 2)} % above their lower bound" if max(loose) < math.inf else ""
+        notes.append(
+            f"{len(loose)} of {len(limit.found)} optima are the best starts found{far}: gentler ones may "
+            "exist."
+        )
+    return notes
+
+
+def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
+    """Start times for which there is no start with a single contact, or just one."""
+    refused = [p for p in limit.points if p.status == "INFEASIBLE"]
+    once = [row.run.start_time for row in choice.rows if row.run.contacts == 1]
+    soonest = min((time for time in once if not math.isnan(time)), default=math.inf)
+    # within rounding of the shortest time the search may refuse a start that a strategy has made
+    none = [p for p in refused if p.start_time_bound < soonest and p.shortest_start_time is not None]
+    only = [p for p in refused if p.start_time_bound >= soonest]
+    notes = []
+    if none:
+        notes.append(
+            f"In {_times([p.start_time_bound for p in none])} there is no start whose gap closes only once; "
+            f"the shortest such start takes {digits(none[0].shortest_start_time, 5)} s. Quicker starts "
+            "bounce in the gap."
+        )
+    if only:
+        notes.append(
+            f"In {_times([p.start_time_bound for p in only])} there is no choice: no start whose gap closes "
+            "only once was found that is noticeably quicker, so there is no optimum to tell."
+        )
+    return notes
+
+
+def _on_missing(drive: Drive, limit: Limit) -> list[str]:
+    """Where there is no optimum, why, and what is shown instead."""
+    notes = []
+    if limit.missing:
+        ended = (
+            f"none was found within the {short(limit.budget)} s given (more: --budget)"
+            if limit.budget
+            else "none was looked for (--budget 0)"
+        )
+        if gave_up := limit.gave_up:
+            ended += f"; at {_times([p.start_time_bound for p in gave_up])} the search ended without one"
+        notes.append(
+            f"For {_times(limit.missing)} no optimum is shown: {_why_hard(drive)}, and {ended}. The lower "
+            "bound holds all the same. A longer search: softstart pareto."
+        )
+    if limit.known:
+        notes.append(
+            "Starts found: the best of some thousand torques over time that a quick search tried, each "
+            "simulated exactly. They are known to be possible, not known to be the gentlest: the limit lies "
+            "between them and the lower bound."
+        )
+    return notes
+
+
+def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
+    """Between which figures the least K_dyn lies in the start time of the recommended strategy."""
+    best = choice.recommended
+    if best is None:
+        return []
+    time, own = best.row.run.start_time, best.row.run.k_dyn
+    bound, known = bound_at(drive, time), limit.gentlest_known(time, choice.rows)
+    if bound is None or known is None:
+        return []
+    optimum = limit.optimum_at(time)
+    if optimum is not None and 100.0 * (known / bound - 1.0) <= TIGHT:
+        return []
+    said = (
+        f"In the {digits(time)} s of {best.name} the least possible K_dyn thus lies "
+        f"between {fixed(bound, 3)} (proved) and {fixed(known, 3)} "
+    )
+    most = percent(1.0 - bound / own)
+    if known < own:
+        return [
+            f"{said}(found): {best.name} with {fixed(own, 3)} could be undercut by "
+            f"{percent(1.0 - known / own)} for certain, by {most} at most."
+        ]
+    return [f"{said}(that of {best.name} itself, the gentlest start known): {most} less at most."]
+
+
+def _times(times: Sequence[float]) -> str:
+    """Start times in words, each once, or how many there are."""
+    words = list(dict.fromkeys(f"{digits(t)} s" for t in times))
+    return f"{len(times)} start times" if len(words) > 4 else listed(words)
+
+
+def _why_hard(drive: Drive) -> str:
+    problem = Problem(drive, 1.0, "reached")
+    if linear_search.not_linear(problem) and (reason := whole.not_linear(problem)):
+        return f"they need a numerical search (direct collocation), because {reason}"
+    if reason := applies(problem):
+        return f"there is no formula ({reason}), only a search by linear programs"
+    return "so near the shortest start time there is no formula, and a linear program has to be certified"
+
+
+def limit_figure(choice: Choice, limit: Limit) -> Any:
+    """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
+    placed = [one for one in choice.candidates if not math.isnan(one.row.run.start_time)]
+    optima = limit.found
+    own = [one.row.run.start_time for one in placed] + [p.start_time_bound for p in optima]
+    own += [one.start_time for one in limit.known]
+    left, right = min(own), max(own)
+    right = max(right, 1.001 * left)  # a single start
+    values = [one.row.run.k_dyn for one in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
+    values += [one.k_dyn for one in limit.known]
+    with drawing():
+        figure, axes = new_figure(1, 1, (WIDE, 3.6))
+        left, right = left - 0.15 * (right - left), right + 0.04 * (right - left)
+        if limit.times:
+            t, k = _within(limit, left, right, 2.0 * max(values))
+            axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
+            axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound: no torque goes below")
+            values.append(float(k.min()))
+        if optima:
+            axes.plot(
+                [p.start_time_bound for p in optima], [p.k_dyn for p in optima], "-", color=COLOURS[0],
+                lw=1.2, marker=".", ms=7, label="optimum found", zorder=3,
+            )  # fmt: skip
+        if limit.known:
+            axes.plot(
+                [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], ls=DASHES[2],
+                color="black", lw=1.0, marker="+", ms=6, label="start found: possible, not proved best",
+                zorder=3,
+            )  # fmt: skip
+        for index, one in enumerate(placed):
+            best = one is choice.recommended or one is choice.ordinary
+            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], "osD^vPX*"[index % 8],
+                      ms=8 if best else 6.5, mfc=COLOURS[(index + 1) % 8] if best else "white", mew=1.6,
+                      color=COLOURS[(index + 1) % 8], zorder=4)  # fmt: skip
+        axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
+        low, high = min(values), max(values)
+        if high > 4.0 * low:
+            _logarithmic(axes, low, high)
+        else:
+            axes.set_ylim(0.0, 1.1 * high)
+        axes.set_xlim(left, right)
+        axes.set_xlabel("start time, s")
+        axes.set_ylabel("K_dyn")
+        handles = axes.get_legend_handles_labels()[0]
+        if handles:
+            figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=SMALL)
+        points = [(name_in_figure(one.name), one.row.run.start_time, one.row.run.k_dyn) for one in placed]
+        name_points(figure, axes, points)
+    return figure
+
+
+def _within(limit: Limit, left: float, right: float, most: float) -> tuple[Any, Any]:
+    """The curve of the bound in the frame: near the shortest start time it rises beyond all others."""
+    times, bounds = np.array(limit.times), np.minimum(limit.bounds, most)
+    inside = times[(times > left) & (times < right)]
+    ends = [t for t in (left, right) if times[0] <= t <= times[-1]]
+    t = np.union1d(inside, ends) if inside.size or ends else times
+    return t, np.interp(t, times, bounds)
+
+
+def _logarithmic(axes: Axes, low: float, high: float) -> None:
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
+    axes.yaxis.set_major_formatter(ticker.FuncFormatter(lambda k, _: f"{k:g}"))
+    axes.yaxis.set_minor_locator(ticker.NullLocator())
+    axes.set_ylim(0.8 * low, 1.2 * high)

@@ -1,20 +1,29 @@
-"""HTML from small functions: text is escaped, only what they made themselves is not."""
+"""HTML from small functions: text is escaped, only what they made themselves is not. Figures become SVG."""
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import TYPE_CHECKING, Any
+
+from softstart.late import late
+from softstart.views.drawing import drawing
+
+if TYPE_CHECKING:
+    import matplotlib as mpl
+else:
+    mpl = late("matplotlib")
 
 VOID = frozenset({"meta", "br", "hr", "col"})
+Part = str | None
 
 
 class Html(str):
     """Text that is HTML already. Plain `str` never is."""
 
     __slots__ = ()
-
-
-Part = str | None
 
 
 def html(*parts: Part) -> Html:
@@ -85,4 +94,51 @@ def css_string(text: str) -> str:
         '"'
         + "".join(c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in text)
         + '"'
+    )
+
+
+class Figures:
+    """Numbers the figures of one report in the order in which they are made, with ids of their own."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def prefix(self) -> str:
+        """What the ids of the next figure begin with."""
+        self.count += 1
+        return f"figure-{self.count}"
+
+    def drawn(self, figure: Any, title: str, caption: Part) -> Html:
+        """A figure of matplotlib with its caption; `title` describes it to those who cannot see it."""
+        return self.ready(inlined(figure, self.prefix(), title), caption)
+
+    def ready(self, picture: Html, caption: Part) -> Html:
+        """A picture that was made with the last prefix, with its caption."""
+        return tag("figure", picture, tag("figcaption", tag("b", f"Figure {self.count}. "), caption))
+
+
+def inlined(figure: Any, prefix: str, title: str) -> Html:
+    """The figure as an <svg> element whose ids begin with `prefix`; text is drawn as paths.
+
+    The same figure gives the same text. Screen readers read `title` instead of it.
+    """
+    buffer = io.StringIO()
+    with drawing(), mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": prefix}):
+        figure.savefig(
+            buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
+        )
+    whole = buffer.getvalue()
+    box = re.search(r'viewBox="([^"]+)"', whole)
+    assert box is not None
+    inner = whole[whole.index(">", whole.index("<svg")) + 1 : whole.rindex("</svg>")]
+    # a <style> would hold for the whole page; comments repeat every text
+    inner = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", "", inner, flags=re.DOTALL)
+    inner = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', inner)
+    inner = re.sub(r'(?:xlink:)?href="#([^"]+)"', rf'href="#{prefix}-\1"', inner)
+    inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", inner)
+    inner = re.sub(r"\s*\n\s*", "\n", inner)
+    head = tag("title", title, id=f"{prefix}-title")
+    return Html(
+        f'<svg class="plot" viewBox="{box[1]}" role="img" aria-labelledby="{prefix}-title">'
+        f"{head}{inner}</svg>"
     )

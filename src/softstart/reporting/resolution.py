@@ -95,8 +95,8 @@ class Resolution:
             return 2.0 * math.pi * self.frequency if "frequency" in name else self.speed
         return {"s": self.time, "1": self.share}.get(unit)
 
-    def told(self, drive: Drive) -> list[tuple[str, str]]:
-        """What is rounded to what, for people."""
+    def described(self, drive: Drive) -> list[tuple[str, str]]:
+        """What is rounded to what, in words."""
         rated, meant = rated_torque(drive)
         if self.torque is not None:
             torque = f"{short(self.torque)} N m"

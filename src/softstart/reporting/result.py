@@ -1,21 +1,59 @@
-"""What a report holds: the data behind everything that it says."""
+"""`report`: compare, bound, map, choose, round; a `Report` holds the data behind everything that is said."""
 
 from __future__ import annotations
 
-import math
+import platform
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, requires, version
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
+from softstart import __version__
+from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
+from softstart.errors import InputError, SimulationError
 from softstart.export import write_whole
-from softstart.reporting.choice import Choice
-from softstart.reporting.limit import Limit, bound_at
-from softstart.reporting.provenance import Provenance
+from softstart.late import late
+from softstart.reporting.choice import SLOWER, Choice, choose
+from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.resolution import Resolution
-from softstart.reporting.sheet import Sheet
+from softstart.reporting.robustness import robustness
+from softstart.reporting.sheet import Sheet, make_sheet
 from softstart.reporting.strategies import label_of
-from softstart.start.comparison import Comparison, Row
+from softstart.start.comparison import REFERENCE, Comparison, Row, compared, make_controllers
+from softstart.start.simulation import simulate
+
+document = late("softstart.reporting.document")  # renders a Report, so it stands above this module
+
+BUDGET = 20.0  # s for optima that take a search
+Progress = Callable[[float, str], object]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Versions, date (UTC), the drive's file and the command."""
+
+    made: str
+    softstart: str
+    python: str
+    libraries: tuple[tuple[str, str], ...]
+    drive_toml: str
+    command: str
+
+    def summary(self) -> dict[str, Any]:
+        """As plain data."""
+        return {
+            "date": self.made,
+            "softstart": self.softstart,
+            "python": self.python,
+            "libraries": dict(self.libraries),
+            "drive": self.drive_toml,
+            "command": self.command,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,19 +85,16 @@ class Report:
 
     def lower_bound(self, row: Row) -> float | None:
         """The K_dyn that no start as quick as this one can go below."""
-        return None if math.isnan(row.run.start_time) else bound_at(self.drive, row.run.start_time)
+        return bound_at(self.drive, row.run.start_time)
 
     def gentlest_known(self, row: Row) -> float | None:
         """Least K_dyn of all starts that this report knows and that take no longer than this one."""
-        time = row.run.start_time
-        own = [other.run for other in self.comparison.rows if other.run.start_time <= time]
-        found = [run.k_dyn for run in own] + [self.limit.gentlest_known(time)]
-        return min((k for k in found if k is not None), default=None)
+        return self.limit.gentlest_known(row.run.start_time, self.comparison.rows)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON, under the names used everywhere."""
         best, plain = self.choice.recommended, self.choice.ordinary
-        direct = self.row("direct")
+        direct = self.row(REFERENCE)
         return {
             "drive": self.drive.name,
             "recommended": best.name if best else None,
@@ -85,11 +120,160 @@ class Report:
 
     def to_html(self) -> str:
         """The report as one HTML file that needs nothing else."""
-        from softstart.reporting.document import document
-
-        return document(self)
+        text: str = document.document(self)
+        return text
 
     def write(self, path: str | Path) -> None:
         """Write the HTML file, whole or not at all."""
         text = self.to_html()
         write_whole(Path(path), lambda stream: stream.write(text))
+
+
+def report(
+    drive: Drive | str,
+    *,
+    controllers: Sequence[str | Controller] | None = None,
+    parameters: Mapping[str, Mapping[str, object]] | None = None,
+    resolution: Resolution | Mapping[str, object] | str | None = None,
+    slower: float = SLOWER,
+    budget: float = BUDGET,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Report:
+    """Everything that a customer asks about the start of a drive, computed.
+
+    Parameters
+    ----------
+    drive : a Drive, or the name or file of one.
+    controllers : names, files of tuned gains or Controller objects; by default all installed ones that run as
+        they are. `direct` is added, if it is not among them, to compare with.
+    parameters : a controller's name -> its parameters.
+    resolution : the steps in which the inverter can be set, as "torque=0.5%,time=10ms" or a Resolution.
+    slower : by what share the start of the recommended strategy may be longer than that of direct.
+    budget : s, at most, to look for optima where there is no formula; 0 looks for none.
+    progress : told the share that is done and what is being done.
+    command : the command that repeats it, for the provenance.
+
+    Raises InputError for bad input and SimulationError where not even direct can be started.
+
+    >>> found = report("crane-4amtkf", controllers=["ramp", "shaped"], budget=0.0)
+    >>> found
+    <Report: shaped, K_dyn 1.004 recommended for Crane travel drive 4AMTKF(H)112L6>
+    >>> found.choice.ordinary.name
+    'ramp'
+    """
+    drive = Drive.load(drive) if isinstance(drive, str) else drive
+    steps = _checked(drive, resolution, slower, budget)
+    made = _made(controllers, parameters or {})
+
+    def tell(share: float, what: str) -> None:
+        if progress is not None:
+            progress(share, what)
+
+    rows: list[Row] = []
+    failed: list[tuple[str, str]] = []
+    maps = []
+    reference = simulate(drive, REFERENCE).start_time
+    for number, one in enumerate(made):
+        tell(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
+        try:
+            row = compared(drive, one, reference)
+            maps.append(robustness(drive, one))
+            rows.append(row)
+        except SimulationError as error:
+            if label_of(one) == REFERENCE:
+                raise
+            failed.append((label_of(one), " ".join(str(error).split())))
+    used = [one for one in made if label_of(one) not in dict(failed)]
+    choice = choose(rows, maps, slower)
+    sheets = []
+    chosen = [one for one in (choice.recommended, choice.ordinary) if one is not None]
+    for index, candidate in enumerate(dict.fromkeys(chosen)):
+        tell(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
+        controller = used[rows.index(candidate.row)]
+        sheets.append(make_sheet(drive, controller, candidate.row.run, steps))
+    times = [one.row.run.start_time for one in chosen]
+    direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
+    reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
+    tell(0.5, "looking for the limit")
+    found = limit(
+        drive, [*times, *reached], direct, budget, lambda share, what: tell(0.5 + 0.5 * share, what)
+    )
+    tell(1.0, "done")
+    return Report(
+        drive, Comparison(drive, tuple(rows)), tuple(failed), found, choice, tuple(sheets), steps,
+        provenance(drive, command),
+    )  # fmt: skip
+
+
+def _checked(
+    drive: object, resolution: Resolution | Mapping[str, object] | str | None, slower: object, budget: object
+) -> Resolution:
+    """The resolution; all mistakes of the input at once."""
+    wrong: list[str] = []
+    if not isinstance(drive, Drive):
+        wrong.append(f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one.")
+    elif drive.shape != ():
+        wrong.append("drive: a report is about one drive; give one value for each parameter.")
+    for name, value in (("slower", slower), ("budget", budget)):
+        if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < float("inf"):
+            meant = "a share, as 0.15" if name == "slower" else "a time in s, as 20"
+            wrong.append(f"{name} = {value!r}: give {meant}, 0 or more.")
+    steps = Resolution()
+    try:
+        if isinstance(resolution, Resolution):
+            steps = resolution
+        elif resolution is not None:
+            steps = Resolution.read(resolution)
+    except InputError as error:
+        wrong.extend(error.sentences)
+    if wrong:
+        raise InputError(wrong)
+    return steps
+
+
+def _made(
+    controllers: Sequence[str | Controller] | None, parameters: Mapping[str, Mapping[str, object]]
+) -> list[Controller]:
+    made = make_controllers(controllers, parameters)
+    labels = [label_of(one) for one in made]
+    mistakes = [
+        f"controllers: two of them are called {label}; give one of the two another name (that of its file)."
+        for label in dict.fromkeys(labels)
+        if labels.count(label) > 1
+    ]
+    if mistakes:
+        raise InputError(mistakes)
+    if not any(label_of(one) == REFERENCE for one in made):
+        made.append(make_controller(REFERENCE))
+    return made
+
+
+def provenance(drive: Drive, command: str) -> Provenance:
+    """That of a report made now.
+
+    >>> made = provenance(Drive.load("crane-4amtkf"), "softstart report")
+    >>> made.command, "numpy" in dict(made.libraries)
+    ('softstart report', True)
+    """
+    return Provenance(
+        datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"), __version__, platform.python_version(),
+        tuple((name, version(name)) for name in _libraries()), drive.to_toml(), command,
+    )  # fmt: skip
+
+
+def _libraries() -> list[str]:
+    """The installed ones that softstart requires to run."""
+    try:
+        needed = [one for one in requires("softstart") or [] if "extra ==" not in one]
+    except PackageNotFoundError:
+        needed = []
+    found = []
+    for one in needed or ["numpy", "scipy", "numba", "matplotlib"]:
+        name = re.split(r"[^A-Za-z0-9._-]", one, maxsplit=1)[0]
+        try:
+            version(name)
+        except PackageNotFoundError:
+            continue
+        found.append(name)
+    return sorted(found)

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.controller import Controller
 from softstart.drive import Drive
+from softstart.late import late
+from softstart.reporting.markup import Figures, Html, html, tag
+from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
+from softstart.reporting.values import digits, fixed, short
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
+from softstart.views.drawing import drawing, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib import colors, patches, ticker
+    from matplotlib.axes import Axes
+else:
+    colors, patches, ticker = (late(f"matplotlib.{name}") for name in ("colors", "patches", "ticker"))
 
 Matrix = NDArray[np.float64]
-
 GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
 INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
 
@@ -83,3 +94,114 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     time = np.asarray(found["start_time"][0], dtype=np.float64).reshape(shape)
     k = np.asarray(found["k_dyn"][0], dtype=np.float64).reshape(shape)
     return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k), time)
+
+
+def robustness_section(drive: Drive, shown: Sequence[tuple[str, RobustnessMap]], figures: Figures) -> Html:
+    """The maps of strategies, by name, in one scale of colours."""
+    first = shown[0][1]
+    gap, inertia = float(drive.gap), float(drive.J2)
+    gaps = f"gaps from {digits(first.gaps[0], 3)} to {digits(first.gaps[-1], 3)} rad"
+    if gap == 0.0:
+        gaps = "no gap (the drive has none, so the maps have one row and say nothing about play)"
+    text = (
+        f"Gears wear and loads change. Each strategy was set up once, for the drive as it is, and then "
+        f"started at "
+        f"{gaps} and load inertias from {short(first.inertias[0])} to {short(first.inertias[-1])} kg m². "
+        f"K_dyn refers "
+        "to the drive as it is everywhere, so the numbers compare shaft torques."
+    )
+    nominal = (
+        min(first.gaps, key=lambda v: abs(v - gap)),
+        min(first.inertias, key=lambda v: abs(v - inertia)),
+    )
+    title = "K_dyn over gap and load inertia: " + "; ".join(
+        f"{name}, worst {fixed(one.worst, 3)} at gap {short(one.worst_at[0])} rad and J2 "
+        f"{short(one.worst_at[1])} kg m²"
+        for name, one in shown
+    )
+    caption = (
+        "K_dyn over gap and load inertia, all maps in one scale of colours, dark is gentle. Framed: the "
+        "drive as it "
+        "is. Grey: the load does not reach its target speed."
+    )
+    return html(tag("p", text), figures.drawn(maps_figure(shown, nominal), title, caption))
+
+
+def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float, float]) -> Any:
+    """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
+    first = shown[0][1]
+    rows, columns = len(first.gaps), len(first.inertias)
+    finite = np.concatenate([one.k_dyn[np.isfinite(one.k_dyn)] for _, one in shown])
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (1.0, 2.0)
+    high = max(high, low * 1.02)
+    scale = colors.LogNorm(low, high) if high > 3.0 * low else colors.Normalize(low, high)
+    down = math.ceil(len(shown) / 2)
+    inertia, gap = _thousand(first.inertias), _thousand(first.gaps)
+    with drawing():
+        size = (WIDE, 0.35 + down * (0.75 + 0.31 * max(rows, 2)))
+        figure, axes = new_figure(down, 2, size, squeeze=False)
+        drawn: Any = None
+        for panel, (name, one) in zip(axes.flat, shown, strict=False):
+            panel.grid(visible=False)
+            panel.set_facecolor("#D0D0D0")
+            edges = np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5
+            cells = np.ma.masked_invalid(one.k_dyn)
+            drawn = panel.pcolormesh(
+                *edges, cells, cmap="cividis", norm=scale, edgecolors="face", linewidth=0.3
+            )
+            for (i, j), value in np.ndenumerate(one.k_dyn):
+                dark = math.isnan(value) or float(scale(value)) > 0.55
+                text = f"{value:.2f}" if math.isfinite(value) else "none"
+                panel.text(j, i, text, ha="center", va="center", fontsize=SMALL - 1.0,
+                           color="black" if dark else "white")  # fmt: skip
+            _frame(panel, first.gaps.index(nominal[0]), first.inertias.index(nominal[1]))
+            panel.set_title(f"{name_in_figure(name)}: {_worst(one)}", loc="left", fontsize=SMALL + 0.5)
+            panel.set_xticks(
+                range(columns), [f"{v / inertia:.3g}" for v in first.inertias], fontsize=SMALL - 0.5
+            )
+            panel.set_yticks(range(rows), [f"{v / gap:.3g}" for v in first.gaps], fontsize=SMALL - 0.5)
+            panel.tick_params(length=0)
+        for panel in axes.flat[len(shown) :]:
+            panel.set_axis_off()
+        for panel in axes[:, 0]:
+            panel.set_ylabel(f"gap, {_powers(gap)}rad", fontsize=SMALL)
+        for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
+            panel.set_xlabel(f"load inertia J2, {_powers(inertia)}kg m²", fontsize=SMALL)
+        bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
+        bar.set_label("K_dyn", fontsize=SMALL)
+        bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
+        bar.solids.set_edgecolor("face")
+        _plain_ticks(bar, low, high)
+    return figure
+
+
+def _thousand(values: Sequence[float]) -> float:
+    """The power of a thousand in whose multiples small or large numbers are short, 1 for usual ones."""
+    if max(values) == 0.0 or (values[0] >= 1e-2 and max(values) < 1e3):
+        return 1.0
+    return 1e3 ** math.floor(math.log10(max(values)) / 3.0)
+
+
+def _powers(unit: float) -> str:
+    """Such a power, to stand before a unit."""
+    return "" if unit == 1.0 else f"$10^{{{round(math.log10(unit))}}}$ "
+
+
+def _worst(one: RobustnessMap) -> str:
+    return f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
+
+
+def _plain_ticks(bar: Any, low: float, high: float) -> None:
+    ticks = [float(f"{v:.2g}") for v in np.geomspace(low, high, 6)]
+    bar.ax.yaxis.set_major_locator(ticker.FixedLocator([v for v in ticks if low <= v <= high]))
+    bar.ax.yaxis.set_minor_locator(ticker.NullLocator())
+    bar.ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    bar.ax.tick_params(labelsize=SMALL - 0.5)
+
+
+def _frame(axes: Axes, row: int, column: int) -> None:
+    """A frame around the drive as it is."""
+    for colour, width in (("white", 3.4), ("#D55E00", 1.8)):
+        axes.add_patch(
+            patches.Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fc="none", ec=colour, lw=width, zorder=5)
+        )

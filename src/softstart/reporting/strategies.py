@@ -1,24 +1,27 @@
-"""What a strategy asks of the inverter: what it measures, and whether an ordinary one can do it."""
+"""The strategies compared: what each needs, its figures, its traces over time."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.controller import CompiledController, Controller, Sensor
+from softstart.controller import Controller, Sensor
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.reporting.markup import Figures, Html, html, joined, table, tag
+from softstart.reporting.values import digits, fixed, listed, short
+from softstart.start import metrics
+from softstart.start.comparison import LIGHT_INERTIA, REFERENCE, WORN_GAP, Row
+from softstart.start.run import Run
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ORDINARY = ("ramp", "s-curve")
-DOCUMENTED = (
-    "acceleration-delay",
-    "current-limit-feedback",
-    "pulse-coast-hold",
-    "shaped",
-    "state-feedback",
-)
 _OPEN_LOOP = {
     "direct": "switching on at a torque limit",
     "ramp": "a torque ramp",
@@ -29,21 +32,12 @@ _SENSORS = {
     Sensor.SHAFT_TORQUE: "sensor of the shaft torque",
     Sensor.LOAD_SPEED: "encoder at the load",
 }
-_DATA = {
-    "motor_inertia": "J1",
-    "load_inertia": "J2",
-    "stiffness": "c",
-    "damping": "d",
-    "gap": "the gap",
-    "starting_torque": "Ms",
-    "load_torque": "Mc",
-    "torque_lag": "the torque lag",
-    "torque_rate": "the torque rate",
-    "torque_noise": "the noise of the torque",
-    "computing_delay": "the dead time",
-}
-_LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
-_PROBE = 1e-3  # relative
+AT_ONCE = 5  # strategies in one figure of traces: what a page holds
+LATE = 1.6  # times the median start time, up to which traces are shown
+GREY, SMALL = "#666666", 8.5
+WIDE = 7.1  # inches: what an A4 page holds
+MOST_STAGES = 6  # numbered
+LONGEST = 32  # letters of a name in a figure
 
 
 @dataclass(frozen=True)
@@ -92,28 +86,157 @@ def means_of(controller: Controller) -> Means:
     )
 
 
-def computes_with(ready: Controller, own: Drive) -> list[str] | None:
-    """The data of the drive that a controller computes with, beside its parameters; None if it does not tell.
+def ordered(rows: Sequence[Row]) -> list[Row]:
+    """The strategies, the gentlest first; those that do not reach the target speed last."""
+    return sorted(rows, key=lambda row: (math.isnan(row.run.start_time), float(f"{row.run.k_dyn:.9g}")))
 
-    >>> from softstart.controller import make_controller
-    >>> computes_with(*make_controller("acceleration-delay").set_up(Drive.load("crane-4amtkf")))
-    ['J1']
+
+def strategies_section(
+    drive: Drive, compared: Sequence[Row], chosen: Sequence[Row], failed: Sequence[tuple[str, str]]
+) -> Html:
+    """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
+    rows = ordered(compared)
+    direct = next((row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE), math.nan)
+    cells, needs = [], []
+    for row in rows:
+        run, name, means = row.run, label_of(row.run.controller), means_of(row.run.controller)
+        lost = run.start_time - direct
+        cells.append([
+            name, fixed(run.k_dyn, 3), fixed(row.k_dyn_worn_gap, 3), fixed(row.k_dyn_light_load, 3),
+            digits(run.peak_torque), digits(run.start_time), fixed(lost, _decimals(run.start_time)),
+            fixed(100.0 * lost / direct, 1), str(run.contacts),
+        ])  # fmt: skip
+        needs.append([name, run.controller.summary, means.measures, means.inverter])
+    strong = [rows.index(row) for row in chosen]
+    base = float(metrics.base_torque(drive))
+    notes = [
+        f"K_dyn is the largest shaft torque of the whole start, divided by {digits(base)} N m, the mean "
+        f"shaft torque "
+        "under the full starting torque. It is located in the exact solution, not read off a grid.",
+        f"Gap × {short(WORN_GAP)} and J2 × {short(LIGHT_INERTIA)}: the strategy as it was set up for this "
+        f"drive, when "
+        f"the gap is {short(WORN_GAP)} times as wide or the load inertia {short(LIGHT_INERTIA)} times as "
+        f"large.",
+        "Time lost: start time beyond that of direct start.",
+        *(
+            f"{label_of(row.run.controller)}: {row.run.status.value}"
+            for row in rows
+            if math.isnan(row.run.start_time)
+        ),
+        *(f"{name} could not be examined: {reason}" for name, reason in failed),
+    ]
+    first = table(
+        [
+            "strategy", "K_dyn", f"K_dyn, gap × {short(WORN_GAP)}", f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
+            "peak torque, N m", "start time, s", "time lost, s", "time lost, %", "contacts",
+        ],
+        cells, caption="Strategies on this drive, the gentlest first", strong=strong, class_="names",
+    )  # fmt: skip
+    second = table(
+        ["strategy", "what it does", "what it measures", "can an ordinary inverter do it?"], needs,
+        caption="What each strategy needs", text_columns=(0, 1, 2, 3), strong=strong, class_="words",
+    )  # fmt: skip
+    return html(first, tag("ul", joined(tag("li", one) for one in notes), class_="notes"), second)
+
+
+def _decimals(start_time: float) -> int:
+    """Decimals of start times of this size."""
+    if not start_time > 0.0:
+        return 4
+    return min(max(3 - math.floor(math.log10(start_time)), 0), 9)
+
+
+def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
+    """Torques and speeds of all strategies."""
+    runs = [row.run for row in ordered(rows)]
+    times = [run.start_time for run in runs if not math.isnan(run.start_time)]
+    ends = [run.end_time for run in runs if not math.isnan(run.start_time)]
+    shown = min(max(ends), LATE * float(np.median(times))) if times else max(run.end_time for run in runs)
+    late = [label_of(run.controller) for run in runs if run.start_time > shown]
+    cut = f" The start of {listed(late)} goes on beyond the {digits(shown)} s shown." if late else ""
+    highest = max(float(max(run.peak_torque, run.u.max())) for run in runs)
+    lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
+    parts = []
+    pieces = -(-len(runs) // AT_ONCE)
+    size = -(-len(runs) // pieces)
+    for first in range(0, len(runs), size):
+        some = runs[first : first + size]
+        names = ", ".join(label_of(run.controller) for run in some)
+        caption = (
+            f"Torques (left) and speeds (right) under {names}. Grey: the gap is open; numbers: stages, odd "
+            f"with the "
+            "gap open, even with the gap closed. Dot: the peak. Dotted: target speed and start time. All "
+            "torques "
+            f"have one scale.{cut}"
+        )
+        title = "; ".join(
+            f"{label_of(run.controller)}: peak shaft torque {digits(run.peak_torque)} N m, start time "
+            f"{digits(run.start_time)} s"
+            for run in some
+        )
+        parts.append(
+            figures.drawn(traces_figure(some, shown, lowest, highest), f"Traces over time. {title}.", caption)
+        )
+    return html(*parts)
+
+
+def traces_figure(runs: Sequence[Run], longest: float, lowest: float, highest: float) -> Any:
+    """Torques (left) and speeds (right) of several starts; grey where the gap is open.
+
+    Up to `longest` s; torques from `lowest` to `highest` N m, with some room, in all panels.
     """
-    if not isinstance(ready, CompiledController):
-        return None
-    numbers = np.asarray(ready.vector(own), dtype=np.float64)
-    found = []
-    for key, symbol in _DATA.items():
-        value = float(getattr(own, key))
-        if (value == 0.0 and key in _LEFT_OUT_AT_0) or np.isinf(value):
-            continue
-        try:
-            changes: dict[str, Any] = {key: (1.0 - _PROBE) * value or 1e-6}
-            other = own.replace(**changes)
-            moved = np.asarray(ready.vector(other), dtype=np.float64)
-        except InputError:  # then it is read, at least
-            found.append(symbol)
-            continue
-        if not np.array_equal(numbers, moved, equal_nan=True):
-            found.append(symbol)
-    return found
+    with drawing():
+        size = (WIDE, 0.55 + 1.72 * len(runs))
+        figure, axes = new_figure(len(runs), 2, size, sharex=True, squeeze=False)
+        for index, run in enumerate(runs):
+            torque, speed = axes[index]
+            for panel in (torque, speed):
+                shade_open_gap(panel, run)
+            torque.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor torque u")
+            torque.plot(run.t, run.T, color=COLOURS[0], lw=1.3, label="shaft torque T")
+            torque.plot([run.peak_time], [_peak(run)], "o", ms=3.5, color=COLOURS[0])
+            torque.set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
+            torque.set_ylabel("N m", fontsize=SMALL)
+            torque.set_title(
+                f"{name_in_figure(label_of(run.controller))}: K_dyn {run.k_dyn:.3f}",
+                loc="left",
+                fontsize=SMALL + 0.5,
+                pad=3,
+            )
+            speed.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor speed w1")
+            speed.plot(run.t, run.w2, color=COLOURS[0], lw=1.3, label="load speed w2")
+            speed.axhline(float(run.drive.target_speed), color=GREY, lw=0.8, ls=":")
+            reached = not math.isnan(run.start_time)
+            if reached:
+                speed.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
+            said = f"start time {run.start_time:.4g} s" if reached else "target speed not reached"
+            speed.set_title(said, loc="left", fontsize=SMALL + 0.5, pad=3)
+            speed.set_ylabel("rad/s", fontsize=SMALL)
+            _number_stages(torque, run, longest)
+        for panel in axes.flat:
+            panel.tick_params(labelsize=SMALL - 0.5)
+            panel.set_xlim(0.0, longest)
+        for panel in axes[-1]:
+            panel.set_xlabel("time, s", fontsize=SMALL)
+        handles = [*axes[0, 0].get_legend_handles_labels()[0], *axes[0, 1].get_legend_handles_labels()[0]]
+        figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=SMALL)
+    return figure
+
+
+def name_in_figure(name: str) -> str:
+    """A name as it is, not set as a formula, and cut where it is too long for a figure."""
+    text = name if len(name) <= LONGEST else name[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    return text.replace("$", r"\$")
+
+
+def _peak(run: Run) -> float:
+    return max(run.stages, key=lambda one: abs(one.peak_torque)).peak_torque
+
+
+def _number_stages(axes: Axes, run: Run, longest: float) -> None:
+    """The number of each stage at the top, as far as there is room."""
+    for stage in run.stages[:MOST_STAGES]:
+        if min(stage.end, longest) - stage.start > 0.025 * longest:
+            middle = 0.5 * (stage.start + min(stage.end, longest))
+            axes.text(middle, 0.985, str(stage.number), transform=axes.get_xaxis_transform(),
+                      fontsize=SMALL - 1.5, ha="center", va="top", color=GREY)  # fmt: skip

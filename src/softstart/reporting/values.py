@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from softstart.views import numbers
+
 MINUS, NOTHING = "\N{MINUS SIGN}", "\N{EN DASH}"
 UNITS = {
     "kg*m^2": "kg m\N{SUPERSCRIPT TWO}",
@@ -16,18 +18,18 @@ UNITS = {
 RPM = 30.0 / math.pi  # of one rad/s
 
 
+def printed(text: str) -> str:
+    """A number of `views.numbers` as it is printed: a true minus sign, a dash for a missing value."""
+    return NOTHING if text == numbers.NOTHING else text.replace("-", MINUS).replace("inf", "infinite")
+
+
 def fixed(value: float | None, decimals: int) -> str:
-    """A number with so many decimals; a dash for what there is not.
+    """A number with so many decimals; a dash for a missing value.
 
     >>> fixed(0.98123, 3), fixed(float("nan"), 3), fixed(-1.5, 1)
     ('0.981', '\N{EN DASH}', '\N{MINUS SIGN}1.5')
     """
-    if value is None or math.isnan(value):
-        return NOTHING
-    if math.isinf(value):
-        return ("" if value > 0 else MINUS) + "infinite"
-    text = f"{value:.{decimals}f}"
-    return text.lstrip("-") if not text.strip("-0.") else text.replace("-", MINUS)
+    return printed(numbers.number(value, decimals))
 
 
 def digits(value: float | None, count: int = 4) -> str:
@@ -36,12 +38,7 @@ def digits(value: float | None, count: int = 4) -> str:
     >>> digits(0.0165988), digits(164.81), digits(2.6e-5), digits(368.465, 6)
     ('0.01660', '164.8', '2.600e\N{MINUS SIGN}05', '368.465')
     """
-    if value is None or not math.isfinite(value) or value == 0.0:
-        return fixed(value, 0)
-    order = math.floor(math.log10(abs(value)))
-    if not -4 <= order <= 6:
-        return f"{value:.{count - 1}e}".replace("-", MINUS)
-    return fixed(value, max(0, count - 1 - order))
+    return printed(numbers.column_of([value], count)[0])
 
 
 def short(value: float) -> str:
@@ -50,7 +47,7 @@ def short(value: float) -> str:
     >>> short(0.175), short(62.0), short(float("inf"))
     ('0.175', '62', 'infinite')
     """
-    return fixed(value, 0) if not math.isfinite(value) else f"{value:.6g}".replace("-", MINUS)
+    return NOTHING if math.isnan(value) else printed(numbers.short(value))
 
 
 def unit(written: str) -> str:

@@ -9,12 +9,10 @@ import pytest
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.reporting import report
-from softstart.reporting.answer import answer
-from softstart.reporting.choice import choose
-from softstart.reporting.choice_section import choice_section
-from softstart.reporting.figure_list import Figures
-from softstart.reporting.limit import bound_at
-from softstart.reporting.limit_section import limit_section
+from softstart.reporting.choice import choice_section, choose
+from softstart.reporting.document import answer
+from softstart.reporting.limit import bound_at, limit, limit_section
+from softstart.reporting.markup import Figures
 from softstart.reporting.robustness import robustness
 
 
@@ -77,7 +75,7 @@ def test_direct_start_is_not_praised_where_gentler_ones_are_only_too_slow(hostil
     assert choose(hostile.comparison.rows, maps, 0.06).recommended.name == "shaped"
     assert "s-curve is the best: K_dyn 1.879" in said
     assert "7.6\N{NO-BREAK SPACE}% slower than direct" in said
-    assert "at most 1.25\N{NO-BREAK SPACE}% slower than direct" in choice_section(strict)
+    assert "at most 1.25\N{NO-BREAK SPACE}% slower than direct" in choice_section(strict.choice)
     alone = replace(hostile, choice=choose(hostile.comparison.rows[:1], maps[:1]))
     assert answer(alone).startswith("Only direct start was examined")
 
@@ -115,13 +113,11 @@ def test_reactive_damped_lagging_drive_says_what_was_not_found():
     assert len(made.limit.missing) >= 6
     for row in made.comparison.rows:
         assert bound_at(servo, row.run.start_time) <= row.run.k_dyn
-    assert "only a search by linear programs" in limit_section(made, Figures())
+    assert "only a search by linear programs" in limit_section(made.drive, made.choice, made.limit, Figures())
 
 
 def test_search_for_optima_ends_when_its_time_is_up():
     """At 1.005 times the shortest start time there is no formula, and the search takes seconds."""
-    from softstart.reporting.limit import limit
-
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     told = []
     began = time.monotonic()

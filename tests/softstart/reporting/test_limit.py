@@ -9,12 +9,11 @@ import pytest
 from softstart import Drive, simulate
 from softstart.optimal.front_points import FrontPoint
 from softstart.reporting import report
-from softstart.reporting.answer import answer
-from softstart.reporting.figure_list import Figures
-from softstart.reporting.known import known_starts
-from softstart.reporting.limit import bound_at
-from softstart.reporting.limit_section import limit_section
+from softstart.reporting.document import answer
+from softstart.reporting.gentle_starts import gentle_starts
+from softstart.reporting.limit import bound_at, limit_section
 from softstart.reporting.limit_worker import work
+from softstart.reporting.markup import Figures
 
 from .test_page import Page, rows_of
 
@@ -30,22 +29,22 @@ LAGGING = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.002
         {"gap": 0.0, "load_torque": 0.0},
     ],
 )
-def test_known_starts_are_possible_and_near_the_bound(change):
+def test_gentle_starts_are_possible_and_near_the_bound(change):
     drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, **change)
     direct = simulate(drive, "direct").start_time
-    (found,) = known_starts(drive, [1.2 * direct], 60.0)
+    (found,) = gentle_starts(drive, [1.2 * direct], 60.0)
     assert found.start_time <= found.start_time_bound == 1.2 * direct
     bound = bound_at(drive, 1.2 * direct)
     assert bound <= found.k_dyn <= 1.15 * bound  # the bound knows nothing of lag and rate
 
 
-def test_known_starts_are_repeatable_and_fall_with_the_start_time():
+def test_gentle_starts_are_repeatable_and_fall_with_the_start_time():
     drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-    found = known_starts(drive, [0.30, 0.29, 0.34], 60.0)
+    found = gentle_starts(drive, [0.30, 0.29, 0.34], 60.0)
     assert [one.start_time_bound for one in found] == [0.29, 0.30, 0.34]
     assert [one.k_dyn for one in found] == sorted((one.k_dyn for one in found), reverse=True)
-    assert known_starts(drive, [0.30, 0.29, 0.34], 60.0) == found
-    assert known_starts(drive, [0.30], 0.0) == []
+    assert gentle_starts(drive, [0.30, 0.29, 0.34], 60.0) == found
+    assert gentle_starts(drive, [0.30], 0.0) == []
 
 
 def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypatch):
@@ -55,7 +54,7 @@ def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypa
     best = made.choice.recommended
     bound, known, own = made.lower_bound(best.row), made.gentlest_known(best.row), best.row.run.k_dyn
     assert bound < known < own
-    page = Page(limit_section(made, Figures()))
+    page = Page(limit_section(made.drive, made.choice, made.limit, Figures()))
     said = "".join(page.text)
     assert f"between {bound:.3f} (proved) and {known:.3f} (found): {best.name} with {own:.3f}" in said
     assert "not known to be the gentlest" in said
@@ -71,7 +70,7 @@ def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypa
 
 def test_without_a_search_nothing_else_is_claimed():
     made = report(LAGGING, controllers=["direct", "shaped"], budget=0.0)
-    said = limit_section(made, Figures())
+    said = limit_section(made.drive, made.choice, made.limit, Figures())
     assert "none was looked for (--budget 0)" in said
     assert "the gentlest start known" in said
     assert made.limit.known == ()
@@ -85,7 +84,9 @@ def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostil
         bound_kind="certificate",
     )  # fmt: skip
     points = (*hostile.limit.found, single)
-    page = Page(limit_section(replace(hostile, limit=replace(hostile.limit, points=points)), Figures()))
+    page = Page(
+        limit_section(hostile.drive, hostile.choice, replace(hostile.limit, points=points), Figures())
+    )
     said = "".join(page.text)
     assert f"{len(points) - 1} of {len(points)} optima are certified against every other start" in said
     assert "That at 0.3735 s is certified among starts whose gap closes only once" in said

@@ -7,8 +7,8 @@ from html.parser import HTMLParser
 import pytest
 
 from softstart import Drive, compare, optimize
-from softstart.reporting.markup import VOID, css_string
-from softstart.reporting.svg import inlined
+from softstart.reporting.limit import Limit, _within
+from softstart.reporting.markup import VOID, css_string, inlined
 
 from .conftest import COMMAND, HOSTILE
 
@@ -169,9 +169,6 @@ def test_provenance_holds_the_drive(read, hostile):
 
 def test_a_bound_that_grows_beyond_the_frame_is_cut():
     import numpy as np
-
-    from softstart.reporting.limit import Limit
-    from softstart.reporting.pictures import _within
 
     limit = Limit(times=(1.0, 1.1, 1.2, 1.3, 2.0), bounds=(1e9, 5.0, 1.2, 1.0, 0.8))
     t, k = _within(limit, 0.9, 1.25, 6.0)

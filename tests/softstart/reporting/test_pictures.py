@@ -12,12 +12,11 @@ from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import report
 from softstart.reporting.choice import choose
-from softstart.reporting.figure_list import Figures
-from softstart.reporting.limit import Limit
-from softstart.reporting.pictures import limit_figure, maps_figure, traces_figure
-from softstart.reporting.robustness import robustness
-from softstart.reporting.scheme import scheme
-from softstart.reporting.strategies_section import traces_section
+from softstart.reporting.drive_section import scheme
+from softstart.reporting.limit import Limit, limit_figure
+from softstart.reporting.markup import Figures
+from softstart.reporting.robustness import maps_figure, robustness
+from softstart.reporting.strategies import traces_figure, traces_section
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -34,8 +33,8 @@ def test_traces_of_a_braking_motor_are_in_the_frame_and_all_in_one_scale(monkeyp
         asked.append(traces_figure(*arguments))
         return asked[-1]
 
-    monkeypatch.setattr("softstart.reporting.strategies_section.traces_figure", drawn)
-    traces_section(made, Figures())
+    monkeypatch.setattr("softstart.reporting.strategies.traces_figure", drawn)
+    traces_section(made.comparison.rows, Figures())
     panels = asked[0].axes[0::2]
     assert len(panels) == 2
     assert len({panel.get_ylim() for panel in panels}) == 1  # the caption says so
@@ -70,7 +69,7 @@ def test_small_inertias_stand_in_powers_that_keep_their_labels_apart():
     servo = Drive.load("servo-axis-small")
     made = report(servo, controllers=["direct"], budget=0.0)
     one = made.choice.of("direct")
-    axes = maps_figure([one], (one.map.gaps[2], one.map.inertias[3])).axes[0]
+    axes = maps_figure([(one.name, one.map)], (one.map.gaps[2], one.map.inertias[3])).axes[0]
     labels = [tick.get_text() for tick in axes.get_xticklabels()]
     assert labels == ["52", "78", "104", "130", "162"]
     assert "10^{-6}" in axes.get_xlabel()
@@ -114,6 +113,6 @@ def test_labels_of_the_scheme_are_inside_and_clear_of_each_other(drive):
 def test_traces_that_are_cut_off_are_named():
     slow = make_controller("ramp", {"time": 5.0})
     made = report(CRANE, controllers=["direct", slow], budget=0.0)
-    assert "The start of ramp goes on beyond the" in traces_section(made, Figures())
+    assert "The start of ramp goes on beyond the" in traces_section(made.comparison.rows, Figures())
     made = report(CRANE, controllers=["direct", "ramp"], budget=0.0)
-    assert "goes on beyond" not in traces_section(made, Figures())
+    assert "goes on beyond" not in traces_section(made.comparison.rows, Figures())

@@ -13,10 +13,9 @@ from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import Resolution, report
-from softstart.reporting.answer import answer
+from softstart.reporting.document import answer
 from softstart.reporting.resolution import nearest_step, rated_torque
-from softstart.reporting.sheet import make_sheet
-from softstart.reporting.sheet_section import _limits, _multiple, _notes
+from softstart.reporting.sheet import _limits, _multiple, _notes, make_sheet
 
 
 def sheet_of(name, steps, **parameters):

@@ -1,4 +1,4 @@
-"""Gentle starts found fast, where the optimum takes a long search: what is known, beside what is proved."""
+"""Gentle starts found by a quick search, where the optimum takes a long one. They are not proved best."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ N_NUMBERS = 7
 
 
 @dataclass(frozen=True)
-class KnownStart:
+class GentleStart:
     """A start within `start_time_bound` s that was found and simulated; a gentler one may exist.
 
     `start_time` (s), `k_dyn` and `contacts` are those of the exact plant.
@@ -45,7 +45,7 @@ class KnownStart:
         return asdict(self)
 
 
-def known_starts(drive: Drive, start_times: Sequence[float], seconds: float) -> list[KnownStart]:
+def gentle_starts(drive: Drive, start_times: Sequence[float], seconds: float) -> list[GentleStart]:
     """Gentle starts of any drive, as many of the start times (s) as are done within about `seconds`.
 
     Differential evolution on the exact plant over torques of five levels known beforehand (pulse, coast,
@@ -53,12 +53,12 @@ def known_starts(drive: Drive, start_times: Sequence[float], seconds: float) -> 
     before. Nothing is proved of them: they say from above what `bound_at` says from below.
 
     >>> crane = Drive.load("crane-4amtkf").replace(torque_lag=0.002)
-    >>> found, = known_starts(crane, [0.4], 60.0)
+    >>> found, = gentle_starts(crane, [0.4], 60.0)
     >>> found.start_time <= 0.4, 0.96 < found.k_dyn < 1.0
     (True, True)
     """
     search = _Search(drive, max(start_times, default=0.0), time.monotonic() + seconds)
-    found: list[KnownStart] = []
+    found: list[GentleStart] = []
     for start_time in [*start_times[:1], *sorted(start_times[1:])]:
         best = search.best(start_time)
         if search.over:
@@ -67,11 +67,11 @@ def known_starts(drive: Drive, start_times: Sequence[float], seconds: float) -> 
         known = [one for one in [_run(drive, search, best, start_time), *quick] if one is not None]
         if known:
             least = min(known, key=lambda one: one.k_dyn)
-            found.append(KnownStart(start_time, least.start_time, least.k_dyn, least.contacts))
+            found.append(GentleStart(start_time, least.start_time, least.k_dyn, least.contacts))
     return sorted(found, key=lambda one: one.start_time_bound)
 
 
-def _run(drive: Drive, search: _Search, numbers: Vector, start_time: float) -> KnownStart | None:
+def _run(drive: Drive, search: _Search, numbers: Vector, start_time: float) -> GentleStart | None:
     """The start as the exact plant makes it, None if it is late."""
     profile = search.staircase(numbers).tidy()
     try:
@@ -80,7 +80,7 @@ def _run(drive: Drive, search: _Search, numbers: Vector, start_time: float) -> K
         return None
     if not run.start_time <= start_time:
         return None
-    return KnownStart(start_time, run.start_time, run.k_dyn, run.contacts)
+    return GentleStart(start_time, run.start_time, run.k_dyn, run.contacts)
 
 
 class _Search:
