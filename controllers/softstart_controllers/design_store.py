@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 
 FOLDER = Path(__file__).parent / "__pycache__"
 

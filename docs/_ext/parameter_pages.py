@@ -15,7 +15,8 @@ from softstart.clutch.parameters import TABLES as CLUTCH
 from softstart.controller import controller_class, controller_names
 from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS
-from softstart.input_tables import REQUIRED, Table
+from softstart.input.documents import Table
+from softstart.input.parameters import REQUIRED
 from softstart.study import find_study, study_names
 
 
@@ -62,7 +63,7 @@ def _tables(tables: Iterable[Table]) -> str:
         elif table.name and not table.required:
             lines += ["May be left out as a whole.", ""]
         lines += ["| key | unit | default | range | meaning | example |", "|---|---|---|---|---|---|"]
-        for f in table.fields:
+        for f in table.parameters:
             default = "**needed**" if f.default is REQUIRED else _default(f.default, f.unit)
             limit = _choices(f.choices) or _limit(f.limit, f.unit)
             many = " (a list)" if f.many else ""
@@ -144,11 +145,11 @@ def _searched(told: Any) -> str:
 def shipped() -> str:
     """The drives that come with it."""
     from softstart import Drive
-    from softstart.drive.library import names
+    from softstart.drive import library
 
     lines = ["| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | source |"]
     lines += ["|---|--:|--:|--:|--:|--:|---|---|"]
-    for name in names():
+    for name in library.names():
         d = Drive.load(name)
         load = f"{d.Mc:g} N m, {d.load_kind}"
         lines.append(

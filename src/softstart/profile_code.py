@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.profile_files import Profile
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.export import write_whole
-from softstart.units import to_si
+from softstart.input.files import write_whole
+from softstart.quantities import to_si
 
 Vector = NDArray[np.float64]
 

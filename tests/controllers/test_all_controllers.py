@@ -12,9 +12,9 @@ from tests.controllers.starts import CRANE, random_drive
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import CompiledController, controller_class, make_controller
-from softstart.drive.library import names
+from softstart.drive import library
 from softstart.plant import layout as at
-from softstart.units import to_si
+from softstart.quantities import to_si
 
 ALL = (
     "acceleration-delay",
@@ -37,7 +37,7 @@ SAMPLED = (
     "shaped",
     "state-feedback",
 )
-DRIVES = [Drive.load(name) for name in names()]
+DRIVES = [Drive.load(name) for name in library.names()]
 
 
 @pytest.mark.parametrize("name", [*ALL, "profile"])

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.drive.library import names
+from softstart.drive import library
 from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback_step as at
@@ -176,7 +176,7 @@ def distance_to_instability(drive: Drive, plant: Drive) -> float:
 LAGGING = CRANE.replace(torque_lag=0.005, encoder_lines=1024)
 
 
-@pytest.mark.parametrize("drive", [*map(Drive.load, names()), LAGGING], ids=lambda drive: drive.name)
+@pytest.mark.parametrize("drive", [*map(Drive.load, library.names()), LAGGING], ids=lambda drive: drive.name)
 def test_phase_margin_is_at_least_45_degrees(drive: Drive) -> None:
     """2 arcsin(d/2) with the distance d: 0.86 at the least, so 51 degrees."""
     assert 2.0 * math.asin(0.5 * distance_to_instability(drive, drive)) > math.radians(45.0)

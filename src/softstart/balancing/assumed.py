@@ -7,7 +7,7 @@ from typing import Any
 
 from softstart.balancing.tables import TABLES
 from softstart.errors import InputError
-from softstart.units import nearest, show
+from softstart.quantities import nearest, show
 
 __all__ = ["assumed_keys"]
 
@@ -23,7 +23,7 @@ def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, A
     Traceback (most recent call last):
     softstart.errors.InputError: assumed = "mases.*": an engine file has no such key; did you mean masses.*?
     """
-    known = [f"{table.name}.{field.key}" for table in TABLES for field in table.fields if table.name]
+    known = [p.path for table in TABLES for p in table.parameters if table.name]
     stars = [f"{table.name}.*" for table in TABLES if table.name]
     named: dict[str, None] = {}
     wrong = []

@@ -20,7 +20,7 @@ from softstart.balancing.parts import CYCLE_ANGLE, Cylinders, Part
 from softstart.balancing.slider_crank import Vector
 from softstart.balancing.tables import CYCLE
 from softstart.balancing.work import shape_work
-from softstart.input_tables import Table
+from softstart.input.documents import Table
 
 __all__ = ["SimpleCycle"]
 

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softstart.balancing import files
 from softstart.balancing.assumed import assumed_keys
 from softstart.balancing.cycle import SimpleCycle
 from softstart.balancing.indicator import MeasuredCycle
@@ -32,13 +31,26 @@ from softstart.balancing.parts import (
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.balancing.shaking import Shaking, shaking_of_crank, shaking_of_shafts
 from softstart.balancing.slider_crank import Vector, inertia_torque_harmonics
-from softstart.balancing.tables import TABLES
+from softstart.balancing.tables import (
+    BALANCER,
+    COUNTERWEIGHTS,
+    CYCLE,
+    CYLINDERS,
+    INDICATOR,
+    LIBRARY,
+    MASSES,
+    OPERATION,
+    SHAFT,
+    TABLES,
+    TOP,
+)
 from softstart.balancing.work import shape_work, torque_harmonics
-from softstart.balancing.writing import toml_of
 from softstart.errors import InputError
-from softstart.input_tables import read_document
+from softstart.input.documents import Table, document_text, read_document
 
-__all__ = ["HIGHEST", "Engine"]
+__all__ = ["HIGHEST", "INDICATOR_FILE", "Engine"]
+
+INDICATOR_FILE = "indicator.csv"
 
 HIGHEST = 24  # the highest order of the crank speed that is looked at
 Complex = NDArray[np.complex128]
@@ -86,8 +98,8 @@ class Engine:
     @classmethod
     def load(cls, engine: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Engine:
         """An engine from its TOML file, or a shipped one by its name; `also` as in `from_toml`."""
-        text, where, folder = files.find(engine)
-        return cls.from_toml(text, where=where, folder=folder, also=also)
+        text, where = LIBRARY.find(engine)
+        return cls.from_toml(text, where=where, folder=Path(where).parent, also=also)
 
     @classmethod
     def from_toml(
@@ -107,7 +119,7 @@ class Engine:
         >>> Engine.from_toml(engine.to_toml()) == engine
         True
         """
-        found = read_document(text, TABLES, "an engine file", where=where, also=also)
+        found = read_document(text, TABLES, "an engine", where=where, also=also)
         before = f"{where}: " if where else ""
         wrong: list[str] = []
 
@@ -156,7 +168,21 @@ class Engine:
 
         A measured pressure is not in it: it stands in its own file.
         """
-        return toml_of(self)
+        blocks: list[tuple[Table, Any]] = [
+            (TOP, {"name": self.name, "source": self.source, "assumed": ", ".join(self.assumed)}),
+            (CYLINDERS, vars(self.cylinders)),
+            (MASSES, vars(self.masses)),
+            (COUNTERWEIGHTS, vars(self.counterweights)),
+            (OPERATION, vars(self.operation)),
+            *((BALANCER, vars(layout)) for layout in [self.layout] if layout is not None),
+            *((SHAFT, vars(shaft)) for shaft in self.shafts),
+        ]
+        if isinstance(self.gas, MeasuredCycle):
+            about = {"file": INDICATOR_FILE, "crankcase_pressure": self.gas.crankcase_pressure}
+            blocks.insert(1, (INDICATOR, about))
+        else:
+            blocks.insert(4, (CYCLE, vars(self.gas)))
+        return document_text((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
 
     # ---- figures -----------------------------------------------------------------------------------------
 

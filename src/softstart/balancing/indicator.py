@@ -14,7 +14,7 @@ import numpy as np
 from softstart.balancing.parts import CYCLE_ANGLE, Cylinders
 from softstart.balancing.slider_crank import Vector
 from softstart.errors import InputError
-from softstart.units import RefusedError, parse, show, to_si
+from softstart.quantities import RefusedError, parse, show, to_si
 
 __all__ = ["MeasuredCycle"]
 
@@ -86,6 +86,11 @@ class MeasuredCycle:
             return cls(tuple(columns[0]), tuple(columns[1]), crankcase_pressure)
         except InputError as error:
             raise InputError(f"{place}: {sentence}" for sentence in error.sentences) from None
+
+    def to_csv(self) -> str:
+        """The pressure as the CSV text that it is read from."""
+        rows = zip(self.angles, self.pressures, strict=True)
+        return "angle [rad],pressure [Pa]\n" + "".join(f"{phi!r},{p!r}\n" for phi, p in rows)
 
     def breaks(self) -> tuple[float, ...]:
         """The angles measured."""

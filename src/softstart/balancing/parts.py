@@ -12,8 +12,8 @@ import numpy as np
 from softstart.balancing.slider_crank import SliderCrank, Vector
 from softstart.balancing.tables import BALANCER, COUNTERWEIGHTS, CYLINDERS, MASSES, OPERATION, SHAFT
 from softstart.errors import InputError
-from softstart.input_tables import Table, read_table
-from softstart.units import show
+from softstart.input.documents import Table, read_table
+from softstart.quantities import show
 
 __all__ = [
     "CYCLE_ANGLE",

@@ -17,7 +17,7 @@ from softstart.balancing.parts import BalancerShaft
 from softstart.balancing.shaking import moment_harmonic
 from softstart.balancing.slider_crank import Vector
 from softstart.errors import InputError
-from softstart.units import to_si
+from softstart.quantities import to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

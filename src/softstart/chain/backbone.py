@@ -18,7 +18,7 @@ from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration import natural_vibration
 from softstart.drive.reading import elastic_frequency
 from softstart.errors import InputError
-from softstart.units import Value
+from softstart.quantities import Value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from softstart.chain.tables import MASS, MOTOR, SHAFT
 from softstart.drive.parameters import ContactLaw, LoadKind
 from softstart.errors import InputError
-from softstart.input_tables import read_table
+from softstart.input.documents import read_table
 
 __all__ = ["Mass", "Motor", "Quantity", "Shaft", "Side", "gap_of", "mass_mistakes", "shaft_mistakes"]
 

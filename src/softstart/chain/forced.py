@@ -16,7 +16,7 @@ from softstart.chain.arrays import ChainArrays
 from softstart.chain.model import Chain, Mass, Shaft
 from softstart.chain.simulation import simulate_chain
 from softstart.errors import InputError
-from softstart.units import Value
+from softstart.quantities import Value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, cast
 
-from softstart.chain import files
 from softstart.chain.arrays import ChainArrays, arrays_at
 from softstart.chain.elements import (
     Mass,
@@ -24,12 +23,11 @@ from softstart.chain.elements import (
     motor_mistakes,
     shaft_mistakes,
 )
-from softstart.chain.tables import START, TABLES
-from softstart.chain.writing import toml_of
+from softstart.chain.tables import LIBRARY, MASS, MOTOR, SHAFT, START, TABLES, TOP
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.input_tables import read_document, read_table
-from softstart.units import nearest, show
+from softstart.input.documents import Table, document_text, read_document, read_table
+from softstart.quantities import nearest, show
 
 __all__ = ["Chain", "Mass", "Motor", "Shaft"]
 
@@ -102,7 +100,7 @@ class Chain:
         >>> len(Chain.load("crane-4-mass").masses)
         4
         """
-        text, where = files.find(chain)
+        text, where = LIBRARY.find(chain)
         return cls.from_toml(text, where=where, also=also)
 
     @classmethod
@@ -113,7 +111,7 @@ class Chain:
         >>> Chain.from_toml(chain.to_toml()) == chain
         True
         """
-        found = read_document(text, TABLES, "a chain file", where=where, also=also)
+        found = read_document(text, TABLES, "a chain", where=where, also=also)
         rows = [("[mass] " + str(i), mass_mistakes(row)) for i, row in enumerate(found["mass"], start=1)]
         rows += [("[shaft] " + str(i), shaft_mistakes(row)) for i, row in enumerate(found["shaft"], start=1)]
         if found["motor"] is not None:
@@ -174,8 +172,14 @@ class Chain:
         )
 
     def to_toml(self) -> str:
-        """The chain as TOML text in SI, which `from_toml` reads back to an equal chain."""
-        return toml_of(self)
+        """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
+        start = {"load": self.load_mass, "target_speed": self.target_speed}
+        rows: list[tuple[Table, Any]] = [(TOP, vars(self))]
+        for i, mass in enumerate(self.masses):
+            rows += [(MASS, vars(mass)), *((SHAFT, vars(shaft)) for shaft in self.shafts[i : i + 1])]
+        rows += [] if self.motor is None else [(MOTOR, vars(self.motor))]
+        rows.append((START, start))
+        return document_text((table, _without_defaults(table, values)) for table, values in rows)
 
     # ---- places ------------------------------------------------------------------------------------------
 
@@ -273,6 +277,10 @@ class Chain:
     @cached_property
     def _at_motor_shaft(self) -> ChainArrays:
         return arrays_at(self, self.motor_index)
+
+
+def _without_defaults(table: Table, values: Mapping[str, object]) -> dict[str, object]:
+    return {p.name: values[p.name] for p in table.parameters if values.get(p.name) != p.default}
 
 
 def _no_such(place: str, names: list[str]) -> str:

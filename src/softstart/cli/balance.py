@@ -21,9 +21,9 @@ DEFAULT_ENGINE = "vaz-11113"
 
 
 def _engines() -> Iterable[str]:
-    from softstart.balancing.files import names
+    from softstart.balancing.tables import LIBRARY
 
-    return names()
+    return LIBRARY.names()
 
 
 def _keys() -> Keys:
@@ -111,7 +111,7 @@ def read_speeds(texts: Sequence[str]) -> list[float] | None:
     >>> [round(speed, 3) for speed in read_speeds(["4500rpm", "100"])]
     [471.239, 100.0]
     """
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     found = []
     mistakes = Mistakes()

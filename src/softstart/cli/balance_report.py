@@ -22,7 +22,7 @@ STEPS = 1440  # of the torque over the cycle: half degrees
 def write_balance(found: Balance, folder: Path, command: str) -> None:
     """Figures, tables, the engine with all changes, and the report that ties them together."""
     from softstart.balancing import MeasuredCycle
-    from softstart.balancing.writing import INDICATOR, indicator_csv
+    from softstart.balancing.engine import INDICATOR_FILE
     from softstart.cli.balance_text import conclusion, engine_lines, footnotes, tables
     from softstart.views.drawing import save_figure
 
@@ -32,7 +32,7 @@ def write_balance(found: Balance, folder: Path, command: str) -> None:
         save_figure(figure, folder, stem)
     write_text(folder / "engine.toml", engine.to_toml())
     if isinstance(engine.gas, MeasuredCycle):
-        write_text(folder / INDICATOR, indicator_csv(engine.gas))
+        write_text(folder / INDICATOR_FILE, engine.gas.to_csv())
     _write_tables(found, folder)
     parts = [
         f"# {markdown(engine.name)}: forces, moments and balancers",

@@ -22,9 +22,9 @@ DEFAULT_POINTS = 8
 
 
 def _clutches() -> Iterable[str]:
-    from softstart.clutch import library
+    from softstart.clutch.parameters import LIBRARY
 
-    return library.names()
+    return LIBRARY.names()
 
 
 def _laws() -> Iterable[str]:
@@ -178,7 +178,7 @@ def read_end(text: str | None) -> float | None:
     """
     if text is None:
         return None
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     value = float(to_si(text, "s", name="--until"))
     if not value > 0.0:

@@ -16,7 +16,7 @@ from click.shell_completion import CompletionItem
 from softstart.plugins import registered
 
 if TYPE_CHECKING:
-    from softstart.input_tables import Table
+    from softstart.input.documents import Table
 
 Answer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 Keys = Mapping[
@@ -127,7 +127,7 @@ def table_keys(tables: Iterable[Table]) -> Keys:
     found: dict[str, tuple[str, Sequence[str]]] = {}
     for table in tables:
         place = f"{table.name}{'[1]' if table.many else ''}." if table.name else ""
-        for field in table.fields:
+        for field in table.parameters:
             found[place + field.key] = (_with_unit(field.meaning, field.unit), field.choices)
     return found
 

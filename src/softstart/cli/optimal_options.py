@@ -96,7 +96,7 @@ def read_start_time(text: str, option: str = "--start-time") -> Asked:
 
 def read_positive(text: str, option: str, unit: str, meaning: str, shown: str | None = None) -> float:
     """A finite quantity above 0."""
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     said = text if shown is None else shown
     try:
@@ -151,7 +151,7 @@ def read_quantities(text: str | None, option: str, unit: str) -> list[float]:
     """
     if text is None:
         return []
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     return _each(text, option, lambda part: float(to_si(part, unit, name=option)))
 
@@ -164,7 +164,7 @@ def read_corners(text: str | None) -> tuple[tuple[float, float], ...]:
     """
     if text is None:
         return ()
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     def corner(part: str) -> tuple[float, float]:
         speed, colon, torque = part.partition(":")

@@ -160,7 +160,7 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
 
 
 def _weight(text: str) -> float:
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     value = float(to_si(text, "s", name="--smoothness"))
     if value < 0.0:

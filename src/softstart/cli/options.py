@@ -19,7 +19,7 @@ from softstart.cli.completing import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.errors import InputError
 from softstart.plugins import registered
-from softstart.units import to_si
+from softstart.quantities import to_si
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -34,9 +34,9 @@ METHODS = ("lever", "modal")
 
 
 def _chains() -> Iterable[str]:
-    from softstart.chain.files import names
+    from softstart.chain.tables import LIBRARY
 
-    return names()
+    return LIBRARY.names()
 
 
 def _keys() -> Keys:

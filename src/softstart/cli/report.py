@@ -112,7 +112,7 @@ def report(
 
     made, page = _made(one, names, given, asked, out is not None)
     if out is not None:
-        from softstart.export import write_whole
+        from softstart.input.files import write_whole
 
         write_whole(Path(out), lambda stream: stream.write(page))
 
@@ -183,7 +183,7 @@ def _share(text: str) -> float:
     >>> _share("15%"), _share("0.15")
     (0.15, 0.15)
     """
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     stripped = text.strip()
     try:
@@ -200,7 +200,7 @@ def _share(text: str) -> float:
 
 def _seconds(text: str) -> float:
     """A time in s, 0 or more."""
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     value = float(to_si(text, "s", name="--budget"))
     if value < 0.0:

@@ -196,6 +196,6 @@ def _whole(name: str, text: str | None) -> dict[str, int]:
 
 
 def _share(text: str) -> float:
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     return float(to_si(text, "1", name="--quantile"))

@@ -46,7 +46,7 @@ def read_grid(text: str | None, option: str, unit: str) -> list[Any] | None:
 
 def _all(parts: Sequence[str], option: str, unit: str) -> list[tuple[float, str]]:
     """Each part as a number and the ending of its multiple, if it is one."""
-    from softstart.units import to_si
+    from softstart.quantities import to_si
 
     mistakes = Mistakes()
     found = []

@@ -36,7 +36,7 @@ from softstart.clutch.motion import (
 from softstart.clutch.polynomials import definite, definite_integral, first_root, leading, roots, value
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.units import to_si
+from softstart.quantities import to_si
 
 views = late("softstart.clutch.pictures")
 

@@ -21,7 +21,7 @@ from softstart.clutch.least_work import Answer, Cut, Program, Slip, least_over_e
 from softstart.clutch.model import Clutch
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.units import nearest, show
+from softstart.quantities import nearest, show
 
 views = late("softstart.clutch.pictures")
 

@@ -8,8 +8,8 @@ import re
 
 from softstart.clutch.parameters import PARAMETERS
 from softstart.errors import InputError
-from softstart.input_tables import text_of
-from softstart.units import RefusedError, parse, show
+from softstart.input.files import text_of
+from softstart.quantities import RefusedError, parse, show
 
 __all__ = ["read_law"]
 
@@ -37,7 +37,7 @@ def read_law(path: str | os.PathLike[str]) -> tuple[list[float], list[float]]:
         rows = rows[1:]
     if not rows:
         raise InputError(f"{where}: there are no numbers in it; write lines of time, torque, as 0.5,200.")
-    fields = {p.name: p.field for p in PARAMETERS}
+    fields = {p.name: p for p in PARAMETERS}
     columns: tuple[list[float], list[float]] = [], []
     wrong = []
     for number, row in rows:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Self, cast
 
 import numpy as np
 
-from softstart.clutch import library
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
-from softstart.clutch.parameters import PARAMETERS, TABLES, WHAT
+from softstart.clutch.parameters import LIBRARY, PARAMETERS, TABLES, WHAT
 from softstart.errors import InputError
-from softstart.input_tables import Table, read_document, read_table, text_of
-from softstart.units import nearest, show
+from softstart.input.documents import Table, document_text, read_document, read_table
+from softstart.quantities import nearest, show
 
 __all__ = ["Clutch"]
+
+KEYWORDS = Table("", PARAMETERS)
 
 ABOVE = 1.0 + 1e-9  # a table may lie above MM by rounding
 SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate is no number any more
@@ -44,7 +43,7 @@ class Clutch:
     >>> clutch.replace(stiffness=-1, law="linaer")
     Traceback (most recent call last):
     softstart.errors.InputError: stiffness = -1: the stiffness cp of the shaft must be above 0.
-    law = "linaer": the engagement law is "linear" or ... or "table"; did you mean "linear"?
+    law = "linaer": the engagement law is "linear", ... or "table"; did you mean "linear"?
     """
 
     clutch_inertia: float
@@ -67,9 +66,7 @@ class Clutch:
 
     def __post_init__(self) -> None:
         given = {p.name: getattr(self, p.name) for p in PARAMETERS}
-        table = Table("", tuple(dataclasses.replace(p.field, key=p.name) for p in PARAMETERS))
-        values = read_table(given, table)
-        for name, value in values.items():
+        for name, value in read_table(given, KEYWORDS).items():
             object.__setattr__(self, name, tuple(value.tolist()) if isinstance(value, np.ndarray) else value)
         wrong = self._mistakes()
         if wrong:
@@ -86,18 +83,8 @@ class Clutch:
         softstart.errors.InputError: "paper-d": there is no such file, and no shipped clutch of this name;
         did you mean paper-c?
         """
-        if isinstance(clutch, str) and clutch in library.names():
-            return cls.from_toml(library.text(clutch), where=clutch, also=also)
-        if not Path(clutch).exists():
-            meant = nearest(Path(clutch).name.removesuffix(".toml"), library.names())
-            hint = (
-                f"did you mean {meant}?" if meant else f"shipped clutches are {', '.join(library.names())}."
-            )
-            raise InputError(
-                f"{show(os.fspath(clutch))}: there is no such file, and no shipped clutch of this name; "
-                f"{hint}"
-            )
-        return cls.from_toml(text_of(clutch, WHAT), where=os.fspath(clutch), also=also)
+        text, where = LIBRARY.find(clutch)
+        return cls.from_toml(text, where=where, also=also)
 
     @classmethod
     def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
@@ -107,9 +94,9 @@ class Clutch:
         """
         found = read_document(text, TABLES, WHAT, where=where, also=also)
         values = {
-            p.name: found[p.table][p.field.key]
+            p.name: found[p.table][p.key]
             for p in PARAMETERS
-            if found[p.table] is not None and p.field.key in found[p.table]
+            if found[p.table] is not None and p.key in found[p.table]
         }
         try:
             return cls(**values)
@@ -189,21 +176,7 @@ class Clutch:
         >>> Clutch.from_toml(clutch.to_toml()) == clutch
         True
         """
-        lines: list[str] = []
-        table = ""
-        for p in PARAMETERS:
-            value = getattr(self, p.name)
-            if value is None:
-                continue
-            if p.table != table:
-                table = p.table
-                lines += ["", f"[{table}]"]
-            if isinstance(value, str):
-                lines.append(f"{p.field.key} = {json.dumps(value, ensure_ascii=False)}")
-            else:
-                shown = list(value) if isinstance(value, tuple) else value
-                lines.append(f"{p.field.key} = {shown!r}  # {p.field.unit}: {p.field.meaning}")
-        return "\n".join(lines) + "\n"
+        return document_text((table, self.summary()) for table in TABLES)
 
     # checks -----------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from softstart.controller.base import Controller, Sensor
 from softstart.controller.gain_files import SUFFIXES
 from softstart.errors import InputError
 from softstart.plugins import load, registered
-from softstart.units import show, to_si
+from softstart.quantities import show, to_si
 
 GROUP = "softstart.controllers"
 

@@ -8,6 +8,6 @@
 from __future__ import annotations
 
 from softstart.drive.model import Drive
-from softstart.drive.parameters import PARAMETERS, TABLES, Parameter
+from softstart.drive.parameters import PARAMETERS, TABLES, Parameter, library
 
-__all__ = ["PARAMETERS", "TABLES", "Drive", "Parameter"]
+__all__ = ["PARAMETERS", "TABLES", "Drive", "Parameter", "library"]

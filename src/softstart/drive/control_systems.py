@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.units import Value
+from softstart.quantities import Value
 
 if TYPE_CHECKING:
     import control

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, field_serializer
 
 from softstart.errors import InputError
-from softstart.units import show
+from softstart.quantities import show
 
 __all__ = ["FrozenModel"]
 

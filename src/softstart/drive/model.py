@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, Literal, Self, Unpack, cast, overload
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
-from softstart.drive import files, toml_file
+from softstart.drive import toml_file
 from softstart.drive.frozen import FrozenModel
 from softstart.drive.keywords import DriveChanges, DriveKeywords
-from softstart.drive.parameters import PARAMETERS, ContactLaw, LoadKind
+from softstart.drive.parameters import PARAMETERS, ContactLaw, LoadKind, library
 from softstart.drive.reading import cross_checks, elastic_frequency, read_parameter
 from softstart.drive.sentences import Mistake, Wording, mistakes_of, told
 from softstart.drive.settings import read_settings
 from softstart.errors import InputError
-from softstart.units import RefusedError, Value
+from softstart.quantities import RefusedError, Value
 
 if TYPE_CHECKING:
     import control
@@ -119,7 +119,7 @@ class Drive(FrozenModel):
         >>> Drive.load("crane-4amtkf").gap
         0.5
         """
-        text, where = files.find(drive)
+        text, where = library.find(drive)
         return cls.from_toml(text, where=where)
 
     @classmethod

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
-__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "LoadKind", "Parameter"]
+from softstart.input.files import Library
+
+__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "LoadKind", "Parameter", "library"]
 
 LoadKind = Literal["active", "reactive"]
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
@@ -154,6 +156,8 @@ _TABLE = (
         '"0 rad/s"', default=0.0,
     ),
 )  # fmt: skip
+
+library = Library("softstart.drive", "a drive", "drives")
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in _TABLE})
 TABLES: tuple[str, ...] = tuple(dict.fromkeys(p.table for p in _TABLE if p.table))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from softstart.drive.parameters import PARAMETERS, Parameter
 from softstart.drive.sentences import Wording
-from softstart.units import RefusedError, Value, nearest, parse, show
+from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = ["LIMITS", "cross_checks", "elastic_frequency", "read_parameter"]
 
@@ -23,7 +23,7 @@ def read_parameter(parameter: Parameter, value: object) -> Value | str | None:
     0.5
     >>> read_parameter(PARAMETERS["load_kind"], "activ")
     Traceback (most recent call last):
-    softstart.units.RefusedError: the kind of the load torque is "active" or "reactive"; did you mean ...?
+    softstart.quantities.RefusedError: the kind of the load torque is "active" or "reactive"; did you mean ...
     """
     if not parameter.unit:
         return _read_text(parameter, value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pydantic import ValidationError
 
 from softstart.drive.parameters import PARAMETERS
-from softstart.units import RefusedError, nearest, show
+from softstart.quantities import RefusedError, nearest, show
 
 __all__ = ["Mistake", "Wording", "flat_name_meant", "mistakes_of", "refused", "told"]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from softstart.drive.parameters import PARAMETERS, TABLES
 from softstart.drive.sentences import Mistake, Wording
-from softstart.units import nearest, show
+from softstart.quantities import nearest, show
 
 __all__ = ["read_settings"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from softstart.drive.parameters import PARAMETERS, TABLES, Parameter
 from softstart.drive.sentences import Mistake, Wording
 from softstart.errors import InputError
-from softstart.units import nearest
+from softstart.quantities import nearest
 
 __all__ = ["flatten", "parsed", "write"]
 

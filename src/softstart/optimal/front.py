@@ -15,7 +15,7 @@ from softstart import __version__
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.optimal.front_points import ControllerPoint, FrontPoint, label_of
 from softstart.optimal.front_saved import SavedPoints
 from softstart.optimal.problem import Problem, Terminal

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 
 Record = dict[str, Any]
 

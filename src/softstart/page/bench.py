@@ -15,9 +15,9 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.trouble import sentence_of
+from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
 from softstart.start.simulation import simulate
-from softstart.units import nearest
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller

@@ -9,8 +9,8 @@ from typing import Self
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.quantities import nearest, to_si
 from softstart.reporting.values import RPM, decimals_of, digits, short
-from softstart.units import nearest, to_si
 
 EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"
 _KEYS = {

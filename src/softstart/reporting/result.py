@@ -16,7 +16,7 @@ from softstart import __version__
 from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.reporting.choice import SLOWER, Choice, choose
 from softstart.reporting.limit import Limit, bound_at, limit

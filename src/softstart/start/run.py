@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import record

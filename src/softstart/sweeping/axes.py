@@ -13,8 +13,8 @@ from softstart.drive import PARAMETERS
 from softstart.drive.reading import read_parameter
 from softstart.drive.sentences import Wording, flat_name_meant, refused
 from softstart.errors import InputError
+from softstart.quantities import RefusedError, nearest, show
 from softstart.sweeping.maker import Maker, Parameters
-from softstart.units import RefusedError, nearest, show
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"

@@ -15,6 +15,7 @@ from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers, why_not_sendable
+from softstart.quantities import nearest, show
 from softstart.sweeping import netcdf as netcdf_file
 from softstart.sweeping.axes import Axis, read_grid
 from softstart.sweeping.checking import check_corners, first_start
@@ -25,7 +26,6 @@ from softstart.sweeping.plan import Plan, checked_chunk, plan_for
 from softstart.sweeping.progress import Told, Watch
 from softstart.sweeping.starts import Question, Task, cut, known_figures
 from softstart.sweeping.store import Folder, compute_and_keep, open_folder, write_block
-from softstart.units import nearest, show
 
 if TYPE_CHECKING:
     import xarray

@@ -18,7 +18,7 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import why_not_sendable
-from softstart.units import show
+from softstart.quantities import show
 
 
 class Known(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.units import to_si
+from softstart.quantities import to_si
 
 GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
 INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia

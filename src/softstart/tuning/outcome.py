@@ -15,7 +15,7 @@ from softstart.controller.gain_files import Gain, RobustFile, ScheduleFile
 from softstart.controller.gain_text import robust_text, schedule_csv, schedule_text
 from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.tuning.question import Question
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from typing import Any, Literal, NamedTuple
 from softstart import __version__
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.quantities import to_si
 from softstart.tuning.ranges import Range, check_number
 from softstart.tuning.recipe import Recipe
 from softstart.tuning.tolerances import Scenario
-from softstart.units import to_si
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
 

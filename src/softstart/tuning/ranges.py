@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softstart.controller import Controller
 from softstart.errors import InputError
-from softstart.units import nearest, to_si
+from softstart.quantities import nearest, to_si
 
 Vector = NDArray[np.float64]
 

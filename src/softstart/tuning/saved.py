@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.optimal.front_saved import key_of
 
 Part = tuple[Any, ...]  # what was done: a word, then numbers or texts

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
-from softstart.units import nearest, to_si
+from softstart.quantities import nearest, to_si
 
 MOST = 16  # scenarios beside the drive as it is; more combinations are sampled
 

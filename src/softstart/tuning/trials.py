@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from softstart.controller import Controller, PlainController, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.quantities import nearest
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.tuning.question import Question
-from softstart.units import nearest
 
 Vector = NDArray[np.float64]
 Cells = NDArray[np.int64]  # axes: candidate, cell

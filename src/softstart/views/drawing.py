@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.late import late
 
 if TYPE_CHECKING:

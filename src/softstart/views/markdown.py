@@ -19,7 +19,7 @@ from typing import IO, Any
 from softstart import __version__
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.views.drives import controllers_set_up
 
 FITTED_TO = "fitted-to.toml"

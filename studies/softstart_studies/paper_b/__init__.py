@@ -38,7 +38,7 @@ class PaperB(Study):
         progress("balancing the engine over its speeds")
         found = balanced()
         if out is not None:
-            from softstart.export import write_whole
+            from softstart.input.files import write_whole
 
             write_whole(out / "vaz-11113.toml", lambda stream: stream.write(VAZ.to_toml()))
         progress("varying what is assumed")

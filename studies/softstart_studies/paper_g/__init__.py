@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from softstart.export import write_whole
+from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
 from softstart_studies.paper_g import (
     curves,

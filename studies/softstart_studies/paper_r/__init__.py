@@ -36,7 +36,7 @@ class PaperR(Study):
         """All of it; `out` receives the chain with its assumed values and its scheme."""
         if out is not None:
             from softstart.chain.scheme import scheme_svg
-            from softstart.export import write_whole
+            from softstart.input.files import write_whole
 
             chain = free.tractor()
             write_whole(out / "tractor-like.toml", lambda stream: stream.write(chain.to_toml()))

@@ -9,7 +9,6 @@ from tests.softstart.balancing.engines import RPM, engine
 
 from softstart import Engine, InputError, PeriodicTorque
 from softstart.balancing import BalancerShaft, Cylinders, Layout, MeasuredCycle, Operation
-from softstart.balancing.writing import indicator_csv
 
 VAZ = Engine.load("vaz-11113")
 GOOD = VAZ.to_toml()
@@ -37,7 +36,7 @@ def test_a_measured_pressure_is_read_beside_the_file(tmp_path):
     angles = np.radians(np.arange(-360.0, 360.0, 5.0))
     gas = MeasuredCycle(tuple(angles), tuple(VAZ.pressure(np.mod(angles, 4 * np.pi), 300.0)))
     made = replace(VAZ, gas=gas)
-    (tmp_path / "indicator.csv").write_text(indicator_csv(gas))
+    (tmp_path / "indicator.csv").write_text(gas.to_csv())
     (tmp_path / "mine.toml").write_text(made.to_toml())
     assert Engine.load(tmp_path / "mine.toml") == made
     with pytest.raises(InputError, match="a measured pressure is that of the load"):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
-from softstart.chain.files import names
+from softstart.chain.tables import LIBRARY
 
 BASE = """
 [[mass]]
@@ -143,7 +143,7 @@ def test_backlash_on_a_diameter_is_the_angle_of_the_paper() -> None:
     assert shaft.gap == pytest.approx(2 * 0.2 / 185, rel=1e-15)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", LIBRARY.names())
 def test_shipped_chains_say_what_is_assumed(name: str) -> None:
     chain = Chain.load(name)
     assert chain.assumed
@@ -248,5 +248,5 @@ def test_replacing_keeps_the_checks() -> None:
 def test_there_is_no_such_chain(tmp_path: object) -> None:
     with pytest.raises(InputError, match="did you mean tractor-like"):
         Chain.load("tractor-liek")
-    with pytest.raises(InputError, match="folder"):
+    with pytest.raises(InputError, match="directory"):
         Chain.load(str(tmp_path))

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from softstart.chain import Chain, Mass, Shaft, reduce_chain
-from softstart.chain.files import names
 from softstart.chain.scheme import scheme_svg
+from softstart.chain.tables import LIBRARY
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -19,7 +19,7 @@ def discs(text: str) -> list[ElementTree.Element]:
     return [one for one in ElementTree.fromstring(text).iter(f"{SVG}rect") if one.get("rx")]
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", LIBRARY.names())
 def test_everything_is_named_and_inside(name: str) -> None:
     chain = Chain.load(name)
     text = scheme_svg(chain)

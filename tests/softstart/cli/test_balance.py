@@ -104,7 +104,7 @@ def test_an_engine_with_a_measured_pressure_and_without_a_free_force(run, place)
 
 ONE_SENTENCE = {
     "engine": (["vaz-1111"], ["did you mean vaz-11113?"]),
-    "folder": (["folder"], ["this is a folder"]),
+    "folder": (["folder"], ["this is a directory"]),
     "empty": (["empty.toml"], ["it is empty"]),
     "speed": (["--speed", "50 Hz"], ["--speed", "Hz is a frequency"]),
     "speed below 0": (["--speed", "-1"], ['--speed = "-1"', "above 0"]),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from softstart.clutch import Clutch, engage, library
+from softstart.clutch import Clutch, engage
 from softstart.clutch.law_files import read_law
+from softstart.clutch.parameters import LIBRARY
 from softstart.errors import InputError, SimulationError
 
 PAPER = Clutch.load("paper-c")
@@ -17,7 +18,7 @@ def sentences(make):
     return caught.value.sentences
 
 
-@pytest.mark.parametrize("name", library.names())
+@pytest.mark.parametrize("name", LIBRARY.names())
 def test_shipped_clutches_name_their_source_and_run(name):
     clutch = Clutch.load(name)
     assert clutch.source != "not given"
@@ -37,9 +38,14 @@ def test_the_data_of_the_paper():
 def test_all_mistakes_of_a_file_at_once():
     text = PAPER.to_toml().replace("230.0", '"50 Hz"').replace("gap = 0.0", "gapp = 0.1") + "\n[cluch]\nx = 1"
     found = sentences(lambda: Clutch.from_toml(text, where="my.toml"))
-    assert len(found) == 3
+    assert len(found) == 4
     assert all(one.startswith("my.toml: ") for one in found)
-    for words in ("did you mean [clutch]?", "did you mean gap?", 'write "50 turn/s" or "50 rad/s"'):
+    for words in (
+        "did you mean [clutch]?",
+        "[cluch] x = 1: [clutch] has no key x",
+        "did you mean gap?",
+        'write "50 turn/s" or "50 rad/s"',
+    ):
         assert any(words in one for one in found), found
 
 

@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart.errors import InputError
-from softstart.unit_table import OTHER_NOUNS, QUANTITIES, read_unit
-from softstart.units import nearest, show, to_si
+from softstart.quantities import OTHER_NOUNS, QUANTITIES, nearest, read_unit, show, to_si
 
 READ = [
     ("0.5", "rad", 0.5),
@@ -250,7 +249,7 @@ def test_a_wrong_unit_in_the_code_is_a_sentence_too():
 
 def test_bare_numbers_do_not_import_pint():
     code = (
-        "import sys; from softstart.units import to_si; to_si(1.0, 'rad'); to_si('2', 'rad');"
+        "import sys; from softstart.quantities import to_si; to_si(1.0, 'rad'); to_si('2', 'rad');"
         "assert 'pint' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

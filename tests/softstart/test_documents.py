@@ -3,21 +3,23 @@
 import pytest
 
 from softstart.errors import InputError
-from softstart.input_tables import Field, Table, read_document, read_table, text_of
+from softstart.input.documents import Table, read_document, read_table
+from softstart.input.files import text_of
+from softstart.input.parameters import Parameter
 
-TOP = Table("", (Field("name", "", "name", '"my chain"', default="unnamed"),))
+TOP = Table("", (Parameter("name", "", "name", '"my chain"', default="unnamed"),))
 MASS = Table(
     "mass",
     (
-        Field("inertia", "kg*m^2", "inertia", '"0.1 kg*m^2"', "above 0"),
-        Field("kind", "", "kind of mass", '"free"', default="free", choices=("free", "stuck")),
+        Parameter("inertia", "kg*m^2", "inertia", '"0.1 kg*m^2"', "above 0"),
+        Parameter("kind", "", "kind of mass", '"free"', default="free", choices=("free", "stuck")),
     ),
     many=True,
     least=2,
 )
 LAW = Table(
     "law",
-    (Field("times", "s", "instants of the table", "[0, 1]", "0 or more", default=None, many=True),),
+    (Parameter("times", "s", "instants of the table", "[0, 1]", "0 or more", default=None, many=True),),
     required=False,
 )
 TABLES = (TOP, MASS, LAW)
@@ -32,7 +34,7 @@ kind = "stuck"
 
 
 def read(text, **more):
-    return read_document(text, TABLES, "a chain file", **more)
+    return read_document(text, TABLES, "a chain", **more)
 
 
 def sentences(text, **more):
@@ -53,8 +55,8 @@ def test_a_file_is_read_in_si_with_its_defaults():
 def test_everything_that_is_wrong_is_told_at_once():
     text = GOOD.replace("0.2", '"0.2 N"').replace('"stuck"', '"stick"') + "colour = 1\n[laws]\ntimes = 3"
     assert sentences(text, where="my.toml") == (
-        "my.toml: [laws]: a chain file has no such table; did you mean [law]?",
-        "my.toml: [mass] 2, colour = 1: [mass] 2 has no such key; the keys are inertia, kind.",
+        "my.toml: [laws]: a chain has no such table; did you mean [law]?",
+        "my.toml: [mass] 2, colour = 1: [mass] has no key colour; it has inertia, kind.",
         'my.toml: [mass] 2, inertia = "0.2 N": N is a force, not an inertia; '
         'write an inertia as "0.035 kg*m^2" or as a bare number in kg*m^2.',
         'my.toml: [mass] 2, kind = "stick": the kind of mass is "free" or "stuck"; did you mean "stuck"?',
@@ -68,12 +70,12 @@ def test_everything_that_is_wrong_is_told_at_once():
         ("name = two", "this is not valid TOML"),
         ("[[mass]]\ninertia = 1", "a chain file needs at least 2, and there are 1; add [[mass]] tables"),
         ("[mass]\ninertia = 1", "there may be several; write [[mass]] before each"),
-        ("nam = 'x'" + GOOD.replace('name = "two"', ""), "this file has no such key; did you mean name?"),
+        ("nam = 'x'" + GOOD.replace('name = "two"', ""), "a chain file has no key nam; did you mean name?"),
         (GOOD.replace("0.2", "-1"), "[mass] 2, inertia = -1: the inertia must be above 0"),
         (GOOD.replace("0.2", "[1, 2]"), "the inertia is one number, not a list"),
         (GOOD.replace("inertia = 0.2", ""), 'needed; write for example inertia = "0.1 kg*m^2"'),
         (GOOD + "[law]\ntimes = [0, -1]", "times[1] = -1.0: the instants of the table must be 0 or more"),
-        ("law = 3" + GOOD, "this is one table; write [law] on a line of its own"),
+        ("law = 3" + GOOD, "law is a table; write [law] on a line of its own"),
         (GOOD.replace("0.2", "1e31"), "its size in kg*m^2 must be between 1e-30 and 1e+30; check number"),
         (GOOD.replace("0.2", "1e-300"), "inertia = 1e-300: its size in kg*m^2 must be between 1e-30"),
         (GOOD + "[law]\ntimes = [0, 1e-40, 1e40]", "times[2] = 1e+40: its size in s must be between"),
@@ -104,13 +106,13 @@ def test_values_from_python_are_checked_alike():
         read_table({"inertia": -1, "knid": "free"}, MASS)
     assert caught.value.sentences == (
         "inertia = -1: the inertia must be above 0.",
-        'knid = "free": it has no such key; did you mean kind?',
+        'knid = "free": there is no parameter knid; did you mean kind?',
     )
 
 
 def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(InputError, match="this is a folder"):
-        text_of(tmp_path, "a chain file")
+    with pytest.raises(InputError, match="this is a directory"):
+        text_of(tmp_path, "a chain")
     (tmp_path / "latin.toml").write_bytes("name = 'Getriebe für'".encode("latin-1"))
-    with pytest.raises(InputError, match="no UTF-8 text"):
-        text_of(tmp_path / "latin.toml", "a chain file")
+    with pytest.raises(InputError, match="not UTF-8 text"):
+        text_of(tmp_path / "latin.toml", "a chain")

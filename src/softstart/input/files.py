@@ -1,0 +1,150 @@
+"""Files: shipped ones found by name, text read with a clear refusal, results written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import IO, Any
+
+from softstart.errors import InputError
+from softstart.quantities import RefusedError, nearest, show
+
+__all__ = ["Library", "read_text", "text_of", "write_whole"]
+
+
+class Library:
+    """The TOML files in the folder `library` of a package; `what` and `plural` as "a clutch", "clutches".
+
+    >>> drives = Library("softstart.drive", "a drive", "drives")
+    >>> drives.names()[0], drives.find("crane-4amtkf")[1]
+    ('crane-4amtkf', 'crane-4amtkf')
+    >>> print(drives.text("crane-4amtkf").splitlines()[0])
+    # The crane drive of [G] with J2 = 5 J1 and a gap of 0.5 rad.
+    """
+
+    def __init__(self, package: str, what: str, plural: str) -> None:
+        self.package, self.what, self.plural = package, what, plural
+
+    def names(self) -> tuple[str, ...]:
+        """The names of the shipped files, in order."""
+        return self._names
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        entries = (entry.name for entry in resources.files(self.package).joinpath("library").iterdir())
+        return tuple(sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml")))
+
+    def text(self, name: str) -> str:
+        """The text of a shipped file, whose name must be one of `names()`."""
+        return resources.files(self.package).joinpath("library", f"{name}.toml").read_text(encoding="utf-8")
+
+    def find(self, given: str | os.PathLike[str]) -> tuple[str, str]:
+        """The TOML text, and what to call it in sentences: a shipped file by its name, else one by its path.
+
+        A string that is a shipped name means that file; `./name` means a file of the user's own. Raises
+        InputError in one sentence, with the name that was probably meant.
+        """
+        if not isinstance(given, str | os.PathLike):
+            raise InputError(
+                f"{show(given)}: {self.what} is named by text, a shipped name or the path of a TOML file."
+            )
+        if isinstance(given, str) and given in self._names:
+            return self.text(given), given
+        path = os.fspath(given)
+        noun = self.what.split()[-1]
+        if not path:
+            listed = ", ".join(self._names)
+            raise InputError(f'"": the name of the {noun} is empty; give a path, or one of {listed}.')
+        try:
+            return read_text(path), path
+        except RefusedError as refusal:
+            reason = refusal.reason
+            if reason == ABSENT:
+                reason = self._hint(Path(path), noun)
+            elif reason == FOLDER:
+                reason = f"{FOLDER}; give the TOML file of {self.what} in it"
+            stop = "" if reason.endswith("?") else "."
+            raise InputError(f"{show(path)}: {reason}{stop}") from None
+
+    def _hint(self, path: Path, noun: str) -> str:
+        shipped = f"shipped {self.plural} are {', '.join(self._names)}"
+        try:
+            entries = list(path.parent.iterdir())
+        except OSError:
+            return f"there is no directory {show(str(path.parent))}; {shipped}"
+        beside = [str(path.parent / entry.name) for entry in entries if entry.suffix == ".toml"]
+        meant = nearest(path.stem, self._names) or nearest(str(path), beside)
+        return f"{ABSENT}, and no shipped {noun} of this name; " + (
+            f"did you mean {meant}?" if meant else shipped
+        )
+
+
+ABSENT, FOLDER = "there is no such file", "this is a directory"
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a UTF-8 file; raises RefusedError with the reason, for callers that word the sentence."""
+    try:
+        content = Path(path).read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise RefusedError(ABSENT) from None
+    except IsADirectoryError:
+        raise RefusedError(FOLDER) from None
+    except OSError as error:
+        raise RefusedError(f"the file cannot be read ({error.strerror or error})") from None
+    except ValueError as error:  # a NUL in the path
+        raise RefusedError(f"this cannot be the path of a file ({error})") from None
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise RefusedError(f"the file is not UTF-8 text (line {line}); save it as UTF-8") from None
+
+
+def text_of(path: str | os.PathLike[str], what: str, form: str = "TOML") -> str:
+    """The text of a file, or an InputError in one sentence that names it; `form` is that of the file.
+
+    >>> text_of("nowhere.csv", "a table of the law", "CSV")
+    Traceback (most recent call last):
+    softstart.errors.InputError: "nowhere.csv": there is no such file; give the path of a table ...
+    """
+    try:
+        return read_text(path)
+    except RefusedError as refusal:
+        remedy = f"; give the path of {what} ({form})" if refusal.reason in (ABSENT, FOLDER) else ""
+        raise InputError(f"{show(os.fspath(path))}: {refusal.reason}{remedy}.") from None
+
+
+def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = False) -> None:
+    """Write a file through a temporary neighbour and a rename, so that it is never half-written.
+
+    Raises InputError if the file cannot be written there.
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InputError(
+            f"output = {path}: the file cannot be written there: {error.strerror or error}; "
+            "give a folder that exists and that you may write to."
+        ) from None
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "wb" if binary else "w", encoding=None if binary else "utf-8") as stream:
+            write(stream)
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(
+            f"output = {path}: the file could not be finished: {error.strerror or error}; "
+            "nothing was left behind."
+        ) from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,264 @@
+"""What a parameter is, how its value is read in SI, and the sentence for a value that is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from softstart.quantities import RefusedError, Value, nearest, parse, show
+
+__all__ = [
+    "REQUIRED",
+    "Limit",
+    "Mistake",
+    "Parameter",
+    "Wording",
+    "read_value",
+    "read_values",
+    "sentences_of",
+]
+
+# beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
+LEAST, MOST = 1e-30, 1e30
+
+Limit = Literal[
+    "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "a whole number, 0 or more", "one line"
+]
+
+# each holds for a number and, element by element, for an array
+LIMITS: dict[str, Callable[[Any], Any]] = {
+    "above 0": lambda x: x > 0.0,
+    "0 or more": lambda x: x >= 0.0,
+    "0 or less": lambda x: x <= 0.0,
+    "from 0 to 1": lambda x: (x >= 0.0) & (x <= 1.0),
+    "a whole number, 0 or more": lambda x: (x >= 0.0) & (x % 1.0 == 0.0),
+}
+
+
+class _Required:
+    def __repr__(self) -> str:
+        return "REQUIRED"
+
+
+REQUIRED: Any = _Required()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: its key in a file, its keyword in Python, and what it means.
+
+    `unit` is the SI unit; a parameter without one is text, or one of `choices`. `default` is REQUIRED, a
+    value in SI, or None for "not given"; one that `follows` another parameter takes its value. A `many`
+    parameter is a list of numbers, an `infinite` one may be infinity. `example` is what to type. `table` is
+    that of the file, "" above the first one; `name` is the keyword in Python, by default the key.
+    """
+
+    key: str
+    unit: str
+    meaning: str
+    example: str
+    limit: Limit = "any"
+    default: Any = REQUIRED
+    choices: tuple[str, ...] = ()
+    many: bool = False
+    infinite: bool = False
+    symbol: str = ""
+    follows: str = ""
+    table: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.key)
+
+    @property
+    def required(self) -> bool:
+        """Whether it has neither a default nor a parameter to follow."""
+        return self.default is REQUIRED
+
+    @property
+    def path(self) -> str:
+        """What the parameter is called with `--set`: `load.inertia`."""
+        return f"{self.table}.{self.key}" if self.table else self.key
+
+    @property
+    def place(self) -> str:
+        """What the parameter is called in a sentence about a file: `[load] inertia`."""
+        return f"[{self.table}] {self.key}" if self.table else self.key
+
+
+@dataclass(frozen=True)
+class Wording:
+    """How the writer of the input names parameters and writes values.
+
+    `where` is the file, put before each sentence; `style` is "python" (`load_inertia`), "toml"
+    (`[load] inertia`) or "path" (`load.inertia`). `written` holds names that were written otherwise, `row`
+    stands for the table where there are several, as "[mass] 2, ".
+    """
+
+    where: str = ""
+    style: str = "python"
+    written: Mapping[str, str] = field(default_factory=dict)
+    row: str = ""
+
+    def label(self, parameter: Parameter) -> str:
+        """The parameter as the writer calls it.
+
+        >>> gap = Parameter("gap", "rad", "gap", '"0.5 rad"', table="shaft")
+        >>> Wording(style="toml").label(gap), Wording().label(gap)
+        ('[shaft] gap', 'gap')
+        """
+        if parameter.name in self.written:
+            return self.written[parameter.name]
+        if self.row:
+            return f"{self.row}{parameter.key}"
+        return {"toml": parameter.place, "path": parameter.path}.get(self.style, parameter.name)
+
+    def show(self, value: object) -> str:
+        """The value as the writer wrote it."""
+        return show(value, toml=self.style == "toml")
+
+    def sentence(self, subject: str, reason: str) -> str:
+        """Subject and reason with the file before and a full stop behind."""
+        stop = "" if reason.endswith(("?", ".")) else "."
+        return f"{self.where + ': ' if self.where else ''}{subject}: {reason}{stop}"
+
+    def whole(self, reason: str) -> str:
+        """A sentence about the input as a whole."""
+        return replace(self, where="").sentence(self.where or "the text", reason)
+
+    def missing(self, parameter: Parameter, instead: str = "") -> str:
+        """That a required parameter is missing, and what to write; `instead` names what may replace it."""
+        p = parameter
+        symbol = f" {p.symbol}" if p.symbol and p.symbol != p.key else ""
+        text = f"{p.name}={p.example}" if self.style == "python" else f"{p.key} = {p.example}"
+        return self.sentence(
+            f"{self.label(p)} is missing",
+            f"the {p.meaning}{symbol} is needed{instead}; write for example {text}",
+        )
+
+    def refused(self, parameter: Parameter, value: object, refusal: RefusedError) -> str:
+        """The sentence for a value that was refused; of an array, only the bad element is shown."""
+        index = ""
+        if refusal.index is not None:
+            value, index = refusal.value, f"[{', '.join(map(str, refusal.index))}]"
+        return self.sentence(f"{self.label(parameter)}{index} = {self.show(value)}", refusal.reason)
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One sentence; `missing` is the path of the parameter that it misses, `meant` of one misspelt."""
+
+    sentence: str
+    missing: str | None = None
+    meant: str | None = None
+
+
+def sentences_of(mistakes: Iterable[Mistake]) -> list[str]:
+    """The sentences, each once; a parameter that was only misspelt is not also called missing.
+
+    >>> sentences_of([Mistake("gapp: did you mean gap?", meant="gap"), Mistake("no gap", missing="gap")])
+    ['gapp: did you mean gap?']
+    """
+    mistakes = list(mistakes)
+    misspelt = {mistake.meant for mistake in mistakes if mistake.meant}
+    kept = (m.sentence for m in mistakes if m.missing is None or m.missing not in misspelt)
+    return list(dict.fromkeys(kept))
+
+
+def read_values(
+    given: Mapping[str, object],
+    parameters: Mapping[str, Parameter],
+    wording: Wording,
+    *,
+    batch: bool = False,
+    known: Mapping[str, Any] | None = None,
+) -> tuple[dict[str, Any], list[Mistake]]:
+    """The values of `parameters` (by the names used in `given`), and what is wrong or missing.
+
+    `known` holds values that were read before. None stands for "not given" where that is the default.
+    """
+    values: dict[str, Any] = {}
+    mistakes: list[Mistake] = []
+    for name, parameter in parameters.items():
+        if known is not None and name in known:
+            values[name] = known[name]
+        elif name in given and not (given[name] is None and parameter.default is None):
+            value = given[name]
+            try:
+                values[name] = read_value(parameter, value, batch=batch)
+            except RefusedError as refusal:
+                mistakes.append(Mistake(wording.refused(parameter, value, refusal)))
+        elif parameter.default is REQUIRED:
+            mistakes.append(Mistake(wording.missing(parameter), missing=parameter.path))
+        else:
+            values[name] = values.get(parameter.follows) if parameter.follows else parameter.default
+    return values, mistakes
+
+
+def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> Any:
+    """One value in SI, as text, or one of the choices; raises `RefusedError` with reason and remedy.
+
+    A `batch` lets arrays of any shape through, and leaves it to the caller to refuse extremes.
+
+    >>> read_value(Parameter("gap", "rad", "total gap", '"0.5 rad"', "0 or more"), "500 mrad")
+    0.5
+    >>> read_value(Parameter("kind", "", "kind", '"active"', choices=("active", "reactive")), "activ")
+    Traceback (most recent call last):
+    softstart.quantities.RefusedError: the kind is "active" or "reactive"; did you mean "active"?
+    """
+    if not parameter.unit:
+        return _read_text(parameter, value)
+    number = parse(value, parameter.unit, infinite=parameter.infinite)
+    if parameter.many:
+        number = np.atleast_1d(number)
+        if number.ndim > 1:
+            raise RefusedError(f"the {parameter.meaning} is one list of numbers, such as {parameter.example}")
+    elif not batch and not isinstance(number, float):
+        raise RefusedError(f"the {parameter.meaning} is one number, not a list")
+    limit = LIMITS.get(parameter.limit)
+    if limit is not None:
+        _refuse(number, limit(number), f"the {parameter.meaning} must be {parameter.limit}")
+    if not batch:
+        sizes = np.asarray(number)
+        beyond = np.isfinite(sizes) & (np.abs(sizes) > MOST)
+        if parameter.limit == "above 0":
+            beyond |= sizes < LEAST
+        size = f"its size in {parameter.unit}" if parameter.unit != "1" else "it"
+        reason = f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit"
+        _refuse(number, ~beyond, reason)
+    if isinstance(number, np.ndarray):
+        number.setflags(write=False)
+    return number
+
+
+def _refuse(number: Value, allowed: Any, reason: str) -> None:
+    """Raise for the first value of a number or array that is not allowed."""
+    if isinstance(number, float):
+        if not allowed:
+            raise RefusedError(reason)
+    elif not allowed.all():
+        index = tuple(int(i) for i in np.argwhere(~allowed)[0])
+        raise RefusedError(reason, float(number[index]), index)
+
+
+def _read_text(parameter: Parameter, value: object) -> str:
+    what = f"the {parameter.meaning}"
+    if not parameter.choices:
+        empty = isinstance(value, str) and not value.strip() and parameter.default != ""
+        if not isinstance(value, str) or (empty and parameter.limit != "one line"):
+            raise RefusedError(f"{what} must be text, such as {parameter.example}")
+        if parameter.limit == "one line" and (empty or len(value.splitlines()) > 1):
+            raise RefusedError(f"{what} must be one line of text that is not empty")
+        if any(0xD800 <= ord(letter) < 0xE000 for letter in value):
+            raise RefusedError("this text has half a character (a lone surrogate); write it anew")
+        return value
+    if isinstance(value, str) and value in parameter.choices:
+        return value
+    *first, last = (show(choice) for choice in parameter.choices)
+    reason = f"{what} is {', '.join(first)} or {last}"
+    meant = nearest(value, parameter.choices) if isinstance(value, str) else None
+    raise RefusedError(f"{reason}; did you mean {show(meant)}?" if meant else reason)
