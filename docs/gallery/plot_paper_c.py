@@ -9,7 +9,7 @@ they like.
 
 # %%
 # The clutch, shaft and load of [C] (its units: kgf m), and the four laws on the exact plant with re-slip:
-from softstart.clutch.pictures import engagement_figure, front_figure
+from softstart.views.clutches import engagement_figure, front_figure
 from softstart_studies.paper_c import IN_KGF, fronts, printed
 
 runs = printed.engagements()

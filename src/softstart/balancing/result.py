@@ -17,10 +17,13 @@ from softstart.balancing.parts import BalancerShaft
 from softstart.balancing.shaking import moment_harmonic
 from softstart.balancing.slider_crank import Vector
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.quantities import to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+views = late("softstart.views.balances")
 
 __all__ = ["Balance", "Residual", "balance"]
 
@@ -198,13 +201,8 @@ class Balance:
 
     def figures(self) -> dict[str, Figure]:
         """All figures by the stem of their file: torque over crank angle, residuals over speed, forces."""
-        from softstart.balancing.pictures import force_figure, residual_figure, torque_figure
-
-        return {
-            "torque": torque_figure(self),
-            "residual": residual_figure(self),
-            "forces": force_figure(self),
-        }
+        found: dict[str, Figure] = views.figures(self)
+        return found
 
 
 def balance(

@@ -2,39 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.balancing import Balance, Engine, MeasuredCycle
+from softstart.balancing import balance as compute
+from softstart.balancing.engine import INDICATOR_FILE
+from softstart.balancing.tables import LIBRARY, TABLES
 from softstart.cli.commands import Command
-from softstart.cli.completing import Keys, names_or_files, table_keys
+from softstart.cli.completing import names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.errors import InputError
-from softstart.views.markdown import output_folder
+from softstart.quantities import to_si
+from softstart.views import balances as views
+from softstart.views.drawing import save_figure
+from softstart.views.markdown import (
+    command_run,
+    markdown,
+    output_folder,
+    table_sections,
+    write_table,
+    write_text,
+)
+from softstart.views.terminal import console, print_json, print_tables, sentence
 
 if TYPE_CHECKING:
-    from softstart.balancing import Engine
+    from rich.console import Console
 
 DEFAULT_ENGINE = "vaz-11113"
 
 
-def _engines() -> Iterable[str]:
-    from softstart.balancing.tables import LIBRARY
-
-    return LIBRARY.names()
-
-
-def _keys() -> Keys:
-    from softstart.balancing.tables import TABLES
-
-    return table_keys(TABLES)
-
-
 @click.command(cls=Command)
 @click.argument(
-    "engine", metavar="[ENGINE]", default=DEFAULT_ENGINE, shell_complete=names_or_files(_engines, ".toml")
+    "engine",
+    metavar="[ENGINE]",
+    default=DEFAULT_ENGINE,
+    shell_complete=names_or_files(LIBRARY.names, ".toml"),
 )
 @click.option(
     "--speed",
@@ -48,7 +55,7 @@ def _keys() -> Keys:
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
-    shell_complete=settings_of(_keys),
+    shell_complete=settings_of(lambda: table_keys(TABLES)),
     help="Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5. May be "
     "repeated.",
 )
@@ -73,30 +80,20 @@ def balance(
     mistakes.settle()
     assert one is not None
 
-    from softstart.balancing.result import balance as compute
-
     with output_folder(out) as folder:
         found = compute(one, asked)
         if folder is not None:
-            from softstart.cli.balance_report import write_balance
-
-            write_balance(found, folder, command_line())
-
-    from softstart.cli.balance_text import show_balance
-    from softstart.views.terminal import console, print_json
-
+            _write(found, folder, command_line())
     if as_json:
         print_json(found.summary())
         return
-    show_balance(console(), found)
+    _show(console(), found)
     if out is not None:
         print(f"\nWritten to {out}: report.md, the figures and the tables.")
 
 
 def read_engine(name: str, settings: Sequence[str]) -> Engine:
     """The engine asked for, with its changes."""
-    from softstart.balancing import Engine
-
     mistakes = Mistakes()
     changes: dict[str, Any] = {}
     with mistakes.noted():
@@ -111,8 +108,6 @@ def read_speeds(texts: Sequence[str]) -> list[float] | None:
     >>> [round(speed, 3) for speed in read_speeds(["4500rpm", "100"])]
     [471.239, 100.0]
     """
-    from softstart.quantities import to_si
-
     found = []
     mistakes = Mistakes()
     for text in texts:
@@ -123,3 +118,43 @@ def read_speeds(texts: Sequence[str]) -> list[float] | None:
             found.append(speed)
     mistakes.settle()
     return found or None
+
+
+def _show(to: Console, found: Balance) -> None:
+    for index, line in enumerate(views.engine_lines(found)):
+        sentence(to, line, "bold" if index == 0 else "")
+    print_tables(to, views.tables(found))
+    to.print()
+    sentence(to, views.conclusion(found), "bold")
+    for note in views.footnotes(found):
+        sentence(to, note, "dim")
+
+
+def _write(found: Balance, folder: Path, command: str) -> None:
+    """Figures, tables, the engine with all changes, and the report that ties them together."""
+    engine, figures = found.engine, found.figures()
+    for stem, figure in figures.items():
+        save_figure(figure, folder, stem)
+    write_text(folder / "engine.toml", engine.to_toml())
+    if isinstance(engine.gas, MeasuredCycle):
+        write_text(folder / INDICATOR_FILE, engine.gas.to_csv())
+    residuals = [
+        {"balancer": one.name, **one.row(i)} for one in found.residuals for i in range(one.speeds.size)
+    ]
+    for name, rows in (("orders.csv", found.orders()), ("residuals.csv", residuals)):
+        if rows:
+            write_table(folder / name, list(rows[0]), [list(row.values()) for row in rows])
+    write_table(folder / "torque.csv", *views.torque_over_cycle(found))
+    parts = [
+        f"# {markdown(engine.name)}: forces, moments and balancers",
+        "\n".join(f"- {markdown(line)}" for line in views.engine_lines(found)[1:]),
+        markdown(views.conclusion(found)),
+        *table_sections(views.tables(found)),
+        *(f"![{stem}]({stem}.svg)" for stem in figures),
+        *map(markdown, views.footnotes(found)),
+        "All numbers: [orders.csv](orders.csv), [residuals.csv](residuals.csv), torque over the cycle at the "
+        "tuning speed [torque.csv](torque.csv).",
+        f"{command_run(command)}on the engine of [engine.toml](engine.toml), which holds all changes. "
+        f"Source: {markdown(engine.source) or 'none given'}.",
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")

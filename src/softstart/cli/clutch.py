@@ -2,51 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from softstart.cli.commands import Command, did_you_mean
-from softstart.cli.completing import Keys, names_or_files, table_keys
+from softstart.cli.completing import names_or_files, table_keys
 from softstart.cli.completing import settings as settings_of
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
+from softstart.cli.running import working
+from softstart.clutch import (
+    LAWS,
+    Clutch,
+    Engagement,
+    EngagementFront,
+    engage,
+    optimize_engagement,
+)
+from softstart.clutch.law_files import read_law
+from softstart.clutch.parameters import LIBRARY, TABLES
 from softstart.errors import InputError
-from softstart.views.markdown import output_folder
+from softstart.quantities import to_si
+from softstart.views import clutches as views
+from softstart.views.drawing import save_figure
+from softstart.views.markdown import (
+    command_run,
+    markdown,
+    markdown_table,
+    output_folder,
+    plain_table,
+    write_table,
+    write_text,
+)
+from softstart.views.numbers import Column
+from softstart.views.terminal import console, print_json, print_table, print_tables, sentence
 
 if TYPE_CHECKING:
-    from softstart.clutch import Clutch
+    from rich.console import Console
 
 DEFAULT_CLUTCH = "paper-c"
 DEFAULT_POINTS = 8
 
 
-def _clutches() -> Iterable[str]:
-    from softstart.clutch.parameters import LIBRARY
-
-    return LIBRARY.names()
-
-
-def _laws() -> Iterable[str]:
-    from softstart.clutch.laws import LAWS
-
-    return LAWS
-
-
-def _keys() -> Keys:
-    from softstart.clutch.parameters import TABLES
-
-    return table_keys(TABLES)
+TRACES = {"t": "t [s]", "M": "M [N*m]", "F": "F [N*m]", "T": "T [N*m]", "theta": "theta [rad]",
+          "wM": "wM [rad/s]", "wc": "wc [rad/s]"}  # fmt: skip
+LAW = ("t [s]", "M [N*m]")
+PHASES = ("phase", "start [s]", "end [s]", "peak torque [N*m]", "at [s]", "friction work [J]")
 
 
 @click.command(cls=Command)
 @click.argument(
-    "clutch", metavar="[CLUTCH]", default=DEFAULT_CLUTCH, shell_complete=names_or_files(_clutches, ".toml")
+    "clutch",
+    metavar="[CLUTCH]",
+    default=DEFAULT_CLUTCH,
+    shell_complete=names_or_files(LIBRARY.names, ".toml"),
 )
 @click.option(
     "--law",
     metavar="NAME|FILE",
-    shell_complete=names_or_files(_laws, ".csv"),
+    shell_complete=names_or_files(lambda: LAWS, ".csv"),
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
     "and friction torque. By default that of the clutch file.",
 )
@@ -55,7 +71,7 @@ def _keys() -> Keys:
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
-    shell_complete=settings_of(_keys),
+    shell_complete=settings_of(lambda: table_keys(TABLES)),
     help="Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'. May be "
     "repeated.",
 )
@@ -93,7 +109,7 @@ def clutch(
     """
     mistakes = Mistakes()
     one: Clutch | None = None
-    count: int | None = DEFAULT_POINTS
+    count = DEFAULT_POINTS
     with mistakes.noted():
         one = read_clutch(clutch, settings, law)
     with mistakes.noted():
@@ -103,55 +119,32 @@ def clutch(
     mistakes.settle()
     assert one is not None
 
-    from softstart.views.terminal import console, print_json
-
-    if optimal:
-        from softstart.cli.clutch_report import write_front
-        from softstart.cli.clutch_text import show_front
-        from softstart.cli.running import working
-        from softstart.clutch.front import optimize_engagement
-
-        with output_folder(out) as folder, working("looking for the best laws ...") as status:
-
-            def progress(doing: str) -> None:
-                if status is not None:
-                    status.update(f"{doing} ...")
-
-            front = optimize_engagement(
-                one,
-                count or DEFAULT_POINTS,
-                law_class="nondecreasing" if nondecreasing else "any",
-                progress=progress,
-            )
-            if folder is not None:
-                write_front(front, folder, command_line())
-        if as_json:
-            print_json(front.summary())
-            return
-        show_front(console(), front)
-    else:
-        from softstart.cli.clutch_report import write_engagement
-        from softstart.cli.clutch_text import show_engagement
-        from softstart.clutch.engagement import engage
-
-        with output_folder(out) as folder:
-            run = engage(one, until=end)
-            if folder is not None:
-                write_engagement(run, folder, command_line())
-        if as_json:
-            print_json(run.summary())
-            return
-        show_engagement(console(), run)
+    found: Engagement | EngagementFront
+    with output_folder(out) as folder:
+        found = _optimize(one, count, nondecreasing) if optimal else engage(one, until=end)
+        if folder is not None:
+            _write(found, folder, command_line())
+    if as_json:
+        print_json(found.summary())
+        return
+    _show(console(), found)
     if out is not None:
         print(f"\nWritten to {out}: report.md, the figure, the tables and the laws.")
 
 
+def _optimize(one: Clutch, points: int, nondecreasing: bool) -> EngagementFront:
+    with working("looking for the best laws ...") as status:
+
+        def progress(doing: str) -> None:
+            if status is not None:
+                status.update(f"{doing} ...")
+
+        law_class = "nondecreasing" if nondecreasing else "any"
+        return optimize_engagement(one, points, law_class=law_class, progress=progress)
+
+
 def read_clutch(name: str, settings: Sequence[str], law: str | None) -> Clutch:
     """The clutch asked for, with its changes and its law; all mistakes at once."""
-    from softstart.clutch import Clutch
-    from softstart.clutch.law_files import read_law
-    from softstart.clutch.laws import LAWS
-
     mistakes = Mistakes()
     changes: dict[str, Any] = {}
     table: tuple[list[float], list[float]] | None = None
@@ -178,15 +171,13 @@ def read_end(text: str | None) -> float | None:
     """
     if text is None:
         return None
-    from softstart.quantities import to_si
-
     value = float(to_si(text, "s", name="--until"))
     if not value > 0.0:
         raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 5 or "500 ms".')
     return value
 
 
-def _points(text: str | None, optimal: bool, nondecreasing: bool, until: str | None) -> int | None:
+def _points(text: str | None, optimal: bool, nondecreasing: bool, until: str | None) -> int:
     if optimal and until is not None:
         raise InputError(
             f'--until = "{until}": optimal laws are followed to the lock-up; leave it out with --optimal.'
@@ -195,7 +186,71 @@ def _points(text: str | None, optimal: bool, nondecreasing: bool, until: str | N
         what = f'--points = "{text}"' if text is not None else "--nondecreasing"
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
     if text is None:
-        return None
+        return DEFAULT_POINTS
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 200):
         raise InputError(f'--points = "{text}": give a whole number of points from 1 to 200.')
     return int(text)
+
+
+def _show(to: Console, found: Engagement | EngagementFront) -> None:
+    for index, line in enumerate(views.clutch_lines(found.clutch)):
+        sentence(to, line, "bold" if index == 0 else "")
+    if isinstance(found, Engagement):
+        to.print()
+        columns = [Column("figure", False), Column("value"), Column("unit", False), Column("meaning", False)]
+        print_table(to, columns, views.figure_rows(found))
+        headline, note = views.status(found), views.events(found)
+    else:
+        print_tables(to, [views.point_table(found), views.law_table(found)])
+        headline, note = views.conclusion(found), f"The bounds cover {found.covers}."
+    to.print()
+    sentence(to, headline, "bold")
+    sentence(to, note, "dim")
+
+
+def _write(found: Engagement | EngagementFront, folder: Path, command: str) -> None:
+    parts = _engagement_files(found, folder) if isinstance(found, Engagement) else _front_files(found, folder)
+    write_text(folder / "clutch.toml", found.clutch.to_toml())
+    parts.append(
+        f"{command_run(command)}on the clutch of [clutch.toml](clutch.toml), which holds all changes. "
+        f"Source: {markdown(found.clutch.source)}"
+    )
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+def _engagement_files(run: Engagement, folder: Path) -> list[str]:
+    save_figure(run.plot(), folder, "engagement")
+    traces = {"t": run.t, **run.at(run.t)}
+    rows = zip(*(traces[name].tolist() for name in TRACES), strict=True)
+    write_table(folder / "traces.csv", list(TRACES.values()), list(rows))
+    write_table(folder / "events.csv", ("time [s]", "event"), [(event.t, event.name) for event in run.events])
+    write_table(folder / "phases.csv", PHASES, [list(vars(phase).values()) for phase in run.phases])
+    return [
+        f"# {markdown(run.clutch.name)}: {markdown(run.law.label)}",
+        views.STATUS[run.status],
+        markdown_table(["figure", "value", "unit", "meaning"], views.figure_rows(run)),
+        "![engagement](engagement.svg)",
+        "Traces: [traces.csv](traces.csv). Events: [events.csv](events.csv). Phases: "
+        "[phases.csv](phases.csv).",
+    ]
+
+
+def _front_files(front: EngagementFront, folder: Path) -> list[str]:
+    """Each law of the front is a table that --law reads."""
+    save_figure(front.plot(), folder, "front")
+    for index, point in enumerate(front.points, start=1):
+        write_table(folder / f"law-{index}.csv", LAW, list(zip(point.times, point.torques, strict=True)))
+    summaries = [
+        {k: v for k, v in p.summary().items() if k not in ("times", "torques")} for p in front.points
+    ]
+    for name, rows in (("front.csv", summaries), ("laws.csv", [law.summary() for law in front.laws])):
+        if rows:
+            write_table(folder / name, list(rows[0]), [list(one.values()) for one in rows])
+    return [
+        f"# {markdown(front.clutch.name)}: optimal laws, {front.law_class}",
+        views.conclusion(front),
+        *(plain_table(one) for one in (views.point_table(front), views.law_table(front)) if one.rows),
+        f"The bounds cover {front.covers}.",
+        "![front](front.svg)",
+        "Points: [front.csv](front.csv). The laws: law-1.csv, ..., each readable by --law.",
+    ]

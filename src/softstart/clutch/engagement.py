@@ -38,7 +38,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.quantities import to_si
 
-views = late("softstart.clutch.pictures")
+views = late("softstart.views.clutches")
 
 MOST_STEPS = 400_000
 MOST_AT_ONCE = 40

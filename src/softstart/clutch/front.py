@@ -23,7 +23,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.quantities import nearest, show
 
-views = late("softstart.clutch.pictures")
+views = late("softstart.views.clutches")
 
 Progress = Callable[[str], object]
 

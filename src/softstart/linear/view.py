@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 else:
     control = late("control")
 
-views = late("softstart.linear.pictures")
+views = late("softstart.views.linear")
 
 INERTIAS = (0.4, 1.0, 2.5)
 STIFFNESSES = (0.9, 1.1)

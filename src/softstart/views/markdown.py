@@ -21,6 +21,7 @@ from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.views.drives import controllers_set_up
+from softstart.views.numbers import Table
 
 FITTED_TO = "fitted-to.toml"
 
@@ -174,6 +175,20 @@ def markdown_table(
     return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
 
 
+def table_sections(tables: Sequence[Table]) -> list[str]:
+    """Titles and tables in Markdown, without empty tables."""
+    return [
+        part for table in tables if table.rows for part in (f"## {markdown(table.title)}", plain_table(table))
+    ]
+
+
+def plain_table(table: Table) -> str:
+    """A table in Markdown without its title; numbers are set to the right."""
+    headings = [" ".join(column.heading.split()) for column in table.columns]
+    rule = ["---:" if column.number else "---" for column in table.columns]
+    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
+
+
 def drive_table(drive: Drive) -> str:
     """All parameters of a drive that are set."""
     rows = []
@@ -192,6 +207,15 @@ def write_fitted_to(fitted_to: Drive | None, folder: Path) -> None:
         write_text(folder / FITTED_TO, fitted_to.to_toml())
 
 
+def command_run(command: str) -> str:
+    """What was run, by which version: the beginning of a report's last section."""
+    return (
+        "## Where this comes from\n\n"
+        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
+        f"```sh\n{command}\n```\n\n"
+    )
+
+
 def provenance(drive: Drive, command: str, fitted_to: Drive | None = None, one: bool = True) -> str:
     """What was run, by what, on which input: enough to do it again. `one`: no parameter of it is varied."""
     other, shown = "", drive if one else None
@@ -201,9 +225,7 @@ def provenance(drive: Drive, command: str, fitted_to: Drive | None = None, one: 
             f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
         )
     return (
-        "## Where this comes from\n\n"
-        f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
-        f"```sh\n{command}\n```\n\n"
+        f"{command_run(command)}"
         "on the drive of [drive.toml](drive.toml), which holds all changes:\n\n"
         f"```toml\n{drive.to_toml()}```{other}"
     )

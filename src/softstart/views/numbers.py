@@ -20,6 +20,20 @@ class Column(NamedTuple):
         return max(len(line) for text in (self.heading, *cells) for line in text.split("\n"))
 
 
+class Table(NamedTuple):
+    """A titled table of text cells."""
+
+    title: str
+    columns: list[Column]
+    rows: list[list[str]]
+
+    @classmethod
+    def of(cls, title: str, cells: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Table:
+        """From the cells below each heading; columns named in `texts` hold text, the others numbers."""
+        columns = [Column(heading, heading not in texts) for heading in cells]
+        return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)])
+
+
 def number(value: float | None, decimals: int) -> str:
     """A number with so many decimals; a dash for what there is not.
 

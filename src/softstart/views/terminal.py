@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from softstart.late import late
-from softstart.views.numbers import Column, plain, printable
+from softstart.views.numbers import Column, Table, plain, printable
 
 if TYPE_CHECKING:
     import rich.console as rich_console
@@ -92,6 +92,14 @@ def print_table(
     finally:
         to.width = before
     print("\n".join(line.rstrip() for line in captured.get().rstrip().splitlines()))
+
+
+def print_tables(to: rich_console.Console, tables: Sequence[Table]) -> None:
+    """Tables with their titles, each after an empty line; empty ones are left out."""
+    for table in tables:
+        if table.rows:
+            to.print()
+            print_table(to, table.columns, table.rows, title=table.title)
 
 
 def fits(to: rich_console.Console, columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> bool:

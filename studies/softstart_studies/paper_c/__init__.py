@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from softstart.clutch.pictures import engagement_figure, front_figure
 from softstart.study import Progress, Study, StudyResult
+from softstart.views.clutches import engagement_figure, front_figure
 from softstart_studies.paper_c import fronts, printed, readings, verdicts
 
 __all__ = ["PaperC"]

@@ -1,24 +1,26 @@
-"""The figure of a linear view: Bode and Nyquist diagrams of the loop, and the harmonic balance in the gap."""
+"""A linear view in words, tables and figures: margins, modes, limit cycles, Bode and Nyquist diagrams."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart.linear.limit_cycles import Outside, frequency_grid
 from softstart.linear.systems import at_points, frequencies, poles
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, GREY, SMALL, drawing, new_figure
+from softstart.views.numbers import NOTHING, Table, column_of, number, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.linear.loop import Margins
+    from softstart.linear.loop import Crossing, Margins
     from softstart.linear.view import LinearView
 
-GREY = "#666666"
-SMALL = 9.5
+SHOWN_MODES = 16
+SHOWN_CROSSINGS = 4
 DECADES = 2.0  # shown below the elastic frequency
 WIDEST = 3.0  # of the plane about -1
 DEEPEST, HIGHEST = 1e-3, 1e3  # of |L|
@@ -53,6 +55,114 @@ def phase_text(m: Margins) -> str:
 def delay_text(m: Margins) -> str:
     """The delay margin in ms."""
     return "not limited" if math.isinf(m.delay_margin) else f"{1e3 * m.delay_margin:.3g} ms"
+
+
+def _frequency(value: float) -> str:
+    return NOTHING if math.isnan(value) else f"{short(float(f'{value:.5g}'))} rad/s"
+
+
+def _frequencies(crossings: Sequence[Crossing]) -> str:
+    shown = [_frequency(one.frequency) for one in crossings[:SHOWN_CROSSINGS]]
+    return ", ".join([*shown, *(["..."] if len(crossings) > SHOWN_CROSSINGS else [])]) or NOTHING
+
+
+def margin_rows(view: LinearView) -> list[list[str]]:
+    """The figures of the loop, as words and numbers."""
+    m = view.margins
+    assert m is not None
+    rows = [
+        ["closed loop in contact", "stable" if view.stable else "unstable"],
+        ["gain margin", gain_text(m)],
+        ["phase margin", phase_text(m)],
+        ["delay margin", delay_text(m)],
+        ["modulus margin", f"{m.modulus_margin:.4g} (sensitivity at most {m.sensitivity_peak:.4g})"],
+        ["loop gain is 1 at", _frequencies(m.gain_crossovers)],
+        ["loop is at -180 degrees at", _frequencies(m.phase_crossovers)],
+    ]
+    if m.gain_reduction > 0.0:
+        rows.insert(2, ["least gain", f"{m.gain_reduction:.3g} of the present one"])
+    if view.elastic_mode is not None:
+        mode = view.elastic_mode
+        rows.append(["elastic mode", f"{_frequency(mode.frequency)}, damping ratio {mode.damping_ratio:.4g}"])
+    if view.point is not None:
+        rows.append(["linear against exact", f"{100.0 * view.point.mismatch:.2g} % at most"])
+    return rows
+
+
+def _modes(view: LinearView) -> Table:
+    """The closed loop's modes; a pair counts once."""
+    modes = [mode for mode in view.modes if mode.value.imag >= 0.0][:SHOWN_MODES]
+    cells = {
+        "rad/s": column_of([mode.frequency for mode in modes]),
+        "damping\nratio": [number(mode.damping_ratio, 4) for mode in modes],
+        "pole z": [
+            f"{mode.value.real:.5f}" + (f" +- {mode.value.imag:.5f}j" if mode.value.imag > 0.0 else "")
+            for mode in modes
+        ],
+    }
+    return Table.of("Modes of the closed loop", cells, ("pole z",))
+
+
+def _variations(view: LinearView) -> Table:
+    def each(read: str, scale: float, decimals: int) -> list[str]:
+        values = [getattr(one.margins, read) for one in view.variations]
+        return ["any" if math.isinf(value) else number(scale * value, decimals) for value in values]
+
+    cells = {
+        "drive": [one.name for one in view.variations],
+        "stable": ["yes" if one.stable else "no" for one in view.variations],
+        "gain\nmargin": each("gain_margin", 1.0, 2),
+        "phase\nmargin deg": each("phase_margin", 180.0 / math.pi, 1),
+        "delay\nmargin ms": each("delay_margin", 1e3, 2),
+        "modulus\nmargin": each("modulus_margin", 1.0, 3),
+        "least\ndamping": [number(one.least_damping, 3) for one in view.variations],
+    }
+    return Table.of("The same controller on other drives", cells, ("drive", "stable"))
+
+
+def _cycles(view: LinearView) -> Table:
+    found = [one.cycle for one in view.cycles]
+    beyond = " (the demand is beyond the motor's limits)"
+    cells = {
+        "rad/s": column_of([one.frequency for one in found]),
+        "amplitude\nrad": [number(one.amplitude, 4) for one in found],
+        "bias\nrad": [number(one.bias, 4) for one in found],
+        "demand\n+- N m": [number(one.demand_amplitude, 1) for one in found],
+        "predicted": ["stable" if one.stable else "unstable" for one in found],
+        "on the exact plant": [
+            one.verdict.sentence + (beyond if one.beyond_limits else "") for one in view.cycles
+        ],
+    }
+    title = "Limit cycles predicted by the describing function of the gap"
+    return Table.of(title, cells, ("predicted", "on the exact plant"))
+
+
+def tables(view: LinearView) -> list[Table]:
+    """Modes, other drives and limit cycles."""
+    return [_modes(view), _variations(view), _cycles(view)]
+
+
+def notes(view: LinearView) -> list[str]:
+    """The mean torque of the limit cycles, then the notes of the view."""
+    sentence = "No limit cycle through the gap is predicted by the describing function."
+    if view.cycles:
+        mean = view.cycles[0].cycle.mean_torque
+        sentence = "The vibrations are unbiased: the mean shaft torque is 0."
+        if mean:
+            sentence = f"The vibrations are biased by the mean shaft torque of {mean:.4g} N m."
+    return [sentence, *view.notes]
+
+
+def response(view: LinearView) -> tuple[tuple[str, ...], list[list[float]]]:
+    """The loop over frequency, with all crossings among the frequencies: headings and rows."""
+    assert view.own_loop is not None
+    assert view.margins is not None
+    loop, m = view.own_loop.broken, view.margins
+    marked = [one.frequency for one in (*m.gain_crossovers, *m.phase_crossovers)]
+    w = np.unique(np.concatenate([frequencies(view.period, poles(loop)), marked]))
+    L = at_points(loop, np.exp(1j * w * view.period))[:, 0, 0]
+    headings = ("frequency [rad/s]", "|L|", "phase of L [rad]", "|1/(1 + L)|")
+    return headings, np.column_stack([w, np.abs(L), np.angle(L), 1.0 / np.abs(1.0 + L)]).tolist()
 
 
 def linear_figure(view: LinearView) -> Any:
