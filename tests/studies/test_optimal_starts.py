@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from softstart import TorqueProfile
+from softstart.optimal.exact import replay
 from softstart.optimal.pictures import front_figure
-from softstart.optimal.replay import replay
 from softstart.optimal.robust import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
 from softstart.start.metrics import base_torque

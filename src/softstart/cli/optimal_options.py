@@ -224,8 +224,7 @@ def no_solution_told(as_json: bool) -> Iterator[None]:
     except RuntimeError as error:
         if isinstance(error, SimulationError | RecursionError | NotImplementedError):
             raise
-        from softstart.optimal.collocation import NotConverged
-        from softstart.optimal.result import InfeasibleError, OptimumError
+        from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
         from softstart.views.terminal import print_json
 
         if not isinstance(error, InfeasibleError | OptimumError | NotConverged):

@@ -18,7 +18,7 @@ from softstart.views.markdown import (
 if TYPE_CHECKING:
     from softstart.optimal.front import Front
     from softstart.optimal.result import Optimum
-    from softstart.optimal.robust.outcome import SensorWorth
+    from softstart.optimal.robust.solving import SensorWorth
     from softstart.start.run import Run
 
 PLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"

@@ -38,7 +38,7 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.errors import InputError, SimulationError
-from softstart.optimal.direct import start_time_of_direct
+from softstart.optimal.shortest import start_time_of_direct
 from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:

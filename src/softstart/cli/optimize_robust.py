@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 from softstart.cli.optimal_options import Asked, named_as_options, no_solution_told
 from softstart.cli.options import command_line
-from softstart.optimal.direct import start_time_of_direct
+from softstart.optimal.shortest import start_time_of_direct
 from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.drive import Drive
-    from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
+    from softstart.optimal.robust.solving import RobustOptimum, SensorWorth
 
 
 def optimize_for_all(
@@ -26,8 +26,7 @@ def optimize_for_all(
         from softstart.cli.running import working
 
         with working("looking for the gentlest start of all drives ...") as status:
-            from softstart.optimal.robust.scenarios import scenarios_of
-            from softstart.optimal.robust.solving import worth_of_contact_sensor
+            from softstart.optimal.robust.solving import scenarios_of, worth_of_contact_sensor
 
             def progress(doing: str) -> None:
                 if status is not None:

@@ -36,7 +36,7 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.errors import SimulationError
-from softstart.optimal.direct import start_time_of_direct
+from softstart.optimal.shortest import start_time_of_direct
 from softstart.views.markdown import kept_state, output_folder
 
 if TYPE_CHECKING:
@@ -44,8 +44,7 @@ if TYPE_CHECKING:
 
     from softstart.controller import Controller
     from softstart.drive import Drive
-    from softstart.optimal.front import Front
-    from softstart.optimal.front_points import ControllerPoint
+    from softstart.optimal.front import ControllerPoint, Front
 
 STATE = "pareto.jsonl"
 

@@ -30,9 +30,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.optimal.contact import Contact
-from softstart.optimal.ideal import Entry, ThroughStandstill, entry_of, no_ideal
-from softstart.optimal.linear_program import HALVES, Answer, LinearProgram, Multipliers
+from softstart.optimal.lp.ideal import ContactProgram, Multipliers
+from softstart.optimal.lp.motion import Contact, Entry, ThroughStandstill, entry_of, no_ideal
+from softstart.optimal.lp.rows import HALVES
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
 
@@ -72,7 +72,7 @@ ENDINGS = {
 def _covers(problem: Problem, entry: Entry) -> str:
     """The class of starts for which the bound is proved."""
     low, high = problem.lowest_torque, problem.highest_torque
-    open_at_first = getattr(entry, "way", 0.0) > 0.0
+    open_at_first = getattr(entry, "travel", 0.0) > 0.0
     closing = "whose gap closes once and stays closed" if open_at_first else "whose gap stays closed"
     moving = ", the load moving on once it moves," if isinstance(entry, ThroughStandstill) else ""
     return (
@@ -391,8 +391,8 @@ class _Search:
         coarse = max(PROGRAM_STEPS, int(0.75 * self.envelope.contact.Omega * tau))
         if coarse > MOST_STEPS:
             return  # so many elastic periods that momentum alone is as good
-        answer = LinearProgram(self.problem, tau, coarse, None, HALVES, 0.0).solve(te, elastic=PRICE)
-        if not isinstance(answer, Answer):
+        answer = ContactProgram(self.problem, tau, coarse, None, HALVES, 0.0).solve(te, elastic=PRICE)
+        if answer is None:
             return
         by = answer.multipliers
         grid = np.linspace(0.0, 1.0, 4 * coarse + 1)
@@ -404,8 +404,8 @@ class _Search:
                 for share in by.share[worth > ATOM * worth.sum()]:
                     kept |= np.abs(shares - share) < 1.01 / coarse
         mix = np.vstack([spans, np.eye(shares.size)[kept]])
-        fine = LinearProgram(self.problem, tau, grid, mix, HALVES, 0.0).solve(te, elastic=PRICE)
-        if isinstance(fine, Answer):
+        fine = ContactProgram(self.problem, tau, grid, mix, HALVES, 0.0).solve(te, elastic=PRICE)
+        if fine is not None:
             by = fine.multipliers
         if math.isclose(float(by.peak.sum() + by.trough.sum() + by.tail.sum()), 1.0, rel_tol=1e-9):
             self.duals.append(_Dual(self.problem, self.entry, by, self.envelope, self.fastest))

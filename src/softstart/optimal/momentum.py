@@ -40,8 +40,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
-from softstart.optimal.contact import Contact
+from softstart.optimal.lp.motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
 from softstart.optimal.result import LowerBound
@@ -106,8 +107,6 @@ def _plain(problem: Problem, time: float) -> float:
 
 def _gentle_contact(problem: Problem, starts: PulseCoastHold, time: float, plain: float) -> float:
     """The least P, N m, with P (time - t_c(P)) >= J2 (target - w2) + Mc time; damped shaft, gap open."""
-    from scipy.optimize import brentq
-
     contact = Contact.of(problem.drive)
     reach = min(contact.half_period, math.pi / contact.Omega)
     s = reach * np.arange(INSTANTS + 1) / INSTANTS

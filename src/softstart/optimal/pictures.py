@@ -15,10 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from softstart.drive import Drive
-    from softstart.optimal.front import Front
-    from softstart.optimal.front_points import ControllerPoint
+    from softstart.optimal.front import ControllerPoint, Front
     from softstart.optimal.result import Optimum
-    from softstart.optimal.robust.outcome import SensorWorth
+    from softstart.optimal.robust import SensorWorth
 
 GREY = "#666666"
 MARKERS = "osD^vPX*"

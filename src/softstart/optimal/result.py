@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.start import metrics
@@ -12,6 +14,20 @@ from softstart.start.run import Run
 
 Method = Literal["closed-form", "lp", "collocation"]
 BoundKind = Literal["certificate", "momentum", "none"]
+
+
+def heat_of(run: Run, until: float) -> float:
+    """I2t heat in s: the integral of (u/Ms)^2 of the realised torque from 0 to `until`, exact."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    total = 0.0
+    for index, row in enumerate(run.segments):
+        start, end = float(row[0]), min(float(row[1]), until)
+        if end <= start:
+            continue
+        times = start + 0.5 * (end - start) * (nodes + 1.0)
+        u = run.states_in(np.full(times.size, index), times)["u"]
+        total += 0.5 * (end - start) * float(weights @ (u * u))
+    return total / float(run.drive.Ms) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +91,6 @@ class Optimum:
     @property
     def heat(self) -> float:
         """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
-        from softstart.optimal.replay import heat_of
-
         return heat_of(self.run, self.end_time)
 
     def __repr__(self) -> str:
@@ -146,3 +160,18 @@ class InfeasibleError(RuntimeError):
 
 class OptimumError(RuntimeError):
     """A method's answer does not stand: the exact plant or the lower bound contradicts it."""
+
+
+class NotConverged(RuntimeError):  # noqa: N818 - the name says what happened
+    """IPOPT found no solution: `reason` is its own word, `violation` the largest violated constraint.
+
+    `violation` is relative to the units of the problem (Ms, target speed, start time). A large one speaks for
+    a problem without solution, a small one for a search that lost its way.
+    """
+
+    def __init__(self, reason: str, violation: float, final: bool = False) -> None:
+        self.reason, self.violation = reason, violation
+        self.final = final  # no other first guess is worth trying
+        super().__init__(
+            f"collocation: {reason} (largest violated constraint {violation:.2g} of the drive's own units)."
+        )

@@ -7,16 +7,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
+from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal import whole
-from softstart.optimal.contact import Contact
-from softstart.optimal.ideal import entry_of
-from softstart.optimal.linear_program import AIM
-from softstart.optimal.linear_search import greatest_speed, not_linear
+from softstart.late import late
+from softstart.optimal.lp import ideal, whole_search
+from softstart.optimal.lp.motion import Contact, entry_of
+from softstart.optimal.lp.rows import AIM
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import Candidate, Verdict
+from softstart.optimal.result import Candidate, NotConverged, Verdict
 from softstart.start.simulation import simulate
+
+collocation = late("softstart.optimal.collocation.search")
 
 COARSE, FINE = 40, 80  # steps of the linear programs
 WITHIN = 2e-6  # of the start time
@@ -37,13 +39,11 @@ def shortest_start_time(problem: Problem) -> float:
     """
     plain = _plain(problem)
     bounded = problem.k_dyn is not None or problem.heat is not None
-    if not bounded and not (not_linear(plain) and whole.not_linear(plain)):
+    if not bounded and not (ideal.not_linear(plain) and whole_search.not_linear(plain)):
         return _of_linear(plain)
-    from softstart.optimal.collocation import NotConverged, solve
-
     quickest = replace(problem, start_time=None, minimise="start_time")
     try:
-        return solve(quickest).end_time
+        return float(collocation.solve(quickest).end_time)
     except NotConverged:
         return math.inf if bounded else math.nan  # without bounds there is always a start
 
@@ -54,24 +54,26 @@ def _plain(problem: Problem) -> Problem:
 
 @lru_cache(maxsize=128)  # verdicts on several start times of a drive ask for the same ones
 def _of_linear(plain: Problem) -> float:
-    return _quickest_whole(plain)[0] if not_linear(plain) else _by_linear_program(plain)
+    return _quickest_whole(plain)[0] if ideal.not_linear(plain) else _by_linear_program(plain)
 
 
 @lru_cache(maxsize=128)
-def _quickest_whole(plain: Problem) -> tuple[float, whole.Way | None, whole.Instant | None]:
+def _quickest_whole(
+    plain: Problem,
+) -> tuple[float, whole_search.PhaseOrder | None, whole_search.Timing | None]:
     """The shortest t_f of all orders of phases, nan if there was none, with the instants of that start."""
-    found = [(*_by_whole_program(plain, way), way) for way in whole.ways(plain)]
-    known = [(end, way, at) for end, at, way in found if math.isfinite(end)]
+    found = [(*_by_whole_program(plain, order), order) for order in whole_search.phase_orders(plain)]
+    known = [(end, order, at) for end, at, order in found if math.isfinite(end)]
     return min(known, key=lambda one: one[0], default=(math.nan, None, None))
 
 
 def from_quickest(problem: Problem) -> Candidate | None:
     """The optimum of a problem for the whole start's program, looked for from the quickest start on."""
     assert problem.start_time is not None
-    end, way, at = _quickest_whole(_plain(problem))
-    if way is None or at is None or not end < problem.start_time:
+    end, order, at = _quickest_whole(_plain(problem))
+    if order is None or at is None or not end < problem.start_time:
         return None
-    return whole.solve(problem, (way, (at[0], at[1], min(end * (1.0 + 1e-3), problem.start_time))))
+    return whole_search.solve(problem, (order, (at[0], at[1], min(end * (1.0 + 1e-3), problem.start_time))))
 
 
 def _by_linear_program(problem: Problem) -> float:
@@ -81,7 +83,7 @@ def _by_linear_program(problem: Problem) -> float:
 
     def speed_at(end: float, steps: int) -> float:
         nonlocal te
-        speed, te = greatest_speed(problem, entry, end, steps, te)
+        speed, te = ideal.greatest_speed(problem, entry, end, steps, te)
         if not math.isfinite(speed):
             te = math.nan
         return speed
@@ -90,17 +92,19 @@ def _by_linear_program(problem: Problem) -> float:
     return _quickest(problem, soonest, speed_at)
 
 
-def _by_whole_program(problem: Problem, way: whole.Way) -> tuple[float, whole.Instant | None]:
+def _by_whole_program(
+    problem: Problem, order: whole_search.PhaseOrder
+) -> tuple[float, whole_search.Timing | None]:
     """The same where the gap part counts too, and the instants of that start."""
-    near: whole.Instant | None = None
+    near: whole_search.Timing | None = None
 
     def speed_at(end: float, steps: int) -> float:
         nonlocal near
-        speed, found = whole.greatest_speed(problem, way, end, steps, near)
+        speed, found = whole_search.greatest_speed(problem, order, end, steps, near)
         near = found if math.isfinite(speed) else near
         return speed
 
-    return _quickest(problem, max(momentum_shortest_time(problem), way.tb), speed_at), near
+    return _quickest(problem, max(momentum_shortest_time(problem), order.tb), speed_at), near
 
 
 def _quickest(problem: Problem, soonest: float, speed_at: Callable[[float, int], float]) -> float:
@@ -178,6 +182,22 @@ class Bracket:
             if math.isfinite(more) and more != missing:
                 steeper = min(max((end - before) / (more - missing), 1.0), 4.0)
         return max(end + steeper * missing, 0.5 * end)
+
+
+def start_time_of_direct(drive: Drive) -> float:
+    """Start time of the drive under its constant starting torque, s. Raises SimulationError without one.
+
+    >>> from softstart import Drive
+    >>> round(start_time_of_direct(Drive.load("crane-4amtkf")), 4)
+    0.3735
+    """
+    run = simulate(drive, "direct")
+    if math.isnan(run.start_time):
+        raise SimulationError(
+            f"direct does not bring this load to its target speed ({run.status.value[:-1]}); "
+            "give start times in s instead of multiples."
+        )
+    return run.start_time
 
 
 def verdict_on(problem: Problem) -> Verdict:

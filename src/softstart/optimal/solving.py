@@ -10,16 +10,25 @@ from typing import Any, Literal, get_args
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.optimal import linear_search, pulse_coast_hold, whole
+from softstart.late import late
+from softstart.optimal import pulse_coast_hold
 from softstart.optimal.certificate import certified_bound, not_certified
-from softstart.optimal.checking import check
+from softstart.optimal.exact import check, replay, with_tail
+from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Objective, Problem, Terminal
-from softstart.optimal.replay import replay
-from softstart.optimal.result import Candidate, InfeasibleError, LowerBound, Optimum, OptimumError
+from softstart.optimal.result import (
+    Candidate,
+    InfeasibleError,
+    LowerBound,
+    NotConverged,
+    Optimum,
+    OptimumError,
+)
 from softstart.optimal.shortest import from_quickest, shortest_start_time, verdict_on
-from softstart.optimal.tail import with_tail
 from softstart.start.run import Run
+
+collocation = late("softstart.optimal.collocation.search")
 
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)
@@ -113,25 +122,23 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
                 raise InputError(f"method = closed-form: {reason} Use method = auto.") from None
         else:
             return found, "pulse, coast, hold is optimal here" if method == "auto" else asked
-    linear = [one for one in (linear_search, whole) if not one.not_linear(problem)]
+    linear = [one for one in (ideal, whole_search) if not one.not_linear(problem)]
     if method == "lp" or (method == "auto" and linear):
         if not linear:
-            raise InputError(f"method = lp: {whole.not_linear(problem)}; use method = collocation.")
+            raise InputError(f"method = lp: {whole_search.not_linear(problem)}; use method = collocation.")
         best = linear[0].solve(problem)
-        if best is None and linear[0] is whole:
+        if best is None and linear[0] is whole_search:
             best = from_quickest(problem)
         if best is None:
             raise _refusal(problem)
         return best, f"no closed form: {no_formula}" if method == "auto" else asked
-    from softstart.optimal import collocation
-
     try:
         best = collocation.solve(problem, warm=warm)
-    except collocation.NotConverged:
+    except NotConverged:
         if problem.start_time is not None and problem.start_time < shortest_start_time(problem):
             raise InfeasibleError(verdict_on(problem)) from None
         raise
-    no_program = whole.not_linear(problem)
+    no_program = whole_search.not_linear(problem)
     return best, f"no linear program: {no_program}" if method == "auto" else asked
 
 
@@ -167,14 +174,14 @@ def _bound(problem: Problem, candidate: Candidate, profile: Any) -> LowerBound:
 
 def _ideal(problem: Problem, run: Run) -> tuple[float, float | None]:
     """K_dyn of the best start with an ideal torque, which the certificate is about, and its entry, s."""
-    ideal = problem.drive.replace(torque_lag=0.0, torque_rate=math.inf)
-    without = replace(problem, drive=ideal, torque_speed=(), smoothness=0.0)
+    instant = problem.drive.replace(torque_lag=0.0, torque_rate=math.inf)
+    without = replace(problem, drive=instant, torque_speed=(), smoothness=0.0)
     best = None if pulse_coast_hold.applies(without) else _by_formula(without)
     if best is None:
-        best = linear_search.solve(without)
+        best = ideal.solve(without)
     if best is None or best.claimed >= run.k_dyn:
         return run.k_dyn, _entry_of(run)
-    start = replay(ideal, best.profile, best.end_time, problem.base)
+    start = replay(instant, best.profile, best.end_time, problem.base)
     return best.claimed, _entry_of(start)
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from softstart.optimal.front_points import FrontPoint
+    from softstart.optimal.front import FrontPoint
 
 WIDTH, HEIGHT = 340.0, 250.0
 LEFT, RIGHT, TOP, BOTTOM = 36.0, 8.0, 6.0, 32.0  # margins

@@ -22,7 +22,7 @@ from softstart.page.optimum_panel import TERMINALS
 from softstart.page.panel_parts import Mark, action, box, choice, fixed, guarded, hint, save, table
 
 if TYPE_CHECKING:
-    from softstart.optimal.front_points import FrontPoint
+    from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
 
 COLUMNS = ("strategy", "K_dyn", "start, s", "least", "ratio")

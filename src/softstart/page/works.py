@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal.direct import start_time_of_direct
+from softstart.optimal.shortest import start_time_of_direct
 from softstart.page.downloads import text_of
 from softstart.page.job_process import Tell
 from softstart.start.simulation import simulate
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
-    from softstart.optimal.front_points import FrontPoint
+    from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
     from softstart.profile import TorqueProfile
@@ -140,8 +140,7 @@ def curve(
 @contextmanager
 def no_solution_told() -> Iterator[None]:
     """That there is no solution, or that none was found, is said in its own sentence."""
-    from softstart.optimal.collocation import NotConverged
-    from softstart.optimal.result import InfeasibleError, OptimumError
+    from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 
     try:
         yield

@@ -12,8 +12,7 @@ import numpy as np
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal.robust.plays import Plays
-from softstart.optimal.robust.shape import Matrix, Player, Staircase
+from softstart.optimal.robust.evaluation import Evaluator, Matrix, ProfileParameters, Staircase
 from softstart.profile import Vector
 from softstart.start.simulation import simulate
 
@@ -93,9 +92,9 @@ class _Search:
         way = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
         late = float(drive.torque_lag) + self.high / float(drive.torque_rate)
         self.crossing = math.sqrt(2.0 * way * float(drive.J1) / self.high) + late  # of the gap, s
-        self.plays = Plays([drive], longest)
+        self.evaluator = Evaluator([drive], longest)
         # a stand-in whose levels and edges can be told from each other
-        self.player = Player(self.staircase(np.full(N_NUMBERS, 0.55)), drive)
+        self.parameters = ProfileParameters(self.staircase(np.full(N_NUMBERS, 0.55)), drive)
         self.random = np.random.default_rng(SEED)
         self.spread: tuple[Matrix, Vector, Vector] | None = None
         self.handed_on = np.zeros((0, N_NUMBERS))
@@ -166,7 +165,7 @@ class _Search:
 
     def _figures(self, numbers: Matrix) -> tuple[Vector, Vector]:
         """Peak (N m, inf where the start was given up) and start time (s, NaN where there is none)."""
-        figures = self.plays.figures(self.player, self._unknowns(numbers))
+        figures = self.evaluator.figures(self.parameters, self._unknowns(numbers))
         return figures.peak[:, 0], figures.start_time[:, 0]
 
     def _cost(self, peak: Vector, reached: Vector, start_time: float) -> Vector:

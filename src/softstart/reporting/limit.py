@@ -18,9 +18,9 @@ import numpy as np
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.optimal import linear_search, whole
-from softstart.optimal.front_points import FrontPoint
+from softstart.optimal.front import FrontPoint
 from softstart.optimal.labels import name_points
+from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.pulse_coast_hold import applies
@@ -375,7 +375,7 @@ def _times(times: Sequence[float]) -> str:
 
 def _why_hard(drive: Drive) -> str:
     problem = Problem(drive, 1.0, "reached")
-    if linear_search.not_linear(problem) and (reason := whole.not_linear(problem)):
+    if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
         return f"they need a numerical search (direct collocation), because {reason}"
     if reason := applies(problem):
         return f"there is no formula ({reason}), only a search by linear programs"

@@ -9,13 +9,12 @@ from typing import TextIO
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.optimal.front_points import FrontPoint
+from softstart.optimal.front import FrontPoint
 
 
 def work(task: str, out: TextIO) -> None:
     """Optima for the start times of a task (JSON), each written at once as one line of JSON."""
-    from softstart.optimal.collocation import NotConverged
-    from softstart.optimal.result import InfeasibleError, OptimumError
+    from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
     from softstart.optimal.solving import optimize
 
     asked = json.loads(task)

@@ -50,8 +50,7 @@ def optima(
 
 def optimum_of(asked: Asked) -> dict[str, Any]:
     """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick."""
-    from softstart.optimal.collocation import NotConverged
-    from softstart.optimal.result import InfeasibleError, OptimumError
+    from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
     from softstart.optimal.solving import optimize
 
     ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)

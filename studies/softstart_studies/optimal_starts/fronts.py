@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.optimal.front import Front
-from softstart.optimal.front_points import ControllerPoint
+from softstart.optimal.front import ControllerPoint, Front
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
 from softstart.study import Claim, Progress, Table, Verdict

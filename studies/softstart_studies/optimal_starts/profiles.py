@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from softstart import Run
-from softstart.optimal.front_points import FrontPoint
-from softstart.optimal.replay import replay
+from softstart.optimal.exact import replay
+from softstart.optimal.front import FrontPoint
 from softstart.profile import TorqueProfile
 from softstart.study import Progress, Table
 from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, optima, rounded

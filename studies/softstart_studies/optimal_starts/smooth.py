@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.optimal.collocation import NotConverged
-from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
+from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError
 from softstart.optimal.solving import optimize
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, percent, rounded

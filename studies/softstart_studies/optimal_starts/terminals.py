@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from softstart.optimal.front import Front
-from softstart.optimal.front_points import FrontPoint
+from softstart.optimal.front import Front, FrontPoint
 from softstart.optimal.problem import TERMINALS
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import crane, direct_time, optima, percent, rounded

@@ -15,11 +15,10 @@ from scipy.optimize import linprog
 from softstart import Drive, TorqueProfile
 from softstart.optimal import certificate
 from softstart.optimal.certificate import _Dual, _Envelope, _Search, certified_bound, not_certified
-from softstart.optimal.contact import Contact
-from softstart.optimal.ideal import entry_of
-from softstart.optimal.linear_program import Multipliers
+from softstart.optimal.exact import replay
+from softstart.optimal.lp.ideal import Multipliers
+from softstart.optimal.lp.motion import Contact, entry_of
 from softstart.optimal.problem import Problem, Terminal
-from softstart.optimal.replay import replay
 
 Vector = NDArray[np.float64]
 

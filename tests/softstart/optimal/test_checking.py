@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from softstart import Drive, TorqueProfile
-from softstart.optimal import linear_search
-from softstart.optimal.checking import check
+from softstart.optimal.exact import check, heat_of, replay, with_tail
+from softstart.optimal.lp import ideal
 from softstart.optimal.problem import TERMINALS, Problem
 from softstart.optimal.pulse_coast_hold import solve
-from softstart.optimal.replay import heat_of, replay
 from softstart.optimal.result import Candidate, LowerBound, OptimumError
-from softstart.optimal.tail import with_tail
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 PROBLEM = Problem(CRANE, 0.2883042)
@@ -66,7 +64,7 @@ def test_the_good_one_passes(good: Candidate) -> None:
 def test_a_good_bang_bang_passes() -> None:
     for terminal in TERMINALS[::2]:
         problem = Problem(CRANE, 0.2522662, terminal)
-        found = linear_search.solve(problem)
+        found = ideal.solve(problem)
         assert found is not None
         profile = with_tail(problem, found.profile, found.end_time)
         run = check(problem, profile, found.end_time, found.claimed, LowerBound(1.0, "momentum", "all"))

@@ -11,9 +11,10 @@ from tests.softstart.optimal.test_collocation_march import march
 
 from softstart import Drive
 from softstart.errors import InputError
-from softstart.optimal.collocation import NotConverged, solve
+from softstart.optimal.collocation.search import solve
+from softstart.optimal.exact import replay
 from softstart.optimal.problem import Problem
-from softstart.optimal.replay import replay
+from softstart.optimal.result import NotConverged
 from softstart.profile import TorqueProfile
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -7,9 +7,9 @@ import pytest
 from tests.softstart.optimal.test_collocation_march import march
 
 from softstart import Drive
-from softstart.optimal.collocation import solve
+from softstart.optimal.collocation.search import solve
+from softstart.optimal.exact import heat_of, replay
 from softstart.optimal.problem import Problem
-from softstart.optimal.replay import heat_of, replay
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 

@@ -8,8 +8,7 @@ import pytest
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import ready_controller_names
-from softstart.optimal.front import default_start_times, even_start_times, pareto
-from softstart.optimal.front_points import ControllerPoint, FrontPoint
+from softstart.optimal.front import ControllerPoint, FrontPoint, default_start_times, even_start_times, pareto
 from softstart.optimal.front_saved import SavedPoints
 from softstart.optimal.problem import Problem
 from softstart.optimal.shortest import shortest_start_time

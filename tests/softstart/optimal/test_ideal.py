@@ -11,8 +11,9 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile
-from softstart.optimal.contact import Contact
-from softstart.optimal.ideal import (
+from softstart.optimal.exact import replay
+from softstart.optimal.lp.motion import (
+    Contact,
     Entry,
     FromContact,
     ThroughGap,
@@ -21,7 +22,6 @@ from softstart.optimal.ideal import (
     no_ideal,
 )
 from softstart.optimal.problem import Problem
-from softstart.optimal.replay import replay
 
 Vector = NDArray[np.float64]
 
@@ -161,7 +161,7 @@ def test_least_and_greatest_speed_after_the_gap_against_a_program(given: dict[st
         edges = np.linspace(0.0, te, 401)
         impulse = np.diff(edges) / entry.J1
         way = impulse * (te - 0.5 * (edges[1:] + edges[:-1]))
-        needed = entry.way - entry.v0 * te - 0.5 * entry.pull * te**2
+        needed = entry.travel - entry.v0 * te - 0.5 * entry.pull * te**2
         for sign, of in ((1.0, entry.slowest), (-1.0, entry.fastest)):
             found = linprog(
                 sign * impulse, A_eq=way[None, :], b_eq=[needed], bounds=(0.0, entry.Ms), method="highs"
@@ -189,7 +189,7 @@ def breakaway(entry: ThroughStandstill, pieces: list[tuple[float, float]]) -> tu
     In the gap parabolas, in contact turns about (u/c, 0) in the plane (z, v/ws), drawn from the pieces alone.
     """
     ws, z0, t = math.sqrt(entry.c / entry.J1), entry.Mc / entry.c, 0.0
-    z, v = (-entry.way, 0.0) if entry.way > 0.0 else (entry.preload, 0.0)
+    z, v = (-entry.travel, 0.0) if entry.travel > 0.0 else (entry.preload, 0.0)
     for duration, u in pieces:
         left = duration
         if z < 0.0:

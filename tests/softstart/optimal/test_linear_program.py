@@ -9,13 +9,13 @@ import pytest
 
 from softstart import Drive, optimize
 from softstart.errors import InputError
-from softstart.optimal import linear_search, pulse_coast_hold
+from softstart.optimal import pulse_coast_hold
 from softstart.optimal.certificate import _Dual, _Envelope
-from softstart.optimal.contact import Contact
-from softstart.optimal.ideal import entry_of
-from softstart.optimal.linear_program import Answer, LinearProgram
+from softstart.optimal.exact import replay
+from softstart.optimal.lp import ideal
+from softstart.optimal.lp.ideal import Answer, ContactProgram
+from softstart.optimal.lp.motion import Contact, entry_of
 from softstart.optimal.problem import Problem, Terminal
-from softstart.optimal.replay import replay
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -23,7 +23,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 @pytest.mark.parametrize("given", [{}, {"start_position": -0.25, "load_torque": 12.0}])
 def test_pulse_coast_hold_comes_out(given: dict[str, float]) -> None:
     problem = Problem(CRANE.replace(**given), 0.33)
-    best = linear_search.search(problem)
+    best = ideal.search(problem)
     assert best is not None
     truth = pulse_coast_hold.solve(problem).claimed
     assert best.P / problem.base_torque == pytest.approx(truth, rel=3e-4)  # T stays 2e-4 Ms above 0
@@ -43,9 +43,9 @@ CASES: dict[str, tuple[dict[str, Any], float, Terminal]] = {
 @pytest.mark.parametrize(("given", "end", "terminal"), CASES.values(), ids=CASES)
 def test_the_exact_plant_agrees(given: dict[str, Any], end: float, terminal: Terminal) -> None:
     problem = Problem(CRANE.replace(**given), end, terminal)
-    best = linear_search.search(problem)
+    best = ideal.search(problem)
     assert best is not None
-    run = replay(problem.drive, linear_search.assemble(problem, best), best.end_time)
+    run = replay(problem.drive, ideal.assemble(problem, best), best.end_time)
     assert best.end_time <= end * (1.0 + 1e-12)
     assert run.contacts == 1
     state = {name: float(value) for name, value in run.at(best.end_time).items()}
@@ -63,7 +63,7 @@ def test_finer_grids_converge() -> None:
     problem = Problem(CRANE, 0.2522662)
     peaks = []
     for steps in (20, 40, 80, 160):
-        answer = LinearProgram(problem, 0.2355, steps, None, (0.25, 0.5, 0.75, 1.0), 0.0).solve(0.0167662)
+        answer = ContactProgram(problem, 0.2355, steps, None, (0.25, 0.5, 0.75, 1.0), 0.0).solve(0.0167662)
         assert isinstance(answer, Answer)
         peaks.append(answer.P)
     changes = np.abs(np.diff(peaks))
@@ -77,7 +77,7 @@ def test_no_answer_is_below_its_own_dual(given: dict[str, Any], end: float, term
     entry, contact = entry_of(problem), Contact.of(problem.drive)
     te = 1.05 * entry.earliest
     low, high = float(entry.slowest(np.array([te]))[0]), float(entry.fastest(np.array([te]))[0])
-    answer = LinearProgram(problem, end - te, 120).solve(te)
+    answer = ContactProgram(problem, end - te, 120).solve(te)
     assert isinstance(answer, Answer)
     assert low - 1e-9 <= answer.v <= high + 1e-9
     assert answer.u.min() >= -1e-9
@@ -97,22 +97,22 @@ def test_what_is_not_linear_is_refused() -> None:
         ({"damping": 0.5, "contact_law": "modelica"}, "modelica"),
     ):
         with pytest.raises(InputError, match=words):
-            linear_search.solve(Problem(CRANE.replace(**given), 0.3))
+            ideal.solve(Problem(CRANE.replace(**given), 0.3))
     with pytest.raises(InputError, match="the least heat, and only K_dyn is linear"):
-        linear_search.solve(Problem(CRANE, 0.3, minimise="heat"))
+        ideal.solve(Problem(CRANE, 0.3, minimise="heat"))
 
 
 def test_where_a_finer_grid_has_no_answer_the_last_one_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     """The answer kept belongs to the grid it was found on; cutting goes on from that one."""
     problem = Problem(CRANE, 0.2883042)
-    moved, calls = linear_search._moved, []
+    moved, calls = ideal._moved, []
 
     def once(problem, entry, best, grid, width, within):
         calls.append(grid.size)
         return moved(problem, entry, best, grid, width, within) if len(calls) == 1 else best
 
-    monkeypatch.setattr(linear_search, "_moved", once)
-    found = linear_search.search(problem)
+    monkeypatch.setattr(ideal, "_moved", once)
+    found = ideal.search(problem)
     assert found is not None
     assert len(calls) > 2
     assert found.edges.size == calls[0]

@@ -11,11 +11,11 @@ import pytest
 from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import ready_controller_names
 from softstart.errors import SimulationError
-from softstart.optimal import linear_search
+from softstart.optimal.exact import replay
+from softstart.optimal.lp import ideal
 from softstart.optimal.momentum import earliest_pull, momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import solve
-from softstart.optimal.replay import replay
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -148,7 +148,7 @@ def test_it_is_the_optimum_itself_where_that_is_pulse_coast_hold(start_time: flo
 )
 def test_the_linear_program_stays_above(drive: Drive, start_time: float) -> None:
     problem = Problem(drive, start_time)
-    best = linear_search.solve(problem)
+    best = ideal.solve(problem)
     assert best is not None
     assert momentum_bound(problem).k_dyn <= best.claimed * (1 + 1e-6)
 

@@ -12,9 +12,10 @@ import pytest
 from softstart import Drive, InfeasibleError, InputError, optimize, simulate
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.errors import SimulationError
-from softstart.optimal import linear_search, pulse_coast_hold
+from softstart.optimal import pulse_coast_hold
+from softstart.optimal.exact import replay
+from softstart.optimal.lp import ideal
 from softstart.optimal.problem import Problem
-from softstart.optimal.replay import replay
 from softstart.optimal.shortest import shortest_start_time
 from softstart.profile import TorqueProfile
 
@@ -61,8 +62,8 @@ def test_too_short_a_start_time() -> None:
     assert "0.24" in verdict.sentence
     shortest = verdict.shortest_start_time
     # a little longer there is a start, a little shorter there is none
-    assert linear_search.search(Problem(CRANE, 1.001 * shortest)) is not None
-    assert linear_search.search(Problem(CRANE, 0.999 * shortest)) is None
+    assert ideal.search(Problem(CRANE, 1.001 * shortest)) is not None
+    assert ideal.search(Problem(CRANE, 0.999 * shortest)) is None
     assert verdict.summary()["status"] == "INFEASIBLE"
 
 
@@ -170,7 +171,7 @@ def test_random_drives(tens: int) -> None:
         assert best.end_time <= problem.start_time * (1 + 1e-9)
         gaps.append(best.gap_percent)
         if best.method == "closed-form":
-            other = linear_search.solve(problem)
+            other = ideal.solve(problem)
             assert other is not None
             assert other.claimed == pytest.approx(best.k_dyn, rel=2.5e-3), problem.drive
     assert max(gaps) < 1.5

@@ -7,14 +7,13 @@ import pytest
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.optimal.front import Front
-from softstart.optimal.front_points import ControllerPoint, FrontPoint
+from softstart.optimal.exact import replay
+from softstart.optimal.front import ControllerPoint, Front, FrontPoint
 from softstart.optimal.labels import name_points, shared
 from softstart.optimal.pictures import front_figure, optimum_figure, worth_figure
 from softstart.optimal.problem import Problem
-from softstart.optimal.replay import replay
 from softstart.optimal.result import LowerBound, Optimum
-from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
+from softstart.optimal.robust.solving import RobustOptimum, SensorWorth
 from softstart.profile import TorqueProfile
 from softstart.views.drawing import save_figure
 

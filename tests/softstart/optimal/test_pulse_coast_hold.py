@@ -14,10 +14,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from softstart import Drive, simulate
-from softstart.optimal import linear_search
+from softstart.optimal.exact import replay
+from softstart.optimal.lp import ideal
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import NotApplicable, PulseCoastHold, applies, solve
-from softstart.optimal.replay import replay
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -200,7 +200,7 @@ def test_what_it_is_not_for(changes: Any, terms: Any, reason: str) -> None:
 )
 def test_the_linear_program_finds_nothing_better(drive: Drive, start_time: float) -> None:
     problem = Problem(drive, start_time)
-    program = linear_search.solve(problem)
+    program = ideal.solve(problem)
     assert program is not None
     # the program checks T at a grid of instants and steps its torque: a few 1e-4 to either side
     assert program.claimed == pytest.approx(solve(problem).claimed, rel=5e-4)

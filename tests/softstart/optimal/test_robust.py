@@ -17,8 +17,8 @@ from tests.oracle import integrate
 from softstart import Drive, simulate
 from softstart.controller import make_controller
 from softstart.optimal.result import InfeasibleError, Verdict
-from softstart.optimal.robust import RobustOptimum, SensorWorth, families, optimize_robust, pursuit, solving
-from softstart.optimal.robust.scenarios import reached
+from softstart.optimal.robust import RobustOptimum, SensorWorth, guesses, optimize_robust, solving
+from softstart.optimal.robust.solving import reached
 from softstart.profile import TorqueProfile
 from softstart.start.metrics import base_torque
 
@@ -36,12 +36,12 @@ def solved(*gaps: float) -> RobustOptimum:
 def small_search() -> Iterator[None]:
     """Fewer starts: enough where the question has one good local optimum or its quality is not the claim."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(families, "PULSES", 3)
-        patch.setattr(families, "COASTS", 2)
-        patch.setattr(families, "COASTS_REACTING", 2)
-        patch.setattr(pursuit, "LOOKS", ((3, 0),))
-        patch.setattr(pursuit, "PURSUED", 2)
-        patch.setattr(pursuit, "FINE", 60)
+        patch.setattr(guesses, "PULSES", 3)
+        patch.setattr(guesses, "COASTS", 2)
+        patch.setattr(guesses, "COASTS_REACTING", 2)
+        patch.setattr(solving, "EVOLUTIONS", ((3, 0),))
+        patch.setattr(solving, "PURSUED", 2)
+        patch.setattr(solving, "FINE", 60)
         yield
 
 
@@ -142,8 +142,8 @@ def best_pulse_coast_hold(drive: Drive) -> float:
 
 def test_runs_and_figures_belong_together(optima: list[RobustOptimum]) -> None:
     for optimum in optima:
-        player = make_controller("profile", {"profile": optimum.profile})
-        again = [simulate(drive, player, base=optimum.base) for drive in optimum.scenarios]
+        parameters = make_controller("profile", {"profile": optimum.profile})
+        again = [simulate(drive, parameters, base=optimum.base) for drive in optimum.scenarios]
         assert optimum.k_dyn_each == tuple(run.k_dyn for run in again)
         assert optimum.start_times == tuple(run.start_time for run in again)
         assert optimum.k_dyn == max(optimum.k_dyn_each) == optimum.k_dyn_each[optimum.worst]
@@ -190,8 +190,8 @@ def test_no_random_change_beats_it(worth: SensorWorth) -> None:
             tried += 1
             assert tried <= 2000
             changed = disturbed(optimum.profile, random)
-            player = make_controller("profile", {"profile": changed})
-            runs = [simulate(drive, player, base=CRANE, time_limit=0.4) for drive in optimum.scenarios]
+            parameters = make_controller("profile", {"profile": changed})
+            runs = [simulate(drive, parameters, base=CRANE, time_limit=0.4) for drive in optimum.scenarios]
             if all(run.start_time <= START_TIME for run in runs):
                 in_time += 1
                 better += max(run.k_dyn for run in runs) < optimum.k_dyn * (1.0 - 1e-3)

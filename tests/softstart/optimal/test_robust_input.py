@@ -11,14 +11,13 @@ import pytest
 from softstart import Drive, InputError, simulate
 from softstart.optimal.result import InfeasibleError, LowerBound
 from softstart.optimal.robust import (
-    families,
+    guesses,
     optimize_robust,
-    pursuit,
     scenarios_of,
+    solving,
     worth_of_contact_sensor,
 )
-from softstart.optimal.robust.plays import Plays
-from softstart.optimal.robust.shape import Player, Staircase, merged, refined
+from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -30,19 +29,19 @@ def nothing(drive: Drive) -> LowerBound:
 @pytest.fixture
 def _hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that is quick and rough: enough where the quality of the optimum is not the question."""
-    monkeypatch.setattr(families, "PULSES", 2)
-    monkeypatch.setattr(families, "COASTS", 2)
-    monkeypatch.setattr(families, "COASTS_REACTING", 2)
-    monkeypatch.setattr(pursuit, "LOOKS", ((3, 0),))
-    monkeypatch.setattr(pursuit, "LOOK_ROUNDS", 100)
-    monkeypatch.setattr(pursuit, "QUICK_LOOKS", ((3, 0),))
-    monkeypatch.setattr(pursuit, "FIRST_ROUNDS", 3)
-    monkeypatch.setattr(pursuit, "PURSUED", 1)
-    monkeypatch.setattr(pursuit, "DENSE", 8)
-    monkeypatch.setattr(pursuit, "SPARSE", 3)
-    monkeypatch.setattr(pursuit, "ROUNDS", 8)
-    monkeypatch.setattr(pursuit, "COARSE", 15)
-    monkeypatch.setattr(pursuit, "FINE", 20)
+    monkeypatch.setattr(guesses, "PULSES", 2)
+    monkeypatch.setattr(guesses, "COASTS", 2)
+    monkeypatch.setattr(guesses, "COASTS_REACTING", 2)
+    monkeypatch.setattr(solving, "EVOLUTIONS", ((3, 0),))
+    monkeypatch.setattr(guesses, "ROUNDS", 100)
+    monkeypatch.setattr(solving, "QUICK_EVOLUTIONS", ((3, 0),))
+    monkeypatch.setattr(solving, "FIRST_ROUNDS", 3)
+    monkeypatch.setattr(solving, "PURSUED", 1)
+    monkeypatch.setattr(solving, "DENSE", 8)
+    monkeypatch.setattr(solving, "SPARSE", 3)
+    monkeypatch.setattr(solving, "ROUNDS", 8)
+    monkeypatch.setattr(solving, "COARSE", 15)
+    monkeypatch.setattr(solving, "FINE", 20)
 
 
 @pytest.mark.usefixtures("_hasty")
@@ -136,11 +135,11 @@ def test_the_grid_of_scenarios() -> None:
 def test_the_vector_of_the_controller_follows_the_unknowns(react: bool) -> None:
     random = np.random.default_rng(2)
     for _ in range(20):
-        shape = random_staircase(random, react)
-        player = Player(shape, CRANE)
-        moved = shape.unknowns + 1e-3 * random.standard_normal(shape.unknowns.size)
-        known = Player(shape.with_unknowns(moved), CRANE).constant
-        assert np.allclose(player.vectors(moved)[0], known, rtol=0.0, atol=1e-12)
+        staircase = random_staircase(random, react)
+        parameters = ProfileParameters(staircase, CRANE)
+        moved = staircase.unknowns + 1e-3 * random.standard_normal(staircase.unknowns.size)
+        known = ProfileParameters(staircase.with_unknowns(moved), CRANE).constant
+        assert np.allclose(parameters.vectors(moved)[0], known, rtol=0.0, atol=1e-12)
 
 
 def random_staircase(random: np.random.Generator, react: bool) -> Staircase:
@@ -153,14 +152,14 @@ def random_staircase(random: np.random.Generator, react: bool) -> Staircase:
 def test_cutting_a_staircase_changes_no_torque(react: bool) -> None:
     random = np.random.default_rng(3)
     for _ in range(20):
-        shape = random_staircase(random, react)
-        fine = refined(shape, 0.3, 37)
+        staircase = random_staircase(random, react)
+        fine = refined(staircase, 0.3, 37)
         times = random.uniform(0.0, 0.4, 200)
-        assert np.array_equal(fine.profile().at(times), shape.profile().at(times))
+        assert np.array_equal(fine.profile().at(times), staircase.profile().at(times))
         few = merged(fine, 1e-9)
         assert few.levels.size == 6
-        assert np.allclose(few.profile().at(times), shape.profile().at(times), atol=1e-9)
-        assert np.array_equal(shape.with_unknowns(shape.unknowns).unknowns, shape.unknowns)
+        assert np.allclose(few.profile().at(times), staircase.profile().at(times), atol=1e-9)
+        assert np.array_equal(staircase.with_unknowns(staircase.unknowns).unknowns, staircase.unknowns)
 
 
 @pytest.mark.parametrize("react", [False, True])
@@ -169,20 +168,22 @@ def test_differences_agree_with_two_runs(react: bool, changes: dict[str, Any]) -
     """A finite change of the profile changes the torques as the differences say, up to its square."""
     random = np.random.default_rng(5)
     drive = CRANE.replace(**changes)
-    plays = Plays([drive], 0.3)
+    evaluator = Evaluator([drive], 0.3)
     for _ in range(5):
-        shape = random_staircase(random, react)
-        player = Player(shape, drive)
-        edges = np.arange(shape.unknowns.size - shape.n_levels)
-        course = plays.course(0, player, shape, edges, 0.0, 62.0)
-        x = random.standard_normal(shape.unknowns.size)
-        x[shape.n_levels :] *= 1e-4
+        staircase = random_staircase(random, react)
+        parameters = ProfileParameters(staircase, drive)
+        edges = np.arange(staircase.unknowns.size - staircase.n_levels)
+        trajectory = evaluator.trajectory(0, parameters, staircase, edges, 0.0, 62.0)
+        x = random.standard_normal(staircase.unknowns.size)
+        x[staircase.n_levels :] *= 1e-4
         errors = []
         for size in (1e-2, 1e-3):
-            moved = shape.with_unknowns(shape.unknowns + size * x)
-            run = simulate(drive, player._controller(moved), float(course.times[-1]))
-            later = course.times[course.times > course.times[0] + 1e-3]  # the torque's jump at contact moves
-            kept = np.isin(course.times, later)
-            told = course.T[kept] + size * (course.dT @ x)[kept]
-            errors.append(float(np.abs(run.at(later)["T"] - told).max()))
+            moved = staircase.with_unknowns(staircase.unknowns + size * x)
+            run = simulate(drive, parameters._controller(moved), float(trajectory.times[-1]))
+            later = trajectory.times[
+                trajectory.times > trajectory.times[0] + 1e-3
+            ]  # the torque's jump at contact moves
+            kept = np.isin(trajectory.times, later)
+            predicted = trajectory.T[kept] + size * (trajectory.dT @ x)[kept]
+            errors.append(float(np.abs(run.at(later)["T"] - predicted).max()))
         assert errors[1] < 0.05 * errors[0] + 1e-4

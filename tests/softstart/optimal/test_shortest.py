@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from softstart import Drive, optimize, simulate
-from softstart.optimal import collocation, linear_search, shortest
+from softstart.optimal import shortest
+from softstart.optimal.collocation import search as collocation
 from softstart.optimal.front import default_start_times
+from softstart.optimal.lp import ideal, rows
 from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.result import NotConverged
 from softstart.optimal.shortest import shortest_start_time, verdict_on
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -32,12 +35,12 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 def test_it_parts_what_can_be_from_what_cannot(
     given: dict[str, Any], terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(linear_search, "ROUNDS", 1)  # whether there is a start, not how good it is
+    monkeypatch.setattr(rows, "ROUNDS", 1)  # whether there is a start, not how good it is
     problem = Problem(CRANE.replace(**given), 1.0, terminal)
     time = shortest_start_time(problem)
     assert time >= momentum_shortest_time(problem) * (1.0 - 1e-9)
-    assert linear_search.search(Problem(problem.drive, 1.002 * time, terminal)) is not None
-    assert linear_search.search(Problem(problem.drive, 0.998 * time, terminal)) is None
+    assert ideal.search(Problem(problem.drive, 1.002 * time, terminal)) is not None
+    assert ideal.search(Problem(problem.drive, 0.998 * time, terminal)) is None
 
 
 @pytest.mark.parametrize("turns", [4.0, 3.2, 3.4])
@@ -139,7 +142,7 @@ def test_what_was_not_found_is_not_called_impossible(monkeypatch: pytest.MonkeyP
     """A search that does not converge proves nothing: the start time stays unknown, and is said to be."""
 
     def gives_up(problem: Problem, warm: Any = None) -> None:
-        raise collocation.NotConverged("no solution found", 1.0)
+        raise NotConverged("no solution found", 1.0)
 
     monkeypatch.setattr(collocation, "solve", gives_up)
     drive = CRANE.replace(contact_law="modelica", damping=0.5)  # of no linear program
@@ -149,5 +152,5 @@ def test_what_was_not_found_is_not_called_impossible(monkeypatch: pytest.MonkeyP
     assert "was not found" in said.sentence
     assert "no start time would do" not in said.sentence
     assert default_start_times(drive)[0] == pytest.approx(1.02 * simulate(drive, "direct").start_time)
-    with pytest.raises(collocation.NotConverged):
+    with pytest.raises(NotConverged):
         optimize(drive, 0.3, method="collocation")

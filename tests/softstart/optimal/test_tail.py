@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from softstart import Drive, TorqueProfile
+from softstart.optimal.exact import replay, torque_allowed, with_tail
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, solve
-from softstart.optimal.replay import replay
-from softstart.optimal.tail import torque_allowed, with_tail
 from softstart.start.run import Run
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -6,6 +6,7 @@ A torque that lags less, rises faster or may brake more can do all that the othe
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -16,7 +17,9 @@ from tests.softstart.optimal.test_collocation_march import march
 
 from softstart import Drive, optimize
 from softstart.errors import InputError
-from softstart.optimal import collocation, linear_search, pulse_coast_hold, whole
+from softstart.optimal import pulse_coast_hold
+from softstart.optimal.collocation import search as collocation
+from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError
 from softstart.optimal.shortest import shortest_start_time
@@ -51,7 +54,7 @@ CASES: dict[str, tuple[Drive, float, Terminal, tuple[tuple[float, float], ...]]]
 def solved(case: str) -> tuple[Problem, Any]:
     drive, end, terminal, curve = CASES[case]
     problem = Problem(drive, end, terminal, torque_speed=curve)
-    return problem, whole.search(problem)
+    return problem, whole_search.search(problem)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -95,7 +98,7 @@ def test_without_a_lag_it_is_the_program_from_the_contact_on(
     given: dict[str, Any], end: float, terminal: Terminal
 ) -> None:
     problem = Problem(CRANE.replace(**given), end, terminal)
-    whole_start, from_contact = whole.search(problem), linear_search.search(problem)
+    whole_start, from_contact = whole_search.search(problem), ideal.search(problem)
     assert whole_start is not None
     assert from_contact is not None
     assert pytest.approx(from_contact.P, rel=3e-4) == whole_start.P
@@ -103,7 +106,7 @@ def test_without_a_lag_it_is_the_program_from_the_contact_on(
 
 def test_pulse_coast_hold_comes_out() -> None:
     problem = Problem(CRANE, 0.33)
-    best = whole.search(problem)
+    best = whole_search.search(problem)
     assert best is not None
     truth = pulse_coast_hold.solve(problem).claimed
     assert truth * (1.0 - 1e-5) <= best.P / problem.base_torque <= truth * (1.0 + 4e-4)
@@ -128,7 +131,7 @@ def test_collocation_finds_nothing_better(case: str) -> None:
 def test_what_can_do_less_starts_no_gentler(key: str, values: list[float]) -> None:
     peaks = []
     for value in values:
-        best = whole.search(Problem(CRANE.replace(**{key: value}), 0.32))
+        best = whole_search.search(Problem(CRANE.replace(**{key: value}), 0.32))
         assert best is not None
         peaks.append(best.P)
     assert all(after >= before * (1.0 - 1e-4) for before, after in pairwise(peaks))
@@ -147,7 +150,7 @@ def test_units_do_not_matter() -> None:
         starting_torque=drive.Ms * k, maximum_torque=drive.maximum_torque * k, load_torque=drive.Mc * k,
         target_speed=60.0 / s, torque_lag=0.004 * s,
     )  # fmt: skip
-    here, there = whole.solve(Problem(drive, 0.29)), whole.solve(Problem(other, 0.29 * s))
+    here, there = whole_search.solve(Problem(drive, 0.29)), whole_search.solve(Problem(other, 0.29 * s))
     assert here is not None
     assert there is not None
     assert there.claimed == pytest.approx(here.claimed, rel=2e-5)
@@ -159,7 +162,7 @@ def test_units_do_not_matter() -> None:
 def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[str, Any]) -> None:
     drive = CRANE.replace(**given)
     shortest = shortest_start_time(Problem(drive, minimise="start_time"))
-    assert whole.search(Problem(drive, 1.003 * shortest)) is not None
+    assert whole_search.search(Problem(drive, 1.003 * shortest)) is not None
     with pytest.raises(InfeasibleError) as told:
         optimize(drive, 0.997 * shortest)
     assert told.value.verdict.shortest_start_time == pytest.approx(shortest, rel=1e-5)
@@ -168,7 +171,7 @@ def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[
 def test_more_time_than_the_load_leaves_is_not_used() -> None:
     """An active load comes back by itself: however much time there is, the gap is closed after a while."""
     drive = CRANE.replace(torque_lag=0.004)
-    best, longer = (whole.search(Problem(drive, end)) for end in (1.2, 40.0))
+    best, longer = (whole_search.search(Problem(drive, end)) for end in (1.2, 40.0))
     assert best is not None
     assert longer is not None
     assert longer.at.end <= 40.0
@@ -178,9 +181,13 @@ def test_more_time_than_the_load_leaves_is_not_used() -> None:
 
 def test_finer_grids_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, best = solved("lag")
-    for name, value in (("COARSE", 60), ("MIDDLE", 160), ("MOST", 400)):
-        monkeypatch.setattr(f"softstart.optimal.whole.searching.{name}", value)
-    finer = whole.search(problem)
+    for name, value in (
+        ("COARSE", 60),
+        ("MIDDLE", 160),
+        ("REFINEMENT", replace(whole_search.REFINEMENT, most=400)),
+    ):
+        monkeypatch.setattr(whole_search, name, value)
+    finer = whole_search.search(problem)
     assert finer is not None
     assert pytest.approx(best.P, rel=2e-4) == finer.P
     assert finer.P <= best.P * (1.0 + 5e-5)
@@ -201,7 +208,7 @@ def test_finer_grids_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_what_is_not_linear_is_named(drive: Drive, options: dict[str, Any], why: str) -> None:
     problem = Problem(drive, 0.4, **options)
-    assert why in whole.not_linear(problem)
+    assert why in whole_search.not_linear(problem)
     with pytest.raises(InputError, match=r"method = lp: .*; use method = collocation"):
         optimize(drive, 0.4, method="lp", **options)
 

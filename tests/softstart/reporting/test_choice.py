@@ -134,7 +134,7 @@ def test_worker_answers_line_by_line():
     import io
     import json
 
-    from softstart.optimal.front_points import FrontPoint
+    from softstart.optimal.front import FrontPoint
     from softstart.reporting.limit_worker import work
 
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)

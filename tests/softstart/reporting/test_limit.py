@@ -7,7 +7,7 @@ from io import StringIO
 import pytest
 
 from softstart import Drive, simulate
-from softstart.optimal.front_points import FrontPoint
+from softstart.optimal.front import FrontPoint
 from softstart.reporting import report
 from softstart.reporting.document import answer
 from softstart.reporting.gentle_starts import gentle_starts

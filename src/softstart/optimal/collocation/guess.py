@@ -1,30 +1,30 @@
-"""Where the search begins: a course of the whole start that is roughly possible.
+"""First guess and mesh: a roughly possible trajectory of the whole start, and how finely its arcs are cut.
 
 The gap is crossed with constant acceleration; in contact the shaft torque rises smoothly to the level that
-brings the load to its speed in the time left, and is held. From a solution the course is read off instead.
+brings the load to its speed in the time left, and is held. A solution gives its own trajectory instead.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.optimal.collocation.interval import POINTS
-from softstart.optimal.collocation.phases import Phase, Program
-from softstart.optimal.collocation.scaling import Numbers
-from softstart.optimal.collocation.transcription import Mesh, Slot
+from softstart.optimal.collocation.program import Numbers, Phase, Program
+from softstart.optimal.collocation.transcription import POINTS, Mesh, Slot
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 
 Vector = NDArray[np.float64]
+
 Reading = tuple[Vector, float, float, Vector, Vector]  # durations, peak, heat, states, demands
 
 
 @dataclass(frozen=True)
-class ArcCourse:
+class ArcTrajectory:
     """States (n, 4) = (z, v, w2, u) and demand at shares of an arc's duration."""
 
     duration: float
@@ -35,14 +35,14 @@ class ArcCourse:
 
 
 @dataclass(frozen=True)
-class Course:
-    """A whole start, in the units of scaling.py."""
+class Trajectory:
+    """A whole start, in the units of program.py."""
 
-    arcs: tuple[ArcCourse, ...]
+    arcs: tuple[ArcTrajectory, ...]
     peak: float
 
     def values(self, program: Program, p: Numbers, slots: tuple[Slot, ...]) -> Vector:
-        """The course as values of the variables."""
+        """The trajectory as values of the variables."""
         phases = program.arcs
         out = np.empty(len(slots))
         for i, slot in enumerate(slots):
@@ -89,9 +89,9 @@ def likely_contact(problem: Problem, p: Numbers) -> float:
     return quickest * min(max(later, 1.05), 4.0)
 
 
-def make_course(program: Program, p: Numbers, contact: float, end: float) -> Course:
+def first_trajectory(program: Program, p: Numbers, contact: float, end: float) -> Trajectory:
     """A start with its contact at `contact` and its end at `end`."""
-    arcs: list[ArcCourse] = []
+    arcs: list[ArcTrajectory] = []
     z, v, w2 = p.z_start, p.v_start, p.w2_start
     before = [phase for phase in program.phases if not phase.contact]
     for phase in before:
@@ -114,9 +114,11 @@ def make_course(program: Program, p: Numbers, contact: float, end: float) -> Cou
         else:
             last = arcs[-1]
             u = float(last.demand[-1])
-            course = np.repeat(last.states[-1:], 2, axis=0)
-            arcs.append(ArcCourse((u - p.lowest) / p.rate, ENDS, course, ENDS, np.array([u, p.lowest])))
-    return Course(tuple(arcs), peak)
+            trajectory = np.repeat(last.states[-1:], 2, axis=0)
+            arcs.append(
+                ArcTrajectory((u - p.lowest) / p.rate, ENDS, trajectory, ENDS, np.array([u, p.lowest]))
+            )
+    return Trajectory(tuple(arcs), peak)
 
 
 ENDS = np.array([0.0, 1.0])
@@ -125,7 +127,7 @@ FINE = np.linspace(0.0, 1.0, 33)
 
 def _crossing(
     p: Numbers, phase: Phase, start: tuple[float, float, float], time: float, lands: bool
-) -> tuple[list[ArcCourse], tuple[float, float, float]]:
+) -> tuple[list[ArcTrajectory], tuple[float, float, float]]:
     """The gap, with constant relative acceleration."""
     z0, v0, w20 = start
     a2 = -phase.load * p.Mc / p.J2
@@ -138,11 +140,11 @@ def _crossing(
         t = time * (k + FINE) / phase.arcs
         w2 = w20 + a2 * t
         states = np.column_stack([z0 + v0 * t + 0.5 * a * t**2, v0 + a * t, w2, np.full(t.size, u)])
-        pieces.append(ArcCourse(time / phase.arcs, FINE, states, ENDS, np.array([u, u])))
+        pieces.append(ArcTrajectory(time / phase.arcs, FINE, states, ENDS, np.array([u, u])))
     return pieces, (z0 + way, v0 + a * time, w20 + a2 * time)
 
 
-def _pressing(p: Numbers, z: float, v: float, w2: float, way: float, left: float) -> ArcCourse:
+def _pressing(p: Numbers, z: float, v: float, w2: float, way: float, left: float) -> ArcTrajectory:
     """The first bit of a contact, until the load breaks away or the shaft softens."""
     u = 0.5 * p.highest
     speed = math.sqrt(v * v + 2.0 * u / p.J1 * way)
@@ -150,10 +152,10 @@ def _pressing(p: Numbers, z: float, v: float, w2: float, way: float, left: float
     t = time * FINE
     rise = way / time
     states = np.column_stack([z + rise * t, np.full(t.size, rise), np.full(t.size, w2), np.full(t.size, u)])
-    return ArcCourse(time, FINE, states, ENDS, np.array([u, u]))
+    return ArcTrajectory(time, FINE, states, ENDS, np.array([u, u]))
 
 
-def _driving(p: Numbers, phase: Phase, z: float, w2: float, left: float) -> tuple[list[ArcCourse], float]:
+def _driving(p: Numbers, phase: Phase, z: float, w2: float, left: float) -> tuple[list[ArcTrajectory], float]:
     """T rises from c z to its level as half a cosine and is held there."""
     rise = min(0.4 * left, 0.5 * 2.0 * math.pi / p.Omega)
     T0 = p.c * z
@@ -173,17 +175,17 @@ def _driving(p: Numbers, phase: Phase, z: float, w2: float, left: float) -> tupl
         momentum += (level - T0) * np.maximum(t - rise, 0.0) - p.Mc * t
         u = np.clip(T + p.J1 * (bend / p.c + (T - p.Mc) / p.J2), p.lowest, p.highest)
         states = np.column_stack([T / p.c, slope / p.c, w2 + momentum / p.J2, u])
-        pieces.append(ArcCourse(duration, FINE, states, FINE, u))
+        pieces.append(ArcTrajectory(duration, FINE, states, FINE, u))
         begin += duration
     return pieces, max(level, p.Mc)
 
 
-def from_solution(mesh: Mesh, read: Reading, first: Vector) -> Course:
-    """The course of a solution, `read` as in ipopt.py; `first` is the state at t = 0."""
+def from_solution(mesh: Mesh, read: Reading, first: Vector) -> Trajectory:
+    """The trajectory of a solution, `read` as by `Solution.read`; `first` is the state at t = 0."""
     durations, peak, _, states, demands = read
     if states.shape[1] == 3:
         states = np.column_stack([states, np.zeros(len(states))])
-    arcs: list[ArcCourse] = []
+    arcs: list[ArcTrajectory] = []
     at = 0
     begin = first
     for duration, edges in zip(durations, mesh, strict=True):
@@ -194,7 +196,51 @@ def from_solution(mesh: Mesh, read: Reading, first: Vector) -> Course:
         where = (inner[:-1, None] + width[:, None] * np.array([*POINTS, 1.0])).ravel()
         both_ends = np.column_stack([inner[:-1] + 1e-9 * width, inner[1:] - 1e-9 * width]).ravel()
         arcs.append(
-            ArcCourse(float(duration), np.append(0.0, where), own, both_ends, demands[at : at + n].ravel())
+            ArcTrajectory(
+                float(duration), np.append(0.0, where), own, both_ends, demands[at : at + n].ravel()
+            )
         )
         begin, at = own[-1], at + n
-    return Course(tuple(arcs), float(peak))
+    return Trajectory(tuple(arcs), float(peak))
+
+
+STRIDE = 0.6  # rad of the elastic oscillation an interval may span at first
+FEWEST, MOST = 6, 30  # intervals of an arc at first
+
+
+def first_mesh(program: Program, p: Numbers, trajectory: Trajectory) -> Mesh:
+    """Even cuts, fine enough for the elastic oscillation and the torque lag."""
+    mesh = []
+    for phase, arc in zip(program.arcs, trajectory.arcs, strict=True):
+        n = arc.duration * p.Omega / STRIDE if phase.contact else 0.0
+        if program.lagged:
+            n = max(n, arc.duration / (2.0 * p.lag))
+        if program.demand != "steps":
+            n = 1.5 * n
+        if not phase.contact:
+            n = max(n, 4) - 2
+        mesh.append(_even(min(max(math.ceil(n), FEWEST if phase.contact else 4), MOST)))
+    return tuple(mesh)
+
+
+def _even(n: int) -> tuple[float, ...]:
+    return tuple((np.arange(n + 1) / n).tolist())
+
+
+def refined(mesh: Mesh, flagged: list[bool]) -> Mesh:
+    """The mesh with flagged intervals halved."""
+    marks = iter(flagged)
+    finer = []
+    for edges in mesh:
+        kept = [edges[0]]
+        for begin, end in pairwise(edges):
+            if next(marks):
+                kept.append(0.5 * (begin + end))
+            kept.append(end)
+        finer.append(tuple(kept))
+    return tuple(finer)
+
+
+def intervals(mesh: Mesh) -> int:
+    """How many there are."""
+    return sum(len(edges) - 1 for edges in mesh)

@@ -1,29 +1,242 @@
-"""`solve`: from several first guesses to the best solution, then finer until the exact plant agrees."""
+"""Optimal starts by direct collocation: from several first guesses to the best solution, then finer.
+
+IPOPT solves the transcribed program, cold or from a full primal-dual solution; a solution is read in SI units
+and replayed on the exact plant, and the mesh is refined until the two agree.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from softstart.optimal.collocation.failure import NotConverged
 from softstart.optimal.collocation.guess import (
-    Course,
+    Trajectory,
+    first_mesh,
+    first_trajectory,
     from_solution,
+    intervals,
     likely_contact,
-    make_course,
+    refined,
 )
-from softstart.optimal.collocation.interval import parameter_vector
-from softstart.optimal.collocation.ipopt import Solution, Vector, run
-from softstart.optimal.collocation.mesh import first_mesh, intervals, refined
-from softstart.optimal.collocation.phases import Program, programs
-from softstart.optimal.collocation.reading import Claim, Replayed, claim, replayed
-from softstart.optimal.collocation.scaling import BEYOND, Numbers, numbers
-from softstart.optimal.collocation.tail import tail_rows
-from softstart.optimal.collocation.transcription import Mesh, transcribe
+from softstart.optimal.collocation.program import BEYOND, Numbers, Program, numbers, programs
+from softstart.optimal.collocation.transcription import (
+    Mesh,
+    Transcribed,
+    parameter_vector,
+    tail_rows,
+    transcribe,
+)
+from softstart.optimal.exact import replay
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import Candidate
+from softstart.optimal.result import Candidate, NotConverged, heat_of
+from softstart.profile import TorqueProfile
+
+Vector = NDArray[np.float64]
+
+QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "error_on_fail": False}
+ACCURACY = {
+    "ipopt.tol": 1e-8,
+    "ipopt.constr_viol_tol": 1e-9,
+    "ipopt.acceptable_tol": 1e-7,
+    "ipopt.acceptable_constr_viol_tol": 1e-9,
+    "ipopt.acceptable_iter": 8,
+    "ipopt.bound_relax_factor": 0.0,
+    "ipopt.max_iter": 200,
+    "ipopt.max_resto_iter": 30,
+    "ipopt.mu_strategy": "monotone",
+}
+# s of computing time a variable: 200 iterations take half of it, only a search that is lost in restoration
+# takes more.
+PATIENCE = 2e-3
+NEAR = {  # from a solution on a coarser mesh
+    "ipopt.mu_strategy": "monotone",
+    "ipopt.bound_push": 1e-4,
+    "ipopt.bound_frac": 1e-4,
+}
+WARM = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.mu_strategy": "monotone",
+    "ipopt.warm_start_bound_push": 1e-9,
+    "ipopt.warm_start_bound_frac": 1e-9,
+    "ipopt.warm_start_slack_bound_push": 1e-9,
+    "ipopt.warm_start_slack_bound_frac": 1e-9,
+    "ipopt.warm_start_mult_bound_push": 1e-9,
+}
+INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")  # how CasADi tells of a Ctrl-C
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where IPOPT ended, with the multipliers of bounds and conditions."""
+
+    transcribed: Transcribed
+    p: Numbers
+    parameters: Vector
+    x: Vector
+    lam_x: Vector
+    lam_g: Vector
+    value: float  # objective
+    reason: str  # IPOPT's own word
+    violation: float
+    iterations: int
+
+    @property
+    def found(self) -> bool:
+        return self.reason in ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
+    def read(self) -> tuple[Vector, float, float, Vector, Vector]:
+        """Durations, peak, heat, states (4 n, states), demands (n, 2), in the units of program.py."""
+        durations, peak, heat, states, demands = self.transcribed.readout(self.x, self.parameters)
+        return (
+            np.array(durations).ravel(),
+            float(peak),
+            float(heat),
+            np.array(states).T,
+            np.array(demands).T,
+        )
+
+
+@lru_cache(maxsize=32)
+def _solver(transcribed: Transcribed, mu: float, full: bool, adaptive: bool) -> Any:
+    """The solver of a program; `mu` above 0: begun near, at barrier parameter; `full`: with multipliers."""
+    options: dict[str, Any] = {**QUIET, **ACCURACY}
+    options["ipopt.max_cpu_time"] = PATIENCE * max(1000, len(transcribed.slots))
+    if adaptive:
+        options["ipopt.mu_strategy"] = "adaptive"
+    if mu > 0.0:
+        options |= {**(WARM if full else NEAR), "ipopt.mu_init": mu}
+    return ca.nlpsol("start", "ipopt", transcribed.nlp, options)
+
+
+def run(
+    transcribed: Transcribed,
+    p: Numbers,
+    parameters: Vector,
+    x: Vector,
+    multipliers: tuple[Vector, Vector] | None = None,
+    mu: float = 0.0,
+    adaptive: bool = False,
+) -> Solution:
+    """Solve from x, at barrier parameter `mu` where x is near (0: cold); with `multipliers`, a warm start.
+
+    `adaptive` changes the barrier parameter in another manner, mostly slower, that may succeed where
+    the usual one fails.
+    """
+    lbx, ubx, lbg, ubg = transcribed.limits(parameters)
+    given: dict[str, Any] = {"x0": x, "p": parameters, "lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
+    if multipliers is not None:
+        given |= {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
+    solver = _solver(transcribed, mu, multipliers is not None, adaptive)
+    try:
+        out = solver(**given)
+    except RuntimeError as error:
+        if "KeyboardInterrupt" in str(error):
+            raise KeyboardInterrupt from error
+        raise
+    stats = solver.stats()
+    if stats["return_status"] in INTERRUPTED:
+        raise KeyboardInterrupt
+    g, low, high = (np.array(a).ravel() for a in (out["g"], lbg, ubg))
+    violation = float(np.max(np.maximum(low - g, g - high), initial=0.0))
+    return Solution(
+        transcribed,
+        p,
+        parameters,
+        np.array(out["x"]).ravel(),
+        np.array(out["lam_x"]).ravel(),
+        np.array(out["lam_g"]).ravel(),
+        float(out["f"]),
+        str(stats["return_status"]),
+        violation,
+        int(stats["iter_count"]),
+    )
+
+
+CHECKS = 12  # per interval, at the re-simulated shaft torque
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a solution says: profile up to t_f, edges of its intervals in s, its figure."""
+
+    profile: TorqueProfile
+    end_time: float
+    edges: Vector  # of the intervals up to t_f, s
+    levels: Vector  # demand before and after in each, N m
+    peak: float  # N m
+    value: float  # of what is minimised
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """The same on the exact plant."""
+
+    value: float
+    shortfall: float  # of the load speed at t_f, relative to the target
+    landing: float  # largest error of the terminal conditions, relative to target and Ms
+    parted: NDArray[np.bool_]  # intervals in which the flanks part before t_f
+    overshoot: Vector  # largest T in each interval over the claimed peak, relative
+
+
+def claim(problem: Problem, solution: Solution) -> Claim:
+    """Read a solution."""
+    program, units = solution.transcribed.program, solution.p.units
+    durations, peak, heat, _, demands = solution.read()
+    arcs = program.start_arcs
+    mesh = solution.transcribed.mesh[:arcs]
+    widths = np.concatenate([T * np.diff(edges) for T, edges in zip(durations, mesh, strict=False)])
+    edges = np.concatenate([[0.0], np.cumsum(widths)]) * units.time
+    levels = demands[: widths.size] * units.torque
+    levels = np.clip(levels, problem.lowest_torque, problem.highest_torque)
+    end = float(edges[-1])
+    value = {
+        "k_dyn": peak * units.torque / problem.base_torque,
+        "heat": heat * units.time,
+        "start_time": end,
+    }[problem.minimise]
+    return Claim(_profile(program.demand, edges, levels), end, edges, levels, peak * units.torque, value)
+
+
+def _profile(shape: str, edges: Vector, levels: Vector) -> TorqueProfile:
+    if shape == "steps":
+        return TorqueProfile.steps(edges, levels[:, 0])
+    if shape == "ramps":
+        return TorqueProfile(np.repeat(edges, 2)[1:-1], levels.ravel()).simplified()
+    return TorqueProfile(edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
+
+
+def replayed(problem: Problem, own: Claim) -> Replayed:
+    """Run the claim on the exact plant, to the first peak after t_f where the motor coasts."""
+    drive: Any = problem.drive
+    profile, until = own.profile, own.end_time
+    if problem.terminal == "reached":
+        profile = profile.followed_by(own.end_time, TorqueProfile([0.0], [problem.lowest_torque]))
+        until += math.pi / drive.Omega + 5.0 * drive.torque_lag
+    run = replay(drive, profile, until, problem.base)
+    width = np.diff(own.edges)
+    checks = (np.arange(CHECKS) + 0.5) / CHECKS
+    times = own.edges[:-1, None] + width[:, None] * checks
+    T = np.abs(run.at(times.clip(0.0, run.end_time))["T"])
+    overshoot = T.max(axis=1) / max(own.peak, 1e-300) - 1.0
+    end = {name: float(values[0]) for name, values in run.at([own.end_time]).items()}
+    shortfall = 1.0 - end["w2"] / problem.target
+    errors = [shortfall]
+    if problem.terminal != "reached":
+        errors.append(end["v"] / problem.target)
+    if problem.terminal == "steady":
+        errors.append((end["T"] - drive.Mc) / drive.Ms)
+    openings = [e.time for e in run.events if e.kind == "gap opened" and e.time < own.end_time]
+    parted = np.histogram(openings, own.edges)[0] > 0
+    heat = heat_of(run, own.end_time)
+    value = {"k_dyn": run.k_dyn, "heat": heat, "start_time": own.end_time}[problem.minimise]
+    return Replayed(float(value), shortfall, max(map(abs, errors)), parted, overshoot)
+
 
 OTHERWISE = (1.6, 0.7)  # contact instants tried where the likely one fails, in units of that
 WIDE_BARRIER = 1e-2
@@ -53,9 +266,33 @@ class Warm:
 
 
 def solve(
-    problem: Problem, warm: Any, contact_guess: float | None, tolerance: float, max_refinements: int
+    problem: Problem,
+    *,
+    warm: Any = None,
+    contact_guess: float | None = None,
+    tolerance: float = 1e-4,
+    max_refinements: int = 5,
 ) -> Candidate:
-    """See the package."""
+    """The optimal start by direct collocation.
+
+    Parameters
+    ----------
+    problem : any `Problem`; damping, reactive loads, torque lag and rate, torque-speed limits, smoothness.
+    warm : `Candidate.warm` of a similar problem (other start time, gap, inertia): the search begins from its
+        full primal-dual solution, on its mesh. Left aside where the phases of the two problems differ.
+    contact_guess : instant in s of the first contact from which the search begins.
+    tolerance : relative; the mesh is refined until the re-simulated figure moves by less than this and agrees
+        with the claimed one to this.
+    max_refinements : at most so many meshes after the first.
+
+    Raises InputError for a problem of no class known here, and NotConverged where IPOPT finds no solution or
+    the mesh does not get fine enough: `NotConverged.violation` is the largest violated constraint.
+
+    >>> from softstart import Drive
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
+    >>> round(solve(Problem(drive, start_time=0.2883042)).claimed, 3)
+    0.909
+    """
     solution = None
     spent = 0
     if isinstance(warm, Warm) and warm.program in programs(problem):
@@ -101,13 +338,13 @@ def _first(problem: Problem, contact: float) -> tuple[Solution, int]:
     tried: list[Solution] = []
     quickest = np.inf
     for program in programs(problem):
-        course = _course(program, p, contact)
-        mesh = first_mesh(program, p, course)
-        tried.append(_on(program, p, mesh, course))
+        trajectory = _trajectory(program, p, contact)
+        mesh = first_mesh(program, p, trajectory)
+        tried.append(_on(program, p, mesh, trajectory))
         if tried[-1].found or program.minimise == "start_time":
             continue
         for adaptive in (False, True):
-            quick = _quickest(program, p, mesh, course, adaptive)
+            quick = _quickest(program, p, mesh, trajectory, adaptive)
             if quick.found:
                 break
         end = float(quick.read()[0][: program.start_arcs].sum()) if quick.found else np.inf
@@ -119,11 +356,11 @@ def _first(problem: Problem, contact: float) -> tuple[Solution, int]:
     if found:
         return min(found, key=lambda s: s.value), sum(s.iterations for s in tried)
     if 1.0 < quickest < np.inf:
-        told = f"IPOPT finds no start quicker than {quickest * p.units.time:.6g} s"
-        raise NotConverged(told, quickest - 1.0, final=quickest > CLEARLY)
+        reason = f"IPOPT finds no start quicker than {quickest * p.units.time:.6g} s"
+        raise NotConverged(reason, quickest - 1.0, final=quickest > CLEARLY)
     nearest = min(tried, key=lambda s: s.violation)
     # a mesh and guess that led astray once mostly do so again, at length
-    raise NotConverged(_told(nearest.reason), nearest.violation, final=problem.start_time is not None)
+    raise NotConverged(_reason_of(nearest.reason), nearest.violation, final=problem.start_time is not None)
 
 
 def _contacts(problem: Problem, contact_guess: float | None) -> list[float]:
@@ -135,26 +372,26 @@ def _contacts(problem: Problem, contact_guess: float | None) -> list[float]:
     return [f * likely for f in (1.0, *OTHERWISE)] if likely > 0.0 else [0.0]
 
 
-def _quickest(program: Program, p: Numbers, mesh: Mesh, course: Course, adaptive: bool) -> Solution:
+def _quickest(program: Program, p: Numbers, mesh: Mesh, trajectory: Trajectory, adaptive: bool) -> Solution:
     """The quickest start within all other bounds, with the same variables."""
     free = replace(p, values={**p.values, "latest": 100.0})
-    return _on(replace(program, minimise="start_time", smooth=False), free, mesh, course, 0.0, adaptive)
+    return _on(replace(program, minimise="start_time", smooth=False), free, mesh, trajectory, 0.0, adaptive)
 
 
-def _course(program: Program, p: Numbers, contact: float) -> Course:
+def _trajectory(program: Program, p: Numbers, contact: float) -> Trajectory:
     end = 1.0 if program.minimise != "start_time" else 1.3
-    return make_course(program, p, min(contact, 0.6 * end), end)
+    return first_trajectory(program, p, min(contact, 0.6 * end), end)
 
 
 def _on(
-    program: Program, p: Numbers, mesh: Mesh, course: Course, mu: float = 0.0, adaptive: bool = False
+    program: Program, p: Numbers, mesh: Mesh, trajectory: Trajectory, mu: float = 0.0, adaptive: bool = False
 ) -> Solution:
     transcribed = transcribe(program, mesh)
-    x = course.values(program, p, transcribed.slots)
+    x = trajectory.values(program, p, transcribed.slots)
     return run(transcribed, p, _parameters(program, p), x, None, mu, adaptive)
 
 
-def _told(reason: str) -> str:
+def _reason_of(reason: str) -> str:
     return {
         "Infeasible_Problem_Detected": "IPOPT finds no start that meets all conditions",
         "Maximum_Iterations_Exceeded": "IPOPT came to its largest number of iterations",
@@ -243,10 +480,10 @@ def _finer(
     program, old = solution.transcribed.program, solution.transcribed.mesh
     mesh = refined(old, _flags(problem, solution, own, exact, tolerance))
     p = solution.p
-    course = from_solution(old, solution.read(), np.array([p.z_start, p.v_start, p.w2_start, 0.0]))
+    trajectory = from_solution(old, solution.read(), np.array([p.z_start, p.v_start, p.w2_start, 0.0]))
     tried = []
     for barrier in (NEAR_BARRIER, 0.0):  # a finer mesh can lead the search astray: then from a wider barrier
-        tried.append(_on(program, p, mesh, course, barrier))
+        tried.append(_on(program, p, mesh, trajectory, barrier))
         if tried[-1].found and tried[-1].value <= solution.value + WORSE * abs(solution.value):
             break
     found = [s for s in tried if s.found]

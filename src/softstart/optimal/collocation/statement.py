@@ -1,7 +1,7 @@
 """The problem as mathematics: dynamics, path constraints, boundary conditions, objective.
 
 State x = (z, v, w2[, u]): z = phi1 - phi2 - gap/2 twist beyond the driving flank, v = w1 - w2, w2 load speed,
-and the motor torque u where it lags behind its demand. Everything is in the units of scaling.py. A condition
+and the motor torque u where it lags behind its demand. Everything is in the units of program.py. A condition
 is a name, an expression, and the limits between which the expression must lie.
 """
 
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from softstart.optimal.collocation.phases import Phase, Program
+from softstart.optimal.collocation.program import Phase, Program
 
 SX = Any  # casadi has no types
 INFINITY = float("inf")

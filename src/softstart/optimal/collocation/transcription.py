@@ -1,12 +1,15 @@
 """The statement as a nonlinear program: Legendre collocation of degree 3, arcs of free duration.
 
-An arc is cut into intervals at fixed shares of its duration; interval.py says what holds in each. Bounds and
-scales are expressions of the parameters, so that one program, once built, serves every drive, start time and
-bound that lead to the same phases: that is what a warm start needs.
+An arc is cut into intervals at fixed shares of its duration. Within an interval the state is a cubic through
+its beginning and three Gauss points, where it obeys the dynamics; all intervals of a kind share one function,
+so that a finer mesh is quickly written down. Bounds and scales are expressions of the parameters, so that one
+program, once built, serves every drive, start time and bound that lead to the same phases: a warm start needs
+that.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -17,12 +20,193 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.optimal.collocation import statement
-from softstart.optimal.collocation.interval import POINTS, Parameters, interval_piece, path_conditions
-from softstart.optimal.collocation.phases import Phase, Program
+from softstart.optimal.collocation.program import Numbers, Phase, Program
 from softstart.optimal.collocation.statement import INFINITY, Condition, State
 
-SX = Any
+SX = Any  # casadi has no types
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+TAIL_POINTS = 128
+
+
+def tail_rows(program: Program, p: Numbers) -> Matrix:
+    """Rows (z, v, w2[, u], demand, 1) that give T at `TAIL_POINTS` instants after t_f.
+
+    Coasting, the first peak comes within half an elastic period; a lag delays it. Holding is watched for a
+    whole one.
+    """
+    if not program.tail:
+        return np.zeros((0, (4 if program.lagged else 3) + 2))
+    period = 2.0 * math.pi / p.Omega
+    length = period if program.tail == "hold" else 0.5 * period + 5.0 * p.lag
+    length = min(length, 1.5 * period)
+    # y = (z, v, u, demand, 1), y' = A y
+    inverse = 1.0 / p.J1 + 1.0 / p.J2
+    drive_by_demand = not program.lagged
+    A = np.zeros((5, 5))
+    A[0, 1] = 1.0
+    A[1] = [-p.c * inverse, -p.d * inverse, 1.0 / p.J1, 0.0, p.Mc / p.J2]
+    if drive_by_demand:
+        A[1, 2], A[1, 3] = 0.0, 1.0 / p.J1
+    else:
+        A[2, 2], A[2, 3] = -1.0 / p.lag, 1.0 / p.lag
+    step = _exponential(A * (length / TAIL_POINTS))
+    torque = np.array([p.c, p.d, 0.0, 0.0, 0.0])
+    rows = np.empty((TAIL_POINTS, 5))
+    for i in range(TAIL_POINTS):
+        torque = torque @ step
+        rows[i] = torque
+    z, v, u, demand, one = rows.T
+    w2 = np.zeros(TAIL_POINTS)
+    return np.column_stack([z, v, w2, u, demand, one] if program.lagged else [z, v, w2, demand, one])
+
+
+def _exponential(A: Matrix) -> Matrix:
+    """exp(A) by scaling and squaring a Taylor series."""
+    halvings = max(0, math.ceil(math.log2(max(1e-300, float(np.abs(A).sum(axis=1).max())) / 0.25)))
+    small = A / 2.0**halvings
+    term = total = np.eye(A.shape[0])
+    for k in range(1, 14):
+        term = term @ small / k
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return total
+
+
+POINTS = ca.collocation_points(3, "legendre")
+SLOPES, END_WEIGHTS, QUADRATURE = (np.array(a) for a in ca.collocation_coeff(POINTS))
+# Path constraints in contact are asked for at these shares of an interval: seen at the Gauss points alone, an
+# optimum finds the bulges between them.
+CHECKS = tuple((k + 1) / 8 for k in range(7))
+
+NAMES = (
+    "J1", "J2", "c", "d", "gap", "Mc", "lag", "rate", "lowest", "highest", "target", "base", "smoothness",
+    "latest", "largest_peak", "most_heat", "z_start", "v_start", "w2_start",
+)  # fmt: skip
+
+
+class Parameters:
+    """The numbers of a drive as symbols, under the names of the statement."""
+
+    def __init__(self, program: Program) -> None:
+        self.symbols = {name: ca.SX.sym(name) for name in NAMES}
+        states = 4 if program.lagged else 3
+        self.gap_scale, self.contact_scale = ca.SX.sym("gap_scale", 4), ca.SX.sym("contact_scale", 4)
+        self.line_symbols = ca.SX.sym("lines", 2, program.lines)
+        self.lines = [(self.line_symbols[0, i], self.line_symbols[1, i]) for i in range(program.lines)]
+        self.tail = ca.SX.sym("tail", TAIL_POINTS if program.tail else 0, states + 2)
+        own = [*self.symbols.values(), self.gap_scale, self.contact_scale, ca.vec(self.line_symbols)]
+        self.own = ca.vertcat(*own)  # all but the tail
+        self.vector = ca.vertcat(self.own, ca.vec(self.tail))
+
+    def __getattr__(self, name: str) -> SX:
+        try:
+            return self.__dict__["symbols"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def scale(self, phase: Phase) -> SX:
+        """Sizes of the states in a phase."""
+        return self.contact_scale if phase.contact else self.gap_scale
+
+
+def _cubic_at(share: float) -> Vector:
+    """Weights of an interval's beginning and its Gauss points in the value of their cubic at a share."""
+    nodes = np.array([0.0, *POINTS])
+    weights = [np.prod([(share - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+    return np.array(weights)
+
+
+CHECK_WEIGHTS = [_cubic_at(share) for share in CHECKS]
+
+
+def parameter_vector(given: Numbers, tail: Vector) -> Vector:
+    """The numbers in the order of `Parameters.vector`."""
+    lines = np.array(given.lines).reshape(-1, 2)
+    own = [given.values[name] for name in NAMES]
+    return np.concatenate(
+        [own, given.gap_scale, given.contact_scale, lines.ravel(), tail.ravel(order="F")]
+    )  # CasADi stores by columns: a line is a column of its matrix
+
+
+class Piece(NamedTuple):
+    """The conditions of one interval as a function of its variables; built once for all intervals alike."""
+
+    function: Any  # (beginning, inner, node, demand before, after, h, peak, parameters) -> (values, heat)
+    lower: Vector
+    upper: Vector
+    names: tuple[str, ...]
+
+
+@lru_cache(maxsize=64)
+def interval_piece(program: Program, phase: Phase, kept: float, on_border: bool) -> Piece:
+    """Collocation, path constraints, limits of torque and rate in an interval.
+
+    `kept` is the least shaft torque, `on_border` says that a path constraint ends the phase there.
+    """
+    p = Parameters(program)
+    states = 4 if program.lagged else 3
+    x, node, inner = ca.SX.sym("x", states), ca.SX.sym("node", states), ca.SX.sym("inner", states, 3)
+    before, after, h, peak = (ca.SX.sym(name) for name in ("before", "after", "h", "peak"))
+    scale = p.scale(phase)[:states]
+    rows: list[Condition] = []
+
+    def at(point: SX, demand: SX) -> State:
+        return State(point[0], point[1], point[2], point[3] if program.lagged else demand)
+
+    if program.rated:
+        slope = after - before
+        if phase.end == "lowest demand":
+            rows.append(statement.equal("release", slope, -p.rate * h))
+        else:
+            rows.append(statement.at_most("rate up", slope, p.rate * h))
+            rows.append(statement.at_least("rate down", slope, -p.rate * h))
+    cubic = ca.horzcat(x, inner)
+    slopes = ca.mtimes(cubic, SLOPES)
+    heat = 0.0
+    for j, tau in enumerate(POINTS):
+        wanted = before + tau * (after - before)
+        here = at(inner[:, j], wanted)
+        rates = ca.vertcat(*statement.dynamics(program, p, phase, here, wanted))
+        defect = (slopes[:, j] - h * rates) / scale
+        rows += [Condition("dynamics", defect[i], 0.0, 0.0) for i in range(states)]
+        if not phase.contact:
+            rows += path_conditions(program, p, phase, here, peak)
+        heat += h * float(QUADRATURE[j, 0]) * here.u**2
+    if phase.contact:
+        checks = ca.mtimes(cubic, np.array(CHECK_WEIGHTS).T)
+        for k, share in enumerate(CHECKS):
+            here = at(checks[:, k], before + share * (after - before))
+            conditions = path_conditions(program, p, phase, here, peak, kept)
+            every = k % 2 == 1 or phase.load == 0
+            rows += [condition for condition in conditions if every or condition.name == "peak"]
+    gap = (ca.mtimes(cubic, END_WEIGHTS) - node) / scale
+    rows += [Condition("continuity", gap[i], 0.0, 0.0) for i in range(states)]
+    rows += statement.torque_limits(program, p, at(x, before))
+    if on_border:
+        # its end condition puts it on the border: asked for twice, the multipliers would be undetermined
+        rows += statement.torque_limits(program, p, at(node, after))
+    else:
+        rows += path_conditions(program, p, phase, at(node, after), peak, kept)
+    inputs = [x, inner, node, before, after, h, peak, p.own]
+    return Piece(
+        ca.Function("interval", inputs, [ca.vertcat(*(row.value for row in rows)), heat]),
+        np.array([row.lower for row in rows]),
+        np.array([row.upper for row in rows]),
+        tuple(row.name for row in rows),
+    )
+
+
+def path_conditions(
+    program: Program, p: Parameters, phase: Phase, here: State, peak: SX, kept: float = 0.0
+) -> list[Condition]:
+    """Path constraints and torque limits at a point."""
+    limits = statement.torque_limits(program, p, here)
+    return [*statement.path(program, p, phase, here, peak, kept), *limits]
+
+
 Mesh = tuple[tuple[float, ...], ...]  # the edges of the intervals of every arc, as shares of its duration
 
 SHORTEST = 1e-3  # of the time unit: an arc that is not needed shares another one's motion

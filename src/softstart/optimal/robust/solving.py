@@ -1,21 +1,415 @@
-"""The robust optimum: its search, its exact runs, and what a contact sensor is worth."""
+"""One torque profile for several drives: scenarios, search, exact runs, the worth of a contact sensor."""
 
 from __future__ import annotations
 
+import itertools
+import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
 from softstart.controller import make_controller
 from softstart.drive import Drive
-from softstart.optimal.result import InfeasibleError, LowerBound, OptimumError
-from softstart.optimal.robust.outcome import RobustOptimum, SensorWorth
-from softstart.optimal.robust.pursuit import Progress, Pursuit
-from softstart.optimal.robust.scenarios import check_scenarios, limits, reached
-from softstart.profile import TorqueProfile
+from softstart.errors import InputError
+from softstart.optimal.momentum import momentum_bound
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import InfeasibleError, LowerBound, OptimumError, Verdict
+from softstart.optimal.robust.descent import Point, Rules, descend, evaluate
+from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
+from softstart.optimal.robust.guesses import Evolution, Family, gentleness, quickness
+from softstart.profile import TorqueProfile, Vector
+from softstart.start import metrics
+from softstart.start.run import Run
 from softstart.start.simulation import simulate
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustOptimum:
+    """One torque profile for several drives, as the exact plant runs it on each of them.
+
+    Every run goes to one elastic period after its own start time, the profile still playing. All K_dyn refer
+    to `base`. `lower_bound` is the largest bound of a scenario by itself: no profile, reacting or not, does
+    better on all of them.
+    """
+
+    scenarios: tuple[Drive, ...]
+    start_time: float  # s allowed
+    base: Drive
+    react_to_contact: bool
+    profile: TorqueProfile
+    runs: tuple[Run, ...]
+    lower_bound: LowerBound
+    seconds: float  # computing time
+    note: str = ""  # where a contact sensor is left unused, that this is so
+
+    @property
+    def k_dyn_each(self) -> tuple[float, ...]:
+        """Dynamic coefficient of each scenario's whole run."""
+        return tuple(float(metrics.k_dyn(run.peak_torque, self.base)) for run in self.runs)
+
+    @property
+    def k_dyn(self) -> float:
+        """The worst of them, which was minimised."""
+        return max(self.k_dyn_each)
+
+    @property
+    def worst(self) -> int:
+        """Index of the scenario with the worst K_dyn."""
+        return int(np.argmax(self.k_dyn_each))
+
+    @property
+    def start_times(self) -> tuple[float, ...]:
+        """Start time of each scenario, s."""
+        return tuple(run.start_time for run in self.runs)
+
+    @property
+    def gap_percent(self) -> float:
+        """How far the worst K_dyn lies above the bound, in per cent."""
+        return 100.0 * (self.k_dyn / self.lower_bound.k_dyn - 1.0)
+
+    def __repr__(self) -> str:
+        """One line that says what came out."""
+        what = "reacting to the contact" if self.react_to_contact else "one profile"
+        return (
+            f"<RobustOptimum: worst K_dyn {self.k_dyn:.5f} over {len(self.scenarios)} scenarios, {what}, "
+            f"latest start {max(self.start_times):.5f} s>"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """All figures under the names used everywhere (JSON, tables, docs)."""
+        bound = self.lower_bound
+        after = self.profile.after_contact
+        profile: dict[str, Any] = _knots(self.profile)
+        if after is not None:
+            profile["after_contact"] = _knots(after)
+        return {
+            "drive": self.base.name,
+            "terminal": "reached",
+            "react_to_contact": self.react_to_contact,
+            "note": self.note,
+            "start_time_bound": self.start_time,
+            "k_dyn": self.k_dyn,
+            "k_dyn_each": list(self.k_dyn_each),
+            "k_dyn_lower_bound": bound.k_dyn if bound.kind != "none" else None,
+            "bound_kind": bound.kind,
+            "bound_covers": bound.covers,
+            "start_times": list(self.start_times),
+            "worst": self.worst,
+            "scenarios": [
+                {"drive": d.name, "gap": d.gap, "load_inertia": d.J2, "load_torque": d.Mc}
+                for d in self.scenarios
+            ],
+            "seconds": self.seconds,
+            "profile": profile,
+        }
+
+
+def _knots(profile: TorqueProfile) -> dict[str, Any]:
+    return {"time": profile.time.tolist(), "torque": profile.torque.tolist()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SensorWorth:
+    """The best profile that evaluator blindly, and the best that starts its second part at the contact.
+
+    `alone` holds the K_dyn that each scenario could have if it were the only one, where that was asked for.
+    """
+
+    blind: RobustOptimum
+    reacting: RobustOptimum
+    alone: tuple[float, ...] | None = None
+
+    @property
+    def percent(self) -> float:
+        """By how much the sensor lowers the worst K_dyn, per cent of the blind one; 0 if left unused."""
+        return max(100.0 * (1.0 - self.reacting.k_dyn / self.blind.k_dyn), 0.0)
+
+    def __repr__(self) -> str:
+        """One line that says what came out."""
+        return (
+            f"<SensorWorth: worst K_dyn {self.blind.k_dyn:.5f} blind, {self.reacting.k_dyn:.5f} reacting to "
+            f"the contact: {self.percent:.1f} % lower>"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """All figures under the names used everywhere (JSON, tables, docs)."""
+        return {
+            "k_dyn_blind": self.blind.k_dyn,
+            "k_dyn_reacting": self.reacting.k_dyn,
+            "percent": self.percent,
+            "k_dyn_alone": None if self.alone is None else list(self.alone),
+            "blind": self.blind.summary(),
+            "reacting": self.reacting.summary(),
+        }
+
+
+def scenarios_of(
+    drive: Drive,
+    *,
+    gaps: Iterable[float] = (),
+    inertias: Iterable[float] = (),
+    load_torques: Iterable[float] = (),
+) -> tuple[Drive, ...]:
+    """The full grid of a drive's gaps (rad), load inertias (kg m2) and load torques (N m).
+
+    A list left out keeps the drive's own value. The drive itself comes first, also where it is not on the
+    grid, since K_dyn refers to the first scenario. Raises InputError for values that no drive can have.
+
+    >>> nominal = Drive.load("crane-4amtkf")
+    >>> [s.gap for s in scenarios_of(nominal, gaps=[0.3, 0.5, 1.0])]
+    [0.5, 0.3, 1.0]
+    >>> len(scenarios_of(nominal, gaps=[0.3, 1.0], inertias=[0.07, 0.175]))
+    5
+    """
+    if not isinstance(drive, Drive) or drive.shape != ():
+        raise InputError(f"drive = {drive!r}: give a single Drive; its values are varied here.")
+    own = (("gaps", "gap"), ("inertias", "load_inertia"), ("load_torques", "load_torque"))
+    lists = [
+        _values(name, given) for (name, _), given in zip(own, (gaps, inertias, load_torques), strict=True)
+    ]
+    axes = [
+        list(dict.fromkeys(values)) or [getattr(drive, key)]
+        for values, (_, key) in zip(lists, own, strict=True)
+    ]
+    found = [drive]
+    for gap, load_inertia, load_torque in itertools.product(*axes):
+        one = drive.replace(gap=gap, load_inertia=load_inertia, load_torque=load_torque)
+        if one not in found:
+            found.append(one)
+    return tuple(found)
+
+
+def _values(name: str, given: Iterable[float]) -> list[float]:
+    try:
+        values = [float(value) for value in given]
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {given!r}: give a list of numbers in SI units.") from None
+    return values
+
+
+def check_scenarios(scenarios: Sequence[Drive], start_time: Any, base: Any) -> tuple[Drive, ...]:
+    """The scenarios as a tuple, or one InputError with everything that is wrong."""
+    if isinstance(scenarios, Drive) or not isinstance(scenarios, Sequence) or isinstance(scenarios, str):
+        raise InputError(
+            f"scenarios = {scenarios!r}: give a list of Drives; scenarios_of makes one from a drive's gaps, "
+            "inertias and load torques."
+        )
+    drives = tuple(scenarios)
+    if not drives:
+        raise InputError("scenarios: the list is empty; give one Drive or more.")
+    if (
+        not isinstance(start_time, Real)
+        or isinstance(start_time, bool)
+        or not 0.0 < float(start_time) < math.inf
+    ):
+        raise InputError(f"start_time = {start_time!r}: give the time allowed in s, above 0.")
+    if base is not None and (not isinstance(base, Drive) or base.shape != ()):
+        raise InputError(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
+    wrong: list[str] = []
+    for i, drive in enumerate(drives):
+        try:
+            reached(drive, float(start_time), base)
+        except InputError as error:
+            wrong += [f"scenario {i + 1}: {sentence}" for sentence in error.sentences]
+    if not wrong:
+        low, high = limits(drives)
+        if low >= high:
+            wrong.append(
+                f"scenarios: one needs a torque of at least {low:g} N m, another allows {high:g} N m at "
+                "most; one profile cannot serve both, so leave one of them out."
+            )
+        wrong += [
+            f"scenario {i + 1}: load_torque = {drive.Mc:g} N m, but the torque that all scenarios allow is "
+            f"only {high:g} N m; leave out the scenario with the weakest motor."
+            for i, drive in enumerate(drives)
+            if drive.Mc >= high
+        ]
+    if wrong:
+        raise InputError(wrong)
+    return tuple(reached(drive, float(start_time), base).drive for drive in drives)
+
+
+def reached(drive: Drive, start_time: float, base: Drive | None) -> Problem:
+    """A scenario by itself: the load is to reach its target speed in time."""
+    return Problem(drive, start_time=start_time, terminal="reached", base=base)
+
+
+def limits(drives: Sequence[Drive]) -> tuple[float, float]:
+    """The torque in N m that every scenario allows: highest of the lowest, lowest of the highest."""
+    problems = [reached(drive, 1.0, None) for drive in drives]
+    return max(p.lowest_torque for p in problems), min(p.highest_torque for p in problems)
+
+
+def differing(drives: Sequence[Drive], count: int) -> tuple[Drive, ...]:
+    """So many of the drives that differ most in gap, inertia, load torque, stiffness; in their order.
+
+    The two ends of the widest spread come first, then always the one farthest from those chosen.
+
+    >>> drive = Drive.load("crane-4amtkf")
+    >>> [d.gap for d in differing([drive.replace(gap=g) for g in (0.3, 0.4, 0.5, 0.7)], 2)]
+    [0.3, 0.7]
+    """
+    if len(drives) <= count:
+        return tuple(drives)
+    rows = np.array([[d.gap, d.J1, d.J2, d.Mc, d.c, d.d, d.Ms] for d in drives], dtype=np.float64)
+    rows = rows / np.maximum(np.abs(rows).max(axis=0), 1e-300)
+    apart = np.linalg.norm(rows[:, None] - rows[None], axis=2)
+    chosen = [int(i) for i in np.unravel_index(int(np.argmax(apart)), apart.shape)]
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(apart[chosen].min(axis=0))))
+    return tuple(drives[i] for i in sorted(chosen[:count]))
+
+
+Progress = Callable[[str], None]
+
+SEED = 0  # of everything random here: the same question has the same answer
+EVOLUTIONS = ((3, 0), (4, 1))  # steps and seed of the searches over short staircases of any kind
+QUICK_EVOLUTIONS = ((3, 0), (3, 1), (4, 0), (4, 1), (5, 0), (5, 1))
+REPRESENTED = 3  # scenarios that the first rounds are over
+DENSE, SPARSE = 12, 6  # intervals of an elastic period in the first rounds: in the first two periods, then
+FIRST_ROUNDS = 8  # of the descent from each start
+ALIKE = 3e-3  # relative: peaks on the way that count as one
+PURSUED, FINISHED = 4, 1  # how many are followed to the end of the coarse grid, and on the fine one
+COARSE, FINE = 40, 90  # intervals
+ROUNDS = 80  # of each descent, at most
+CALM, CALMER = 2e-5, 3e-4  # weights of the torque steps, on the way and where the peak may not rise
+MERGED = 0.002  # of the torque range: neighbouring levels that become one
+TIDY_COST = 2e-4  # relative, that a calmer profile of fewer knots may cost
+
+
+class RobustSearch:
+    """The searches, one after the other, each from the best of those before."""
+
+    def __init__(self, drives: Sequence[Drive], start_time: float, react: bool, progress: Progress) -> None:
+        self.drives, self.start_time, self.react, self.progress = tuple(drives), start_time, react, progress
+        self.low, self.high = limits(drives)
+        self.rules = Rules(self.low, self.high, calm=CALM, rounds=ROUNDS)
+        self.evaluator = Evaluator(drives, start_time)
+
+    def best(self) -> Point:
+        """The gentlest point found that is in time; InfeasibleError if none is."""
+        coarse = []
+        for staircase in self._pursued():
+            coarse.append(descend(self.evaluator, staircase, self.rules, 1e-4))
+            self.progress(f"coarse grid: peak {coarse[-1].peak:.3f} N m")
+        fine = []
+        for point in _different(coarse, ALIKE)[:FINISHED]:
+            fine.append(descend(self.evaluator, self._refined(point.staircase, FINE), self.rules, 1e-5))
+            self.progress(f"fine grid: peak {fine[-1].peak:.3f} N m")
+        best = self._calmed(_different(fine)[0])
+        if best.late > 0.0:
+            raise OptimumError(
+                f"robust optimum: a start within {self.start_time:g} s was found and lost again."
+            )
+        return best
+
+    def _pursued(self) -> list[Staircase]:
+        """Where to go on from: the best after a few rounds of each start, over differing scenarios."""
+        quick = self._quick() if self._constant(self.evaluator).late > 0.0 else []
+        evaluator = Evaluator(differing(self.drives, REPRESENTED), self.start_time)
+        rules = replace(self.rules, calm=0.0, rounds=FIRST_ROUNDS)
+        points = []
+        for staircase in [*self._starts(evaluator), *quick]:
+            start = staircase.cut(*[self._grid()] * 2)
+            points.append(descend(evaluator, start, rules, 1e-4))
+            self.progress(f"first rounds: peak {points[-1].peak:.3f} N m")
+        return [point.staircase for point in _different(points, ALIKE)[:PURSUED]] + quick
+
+    def _starts(self, evaluator: Evaluator) -> list[Staircase]:
+        """Members of the family from all over, and the best short staircases of any kind."""
+        starts = Family(evaluator, self.low, self.high, self.react).spread(SEED)
+        for steps, seed in EVOLUTIONS:
+            search = Evolution(evaluator, steps, self.low, self.high, self.react)
+            starts.append(search.best(gentleness(evaluator, self.high - self.low), SEED + seed)[1])
+        return starts
+
+    def _grid(self) -> Vector:
+        """Edges for the first rounds: close together while the gaps close, then wider."""
+        period = max(float(drive.elastic_period) for drive in self.drives)
+        dense = min(2.0 * period, self.evaluator.horizon)
+        rest = self.evaluator.horizon - dense
+        count = min(max(math.ceil(rest / period * SPARSE), 2), COARSE)  # a stiff shaft has many periods
+        early = np.linspace(0.0, dense, math.ceil(dense / period * DENSE) + 1)[:-1]
+        return np.concatenate([early, np.linspace(dense, dense + rest, count + 1)[:-1]])
+
+    def _calmed(self, fine: Point) -> Point:
+        """As good with quieter torque, then with few levels whose edges move: the last that costs nothing."""
+        floor = fine.peak * (1.0 + 0.1 * TIDY_COST)
+        calm = descend(
+            self.evaluator,
+            fine.staircase,
+            replace(self.rules, calm=CALMER, floor=floor, rounds=ROUNDS // 2),
+            1e-5,
+        )
+        few = merged(calm.staircase, MERGED * (self.high - self.low))
+        tidy = descend(self.evaluator, few, replace(self.rules, edges=True, calm=0.0), 1e-6)
+        self.progress(f"moving edges: peak {tidy.peak:.3f} N m")
+        in_time = [point for point in (tidy, calm, fine) if point.late <= max(fine.late, 0.0)]
+        least = min(point.peak for point in in_time)
+        return next(point for point in in_time if point.peak <= least * (1.0 + TIDY_COST))
+
+    def _constant(self, evaluator: Evaluator) -> Point:
+        """The highest torque all the time."""
+        staircase = self._flat(self.high)
+        return evaluate(evaluator, ProfileParameters(staircase, self.drives[0]), staircase)
+
+    def _flat(self, torque: float) -> Staircase:
+        level = np.array([torque, torque])
+        edges = np.array([0.0, 0.5 * self.start_time])
+        return Staircase(edges, level, Staircase(edges, level) if self.react else None)
+
+    def _quick(self) -> list[Staircase]:
+        """A start in time, as the constant torque is none; InfeasibleError if none is found."""
+        patient = Evaluator(self.drives, 100.0 * self.start_time)
+        constant = self._constant(patient)
+        latest = constant.late + patient.start_time
+        evaluator = Evaluator(self.drives, latest)
+        rules = replace(self.rules, aim="quick", calm=0.0)
+        points = [descend(evaluator, self._refined(self._flat(self.high), COARSE), rules)]
+        for steps, seed in QUICK_EVOLUTIONS:
+            search = Evolution(evaluator, steps, self.low, self.high, self.react)
+            staircase = search.best(quickness(evaluator), seed)[1]
+            points.append(descend(evaluator, refined(staircase, evaluator.horizon, COARSE), rules))
+        best = min(points, key=lambda point: point.late)
+        best = descend(evaluator, refined(best.staircase, evaluator.horizon, FINE), rules)
+        self.progress(f"quickest start found: {best.late + latest:.6f} s")
+        if best.late + latest > self.start_time:
+            raise InfeasibleError(self._verdict(evaluator, best))
+        return [best.staircase]
+
+    def _verdict(self, evaluator: Evaluator, quickest: Point) -> Verdict:
+        parameters = ProfileParameters(quickest.staircase, self.drives[0])
+        late = evaluator.lateness(evaluator.figures(parameters, quickest.staircase.unknowns))[0]
+        slowest = self.drives[int(np.argmax(late))]
+        shortest = (quickest.late + evaluator.start_time) * (1.0 + 1e-6)
+        who = (
+            f"gap {slowest.gap:g} rad, load inertia {slowest.J2:g} kg m2, load torque {slowest.Mc:g} N m"
+            f"{f' ({slowest.name})' if slowest.name else ''}"
+        )
+        sentence = (
+            f"start_time = {self.start_time:g} s is too short for one profile over {len(self.drives)} "
+            f"scenario{'s' if len(self.drives) > 1 else ''}: the shortest found is {shortest:.6g} s, and "
+            f"the slowest scenario is the one with {who}; the torque limit is {self.high:g} N m."
+        )
+        return Verdict(reached(slowest, self.start_time, None), shortest, "torque limit", sentence)
+
+    def _refined(self, staircase: Staircase, intervals: int) -> Staircase:
+        return refined(staircase, self.evaluator.horizon, intervals)
+
+
+def _different(points: Sequence[Point], alike: float = 5e-4) -> list[Point]:
+    """The points in order, best first, without those that are as good as one before."""
+    ordered = sorted(points, key=lambda point: (max(point.late, 0.0), point.peak))
+    kept: list[Point] = []
+    for point in ordered:
+        if all(abs(point.peak - other.peak) > alike * other.peak for other in kept):
+            kept.append(point)
+    return kept
+
 
 BoundOf = Callable[[Drive], LowerBound]
 UNUSED = (
@@ -63,7 +457,7 @@ def optimize_robust(
 
 
 def _optimum(
-    scenarios: Sequence[Drive], start_time: float, react: bool, base: Drive | None, say: Progress,
+    scenarios: Sequence[Drive], start_time: float, react: bool, base: Drive | None, progress: Progress,
     bound_of: BoundOf | None, bound: LowerBound | None = None,
 ) -> RobustOptimum:  # fmt: skip
     """The best profile found of one kind, run on the exact plant and checked."""
@@ -73,8 +467,8 @@ def _optimum(
     known = base or drives[0]
     # in an order of their own, each once: what comes out does not depend on how they were listed
     sorted_once = sorted(dict.fromkeys(drives), key=lambda drive: drive.to_toml())
-    best = Pursuit(sorted_once, start_time, react, say).best()
-    profile = best.shape.tidy()
+    best = RobustSearch(sorted_once, start_time, react, progress).best()
+    profile = best.staircase.tidy()
     runs = tuple(
         simulate(drive, make_controller("profile", {"profile": profile}), base=known) for drive in drives
     )
@@ -87,11 +481,13 @@ def _optimum(
     return optimum
 
 
-def _reacting(blind: RobustOptimum, say: Progress) -> RobustOptimum:
+def _reacting(blind: RobustOptimum, progress: Progress) -> RobustOptimum:
     """The best profile found that may react: a drive may also leave its sensor unused."""
     unused = replace(blind, react_to_contact=True, note=UNUSED)
     try:
-        found = _optimum(blind.scenarios, blind.start_time, True, blind.base, say, None, blind.lower_bound)
+        found = _optimum(
+            blind.scenarios, blind.start_time, True, blind.base, progress, None, blind.lower_bound
+        )
     except InfeasibleError:  # in time only by the clock
         return unused
     return found if found.k_dyn < blind.k_dyn else replace(unused, seconds=blind.seconds + found.seconds)
@@ -111,10 +507,10 @@ def worth_of_contact_sensor(
     `k_dyn_alone(drive)` gives the least K_dyn of one scenario by itself, in K_dyn of the base drive: what a
     drive could have whose gap, inertia and load torque were known. Raises as `optimize_robust`.
     """
-    say = progress or _quiet
+    progress = progress or _quiet
 
-    blind = _optimum(scenarios, start_time, False, base, lambda text: say(f"blind: {text}"), bound_of)
-    reacting = _reacting(blind, lambda text: say(f"reacting: {text}"))
+    blind = _optimum(scenarios, start_time, False, base, lambda text: progress(f"blind: {text}"), bound_of)
+    reacting = _reacting(blind, lambda text: progress(f"reacting: {text}"))
     alone = None if k_dyn_alone is None else tuple(k_dyn_alone(drive) for drive in blind.scenarios)
     return SensorWorth(blind, reacting, alone)
 
@@ -125,8 +521,6 @@ def _quiet(text: str) -> None:
 
 def _momentum(start_time: float, base: Drive) -> BoundOf:
     def bound_of(drive: Drive) -> LowerBound:
-        from softstart.optimal.momentum import momentum_bound
-
         return momentum_bound(reached(drive, start_time, base))
 
     return bound_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.optimal.replay import replay
+from softstart.optimal.exact import replay
 from softstart.profile import TorqueProfile
 from softstart_studies.benchmarks.optima.task import Answer, Task, crane
 

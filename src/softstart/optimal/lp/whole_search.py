@@ -1,44 +1,123 @@
-"""The linear program of the whole start: search over the instants of contact and breakaway, then the grid.
+"""The search for the instants of a whole start: the orders of phases, then the instants, then the grid.
 
-P over the instants is smooth but for kinks. A scan finds where its minima are; from there the program
-itself, made linear in the instants, says where to go, first on a coarse grid, then on grids cut finer where
-the torque switches or T is not kept.
+P over the instants is smooth but for kinks. A scan finds where its minima are; from there the program itself,
+linearised in the instants, says where to go, first on a coarse grid, then on grids that are finer where the
+torque switches or T exceeds its limits.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softstart.optimal.contact import Contact
-from softstart.optimal.linear_program import first_grid as contact_grid
+from softstart.optimal.exact import replay
+from softstart.optimal.lp.motion import Contact
+from softstart.optimal.lp.rows import Refinement, Vector, contact_grid, refined
+from softstart.optimal.lp.whole import Grid, Instants, Kind, WholeAnswer, WholeProgram
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
-from softstart.optimal.whole.answer import Grid, Instants, Kind, WholeAnswer
-from softstart.optimal.whole.program import WholeProgram
-from softstart.optimal.whole.ways import Way, ways
+from softstart.profile import TorqueProfile
 
-Vector = NDArray[np.float64]
-Instant = tuple[float, float, float]  # see _Instants
-Value = Callable[[Instant], float]
+Timing = tuple[float, float, float]  # see _Timings
+Value = Callable[[Timing], float]
 
-COARSE, MIDDLE, MOST = 40, 80, 260  # steps of the contact: to find the instants, to refine them, at most
+DOUBLINGS = 40  # of the time in which full torque is simulated until the load moves
+COARSE, MIDDLE = 40, 80  # steps of the contact: to find the instants, to refine them
+REFINEMENT = Refinement(most=260, mending=6, settled=2e-5)
 SCANNED, WINDINGS = 14, 4  # instants of the contact, and durations of the winding up, that are tried at first
 LONGEST_WINDING = 6.0  # times the one under full torque
-ROUNDS, MENDING = 3, 6  # of finer grids: for the switches; and until T is kept
-SETTLED, ENOUGH = 2e-5, 5e-6  # a finer grid, other instants that change P by less are good enough
+ENOUGH = 5e-6  # relative: other instants that lower P by less end the search
 LATER = (1.05, 1.3)  # times an end
 SOONER = (0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # ends that are tried, as shares of the latest
-TRIALS = 25  # of a better place for the instants
+TRIALS = 25  # of better instants
 FINEST = 1e-7  # of t_f, to which they are found
 LOCAL_MINIMA = 3
 EARLIEST = 1.0 + 1e-7  # just later than under full torque: the grid cannot do better
 
 
-def solve(problem: Problem, start: tuple[Way, Instant] | None = None) -> Candidate | None:
+# orders of phases -----------------------------------------------------------------------------------------
+
+
+def not_linear(problem: Problem) -> str:
+    """Why the whole start is no linear program with given instants; empty if it is one."""
+    drive: Any = problem.drive
+    if problem.minimise != "k_dyn":
+        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
+    if problem.heat is not None:
+        return "a bound on the heat is not linear"
+    if problem.smoothness > 0.0:
+        return "the weight on the smoothness is not linear"
+    return _no_phases(drive)
+
+
+def _no_phases(drive: Any) -> str:
+    half = 0.5 * drive.gap
+    v0 = drive.initial_motor_speed - drive.initial_load_speed
+    reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
+    if drive.contact_law == "modelica" and drive.d > 0.0:
+        return "the damped modelica law is not linear in contact"
+    if drive.start_position < -half or (drive.start_position == -half and v0 < 0.0):
+        return "the start begins on the far flank"
+    if drive.start_position >= half and v0 < 0.0:
+        return "the flanks part at once"
+    if reactive and (drive.initial_load_speed != 0.0 or (drive.start_position >= half and v0 != 0.0)):
+        return "a reactive load that moves before the contact"
+    if reactive and drive.c * (drive.start_position - half) > drive.Mc:
+        return "the start is wound up against the load"
+    return ""
+
+
+@dataclass(frozen=True)
+class PhaseOrder:
+    """An order of phases, and how soon full torque passes it: contact at `tc`, breakaway at `tb`, s."""
+
+    kinds: tuple[Kind, ...]
+    tc: float
+    tb: float
+
+
+def phase_orders(problem: Problem) -> Iterator[PhaseOrder]:
+    """The orders of phases that a start may have."""
+    drive: Any = problem.drive
+    reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
+    touching = drive.start_position >= 0.5 * drive.gap
+    tc, tb = _under_full_torque(problem)
+    if not reactive:
+        yield PhaseOrder(("contact",) if touching else ("gap", "contact"), tc, tc)
+        return
+    yield PhaseOrder(("stuck", "contact") if touching else ("resting", "stuck", "contact"), tc, tb)
+    if not touching and drive.d > 0.0:
+        fastest = math.sqrt(2.0 * problem.highest_torque / drive.J1 * drive.gap) + drive.initial_motor_speed
+        if drive.d * fastest > drive.Mc:
+            yield PhaseOrder(("resting", "contact"), tc, tc)
+
+
+def _under_full_torque(problem: Problem) -> tuple[float, float]:
+    """Contact and breakaway on the exact plant under the largest torque, s; inf: they never come."""
+    drive: Any = problem.drive
+    full = TorqueProfile([0.0], [problem.highest_torque])
+    touching = drive.start_position >= 0.5 * drive.gap
+    reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
+    until = 2.0 * math.pi / drive.Omega + 2.0 * math.sqrt(drive.gap * drive.J1 / problem.highest_torque)
+    for _ in range(DOUBLINGS):
+        run = replay(drive, full, until, problem.base)
+        tc = 0.0 if touching else run.first_contact
+        moving = [event.time for event in run.events if event.kind == "load starts"]
+        tb = moving[0] if moving else math.nan
+        if math.isfinite(tc) and (math.isfinite(tb) or not reactive):
+            return tc, max(tc, tb) if reactive else tc
+        until *= 2.0
+    return math.inf, math.inf
+
+
+# the search ------------------------------------------------------------------------------------------------
+
+
+def solve(problem: Problem, start: tuple[PhaseOrder, Timing] | None = None) -> Candidate | None:
     """The optimum of a problem that `not_linear` has nothing against; None if no torque meets the terms.
 
     With `start` it is looked for from these instants on, instead of by a scan.
@@ -54,48 +133,48 @@ def search(problem: Problem) -> WholeAnswer | None:
     """The best answer over all instants, on a grid refined where the torque switches."""
     assert problem.start_time is not None
     latest = float(problem.start_time)
-    orders = list(ways(problem))
-    found = [(way, best) for way in orders if (best := _coarse(problem, way, latest)) is not None]
+    orders = list(phase_orders(problem))
+    found = [(order, best) for order in orders if (best := _coarse(problem, order, latest)) is not None]
     for share in SOONER:  # with all that time the gap could not close only once
-        if found or any(_too_late(problem, way, latest) for way in orders):
+        if found or any(_too_late(problem, order, latest) for order in orders):
             break
-        sooner = [(way, _Instants(problem, way, latest, COARSE).best(share * latest)) for way in orders]
-        found = [(way, best) for way, best in sooner if best is not None]
+        sooner = [(order, _Timings(problem, order, latest, COARSE).best(share * latest)) for order in orders]
+        found = [(order, best) for order, best in sooner if best is not None]
     return _refined(problem, *min(found, key=lambda one: one[1].P)) if found else None
 
 
-def _from(problem: Problem, way: Way, at: Instant) -> WholeAnswer | None:
+def _from(problem: Problem, order: PhaseOrder, at: Timing) -> WholeAnswer | None:
     assert problem.start_time is not None
-    best = _Instants(problem, way, float(problem.start_time), MIDDLE).moved(at, 0.1 * at[2])
-    return None if best is None else _refined(problem, way, best)
+    best = _Timings(problem, order, float(problem.start_time), MIDDLE).moved(at, 0.1 * at[2])
+    return None if best is None else _refined(problem, order, best)
 
 
-def _coarse(problem: Problem, way: Way, latest: float) -> WholeAnswer | None:
+def _coarse(problem: Problem, order: PhaseOrder, latest: float) -> WholeAnswer | None:
     """The best answer on a coarse grid, or on a finer one where there is hardly enough time."""
     for steps in (COARSE, MIDDLE):
-        best = _Instants(problem, way, latest, steps).best(latest)
+        best = _Timings(problem, order, latest, steps).best(latest)
         if best is not None:
             return best
     return None
 
 
-def _too_late(problem: Problem, way: Way, latest: float) -> bool:
+def _too_late(problem: Problem, order: PhaseOrder, latest: float) -> bool:
     """True if the load gets moving, but not to its speed: a start that ends sooner is no help."""
-    speed, _ = greatest_speed(problem, way, latest, COARSE)
+    speed, _ = greatest_speed(problem, order, latest, COARSE)
     return -math.inf < speed < problem.target
 
 
 def greatest_speed(
-    problem: Problem, way: Way, end: float, steps: int, near: Instant | None = None
-) -> tuple[float, Instant]:
+    problem: Problem, order: PhaseOrder, end: float, steps: int, near: Timing | None = None
+) -> tuple[float, Timing]:
     """The greatest load speed at `end`, rad/s, and the instants it needs; -inf where none fit.
 
     Where `near`, those of a similar end, lead to a start, or were those of a later end, no others are tried.
     """
-    return _Instants(problem, way, end, steps).greatest_speed(end, near)
+    return _Timings(problem, order, end, steps).greatest_speed(end, near)
 
 
-class _Instants:
+class _Timings:
     """Answers over the instants of one order of phases, each computed once.
 
     The instants are told as (x, w, end): x is when the load begins to be driven, w how long the shaft is
@@ -103,28 +182,28 @@ class _Instants:
     """
 
     def __init__(
-        self, problem: Problem, way: Way, latest: float, steps: int, grid: Grid | None = None,
+        self, problem: Problem, order: PhaseOrder, latest: float, steps: int, grid: Grid | None = None,
         full_tail: bool = False,
     ) -> None:  # fmt: skip
-        self.problem, self.way, self.latest, self.steps, self.grid = problem, way, latest, steps, grid
+        self.problem, self.order, self.latest, self.steps, self.grid = problem, order, latest, steps, grid
         self.full_tail = full_tail
-        self.winds = "stuck" in way.kinds
-        self.waits = "gap" in way.kinds or "resting" in way.kinds
-        self.answers: dict[Instant, WholeAnswer | None] = {}
-        self.speeds: dict[Instant, tuple[float, Vector | None]] = {}
-        self.shortest_winding = max(way.tb - way.tc, 1e-9 * latest) if self.winds else 0.0
+        self.winds = "stuck" in order.kinds
+        self.waits = "gap" in order.kinds or "resting" in order.kinds
+        self.answers: dict[Timing, WholeAnswer | None] = {}
+        self.speeds: dict[Timing, tuple[float, Vector | None]] = {}
+        self.shortest_winding = max(order.tb - order.tc, 1e-9 * latest) if self.winds else 0.0
 
-    def program(self, at: Instant, grid: Grid | None = None) -> WholeProgram | None:
+    def program(self, at: Timing, grid: Grid | None = None) -> WholeProgram | None:
         """The program with these instants; None where they are out of order."""
         x, w, end = at
         tc = x - w if self.waits else 0.0
-        if (self.waits and tc < self.way.tc) or (self.winds and w <= 0.0) or x >= end:
+        if (self.waits and tc < self.order.tc) or (self.winds and w <= 0.0) or x >= end:
             return None
         instants = Instants(tc, x, end)
-        grid = grid or self.grid or first_grid(self.problem, self.way, instants, self.steps)
+        grid = grid or self.grid or first_grid(self.problem, self.order, instants, self.steps)
         return WholeProgram(self.problem, instants, grid, self.full_tail)
 
-    def peak(self, at: Instant) -> float:
+    def peak(self, at: Timing) -> float:
         """P, N m; inf where there is no start."""
         if at not in self.answers:
             program = self.program(at)
@@ -132,7 +211,7 @@ class _Instants:
         answer = self.answers[at]
         return math.inf if answer is None else answer.P
 
-    def slowness(self, at: Instant) -> float:
+    def slowness(self, at: Timing) -> float:
         """Minus the greatest load speed, rad/s; inf where no start fits."""
         if at not in self.speeds:
             program = self.program(at)
@@ -158,7 +237,7 @@ class _Instants:
         """The answer with the least P so far."""
         return self.answers[min(self.answers, key=self.peak)]
 
-    def greatest_speed(self, end: float, near: Instant | None = None) -> tuple[float, Instant]:
+    def greatest_speed(self, end: float, near: Timing | None = None) -> tuple[float, Timing]:
         """The greatest load speed at the end, rad/s, and the instants it needs; -inf where none fit."""
         if near is not None:
             start = self._down((near[0], near[1], end), 0.1 * near[0], fast=True)
@@ -167,16 +246,16 @@ class _Instants:
         start = self._least(end, fast=True)
         return -self.slowness(start), start
 
-    def moved(self, start: Instant, width: float) -> WholeAnswer | None:
+    def moved(self, start: Timing, width: float) -> WholeAnswer | None:
         """The least P near a start known, at first within `width` s."""
         self._down(start, width, fast=False)
         return self.found()
 
-    def place(self, x: float, w: float, end: float) -> Instant:
+    def place(self, x: float, w: float, end: float) -> Timing:
         """A shaft that is touched from the beginning is wound up all the time before x."""
         return (x, w, end) if self.waits or not self.winds else (x, x, end)
 
-    def _least(self, end: float, fast: bool) -> Instant:
+    def _least(self, end: float, fast: bool) -> Timing:
         """The instants with the least value found: a scan, then down from its lowest points."""
         value = self.slowness if fast else self.peak
         tried = self._scan(value, end)
@@ -191,7 +270,7 @@ class _Instants:
                 ends.append(self._down(lowest[xs[k]], min(width, 0.1 * end) or 0.1 * end, fast))
         return min(ends or tried, key=value)
 
-    def _scan(self, value: Value, end: float) -> dict[Instant, float]:
+    def _scan(self, value: Value, end: float) -> dict[Timing, float]:
         """Values over a coarse net of instants, the earliest first."""
         windings = [0.0]
         if self.winds and self.waits:
@@ -209,13 +288,13 @@ class _Instants:
         return tried
 
     def _times(self, end: float) -> list[float]:
-        first = self.way.tb * EARLIEST
+        first = self.order.tb * EARLIEST
         if not (self.waits or self.winds):
             return [0.0]
         shares = np.linspace(0.0, 1.0, SCANNED, endpoint=False) ** 2.5
         return (first + (end - first) * shares).tolist() if first < end else []
 
-    def _down(self, start: Instant, width: float, fast: bool) -> Instant:
+    def _down(self, start: Timing, width: float, fast: bool) -> Timing:
         """From a start known to the best one near it: the program made linear in the instants says where to.
 
         A step is taken where it helps, and may then be longer; else it is tried again, shorter.
@@ -230,17 +309,17 @@ class _Instants:
             if there is None or there == at:
                 break
             gained = least - value(there)
-            way = max(abs(there[i] - at[i]) for i in range(3))
+            moved = max(abs(there[i] - at[i]) for i in range(3))
             if gained > 0.0:
                 at, least = there, value(there)
                 if gained < ENOUGH * abs(least):
                     break
-                reach *= 1.5 if way > 0.5 * reach else 0.5
+                reach *= 1.5 if moved > 0.5 * reach else 0.5
             else:
-                reach = 0.25 * min(reach, way)
+                reach = 0.25 * min(reach, moved)
         return at
 
-    def _shifted(self, at: Instant, reach: float, fast: bool) -> Instant | None:
+    def _shifted(self, at: Timing, reach: float, fast: bool) -> Timing | None:
         """Where the best instants seem to be, none further than `reach`."""
         x, w, end = at
         own = self.program(at)
@@ -255,7 +334,7 @@ class _Instants:
             free.append((0, tiny, [-reach, reach]))
         if self.waits and self.winds:
             by = min(tiny, 1e-3 * w)
-            room = x - w - by >= self.way.tc
+            room = x - w - by >= self.order.tc
             free.append((1, by if room else -by, [-min(reach, 0.3 * w), min(reach, 0.3 * w)]))
         if not fast:
             free.append((2, -tiny, [-reach, min(reach, self.latest - end)]))
@@ -268,7 +347,7 @@ class _Instants:
         if not free or any(one is None for one in near):
             return None
         weights = np.array([{0: 1.0, 1: -1.0, 2: 0.0}[i] for i, _, _ in free])
-        soonest = self.way.tc - (x - w) if self.waits else -0.5 * x  # no contact before that of full torque
+        soonest = self.order.tc - (x - w) if self.waits else -0.5 * x  # no contact before that of full torque
         ends = np.array([limits for _, _, limits in free])
         programs = [one for one in near if one is not None]
         shift = own.shifted(fast, found, programs, shifts, ends, (weights, soonest))
@@ -278,12 +357,12 @@ class _Instants:
         for (i, _, _), by in zip(free, shift.tolist(), strict=True):
             moved[i] += by
         there = self.place(*moved)
-        while self.waits and there[0] - there[1] < self.way.tc:  # by rounding
+        while self.waits and there[0] - there[1] < self.order.tc:  # by rounding
             there = there[0] + 1e-12 * end, there[1], there[2]
         return there
 
 
-def first_grid(problem: Problem, way: Way, at: Instants, steps: int) -> Grid:
+def first_grid(problem: Problem, order: PhaseOrder, at: Instants, steps: int) -> Grid:
     """Even steps in the gap and while the shaft is wound up; fine ends in a long contact."""
     contact = Contact.of(problem.drive)
     grids: dict[Kind, Vector] = {
@@ -292,62 +371,23 @@ def first_grid(problem: Problem, way: Way, at: Instants, steps: int) -> Grid:
         "stuck": np.linspace(0.0, 1.0, steps // 8 + 1),
         "contact": contact_grid(contact, at.end - at.tb, steps),
     }
-    return tuple((kind, grids[kind]) for kind in way.kinds)
+    return tuple((kind, grids[kind]) for kind in order.kinds)
 
 
-def _refined(problem: Problem, way: Way, best: WholeAnswer) -> WholeAnswer:
-    """The same instants, moved a little, on a grid cut finer where the torque switches or T is not kept."""
-    grid = first_grid(problem, way, best.at, MIDDLE)
-    width = 4e-3 * best.at.end
-    for _ in range(ROUNDS):
-        before = best.P
-        best = _moved(problem, way, best, grid, width)
-        if best.edges.size > MOST:
-            break
-        switching = _switching(problem, best)
-        if not best.broken.any() and abs(before - best.P) < SETTLED * best.P:
-            return best
-        grid = cut(best, switching | best.broken)
-        width *= 0.4
-    for _ in range(MENDING):
-        best = _moved(problem, way, best, grid, width)
-        if not best.broken.any():
-            break
-        grid = cut(best, best.broken)
-        width *= 0.3
-    return best
+def _refined(problem: Problem, order: PhaseOrder, best: WholeAnswer) -> WholeAnswer:
+    """The same instants, moved a little, on a grid that is finer where the torque switches or T exceeds P."""
+
+    def moved(best: WholeAnswer, grid: Grid, width: float, mending: bool) -> WholeAnswer:
+        return _moved(problem, order, best, grid, width)
+
+    grid = first_grid(problem, order, best.at, MIDDLE)
+    return refined(best, grid, REFINEMENT, problem.highest_torque, moved)
 
 
-def _moved(problem: Problem, way: Way, best: WholeAnswer, grid: Grid, width: float) -> WholeAnswer:
+def _moved(problem: Problem, order: PhaseOrder, best: WholeAnswer, grid: Grid, width: float) -> WholeAnswer:
     """The best instants within `width` of those known, on another grid."""
     assert problem.start_time is not None
-    near = _Instants(problem, way, float(problem.start_time), 0, grid, best.beyond)
+    near = _Timings(problem, order, float(problem.start_time), 0, grid, best.beyond)
     winding = best.at.tb - best.at.tc if near.winds else 0.0
     found = near.moved(near.place(best.at.tb, winding, best.at.end), width)
     return found if found is not None else best
-
-
-def _switching(problem: Problem, answer: WholeAnswer) -> NDArray[np.bool_]:
-    """Steps beside which the torque changes by more than 2 %."""
-    mean = answer.demand.mean(axis=1)
-    jump = np.abs(np.diff(mean)) > 0.02 * problem.highest_torque
-    near = np.zeros(mean.size, dtype=bool)
-    near[:-1] |= jump
-    near[1:] |= jump
-    return near
-
-
-def cut(answer: WholeAnswer, wanted: NDArray[np.bool_]) -> Grid:
-    """The answer's own grid, the wanted steps split in three, but for the finest and long unbroken ones."""
-    finer = []
-    at = 0
-    for kind, edges in answer.grid:
-        steps = np.diff(edges)
-        here = slice(at, at + steps.size)
-        short = (steps < 5.0 * np.median(steps)) | answer.broken[here]
-        split = wanted[here] & short & (steps > 1e-4)
-        at += steps.size
-        each = zip(edges[:-1], edges[1:], split, strict=True)
-        parts = [np.linspace(a, b, 4)[1:] if more else [b] for a, b, more in each]
-        finer.append((kind, np.concatenate([[0.0], *parts])))
-    return tuple(finer)

@@ -1,7 +1,7 @@
-"""The optimum for fixed instants of contact and breakaway, over the whole start: a linear program.
+"""The whole start as a linear program, for fixed instants of contact, breakaway and end.
 
 Where the motor torque lags behind its demand, is limited in rate or by a torque-speed curve, may brake, or
-turns a damped shaft against a load at rest, the gap part no longer shrinks to two numbers. But with the
+turns a damped shaft against a load at rest, the gap part no longer reduces to two numbers. But with the
 instants fixed at which the gap closes (tc), the load breaks away (tb, reactive loads alone) and the start
 ends (t_f), every phase is linear with known coefficients, so that the state y = (z, z', w2, u) anywhere is
 linear in the demand r on a grid, and so are its limits. HiGHS solves
@@ -14,48 +14,276 @@ linear in the demand r on a grid, and so are its limits. HiGHS solves
         after t_f             T <= P while the torque is held or (reached) the motor coasts
         everywhere            lowest <= r <= highest, |dr/dt| <= rate, u <= torque_speed(w1)
 
-with limits looked at in four instants of each step or more. What is found is exact for this grid: nothing is
-integrated.
+with limits checked at four instants of each step or more. The answer is exact for its grid: nothing is
+integrated. whole_search.py looks for the best instants.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import expm
 
-from softstart.optimal.linear_program import AIM, MARGIN, QUARTERS, SIXTEENTHS
-from softstart.optimal.whole.answer import Matrix, Vector, WholeAnswer
-from softstart.optimal.whole.limits import Gathered, Limits
-from softstart.optimal.whole.motion import ONE, STATES, W2, Motion, R, Rows, U, V, Z
+from softstart.optimal.lp.rows import (
+    AIM,
+    MARGIN,
+    QUARTERS,
+    SIXTEENTHS,
+    Limits,
+    Marks,
+    Matrix,
+    RowList,
+    Rows,
+    Steps,
+    Vector,
+    below,
+    checked_instants,
+    single_row,
+    split,
+)
+from softstart.optimal.problem import Problem
+from softstart.profile import TorqueProfile
 
-TAIL_POINTS = 96
-BELOW_CURVE = 3e-5  # of U, by which the torque stays below its curve where it is looked at
+Z, V, W2, U, R, SLOPE, ONE = range(7)
+STATES = 4
+TAIL_STEPS, TAIL_POINTS = (
+    12,
+    96,
+)  # after t_f: steps while the demand falls, checks where the motor holds or coasts
+SETTLED = 8.0  # lags, after which the torque follows its demand to 0.03 %
+BELOW_CURVE = 3e-5  # of U, by which the torque stays below its curve where it is checked
+EXCESS = 1e-4  # relative: T above P between the checks by more counts
+
+Kind = Literal["gap", "resting", "stuck", "contact"]  # resting: a gap with the load at rest; stuck: wound up
+Shape = Literal["steps", "ramps", "continuous"]
+Grid = tuple[tuple[Kind, Vector], ...]  # phases in order, each with the edges of its steps as shares of it
 
 
-class WholeProgram(Motion):
-    """The least P, or the greatest speed, of a whole start with given instants on a grid."""
+@dataclass(frozen=True)
+class Instants:
+    """When the gap closes, the load breaks away and the start ends, s; tb = tc where no load is at rest."""
+
+    tc: float
+    tb: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class WholeAnswer:
+    """The optimum at fixed instants: peak P in N m, and the demand at the beginning and end of each step."""
+
+    at: Instants
+    P: float
+    grid: Grid
+    edges: Vector  # s, of all steps up to t_f
+    demand: Matrix  # (steps, 2), N m
+    broken: Marks  # steps in which T is not kept between the checks
+    beyond: bool  # the torque that would hold T at t_f is more than the motor has
+    x: Vector = field(repr=False)  # all variables of the program
+
+    @property
+    def end_time(self) -> float:
+        """t_f, s."""
+        return self.at.end
+
+    @property
+    def levels(self) -> Vector:
+        """Mean demand of each step, N m."""
+        mean: Vector = self.demand.mean(axis=1)
+        return mean
+
+    def finer(self, wanted: Marks) -> Grid:
+        """Its own grid, the wanted steps split in three, but for the finest and long unbroken ones."""
+        grid: list[tuple[Kind, Vector]] = []
+        first = 0
+        for kind, edges in self.grid:
+            steps = np.diff(edges)
+            here = slice(first, first + steps.size)
+            short = (steps < 5.0 * np.median(steps)) | self.broken[here]
+            grid.append((kind, split(edges, wanted[here] & short & (steps > 1e-4), 3)))
+            first += steps.size
+        return tuple(grid)
+
+    def profile(self, problem: Problem) -> TorqueProfile:
+        """The demand up to t_f, exactly within the limits of the torque."""
+        levels = np.clip(self.demand, problem.lowest_torque, problem.highest_torque)
+        shape = demand_shape(problem)
+        if shape == "steps":
+            return TorqueProfile.steps(self.edges, levels[:, 0])
+        if shape == "ramps":
+            return TorqueProfile(np.repeat(self.edges, 2)[1:-1], levels.ravel()).simplified()
+        return TorqueProfile(self.edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
+
+
+def demand_shape(problem: Problem) -> Shape:
+    """Which demands the plant plays without bending them."""
+    if math.isfinite(problem.drive.torque_rate):
+        return "continuous"
+    return "ramps" if problem.torque_speed else "steps"
+
+
+def phase_ends(grid: Grid, at: Instants) -> list[float]:
+    """When the phases of a grid begin and end, s."""
+    ends = {"gap": at.tc, "resting": at.tc, "stuck": at.tb, "contact": at.end}
+    return [0.0, *(ends[kind] for kind, _ in grid)]
+
+
+Z, V, W2, U, R, SLOPE, ONE = range(7)
+
+
+class WholeProgram:
+    """The least P, or the greatest speed, of a whole start with given instants on a grid.
+
+    Variables: the state y = (z, z', w2, u) at each node, the demand r at the beginning and end of each
+    step, P.
+
+    All without dimension: torques in U, the largest motor torque, z in U/c, z' in Omega U/c, w2 in the target
+    speed. With a rate limit and `reached`, a few steps follow after t_f, in which only T <= P is asked for.
+    """
+
+    def __init__(self, problem: Problem, at: Instants, grid: Grid, full_tail: bool = False) -> None:
+        drive: Any = problem.drive
+        self.problem, self.at, self.grid, self.full_tail = problem, at, grid, full_tail
+        self.J1, self.J2, self.c, self.d, self.Mc = (
+            float(value) for value in (drive.J1, drive.J2, drive.c, drive.d, drive.Mc)
+        )
+        self.lag, self.rate = float(drive.torque_lag), float(drive.torque_rate)
+        self.Omega = float(drive.Omega)
+        self.U = problem.highest_torque
+        self.scale = np.array([self.U / self.c, self.Omega * self.U / self.c, problem.target, self.U])
+        self.pulls = drive.contact_law == "dead-zone" and self.d > 0.0
+        self.shape = demand_shape(problem)
+        begins = phase_ends(grid, at)
+        kinds: list[Kind] = []
+        edges = [np.zeros(1)]
+        for (kind, shares), begin, end in zip(grid, begins, begins[1:], strict=False):
+            kinds += [kind] * (shares.size - 1)
+            edges.append(begin + shares[1:] * (end - begin))
+        self.steps = len(kinds)  # up to t_f
+        self.releases = self.shape == "continuous" and problem.terminal == "reached"
+        if self.releases:
+            kinds += ["contact"] * TAIL_STEPS
+            edges.append(at.end + self.tail_length() * np.arange(1, TAIL_STEPS + 1) / TAIL_STEPS)
+        self.kinds = tuple(kinds)
+        self.edges = np.concatenate(edges)
+        self.length = np.diff(self.edges)
+        self.n = len(kinds)
+        self.first_r = STATES * (self.n + 1)
+        self.first, self.second, demands = self._demand_columns()
+        self.P = self.first_r + demands
+        self.columns = self.P + 1
+
+    def _demand_columns(self) -> tuple[Steps, Steps, int]:
+        """Which variable is the demand at the beginning and end of each step, and how many there are."""
+        k = self.first_r + np.arange(self.n)
+        if self.shape == "steps":
+            return k, k, self.n
+        if self.shape == "ramps":
+            return k + np.arange(self.n), k + np.arange(self.n) + 1, 2 * self.n
+        return k, k + 1, self.n + 1
+
+    def tail_length(self) -> float:
+        """How long after t_f T is watched, s: to its peak where the motor coasts, else a whole period."""
+        period = 2.0 * math.pi / self.Omega
+        if self.problem.terminal != "reached":
+            return period
+        falling = (self.U - self.problem.lowest_torque) / self.rate if self.rate < math.inf else 0.0
+        return min(0.5 * period + 5.0 * self.lag + falling, 1.5 * period + falling)
+
+    # the motion ------------------------------------------------------------------------------------------
+
+    def matrix(self, kind: Kind) -> Matrix:
+        """Rates of (z, z', w2, u, r, r', 1) in a phase."""
+        A = np.zeros((7, 7))
+        A[Z, V] = 1.0
+        A[R, SLOPE] = 1.0
+        A[V, U if self.lag > 0.0 else R] = 1.0 / self.J1
+        if self.lag > 0.0:
+            A[U, U], A[U, R] = -1.0 / self.lag, 1.0 / self.lag
+        if kind == "gap":
+            A[V, ONE], A[W2, ONE] = self.Mc / self.J2, -self.Mc / self.J2
+        elif kind == "stuck":
+            A[V, [Z, V]] = -self.c / self.J1, -self.d / self.J1
+        elif kind == "contact":
+            inverse = 1.0 / self.J1 + 1.0 / self.J2
+            A[V, [Z, V, ONE]] = -self.c * inverse, -self.d * inverse, self.Mc / self.J2
+            A[W2, [Z, V, ONE]] = self.c / self.J2, self.d / self.J2, -self.Mc / self.J2
+        return A
+
+    def moved(self, step: Steps, s: Vector) -> Matrix:
+        """How (z, z', w2, u, r, r', 1) moves within s of the given steps, shape (..., 7, 7)."""
+        out = np.empty((step.size, 7, 7))
+        kinds = np.array(self.kinds)[step]
+        for kind in set(kinds.tolist()):
+            here = kinds == kind
+            # steps of one length are computed once
+            shares, back = np.unique((s[here] / self.edges[-1]).round(14), return_inverse=True)
+            out[here] = expm(self.matrix(kind)[None] * (shares * self.edges[-1])[:, None, None])[back]
+        return out
+
+    def rows(self, step: Steps, weights: Matrix) -> Rows:
+        """Rows over the variables, and constants, of `weights` (m, 7) on (z, z', w2, u, r, r', 1) at the
+        beginning of the given steps.
+        """
+        m = step.size
+        each = self.length[step]
+        on_slope = weights[:, SLOPE] / each
+        values = [weights[:, i] * self.scale[i] for i in range(STATES)]
+        columns = [STATES * step + i for i in range(STATES)]
+        values += [(weights[:, R] - on_slope) * self.U, on_slope * self.U]
+        columns += [self.first[step], self.second[step]]
+        where = np.tile(np.arange(m), len(values)), np.concatenate(columns)
+        matrix = sparse.csr_array((np.concatenate(values), where), shape=(m, self.columns))
+        return matrix, weights[:, ONE]
+
+    def single(self, node: int, weights: dict[int, float]) -> Any:
+        """One row on the state at a node."""
+        scaled = {STATES * node + i: value * float(self.scale[i]) for i, value in weights.items()}
+        return single_row(scaled, self.columns)
+
+    @property
+    def T(self) -> Vector:
+        """Weights of T = c z + d z'."""
+        return np.array([self.c, self.d, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+    def instants(self, fractions: tuple[float, ...]) -> tuple[Steps, Vector]:
+        """Where limits are checked: (step, time since its beginning), at these fractions of each step.
+
+        A step longer than a sixth of an elastic period is checked as often as short ones would be. In one
+        that is longer than a period T swings about a mean, ever less, once the torque has come to rest: it is
+        checked that long, and at its end.
+        """
+        period = 2.0 * math.pi / self.Omega
+        watched = period + SETTLED * self.lag
+
+        def within(length: float) -> Vector:
+            count = math.ceil(6 * len(fractions) * min(length, watched) / period)
+            if count <= len(fractions):
+                return np.array(fractions) * length
+            checks = min(length, watched) * np.arange(fractions[0] != 0.0, count + 1) / count
+            return np.append(checks, length) if length > watched else checks
+
+        return checked_instants(self.length, within)
 
     # what must hold --------------------------------------------------------------------------------------
 
     @cached_property
     def _on_P(self) -> Any:
-        return sparse.csr_array((np.ones(1), (np.zeros(1, dtype=np.int64), [self.P])), (1, self.columns))
+        return single_row({self.P: 1.0}, self.columns)
 
-    def _below_P(self, limits: Gathered, rows: Rows, sign: float = 1.0) -> None:
-        ones = sparse.csr_array(np.ones((rows[1].size, 1)))
-        limits.add(sign * rows[0] / self.U - ones @ self._on_P, -sign * rows[1] / self.U)
+    def _below_P(self, torque: Rows, sign: float = 1.0) -> Rows:
+        return below((torque[0] / self.U, torque[1] / self.U), self._on_P, sign)
 
-    def _equations(self) -> Gathered:
+    def _equations(self) -> RowList:
         """The motion, the joints of the phases, the end; the load speed at t_f comes last."""
-        equal = Gathered()
+        equal = RowList()
         all_steps = np.arange(self.n)
         moved = self.moved(all_steps, self.length)
         for i in range(STATES):
@@ -83,9 +311,9 @@ class WholeProgram(Motion):
         equal.add(self.single(self.steps, {W2: 1.0 / self.problem.target}), np.array([AIM]))
         return equal
 
-    def _limits(self, with_P: bool) -> Gathered:
+    def _limits(self, with_P: bool) -> RowList:
         """Everything that is an inequality."""
-        limits = Gathered()
+        limits = RowList()
         drive: Any = self.problem.drive
         step, s = self.instants(QUARTERS)
         moved = self.moved(step, s)
@@ -114,16 +342,16 @@ class WholeProgram(Motion):
             limits.add(-1.0 * rows, constant)
         if with_P:
             pressed = kinds == "contact"
-            self._below_P(limits, self.rows(step[pressed], T[pressed]))
+            limits.add(*self._below_P(self.rows(step[pressed], T[pressed])))
             if self.pulls:
-                self._below_P(limits, self.rows(step[driven], T[driven]), -1.0)
+                limits.add(*self._below_P(self.rows(step[driven], T[driven]), -1.0))
             if not self.releases:
-                self._below_P(limits, self._tail())
+                limits.add(*self._below_P(self._tail()))
         self._add_landing(limits, with_P)
         self._add_demand_limits(limits)
         return limits
 
-    def _add_landing(self, limits: Gathered, with_P: bool) -> None:
+    def _add_landing(self, limits: RowList, with_P: bool) -> None:
         """A damped contact begins with T = d z'; without a wound-up shaft it must move the load at once."""
         begins = [kind for kind, _ in self.grid]
         if begins[0] == "contact" or self.d == 0.0 or "stuck" in begins:
@@ -135,7 +363,7 @@ class WholeProgram(Motion):
         if begins[0] == "resting":
             limits.add(-1.0 * jump, np.array([-self.Mc / self.U]))
 
-    def _add_demand_limits(self, limits: Gathered) -> None:
+    def _add_demand_limits(self, limits: RowList) -> None:
         if self.rate < math.inf:
             k = np.arange(self.n)
             ones = np.ones(self.n)
@@ -246,7 +474,8 @@ class WholeProgram(Motion):
         return Limits(cost, *self._limits(with_P=False).all(self.columns), A_eq[:-1], b_eq[:-1])
 
     def _solved(self, limits: Limits) -> Vector | None:
-        return limits.solved(self._bounds())
+        found = limits.solved(self._bounds())
+        return None if found is None else np.asarray(found.x)
 
     def shifted(self, fast: bool, found: Vector, near: list[WholeProgram], by: Vector, ends: Matrix,
                 order: tuple[Vector, float]) -> Vector | None:  # fmt: skip
@@ -279,9 +508,9 @@ class WholeProgram(Motion):
             own.b_eq,
         )  # fmt: skip
         best = limits.solved(np.vstack([self._bounds(), ends / size[:, None]]))
-        return None if best is None else best[self.columns :] * size
+        return None if best is None else np.asarray(best.x)[self.columns :] * size
 
-    def _broken(self, found: Vector, P: float, allowed: float = 1e-4) -> NDArray[np.bool_]:
+    def _broken(self, found: Vector, P: float) -> Marks:
         """Steps between whose checks T goes above P or off the flank, or the torque above its curve."""
         step, s = self.instants(SIXTEENTHS)
         moved = self.moved(step, s)
@@ -291,8 +520,8 @@ class WholeProgram(Motion):
         kept = rows @ found + constant if self.pulls else T
         contact = np.array(self.kinds)[step] == "contact"
         over = np.abs(T) if self.pulls else T
-        bad = contact & ((over > P * (1.0 + allowed)) | ((kept < -1e-9) & (step < self.steps)))
+        bad = contact & ((over > P * (1.0 + EXCESS)) | ((kept < -1e-9) & (step < self.steps)))
         for rows, right in self._under_curve(SIXTEENTHS):
             bad[step < self.steps] |= rows @ found > right
-        broken: NDArray[np.bool_] = np.bincount(step, weights=bad, minlength=self.n)[: self.steps] > 0.0
+        broken: Marks = np.bincount(step, weights=bad, minlength=self.n)[: self.steps] > 0.0
         return broken

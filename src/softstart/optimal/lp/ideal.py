@@ -1,0 +1,607 @@
+"""The optimal start with an ideal torque: a linear program for a fixed entry, and the search for the entry.
+
+With te and t_f fixed, T, z' and w2 at any instant are linear in the relative speed v at te and in the torque
+u_1..u_n on a grid of the contact, and so are their limits. HiGHS solves
+
+    minimise P   subject to   T(s_j) <= P, T(s_j) >= 0          (dead-zone: -P <= T(s_j), z(s_j) >= 0)
+                              w2(tau) = target, and             (synchronous) z'(tau) = 0
+                                                                (steady) also T(tau) = Mc
+                                                                (reached) T of the coasting tail <= P
+                              v_slowest(te) <= v <= v_fastest(te),  0 <= u <= Ms
+
+where s_j are four instants in each step, tau = t_f - te. The answer is exact for its grid: nothing is
+integrated. In a contact of many elastic periods most of the time is a few long steps.
+
+P over te is smooth but for steep kinks where the least v becomes just enough: a scan brackets them and golden
+sections narrow them down, first on a coarse grid, then on grids that are finer where the torque switches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from softstart.errors import InputError
+from softstart.optimal.lp.motion import Contact, Entry, entry_of, no_ideal
+from softstart.optimal.lp.rows import (
+    AIM,
+    FINE_ENDS,
+    MARGIN,
+    QUARTERS,
+    SIXTEENTHS,
+    Limits,
+    Marks,
+    Refinement,
+    RowList,
+    Rows,
+    Steps,
+    Vector,
+    below,
+    checked_instants,
+    contact_grid,
+    refined,
+    single_row,
+    split,
+)
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import Candidate
+from softstart.profile import TorqueProfile
+
+TAIL_POINTS = 120
+COARSE, MIDDLE = 40, 80  # steps of the grid: to find the entry, to refine it
+REFINEMENT = Refinement(most=400, mending=3, narrowing=0.4)
+EXCESS = 1e-4  # relative: T above P between the checks by more counts
+SCANNED, LOCAL_MINIMA = 20, 3
+SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
+
+
+# the program for a fixed entry ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """What each limit is worth, for the certificate: P >= sum of these times the limits' left sides.
+
+    `peak` (>= 0) belong to T(share tau) <= P, `trough` to T >= -P (dead-zone), `closed` to T >= 0 or z >= 0,
+    `tail` to the coasting T at instants `tail_at` after t_f; `speed`, `rate`, `torque` to the terminal
+    equations w2, z', T. Peak, trough and tail sum to 1.
+    """
+
+    share: Vector
+    peak: Vector
+    trough: Vector
+    closed: Vector
+    tail_at: Vector
+    tail: Vector
+    speed: float
+    rate: float
+    torque: float
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The optimum at fixed (te, t_f): peak P in N m, entry speed v, torques u between the `edges`."""
+
+    te: float
+    end_time: float
+    P: float
+    v: float
+    edges: Vector
+    u: Vector
+    x: Vector  # all variables of the program
+    multipliers: Multipliers
+    program: ContactProgram = field(repr=False)
+
+    @property
+    def levels(self) -> Vector:
+        """Torque of each step, N m."""
+        return self.u
+
+    @cached_property
+    def broken(self) -> Marks:
+        """Steps in which T goes above P or comes off the flank between the checks."""
+        return self.program.broken(self)
+
+    def finer(self, wanted: Marks) -> Vector:
+        """Its own grid with the wanted steps split in four, but for the few long ones and the finest."""
+        grid = self.edges / self.edges[-1]
+        steps = np.diff(grid)
+        return split(grid, wanted & (steps < 5.0 * np.median(steps)) & (steps > 1e-6), 4)
+
+
+class ContactProgram:
+    """The limits of a contact of duration tau on a grid: a number of even steps, or edges as shares of tau.
+
+    Variables, all without dimension: u_k/U, then at each node a = c z/U and b = c z'/(Omega U), and P/U, with
+    U the largest motor torque. The steps between the nodes are exact. `mix` (rows of weights over the checked
+    instants, each summing to 1) replaces T(s_j) by its means: a relaxation, whose multipliers belong to spans
+    instead of instants.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        tau: float,
+        grid: int | Vector,
+        mix: Vector | None = None,
+        checks: tuple[float, ...] = QUARTERS,
+        margin: float = MARGIN,
+    ) -> None:
+        drive = problem.drive
+        grid = np.linspace(0.0, 1.0, grid + 1) if isinstance(grid, int) else grid
+        self.problem, self.tau, self.n = problem, tau, grid.size - 1
+        self.contact = contact = Contact.of(drive)
+        self.entry = entry_of(problem)
+        self.edges = grid * tau
+        self.U, self.W = problem.highest_torque, problem.target
+        self.pulls = drive.contact_law == "dead-zone" and contact.d > 0.0
+        self.columns = 3 * self.n + 3
+        self.first_a, self.first_b, self.P = self.n, 2 * self.n + 1, 3 * self.n + 2
+        damping = contact.d * contact.Omega / contact.c
+        steps = np.diff(self.edges)
+        self.dynamics = self._dynamics(*self._stepped(steps))
+        checked, s = self._instants(checks)
+        self.share = (self.edges[checked] + s) / tau
+        self.T, self.kept = (self._mixed(rows, mix) for rows in self._limited(checked, s))
+        self.mix = mix
+        # the exact plant must not part the flanks by rounding; at first T is 0
+        self.least = np.where(np.arange(self.kept[1].size) < 2 * len(checks), 0.0, margin)
+        reach = min(contact.half_period, np.pi / contact.Omega)
+        self.tail_at = reach * np.arange(1, TAIL_POINTS + 1) / TAIL_POINTS
+        a, b = self._from_node(self.tail_at, np.full(TAIL_POINTS, self.n), None)
+        self.tail = a[0] + damping * b[0], a[1] + damping * b[1]
+        self.T_end = self._single({self.first_a + self.n: 1.0, self.first_b + self.n: damping})
+        # a damped contact begins with T = d v; for the certificate's relaxation it need not count
+        self.T_first: Rows = self._single({self.first_a: 1.0, self.first_b: damping}), np.zeros(1)
+        self.jumps = damping > 0.0 and mix is None and margin > 0.0
+
+    # rows ------------------------------------------------------------------------------------------------
+
+    def _instants(self, fractions: tuple[float, ...]) -> tuple[Steps, Vector]:
+        """Where T is checked: (step, time since its beginning); at these fractions of each step.
+
+        In a step longer than an elastic period T swings about a mean, ever less: its first period is checked,
+        as finely as a step of one radian would be, and its end.
+        """
+        period = 2.0 * np.pi / self.contact.Omega
+        first_period = period * np.arange(1, 6 * len(fractions) + 1) / (6 * len(fractions))
+        shares = np.array(fractions)
+        return checked_instants(
+            np.diff(self.edges),
+            lambda length: np.append(first_period, length) if length > period else shares * length,
+        )
+
+    def _from_node(self, s: Vector, node: Steps, step: Steps | None) -> tuple[Rows, Rows]:
+        """(a, b) at s after the given nodes, under the torque of the given steps (None: coasting)."""
+        contact, U = self.contact, self.U
+        Omega, c = contact.Omega, contact.c
+        h, dh, H = contact.h(s), contact.dh(s), contact.H(s)
+        push = contact.Mc / (contact.J2 * U)
+        weights = (
+            (dh + 2.0 * contact.zeta * h, Omega * h, c * H / contact.J1, c * H * push),
+            (-Omega * h, dh, c * h / (Omega * contact.J1), c * h * push / Omega),
+        )
+        row = np.arange(s.size)
+        out = []
+        for by_a, by_b, by_u, constant in weights:
+            entries = [(by_a, self.first_a + node), (by_b, self.first_b + node)]
+            if step is not None:
+                entries.append((by_u, step))
+            values = np.concatenate([value for value, _ in entries])
+            columns = np.concatenate([column for _, column in entries])
+            where = np.tile(row, len(entries)), columns
+            out.append((sparse.csr_array((values, where), shape=(s.size, self.columns)), constant))
+        return out[0], out[1]
+
+    def _stepped(self, s: Vector) -> tuple[Rows, Rows]:
+        """(a, b) at s_k after node k, under the torque of step k."""
+        steps = np.arange(self.n)
+        return self._from_node(s, steps, steps)
+
+    def _dynamics(self, a: Rows, b: Rows) -> Rows:
+        """Zero: the state at each node is what the step before it leads to."""
+        rows = []
+        for (matrix, constant), first in ((a, self.first_a), (b, self.first_b)):
+            at = np.arange(self.n), first + 1 + np.arange(self.n)
+            node = sparse.csr_array((np.ones(self.n), at), shape=(self.n, self.columns))
+            rows.append((matrix - node, constant))
+        return sparse.vstack([rows[0][0], rows[1][0]]), np.concatenate([rows[0][1], rows[1][1]])
+
+    def _limited(self, step: Steps, s: Vector) -> tuple[Rows, Rows]:
+        """T/U at s into each of the given steps, and what must not be negative there: T or c z/U."""
+        damping = self.contact.d * self.contact.Omega / self.contact.c
+        a, b = self._from_node(s, step, step)
+        T = a[0] + damping * b[0], a[1] + damping * b[1]
+        return T, a if self.pulls else T
+
+    def broken(self, answer: Answer) -> Marks:
+        """Steps in which T goes above P or comes off the flank between the checks, by a share of P."""
+        step, s = self._instants(SIXTEENTHS)
+        T, kept = self._limited(step, s)
+        P = answer.P / self.U
+        over = np.abs(T[0] @ answer.x + T[1]) if self.pulls else T[0] @ answer.x + T[1]
+        bad = (over > P * (1.0 + EXCESS)) | (kept[0] @ answer.x + kept[1] < -1e-9)
+        steps: Marks = np.bincount(step, weights=bad, minlength=self.n) > 0.0
+        return steps
+
+    def _mixed(self, rows: Rows, mix: Vector | None) -> Rows:
+        if mix is None:
+            return rows
+        return sparse.csr_array(mix) @ rows[0], mix @ rows[1]
+
+    def _single(self, weights: dict[int, float]) -> Any:
+        return single_row(weights, self.columns)
+
+    def _speed(self) -> tuple[Any, float]:
+        """(w2(tau) - w2(te))/W: momentum is what the torques brought."""
+        contact, n = self.contact, self.n
+        total = contact.J1 + contact.J2
+        own = contact.J1 * contact.Omega * self.U / (contact.c * total * self.W)
+        weights = dict(enumerate((np.diff(self.edges) * self.U / (total * self.W)).tolist()))
+        weights[self.first_b] = own
+        weights[self.first_b + n] = -own
+        return self._single(weights), -contact.Mc * self.tau / (total * self.W)
+
+    def _terminal(self, te: float) -> list[tuple[Any, float]]:
+        """Equations (row, right side) at tau; the speed comes first."""
+        row, constant = self._speed()
+        start = float(self.entry.load_speed(np.array([te]))[0])
+        equations = [(row, (self.problem.target * AIM - start) / self.W - constant)]
+        if self.problem.terminal != "reached":
+            equations.append((self._single({self.first_b + self.n: 1.0}), 0.0))
+        if self.problem.terminal == "steady":
+            equations.append((self.T_end, self.contact.Mc / self.U))
+        return equations
+
+    # solving ---------------------------------------------------------------------------------------------
+
+    def solve(self, te: float, *, elastic: float = 0.0) -> Answer | None:
+        """The least P; None where there is none.
+
+        With `elastic` > 0 the terminal equations may be missed at that price (in U), so that there always is
+        an answer; its multipliers say how far from feasible the problem is.
+        """
+        P = self._single({self.P: 1.0})
+        none: Rows = (sparse.csr_array((0, self.columns)), np.zeros(0))
+        blocks = [
+            below(self.T, P),
+            below(self.T, P, -1.0) if self.pulls else none,
+            self._kept_closed(),
+            below(self.tail, P) if self.problem.terminal == "reached" else none,
+            below(self.T_first, P) if self.jumps else none,
+        ]
+        found = self._solved(te, P.toarray()[0], blocks, self._terminal(te), elastic)
+        if found is None:
+            return None
+        return Answer(
+            te,
+            te + self.tau,
+            float(found.x[self.P]) * self.U,
+            float(found.x[self.first_b]) * self.contact.Omega * self.U / self.contact.c,
+            self.edges,
+            found.x[: self.n] * self.U,
+            found.x[: self.columns],
+            self._multipliers(found, [block[1].size for block in blocks]),
+            self,
+        )
+
+    def greatest_speed(self, te: float) -> float | None:
+        """The greatest w2(tau) whatever T, rad/s; None where the terminal cannot be met."""
+        row, constant = self._speed()
+        found = self._solved(te, -row.toarray()[0], [self._kept_closed()], self._terminal(te)[1:], 0.0)
+        if found is None:
+            return None
+        start = float(self.entry.load_speed(np.array([te]))[0])
+        return start + self.W * (constant - float(found.fun))
+
+    def _kept_closed(self) -> Rows:
+        return -1.0 * self.kept[0], self.kept[1] - self.least
+
+    def _solved(
+        self, te: float, cost: Vector, blocks: list[Rows], terminal: list[tuple[Any, float]], elastic: float
+    ) -> Any:
+        """SciPy's result; with `elastic` there are slack variables of the terminal equations behind ours."""
+        above, equal = RowList(), RowList()
+        for rows, right in blocks:
+            above.add(rows, right)
+        equal.add(self.dynamics[0], -self.dynamics[1])
+        for row, value in terminal:
+            equal.add(row, np.array([value]))
+        A_ub, b_ub = above.all(self.columns)
+        A_eq, b_eq = equal.all(self.columns)
+        bounds = self._bounds(te)
+        if elastic > 0.0:
+            missed = len(terminal)
+            slack = np.zeros((b_eq.size, 2 * missed))
+            slack[2 * self.n :] = np.hstack([np.eye(missed), -np.eye(missed)])
+            A_eq = sparse.hstack([A_eq, sparse.csr_array(slack)]).tocsr()
+            A_ub = sparse.hstack([A_ub, sparse.csr_array((b_ub.size, 2 * missed))]).tocsr()
+            cost = np.concatenate([cost, np.full(2 * missed, elastic)])
+            bounds = np.concatenate([bounds, np.tile([0.0, np.inf], (2 * missed, 1))])
+        return Limits(cost, A_ub, b_ub, A_eq, b_eq).solved(bounds, "highs")
+
+    def _bounds(self, te: float) -> Vector:
+        """Limits of each variable, shape (columns, 2): torques 0 to 1, and the entry."""
+        at, scale = np.array([te]), self.contact.c / (self.contact.Omega * self.U)
+        bounds = np.tile([-np.inf, np.inf], (self.columns, 1))
+        bounds[: self.n] = 0.0, 1.0
+        bounds[self.first_a] = self.contact.c * self.entry.z0 / self.U
+        bounds[self.first_b] = (
+            scale * float(self.entry.slowest(at)[0]),
+            scale * float(self.entry.fastest(at)[0]),
+        )
+        bounds[self.P] = 0.0, np.inf
+        return bounds
+
+    def _multipliers(self, found: Any, sizes: list[int]) -> Multipliers:
+        """HiGHS's marginals in N m per unit of each limit; signs so that a larger left side raises P."""
+        least = np.maximum(-np.asarray(found.ineqlin.marginals), 0.0)
+        parts = np.split(least, np.cumsum(sizes)[:-1])[:4]
+        total = float(parts[0].sum() + parts[1].sum() + parts[3].sum()) or 1.0
+        peak, trough, closed, tail = (part / total for part in parts)
+        none = np.zeros(self.share.size)
+        if self.mix is not None:
+            peak, trough, closed = (part @ self.mix if part.size else part for part in (peak, trough, closed))
+        equal = np.asarray(found.eqlin.marginals)[2 * self.n :] / total
+        terminal = self.problem.terminal
+        return Multipliers(
+            self.share,
+            peak,
+            trough if trough.size else none,
+            closed,
+            self.tail_at,
+            tail if tail.size else np.zeros(self.tail_at.size),
+            speed=float(equal[0]) * self.U / self.W,
+            rate=float(equal[1]) * self.contact.c / self.contact.Omega if terminal != "reached" else 0.0,
+            torque=float(equal[2]) if terminal == "steady" else 0.0,
+        )
+
+
+# the search for the entry ----------------------------------------------------------------------------------
+
+
+def solve(problem: Problem) -> Candidate | None:
+    """The optimum of a problem with an ideal torque; None where no torque meets the terms.
+
+    Raises InputError where the problem is not linear from the contact on (see `no_ideal`).
+    """
+    reason = not_linear(problem)
+    if reason:
+        raise InputError(f"method = lp: {reason}; use method = collocation.")
+    best = search(problem)
+    if best is None:
+        return None
+    profile = assemble(problem, best)
+    return Candidate(profile, best.end_time, best.P / problem.base_torque, "lp", f"{best.u.size} steps")
+
+
+def not_linear(problem: Problem) -> str:
+    """Why this is no linear program; empty if it is one."""
+    if not problem.ideal_torque:
+        return "the motor torque cannot jump freely (lag, rate, torque-speed curve or smoothness)"
+    if problem.minimise != "k_dyn":
+        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
+    if problem.heat is not None:
+        return "a bound on the heat is not linear"
+    return no_ideal(problem)
+
+
+def search(problem: Problem) -> Answer | None:
+    """The best entry te and end t_f, and the answer there on a grid refined where the torque switches."""
+    assert problem.start_time is not None
+    entry = entry_of(problem)
+    latest = float(problem.start_time)
+    best = _best_entry(problem, entry, latest, COARSE)
+    if best is None:
+        if greatest_speed(problem, entry, latest, MIDDLE, math.nan)[0] < problem.target:
+            return None
+        # hardly enough time: the torque has no room for a coarse grid
+        best = _best_entry(problem, entry, latest, MIDDLE)
+    if best is None or _sooner(problem, best) < best.P * (1.0 - 1e-4):
+        best = _best_end(problem, entry, latest) or best  # more time does not help, or does not fit
+    if best is None:
+        return None
+    return _refined(problem, entry, best)
+
+
+def _sooner(problem: Problem, best: Answer) -> float:
+    """P with the same entry and a little less time, N m."""
+    tau = 0.95 * best.end_time - best.te
+    if tau <= 0.0:
+        return math.inf
+    grid = contact_grid(Contact.of(problem.drive), tau, COARSE)
+    return _peak(ContactProgram(problem, tau, grid).solve(best.te))
+
+
+def _peak(answer: Answer | None) -> float:
+    return math.inf if answer is None else answer.P
+
+
+def _best_entry(problem: Problem, entry: Entry, end: float, steps: int) -> Answer | None:
+    """Scan te, then narrow down around the best ones: P over te has kinks, and may have several minima.
+
+    An entry so late that momentum alone asks for more than the best P known is not tried.
+    """
+    last = min(entry.latest, end)
+    contact = Contact.of(problem.drive)
+    if entry.earliest >= end:
+        return None
+    answers: dict[float, Answer | None] = {}
+
+    def peak_at(te: float) -> float:
+        if te not in answers:
+            tau = end - te
+            answers[te] = ContactProgram(problem, tau, contact_grid(contact, tau, steps)).solve(te)
+        return _peak(answers[te])
+
+    def latest_for(P: float) -> float:
+        """Momentum: J2 (target - w2(te)) <= (P - Mc)(end - te), by bisection."""
+        low, high = entry.earliest, last
+        for _ in range(40):
+            te = 0.5 * (low + high)
+            missing = problem.target - float(entry.load_speed(np.array([te]))[0])
+            if contact.J2 * missing <= (P - contact.Mc) * (end - te):
+                low = te
+            else:
+                high = te
+        return high
+
+    if last <= entry.earliest:
+        peak_at(entry.earliest)
+    else:
+        lowest, limit = math.inf, last
+        shares = np.linspace(0.0, 1.0, SCANNED, endpoint=False)
+        for te in (entry.earliest + (last - entry.earliest) * shares**2.5).tolist():
+            if te > limit:
+                break
+            if peak_at(te) < lowest:
+                lowest = peak_at(te)
+                limit = latest_for(lowest)
+        if not math.isfinite(lowest):  # little time: a narrow window of te is left, if any
+            speed, te = greatest_speed(problem, entry, end, steps, math.nan)
+            if not speed >= problem.target:
+                return None
+            lowest = peak_at(te)
+            if not math.isfinite(lowest):
+                return None
+            limit = latest_for(lowest)
+        for share in np.linspace(0.0, 1.0, SCANNED)[1:] ** 1.5:
+            peak_at(entry.earliest + (limit - entry.earliest) * float(share))
+        tried = sorted(answers)
+        for k in _minima([_peak(answers[te]) for te in tried]):
+            low, high = tried[max(k - 1, 0)], tried[min(k + 1, len(tried) - 1)]
+            golden(peak_at, low, high, max(1e-5 * end, 0.02 * (high - low)))
+    return answers[min(answers, key=lambda te: _peak(answers[te]))]
+
+
+def _minima(values: list[float]) -> list[int]:
+    """The lowest few local minima, lowest first."""
+    padded = [math.inf, *values, math.inf]
+    local = [
+        i
+        for i, value in enumerate(values)
+        if math.isfinite(value) and padded[i] >= value and value <= padded[i + 2]
+    ]
+    return sorted(local, key=lambda i: values[i])[:LOCAL_MINIMA]
+
+
+def greatest_speed(
+    problem: Problem, entry: Entry, end: float, steps: int, near: float
+) -> tuple[float, float]:
+    """The greatest load speed at `end`, rad/s, and the te it needs; -inf where the terminal cannot be met."""
+    contact = Contact.of(problem.drive)
+    known: dict[float, float] = {}
+
+    def short_by(te: float) -> float:
+        te = min(max(te, entry.earliest), entry.latest)
+        if te not in known:
+            found = None
+            if end > te:
+                program = ContactProgram(problem, end - te, contact_grid(contact, end - te, steps))
+                found = program.greatest_speed(te)
+            known[te] = math.inf if found is None else -found
+        return known[te]
+
+    last = min(entry.latest, end)
+    if last > entry.earliest:
+        tried = []
+        if not math.isnan(near):
+            spread = 0.1 * (near - entry.earliest) + 1e-3 * end
+            tried = [max(near - spread, entry.earliest), near, near + spread]
+        if not tried or not short_by(near) <= min(short_by(tried[0]), short_by(tried[2])) < math.inf:
+            tried += [entry.earliest + (last - entry.earliest) * share for share in SHARES]
+            tried.sort()
+        i = min(range(len(tried)), key=lambda k: short_by(tried[k]))
+        if math.isfinite(short_by(tried[i])):
+            low, high = tried[max(i - 1, 0)], tried[min(i + 1, len(tried) - 1)]
+            golden(short_by, low, high, max(0.02 * (high - low), 1e-5 * end))
+    else:
+        short_by(entry.earliest)
+    te = min(known, key=lambda t: known[t])
+    return -known[te], te
+
+
+def _best_end(problem: Problem, entry: Entry, latest: float) -> Answer | None:
+    """The best end before `latest`: where more time does not help, or does not fit."""
+    found: dict[float, Answer | None] = {}
+
+    def peak_at(end: float) -> float:
+        found[end] = _best_entry(problem, entry, end, COARSE)
+        return _peak(found[end])
+
+    for share in np.linspace(1.0, 0.05, 20):
+        peak_at(latest * float(share))
+    ends = sorted(found)
+    i = min(range(len(ends)), key=lambda k: (_peak(found[ends[k]]), ends[k]))
+    if not math.isfinite(_peak(found[ends[i]])):
+        return None
+    golden(peak_at, ends[max(i - 1, 0)], ends[min(i + 1, len(ends) - 1)], 1e-3 * latest)
+    return found[min(found, key=lambda end: (_peak(found[end]), end))]
+
+
+def golden(value: Callable[[float], float], low: float, high: float, width: float) -> None:
+    """Golden-section search; `value` remembers what it was asked."""
+    ratio = 0.5 * (math.sqrt(5.0) - 1.0)
+    a, b = high - ratio * (high - low), low + ratio * (high - low)
+    at_a, at_b = value(a), value(b)
+    while high - low > width:
+        if at_a <= at_b:
+            high, b, at_b = b, a, at_a
+            a = high - ratio * (high - low)
+            at_a = value(a)
+        else:
+            low, a, at_a = a, b, at_b
+            b = low + ratio * (high - low)
+            at_b = value(b)
+
+
+def _refined(problem: Problem, entry: Entry, best: Answer) -> Answer:
+    """The same entry, moved a little, on a grid that is finer where the torque switches or T exceeds P.
+
+    P may have a steep kink in te (the least slow entry), so that te itself is found to 2e-7 of t_f at last.
+    """
+    contact = Contact.of(problem.drive)
+    tau = float(best.edges[-1])
+    grid = contact_grid(contact, tau, max(MIDDLE, int(1.6 * min(contact.Omega * tau, 2.0 * FINE_ENDS))))
+
+    def moved(best: Answer, grid: Vector, width: float, mending: bool) -> Answer:
+        return _moved(problem, entry, best, grid, width, 2e-7 * best.end_time if mending else 0.1 * width)
+
+    return refined(best, grid, REFINEMENT, problem.highest_torque, moved)
+
+
+def _moved(problem: Problem, entry: Entry, best: Answer, grid: Vector, width: float, within: float) -> Answer:
+    """The best entry within `width` of the one known, on another grid."""
+    answers: dict[float, Answer | None] = {}
+    end = best.end_time
+
+    def peak_at(te: float) -> float:
+        te = min(max(te, entry.earliest), entry.latest, end)
+        if te not in answers:
+            answers[te] = ContactProgram(problem, end - te, grid).solve(te)
+        return _peak(answers[te])
+
+    peak_at(best.te)
+    if entry.latest > entry.earliest:
+        golden(peak_at, best.te - width, best.te + width, within)
+    return answers[min(answers, key=lambda te: _peak(answers[te]))] or best
+
+
+def assemble(problem: Problem, answer: Answer) -> TorqueProfile:
+    """The gap part that arrives with v, and the contact part, as one profile up to t_f.
+
+    HiGHS keeps the limits of the torque to its own tolerance only; the profile keeps them exactly.
+    """
+    pieces = entry_of(problem).pieces(answer.te, answer.v)
+    lengths = [max(duration, 0.0) for duration, _ in pieces] + np.diff(answer.edges).tolist()
+    levels = [torque for _, torque in pieces] + np.clip(
+        answer.u, problem.lowest_torque, problem.highest_torque
+    ).tolist()
+    times = np.concatenate([[0.0], np.cumsum(lengths)])
+    return TorqueProfile.steps(times, levels)

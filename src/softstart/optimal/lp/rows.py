@@ -1,0 +1,181 @@
+"""What the linear programs share: rows over variables, HiGHS, checked instants, refinement of a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linprog
+
+from softstart.optimal.lp.motion import Contact
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Steps = NDArray[np.int64]
+Marks = NDArray[np.bool_]
+Rows = tuple[Any, Vector]  # sparse matrix over the variables, constants
+
+AIM = 1.0 + 1e-9  # a little above the target, so that the exact plant finds it reached
+MARGIN = 2e-4  # of U, which T keeps above 0
+QUARTERS, HALVES = (0.25, 0.5, 0.75, 1.0), (0.5, 1.0)  # of a step, where T is checked
+SIXTEENTHS = tuple((np.arange(16) + 1.0) / 16.0)  # where it is checked afterwards
+FINE_ENDS = 30.0  # radians of the elastic oscillation at either end of a long contact
+LONG_STEPS = 4  # between them
+ROUNDS = 3  # of finer grids where the torque switches
+FIRST_WIDTH = 4e-3  # of t_f: how far instants may move on the first finer grid
+SWITCH = 0.02  # of the largest torque: a larger change between two steps is a switch
+
+
+class RowList:
+    """Sparse rows and their right sides, collected block by block."""
+
+    def __init__(self) -> None:
+        self.matrices: list[Any] = []
+        self.rights: list[Vector] = []
+
+    def add(self, matrix: Any, right: Vector) -> None:
+        self.matrices.append(matrix)
+        self.rights.append(np.broadcast_to(right, (matrix.shape[0],)))
+
+    def all(self, columns: int) -> tuple[Any, Vector]:
+        if not self.matrices:
+            return sparse.csr_array((0, columns)), np.zeros(0)
+        return sparse.vstack(self.matrices).tocsr(), np.concatenate(self.rights)
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Minimise cost @ x subject to A_ub x <= b_ub, A_eq x = b_eq."""
+
+    cost: Vector
+    A_ub: Any
+    b_ub: Vector
+    A_eq: Any
+    b_eq: Vector
+
+    def solved(self, bounds: Matrix, method: str = "highs-ds") -> Any:
+        """SciPy's result for the best x within the bounds (columns, 2); None where there is none."""
+        found = linprog(self.cost, self.A_ub, self.b_ub, self.A_eq, self.b_eq, bounds, method=method)
+        return found if found.status == 0 else None
+
+
+def single_row(weights: dict[int, float], columns: int) -> Any:
+    """One row with the given weight in each of the given columns."""
+    where = np.zeros(len(weights), dtype=np.int64), np.array(list(weights))
+    return sparse.csr_array((np.array(list(weights.values())), where), shape=(1, columns))
+
+
+def below(rows: Rows, variable: Any, sign: float = 1.0) -> Rows:
+    """Rows and right sides of sign * rows <= variable, which is itself a row."""
+    ones = sparse.csr_array(np.ones((rows[1].size, 1)))
+    return sign * rows[0] - ones @ variable, -sign * rows[1]
+
+
+# grids ----------------------------------------------------------------------------------------------------
+
+
+def contact_grid(contact: Contact, tau: float, steps: int) -> Vector:
+    """Even steps; in a contact of many elastic periods fine ones at both ends and a few long ones between."""
+    angle = contact.Omega * tau
+    if angle <= 2.0 * FINE_ENDS:
+        return np.linspace(0.0, 1.0, max(steps, int(0.8 * angle)) + 1)
+    end = FINE_ENDS / angle
+    return np.concatenate(
+        [
+            np.linspace(0.0, end, steps + 1)[:-1],
+            np.linspace(end, 1.0 - end, LONG_STEPS + 1)[:-1],
+            np.linspace(1.0 - end, 1.0, 3 * steps // 4 + 1),
+        ]
+    )
+
+
+def checked_instants(lengths: Vector, within: Callable[[float], Vector]) -> tuple[Steps, Vector]:
+    """(step, time since its beginning) of all checks; `within` gives those of a step by its length in s."""
+    parts = [within(length) for length in lengths.tolist()]
+    return np.repeat(np.arange(lengths.size), [part.size for part in parts]), np.concatenate(parts)
+
+
+def split(edges: Vector, chosen: Marks, parts: int) -> Vector:
+    """The edges of a grid with each chosen step split into so many equal parts.
+
+    >>> split(np.array([0.0, 0.5, 1.0]), np.array([False, True]), 2).tolist()
+    [0.0, 0.5, 0.75, 1.0]
+    """
+    each = zip(edges[:-1], edges[1:], chosen, strict=True)
+    pieces = [np.linspace(a, b, parts + 1)[1:] if finer else [b] for a, b, finer in each]
+    return np.concatenate([[0.0], *pieces])
+
+
+class OnGrid(Protocol):
+    """The answer of a linear program on a grid."""
+
+    @property
+    def P(self) -> float: ...  # peak torque, N m
+    @property
+    def end_time(self) -> float: ...  # t_f, s
+    @property
+    def edges(self) -> Vector: ...  # of all steps, s
+    @property
+    def levels(self) -> Vector: ...  # mean torque of each step, N m
+    @property
+    def broken(self) -> Marks: ...  # steps that exceed a limit between the checks
+    def finer(self, wanted: Marks) -> Any:
+        """Its own grid with the wanted steps split.
+
+        Its own: where a finer grid had no answer, the last answer stands, on the grid it was found on.
+        """
+        ...
+
+
+A = TypeVar("A", bound=OnGrid)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How long grids are refined: first where the torque switches, then where a limit is exceeded."""
+
+    most: int  # edges from which on the switches are not refined any further
+    mending: int  # rounds over the steps that exceed a limit
+    narrowing: float = 1.0  # of the width, where `most` is passed
+    settled: float = 0.0  # relative: a round that changes P by less, and keeps all limits, is the last
+
+
+def refined(
+    best: A, grid: Any, rule: Refinement, highest: float, moved: Callable[[A, Any, float, bool], A]
+) -> A:
+    """The best answer with its instants moved a little, on finer and finer grids.
+
+    `moved(best, grid, width, mending)` is the best answer on a grid with instants within `width` s of those
+    known; `highest` is the largest torque in N m.
+    """
+    width = FIRST_WIDTH * best.end_time
+    for _ in range(ROUNDS):
+        before = best.P
+        best = moved(best, grid, width, False)
+        if best.edges.size > rule.most:
+            width *= rule.narrowing
+            break
+        if rule.settled and not best.broken.any() and abs(before - best.P) < rule.settled * best.P:
+            return best
+        grid = best.finer(_switching(best.levels, highest) | best.broken)
+        width *= 0.4
+    for _ in range(rule.mending):
+        best = moved(best, grid, width, True)
+        if not best.broken.any():
+            break
+        grid = best.finer(best.broken)
+        width *= 0.3
+    return best
+
+
+def _switching(levels: Vector, highest: float) -> Marks:
+    """Steps beside which the torque changes by more than 2 % of its largest."""
+    jump = np.abs(np.diff(levels)) > SWITCH * highest
+    near = np.zeros(levels.size, dtype=bool)
+    near[:-1] |= jump
+    near[1:] |= jump
+    return near

@@ -1,0 +1,455 @@
+"""A staircase of torque on the exact plant: figures of many at once, and one with its sensitivities.
+
+A profile is a vector of unknowns: the levels and edges of a staircase, or of two where the second starts with
+the contact. The `profile` controller's parameters are an affine function of them, so that the compiled kernel
+evaluates any number of staircases without building a profile each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from softstart.controller import make_controller
+from softstart.controller.base import CompiledController, Sensor
+from softstart.drive import Drive
+from softstart.plant import layout as at
+from softstart.plant import record
+from softstart.plant import start as kernel
+from softstart.plant.jit import compiled_as
+from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run
+from softstart.plant.vector import plant_vector
+from softstart.profile import TorqueProfile, Vector
+from softstart.start.engine import Book
+
+Matrix = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+LEVEL_PROBE, EDGE_PROBE = 1e-3, 1e-7  # N m, s
+
+
+@dataclass(frozen=True, eq=False)
+class Staircase:
+    """Torque `levels[i]` from `edges[i]` to `edges[i + 1]`, the last one from then on.
+
+    `edges` (s, the first is 0) and `levels` (N m) have the same length. `contact` is a second staircase on a
+    clock that starts with the first contact, or None for a profile that does not react.
+    """
+
+    edges: Vector
+    levels: Vector
+    contact: Staircase | None = None
+
+    @property
+    def parts(self) -> tuple[Staircase, ...]:
+        """The staircase itself and the one after contact, if there is one."""
+        return (self,) if self.contact is None else (self, self.contact)
+
+    @property
+    def unknowns(self) -> Vector:
+        """All levels, then all edges but the first: of the first part, then of the second."""
+        parts = self.parts
+        return np.concatenate([*(p.levels for p in parts), *(p.edges[1:] for p in parts)])
+
+    @property
+    def n_levels(self) -> int:
+        """How many of the unknowns are levels."""
+        return sum(p.levels.size for p in self.parts)
+
+    @property
+    def begins(self) -> Vector:
+        """Where each level begins, s on the clock of its part."""
+        return np.concatenate([p.edges for p in self.parts])
+
+    @property
+    def after_contact(self) -> NDArray[np.bool_]:
+        """For each level, whether it belongs to the second part."""
+        return np.concatenate([np.full(p.levels.size, i == 1) for i, p in enumerate(self.parts)])
+
+    def with_unknowns(self, values: Vector) -> Staircase:
+        """The staircase whose unknowns are `values`."""
+        n, first = self.n_levels, self.levels.size
+        if self.contact is None:
+            return Staircase(np.concatenate([[0.0], values[n:]]), values[:n].copy())
+        middle = n + first - 1
+        contact = Staircase(np.concatenate([[0.0], values[middle:]]), values[first:n].copy())
+        return Staircase(np.concatenate([[0.0], values[n:middle]]), values[:first].copy(), contact)
+
+    def profile(self) -> TorqueProfile:
+        """The same as a profile with two knots at every edge, needed or not."""
+        after = self.contact.profile() if self.contact is not None else None
+        return TorqueProfile(np.repeat(self.edges, 2)[1:], np.repeat(self.levels, 2)[:-1], after)
+
+    def tidy(self) -> TorqueProfile:
+        """The same as a profile with as few knots as it needs."""
+        full = self.profile()
+        after = full.after_contact.simplified(1e-9) if full.after_contact is not None else None
+        return TorqueProfile(full.time, full.torque, after).simplified(1e-9)
+
+    def cut(self, edges: Vector, contact_edges: Vector | None = None) -> Staircase:
+        """The same torque with further edges."""
+
+        def one(part: Staircase, more: Vector) -> tuple[Vector, Vector]:
+            joined = np.unique(np.concatenate([part.edges, more]))
+            far = np.concatenate([[True], np.diff(joined) > 1e-7])
+            own = np.isin(joined, part.edges)
+            near_own = np.concatenate([np.diff(joined) <= 1e-7, [False]]) & np.concatenate([own[1:], [False]])
+            joined = joined[(far | own) & ~(near_own & ~own)]
+            return joined, part.levels[np.searchsorted(part.edges, joined, side="right") - 1]
+
+        if self.contact is None:
+            return Staircase(*one(self, edges))
+        more = contact_edges if contact_edges is not None else np.zeros(0)
+        return Staircase(*one(self, edges), Staircase(*one(self.contact, more)))
+
+
+class ProfileParameters:
+    """The `profile` controller's parameter vector as an affine function of a staircase's unknowns."""
+
+    def __init__(self, staircase: Staircase, drive: Drive) -> None:
+        self.controller = self._controller(staircase)
+        self.origin = staircase.unknowns
+        self.constant = self._numbers(staircase, drive)
+        self.slopes = np.zeros((self.origin.size, self.constant.size))
+        self._trace(staircase, drive, np.arange(staircase.n_levels), self._level_probe(staircase, drive))
+        self._trace(staircase, drive, np.arange(staircase.n_levels, self.origin.size), EDGE_PROBE)
+
+    def _trace(self, staircase: Staircase, drive: Drive, which: Indices, probe: float | Vector) -> None:
+        """Find where the unknowns `which` stand in the vector: each is moved by an amount of its own."""
+        if which.size == 0:
+            return
+        share = np.arange(1, which.size + 1) / which.size
+        moved = self.origin.copy()
+        moved[which] += probe * share
+        change = self._numbers(staircase.with_unknowns(moved), drive) - self.constant
+        change_share = np.abs(change) / np.max(np.abs(probe)) * which.size
+        found = np.flatnonzero(change_share > 0.5)
+        self.slopes[which[np.round(change_share[found]).astype(np.int64) - 1], found] = 1.0
+
+    @staticmethod
+    def _controller(staircase: Staircase) -> CompiledController:
+        return cast(CompiledController, make_controller("profile", {"profile": staircase.profile()}))
+
+    def _numbers(self, staircase: Staircase, drive: Drive) -> Vector:
+        numbers: Vector = np.asarray(
+            self._controller(staircase).fitted(drive).vector(drive), dtype=np.float64
+        ).ravel()
+        return numbers
+
+    @staticmethod
+    def _level_probe(staircase: Staircase, drive: Drive) -> Vector:
+        """Away from the nearer torque limit, so that nothing is cut off."""
+        upper = staircase.unknowns[: staircase.n_levels] > 0.5 * (
+            drive.minimum_torque + min(drive.maximum_torque, drive.Ms)
+        )
+        return np.where(upper, -LEVEL_PROBE, LEVEL_PROBE)
+
+    def vectors(self, unknowns: Matrix) -> Matrix:
+        """Parameter vectors, one row for each row of unknowns."""
+        rows: Matrix = np.ascontiguousarray(
+            self.constant + (np.atleast_2d(unknowns) - self.origin) @ self.slopes
+        )
+        return rows
+
+
+def refined(staircase: Staircase, horizon: float, intervals: int) -> Staircase:
+    """The same torque on a grid of so many even intervals beside its own edges."""
+    grid = np.linspace(0.0, horizon, intervals + 1)[:-1]
+    return staircase.cut(grid, grid)
+
+
+def merged(staircase: Staircase, tolerance: float) -> Staircase:
+    """Neighbouring levels within `tolerance` N m of each other as one, at their mean over time."""
+
+    def one(part: Staircase) -> tuple[Vector, Vector]:
+        edges, levels = part.edges.tolist(), part.levels.tolist()
+        ends = [*edges[1:], edges[-1] + 0.01]
+        kept: list[tuple[float, float, float]] = []
+        for here in zip(edges, ends, levels, strict=True):
+            near = bool(kept) and abs(kept[-1][2] - here[2]) <= tolerance
+            kept.append(_joined(kept.pop(), here) if near else here)
+        return np.array([k[0] for k in kept]), np.array([k[2] for k in kept])
+
+    if staircase.contact is None:
+        return Staircase(*one(staircase))
+    return Staircase(*one(staircase), Staircase(*one(staircase.contact)))
+
+
+def _joined(
+    first: tuple[float, float, float], second: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Two neighbours (start, end, level) as one, at their mean over time."""
+    (a, b, low), (_, c, high) = first, second
+    mean = (low * (b - a) + high * (c - b)) / (c - a)
+    return a, c, min(max(mean, min(low, high)), max(low, high))  # rounding must not lead beyond a limit
+
+
+_A = types.Array(types.float64, 1, "C")
+_I = types.Array(types.int64, 1, "C")
+_M = types.Array(types.float64, 2, "C")
+_STEP = types.FunctionType(STEP_SIGNATURE)
+_RUN_SIGNATURE = types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M)
+_AT_SIGNATURE = types.void(_A, _M, _I, _A, _A, _A, _M)
+_RUN, _AT = types.FunctionType(_RUN_SIGNATURE), types.FunctionType(_AT_SIGNATURE)
+
+# what `positions` holds
+SPANS, SPAN_START, FULL, FIRST_OUT, SECOND_OUT = range(5)
+
+
+@compiled_as(
+    types.boolean(
+        _RUN, _AT, _STEP, _A, _M, _A, types.int64, _A, _I, _A, _A, _A, _A, _A, _M, _M, _M, _A, _A, _M, _M, _M,
+        _I,
+    )
+)  # fmt: skip
+def _all_moved(  # type: ignore[no-untyped-def]
+    run_start, states_at, step, p, rows, begun, sees, times, index, x, m, measured, state, command, segments,
+    events, stages, scratch_x, scratch_m, out, first, second, positions,
+):  # fmt: skip
+    for r in range(rows.shape[0]):
+        for j in range(x.shape[0]):
+            x[j] = begun[j]
+        for j in range(m.shape[0]):
+            m[j] = 0.0
+        for j in range(state.shape[0]):
+            state[j] = 0.0
+        reason = run_start(step, p, rows[r], sees, x, m, measured, state, command, segments, events, stages)
+        if reason == positions[FULL]:
+            return False
+        count = int(x[positions[SPANS]])
+        for i in range(times.shape[0]):
+            low, high = 0, count
+            while high - low > 1:
+                middle = (low + high) // 2
+                if segments[middle, positions[SPAN_START]] <= times[i]:
+                    low = middle
+                else:
+                    high = middle
+            index[i] = low
+        states_at(p, segments, index, times, scratch_x, scratch_m, out)
+        for i in range(times.shape[0]):
+            first[r, i] = out[i, positions[FIRST_OUT]]
+            second[r, i] = out[i, positions[SECOND_OUT]]
+    return True
+
+
+def all_moved(
+    step: Any, p: at.Vector, rows: at.Matrix, begun: at.Vector, sees: int, state_size: int, command_size: int,
+    times: at.Vector, records: int,
+) -> tuple[at.Matrix, at.Matrix]:  # fmt: skip
+    """Shaft torque and load speed at `times` of one start under each row of controller parameters.
+
+    `begun` is the kernel's state at t = 0, `records` about how many spans one start has.
+    """
+    out = np.empty((times.size, record.N_OUT))
+    T, w2 = np.empty((rows.shape[0], times.size)), np.empty((rows.shape[0], times.size))
+    positions = np.array([at.N_SEGMENTS, at.S_START, at.BUFFER_FULL, record.T_OUT, record.W2_OUT])
+    while True:
+        recorders = (np.zeros((records, n)) for n in (at.N_SEGMENT, at.N_EVENT, at.N_STAGE))
+        if _all_moved(
+            run, record.states_at, step, p, rows, begun, sees, times, np.zeros(times.size, dtype=np.int64),
+            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(N_MEASURED), np.zeros(state_size),
+            np.zeros(command_size), *recorders, np.zeros(at.N_X), np.zeros(at.N_M), out, T, w2, positions,
+        ):  # fmt: skip
+            return T, w2
+        records *= 2
+
+
+AIM = 1e-9  # the load's target is raised by so much, so that no rounding lets it miss
+PER_PERIOD = 40  # samples of the shaft torque in one elastic period
+STEP = 1e-5  # of a level, relative to the torque range, for the differences
+EDGE_STEP = 1e-7  # of an edge, in s
+ONSET = 5e-6  # s after the contact at which a damped shaft's first torque is watched
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """Per profile and scenario: peak |T|, start time (NaN if never), and load speed at the end of the run."""
+
+    peak: Matrix
+    start_time: Matrix
+    final_speed: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Shaft torque of one scenario under one profile, and how it changes with the unknowns.
+
+    `T` at instants of the run, `dT` (instants x unknowns); `late` in s is by how much the start misses the
+    time asked for (below 0: it is early), guessed from the missing speed where the run was given up.
+    """
+
+    peak: float
+    times: Vector
+    T: Vector
+    dT: Matrix
+    late: float
+    dlate: Vector
+
+
+class Evaluator:
+    """The scenarios, each ready to be run by the kernel up to one elastic period after its start time."""
+
+    def __init__(self, drives: Sequence[Drive], start_time: float) -> None:
+        self.drives = tuple(drives)
+        self.start_time = start_time
+        self.p = [
+            plant_vector(drive, time_limit=start_time + float(drive.elastic_period)) for drive in drives
+        ]
+        for p in self.p:
+            p[:, at.TARGET] *= 1.0 + AIM
+        self.horizon = start_time + max(float(drive.elastic_period) for drive in drives)
+
+    def figures(self, parameters: ProfileParameters, unknowns: Matrix) -> Figures:
+        """Figures of many staircases of one staircase, a row of unknowns each."""
+        numbers = parameters.vectors(unknowns)
+        size = parameters.controller.state_size
+        sees = parameters.controller.sensors
+        out = np.empty((3, numbers.shape[0], len(self.p)))
+        results = np.empty((numbers.shape[0], at.N_X))
+        for i, p in enumerate(self.p):
+            kernel.run_many(
+                type(parameters.controller).kernel, p, numbers, int(sees), bool(sees & Sensor.STAGE),
+                np.array([math.inf]), results, np.zeros(at.N_X), np.zeros(at.N_M),
+                np.zeros(kernel.N_MEASURED), np.zeros(size), np.zeros(kernel.NEW_STATE + size),
+                np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+            )  # fmt: skip
+            good = results[:, at.STATUS] == at.ENDED
+            out[0, :, i] = np.where(good, np.abs(results[:, at.PEAK]), math.inf)
+            out[1, :, i] = np.where(good, results[:, at.START_TIME], math.nan)
+            out[2, :, i] = np.where(good, results[:, at.W2], -math.inf)
+        return Figures(out[0], out[1], out[2])
+
+    def trajectory(
+        self,
+        i: int,
+        parameters: ProfileParameters,
+        staircase: Staircase,
+        free_edges: Indices,
+        low: float,
+        high: float,
+    ) -> Trajectory:
+        """Scenario i under the staircase, with differences for all levels and the edges marked free."""
+        recorder = _Recorder(parameters, self.p[i])
+        unknowns = staircase.unknowns
+        numbers = parameters.vectors(unknowns)[0]
+        x = recorder.play(numbers, math.inf)
+        peak, end, ts = abs(float(x[at.PEAK])), float(x[at.TIME]), float(x[at.START_TIME])
+        first = end if math.isnan(x[at.FIRST_CONTACT]) else float(x[at.FIRST_CONTACT])
+        times = self._instants(recorder, i, first, end)
+        asked = np.append(times, end if math.isnan(ts) else ts)
+        states = recorder.at(asked)
+        which, steps = self._steps(staircase, free_edges, low, high, first, end)
+        rows = numbers + steps[:, None] * parameters.slopes[which]
+        T, w2 = recorder.moved(rows, end, asked)
+        dT, dlate = np.zeros((times.size, unknowns.size)), np.zeros(unknowns.size)
+        dT[:, which] = ((T[:, :-1] - states[:-1, record.T_OUT]) / steps[:, None]).T
+        gain = self._gain(i, float(states[-1, record.T_OUT]))
+        dlate[which] = (states[-1, record.W2_OUT] - w2[:, -1]) / steps / gain
+        late = ts - self.start_time
+        if math.isnan(ts):
+            late = self._behind(i, float(states[-1, record.W2_OUT]))
+        return Trajectory(peak, times, states[:-1, record.T_OUT].copy(), dT, late, dlate)
+
+    def _gain(self, i: int, T: float) -> float:
+        """Acceleration of the load under T, rad/s2, at least a part of the mean one that is needed."""
+        p = self.p[i][0]
+        return max(float((T - p[at.MC]) * p[at.INV_J2]), 0.05 * self._needed(i))
+
+    def _needed(self, i: int) -> float:
+        p = self.p[i][0]
+        return float(p[at.TARGET] - p[at.W2_0]) / self.start_time
+
+    def _behind(self, i: int, w2: float) -> float:
+        """How late a load comes that has only w2 when its run is given up, s."""
+        p = self.p[i][0]
+        missing = max(float(p[at.TARGET]) - w2, 0.0) / self._needed(i)
+        return float(p[at.TIME_LIMIT]) - self.start_time + missing
+
+    def lateness(self, figures: Figures) -> Matrix:
+        """By how much each start misses the time asked for, s; below 0 where it is early."""
+        behind = np.array(
+            [[self._behind(i, w2) for i, w2 in enumerate(row)] for row in figures.final_speed.tolist()]
+        )
+        late: Matrix = np.where(np.isnan(figures.start_time), behind, figures.start_time - self.start_time)
+        return late
+
+    def _instants(self, recorder: _Recorder, i: int, first: float, end: float) -> Vector:
+        """Instants at which the torque is watched: the onset, an even grid of the contact, and the peaks."""
+        if end - first <= 2.0 * ONSET:
+            return np.array([end])
+        period = float(self.p[i][0, at.PERIOD])
+        count = max(math.ceil((end - first) / period * PER_PERIOD), 2)
+        grid = np.append(first + ONSET, np.linspace(first, end, count + 1)[1:])
+        T = np.abs(recorder.at(grid)[:, record.T_OUT])
+        j = np.flatnonzero((T[2:-1] >= T[1:-2]) & (T[2:-1] > T[3:])) + 2
+        width = grid[-1] - grid[-2]
+        bend = 2.0 * T[j] - T[j - 1] - T[j + 1]
+        peaks = grid[j] + 0.5 * width * (T[j + 1] - T[j - 1]) / np.where(bend > 0.0, bend, np.inf)
+        return np.union1d(grid, peaks)
+
+    @staticmethod
+    def _steps(
+        staircase: Staircase, free_edges: Indices, low: float, high: float, first: float, end: float
+    ) -> tuple[Indices, Vector]:
+        """The unknowns that can make a difference before `end`, and a small step of each."""
+        n = staircase.n_levels
+        clock = np.where(staircase.after_contact, first, 0.0)
+        last = end if staircase.contact is None else first
+        early = np.flatnonzero(staircase.begins + clock < np.where(staircase.after_contact, end, last))
+        upper = staircase.unknowns[early] > 0.5 * (low + high)
+        steps = STEP * (high - low) * np.where(upper, -1.0, 1.0)
+        which = np.concatenate([early, n + free_edges]).astype(np.int64)
+        return which, np.concatenate([steps, np.full(free_edges.size, EDGE_STEP)])
+
+
+class _Recorder:
+    """One scenario, recorded again and again into the same buffers."""
+
+    def __init__(self, parameters: ProfileParameters, p: Matrix) -> None:
+        self.controller = parameters.controller
+        self.p = p[0].copy()
+        self.book = Book(int(parameters.controller.sensors))
+        self.state = np.zeros(self.controller.state_size)
+        self.command = np.zeros(kernel.NEW_STATE + self.controller.state_size)
+        self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
+
+    def play(self, numbers: Vector, until: float) -> Vector:
+        """The state at the end; the spans stay on the recorder."""
+        book = self.book
+        book.m[:] = 0.0
+        self.state[:] = 0.0
+        kernel.begin(self.p, book.x, until, book.events)
+        book.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        while True:
+            reason = kernel.run(
+                type(self.controller).kernel, self.p, numbers, book.sees, book.x, book.m, book.measured,
+                self.state, self.command, book.segments, book.events, book.stages,
+            )  # fmt: skip
+            if reason != at.BUFFER_FULL:
+                return book.x
+            book.grow()
+
+    def moved(self, rows: Matrix, until: float, times: Vector) -> tuple[Matrix, Matrix]:
+        """Shaft torque and load speed at `times` for each row of parameters, run to `until`."""
+        begun = np.zeros(at.N_X)
+        kernel.begin(self.p, begun, until, self.book.events)
+        begun[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        return all_moved(
+            type(self.controller).kernel, self.p, np.ascontiguousarray(rows), begun, self.book.sees,
+            self.state.size, self.command.size, times, self.book.segments.shape[0],
+        )  # fmt: skip
+
+    def at(self, times: Vector) -> Matrix:
+        """States at the instants, columns as in plant/record.py."""
+        spans = self.book.segments[: int(self.book.x[at.N_SEGMENTS])]
+        index = np.searchsorted(spans[:, at.S_START], times, side="right") - 1
+        out = np.empty((times.size, record.N_OUT))
+        record.states_at(self.p, spans, index.clip(0), times, *self.scratch, out)
+        return out
