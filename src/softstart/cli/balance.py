@@ -13,8 +13,8 @@ from softstart.balancing import balance as compute
 from softstart.balancing.engine import INDICATOR_FILE
 from softstart.balancing.tables import LIBRARY, TABLES
 from softstart.cli.commands import Command
-from softstart.cli.completing import names_or_files, table_keys
-from softstart.cli.completing import settings as settings_of
+from softstart.cli.completion import names_or_files, table_keys
+from softstart.cli.completion import settings as settings_of
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.errors import InputError
 from softstart.quantities import to_si

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.commands import Command, did_you_mean
-from softstart.cli.completing import names_or_files, table_keys
-from softstart.cli.completing import settings as settings_of
+from softstart.cli.completion import names_or_files, table_keys
+from softstart.cli.completion import settings as settings_of
 from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
 from softstart.cli.running import working
 from softstart.clutch import (

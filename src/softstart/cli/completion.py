@@ -1,31 +1,179 @@
-"""`softstart completion`: the Tab key in bash, zsh and fish.
+"""`softstart completion`, and what the Tab key makes of the words of a command line in bash, zsh and fish.
 
-A shell gives the line up to the cursor in COMP_LINE and gets the words that the last one may become. Scripts
-and classes take the place of those that come with click: they set no space behind a word that goes on
-(`load.inertia=`, `drives/`), and know values behind an equals sign, as in `--controllers=direct`.
+Click's own scripts are not used, since most words here do not end where a shell ends them: after
+`load.inertia=` or `drives/` no space may follow, bash splits words at `=` and `:`, and a value may be joined
+to its option, as in `--controllers=direct,ra`. The shell passes the line up to the cursor in COMP_LINE and
+gets back whole words; one that ends in `=`, `/`, `:` or `.` goes on. Nothing here raises: at worst there is
+no completion.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import (
-    BashComplete,
-    CompletionItem,
-    FishComplete,
-    ShellComplete,
-    ZshComplete,
-    add_completion_class,
-    split_arg_string,
-)
+from click.shell_completion import CompletionItem, ShellComplete, add_completion_class, split_arg_string
 
 from softstart.cli.commands import Command, did_you_mean
-from softstart.cli.completing import files
+from softstart.drive import PARAMETERS
 from softstart.errors import InputError
+from softstart.late import late
+from softstart.plugins import registered
+
+if TYPE_CHECKING:
+    from softstart import controller as controllers_found
+    from softstart.input.documents import Table
+else:
+    controllers_found = late("softstart.controller")
+
+Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+Keys = Mapping[str, tuple[str, Sequence[str]]]  # by key: its meaning, and its values where these are words
+
+CONTROLLERS, STUDIES = "softstart.controllers", "softstart.studies"
+
+
+def names_or_files(names: Callable[[], Iterable[str]], *endings: str) -> Completer:
+    """One of these names, or a file that ends so."""
+
+    def complete(ctx: click.Context, param: click.Parameter, begun: str) -> list[CompletionItem]:
+        found = [name for name in names() if name.startswith(begun)]
+        return [*map(CompletionItem, found), *map(CompletionItem, files(begun, *endings))]
+
+    return complete
+
+
+def controllers(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """One more controller after the last comma: a name not yet named, tuned gains, or a class in a file."""
+    done, comma, begun = incomplete.rpartition(",")
+    path, colon, _ = begun.rpartition(":")
+    if colon:
+        found = [f"{path}:{name}" for name in classes(path)]
+    else:
+        named = done.split(",")
+        found = [name for name in registered(CONTROLLERS) if name not in named]
+        found += [
+            path + ":" if path.endswith(".py") else path for path in files(begun, ".py", ".toml", ".csv")
+        ]
+    return [CompletionItem(done + comma + word) for word in found if word.startswith(begun)]
+
+
+def files_only(*endings: str) -> Completer:
+    """Files with these endings and folders; folders alone without endings."""
+    return names_or_files(tuple, *endings)
+
+
+def studies(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The name of a study."""
+    return [CompletionItem(name) for name in registered(STUDIES) if name.startswith(incomplete)]
+
+
+def settings(keys: Callable[[], Keys]) -> Completer:
+    """`key=`, and behind it a value where the values are words."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        key, equals, _ = incomplete.partition("=")
+        known = keys()
+        if equals:
+            _, values = known.get(key, ("", ()))
+            found = [CompletionItem(f"{key}={value}") for value in values]
+        else:
+            found = [CompletionItem(f"{key}=", help=meaning) for key, (meaning, _) in known.items()]
+        return [item for item in found if item.value.startswith(incomplete)]
+
+    return complete
+
+
+def axes(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """A parameter of the drive, or `controller=` with names behind it."""
+    key, equals, value = incomplete.partition("=")
+    if equals and key == "controller":
+        return [CompletionItem(f"{key}={item.value}") for item in controllers(ctx, param, value)]
+    found = [CompletionItem("controller=", help="controllers, with commas between")]
+    return [item for item in found if item.value.startswith(incomplete)] + settings(drive_keys)(
+        ctx, param, incomplete
+    )
+
+
+def parameters(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """`key=` of the controller named before, `controller.key=` where there may be several.
+
+    Only installed controllers are asked: no file runs because somebody pressed Tab.
+    """
+    one, several = ctx.params.get("controller"), ctx.params.get("controllers")
+    names = (one or several or ",".join(registered(CONTROLLERS))).split(",")
+    if not one and "." not in incomplete:
+        found = [f"{name}." for name in names if name in registered(CONTROLLERS)]
+        return [CompletionItem(word) for word in found if word.startswith(incomplete)]
+    items: list[CompletionItem] = []
+    for name in names:
+        if name in registered(CONTROLLERS) and (one or incomplete.startswith(f"{name}.")):
+            items += _parameters_of(name, "" if one else f"{name}.")
+    return [item for item in items if item.value.startswith(incomplete)]
+
+
+def _parameters_of(name: str, before: str) -> Iterator[CompletionItem]:
+    for field in fields(controllers_found.controller_class(name)):
+        meaning, unit = field.metadata.get("meaning", ""), field.metadata.get("unit", "")
+        yield CompletionItem(f"{before}{field.name}=", help=_with_unit(meaning, unit))
+
+
+def drive_keys() -> Keys:
+    """The parameters of a drive as `--set` names them."""
+    return {p.path: (_with_unit(p.meaning, p.unit), p.choices) for p in PARAMETERS.values()}
+
+
+def table_keys(tables: Iterable[Table]) -> Keys:
+    """The keys of a file of tables as `--set` names them; the first of a list of tables stands for all."""
+    found: dict[str, tuple[str, Sequence[str]]] = {}
+    for table in tables:
+        place = f"{table.name}{'[1]' if table.many else ''}." if table.name else ""
+        for field in table.parameters:
+            found[place + field.key] = (_with_unit(field.meaning, field.unit), field.choices)
+    return found
+
+
+def files(begun: str, *endings: str) -> list[str]:
+    """Files with these endings and all folders (with a slash behind) whose path begins so.
+
+    >>> "pyproject.toml" in files("nowhere/", ".toml")
+    False
+    """
+    folder, slash, head = begun.rpartition("/")
+    place = os.path.expanduser(folder) or slash or "."
+    found: list[tuple[bool, str]] = []
+    try:
+        with os.scandir(place) as entries:
+            for entry in entries:
+                name, is_folder = entry.name, entry.is_dir()
+                hidden = name.startswith((".", "__")) and not head.startswith((".", "__"))
+                if name.startswith(head) and not hidden and (is_folder or name.endswith(endings)):
+                    found.append((is_folder, f"{folder}{slash}{name}{'/' if is_folder else ''}"))
+    except OSError:
+        return []
+    return [path for _, path in sorted(found)]
+
+
+def classes(path: str) -> list[str]:
+    """Names of the classes in a Python file, which is read and not run."""
+    try:
+        with open(os.path.expanduser(path), encoding="utf-8") as opened:
+            body = ast.parse(opened.read()).body
+    except (OSError, SyntaxError, ValueError):
+        return []
+    return [node.name for node in body if isinstance(node, ast.ClassDef)]
+
+
+def _with_unit(meaning: str, unit: Any) -> str:
+    return f"{meaning}, {unit}" if unit and unit != "1" else meaning
+
+
+# the shells ----------------------------------------------------------------------------------------------
 
 BASH = """\
 # softstart in bash: put this into ~/.local/share/bash-completion/completions/softstart, or into ~/.bashrc
@@ -80,11 +228,11 @@ complete --command softstart --no-files --keep-order --arguments "(__softstart_c
 SPECIAL = re.compile(r"""([\s"'`$&|;<>()*?\[\]!\\])""")
 
 
-class _Line(ShellComplete):
-    """Reads the line up to the cursor; gives whole words."""
+class _Shell(ShellComplete):
+    """Reads the line up to the cursor, returns whole words."""
 
     def source(self) -> str:
-        """The script, as it stands."""
+        """The script as it is: click would format its per cent signs."""
         return self.source_template
 
     def get_completion_args(self) -> tuple[list[str], str]:
@@ -100,7 +248,7 @@ class _Line(ShellComplete):
     def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem]:
         """What the last word may become; a value written as --option=value with its option."""
         try:
-            found = list(_whole(super().get_completions(args, incomplete)))
+            found = super().get_completions(args, incomplete)
         except (click.UsageError, InputError):
             return []  # the line is wrong before its last word
         option, equals, _ = incomplete.partition("=")
@@ -110,9 +258,10 @@ class _Line(ShellComplete):
         return found
 
 
-class Bash(_Line, BashComplete):
+class Bash(_Shell):
     """Words alone, with what is special to a shell escaped."""
 
+    name = "bash"
     source_template = BASH
 
     def format_completion(self, item: CompletionItem) -> str:
@@ -120,9 +269,10 @@ class Bash(_Line, BashComplete):
         return SPECIAL.sub(r"\\\1", item.value)
 
 
-class Zsh(_Line, ZshComplete):
+class Zsh(_Shell):
     """Words and what they mean, a colon between."""
 
+    name = "zsh"
     source_template = ZSH
 
     def format_completion(self, item: CompletionItem) -> str:
@@ -131,9 +281,10 @@ class Zsh(_Line, ZshComplete):
         return f"{word}:{_one_line(item)}" if item.help else word
 
 
-class Fish(_Line, FishComplete):
+class Fish(_Shell):
     """Words and what they mean, a tabulator between."""
 
+    name = "fish"
     source_template = FISH
 
     def format_completion(self, item: CompletionItem) -> str:
@@ -141,20 +292,11 @@ class Fish(_Line, FishComplete):
         return f"{item.value}\t{_one_line(item)}" if item.help else str(item.value)
 
 
-def _whole(items: list[CompletionItem]) -> Iterator[CompletionItem]:
-    """The items, with files and folders by name where click says only that such are wanted."""
-    for item in items:
-        if item.type == "plain":
-            yield item
-        else:
-            yield from map(CompletionItem, files(item.value, *([] if item.type == "dir" else [""])))
-
-
 def _one_line(item: CompletionItem) -> str:
     return " ".join(str(item.help).split())
 
 
-SHELLS: dict[str, type[_Line]] = {one.name: one for one in (Bash, Zsh, Fish)}
+SHELLS: dict[str, type[_Shell]] = {one.name: one for one in (Bash, Zsh, Fish)}
 
 
 def register_shells() -> None:

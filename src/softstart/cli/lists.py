@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from softstart.cli.commands import Command, did_you_mean
-from softstart.cli.completing import controllers as controllers_known
-from softstart.cli.completing import names_or_files
+from softstart.cli.completion import controllers as controllers_known
+from softstart.cli.completion import names_or_files
 from softstart.cli.options import Mistakes, check_name, controller_names, drive_names, json_option
+from softstart.cli.running import Attributed, working
+from softstart.drive import PARAMETERS, Drive, library
 from softstart.errors import InputError
+from softstart.late import late
+from softstart.views.numbers import Column, printable
+from softstart.views.terminal import console, print_json, print_table, sentence
 
 if TYPE_CHECKING:
+    from softstart import controller
     from softstart.controller import Controller
+else:
+    controller = late("softstart.controller")
 
 
 @click.command(cls=Command)
@@ -24,10 +33,6 @@ def drives(name: str | None, as_json: bool) -> None:
 
     An own drive begins with: softstart drives crane-4amtkf > mine.toml
     """
-    from softstart.drive import Drive, library
-    from softstart.views.numbers import Column, printable
-    from softstart.views.terminal import console, print_json, print_table, sentence
-
     if name is not None and name not in drive_names():
         raise InputError(
             f'"{name}": there is no shipped drive of this name; {did_you_mean(name, drive_names())}'
@@ -53,8 +58,6 @@ def drives(name: str | None, as_json: bool) -> None:
 
 
 def _values(drive: Any) -> dict[str, Any]:
-    from softstart.drive import PARAMETERS
-
     return {name: getattr(drive, name) for name in PARAMETERS}
 
 
@@ -66,19 +69,14 @@ def controllers(name: str | None, as_json: bool) -> None:
 
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
     """
-    from softstart.cli.running import Attributed, working
-    from softstart.views.terminal import console, print_json, sentence
-
     if name is not None:
         check_name(name, "controller")
     broken = Mistakes()
     found: dict[str, type[Controller]] = {}
     with working("looking at the controllers ..."):
-        from softstart.controller import controller_class
-
         for one in [name] if name else controller_names():
             with broken.noted(), Attributed(one):
-                found[one] = controller_class(one)
+                found[one] = controller.controller_class(one)
     if name:
         broken.settle()
     if as_json:
@@ -100,8 +98,6 @@ def _sensors(cls: type[Controller]) -> list[str]:
 
 
 def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
-    from dataclasses import fields
-
     return {
         "name": name,
         "summary": cls.summary,
@@ -120,9 +116,6 @@ def _described(name: str, cls: type[Controller]) -> dict[str, Any]:
 
 
 def _show_all(found: dict[str, type[Controller]]) -> None:
-    from softstart.views.numbers import Column, printable
-    from softstart.views.terminal import console, print_table, sentence
-
     to = console()
     rows = [
         [key, printable(cls.summary), ", ".join(_sensors(cls)[2:]) or "-", printable(cls.source) or "-"]
@@ -137,9 +130,6 @@ def _show_all(found: dict[str, type[Controller]]) -> None:
 
 
 def _show_one(name: str, cls: type[Controller]) -> None:
-    from softstart.views.numbers import Column
-    from softstart.views.terminal import console, print_table, sentence
-
     to = console()
     about = _described(name, cls)
     sentence(to, f"{name}: {about['summary'] or cls.__name__}", "bold")

@@ -14,8 +14,8 @@ from typing import Any
 import click
 
 from softstart.cli.commands import did_you_mean
-from softstart.cli.completing import controllers, drive_keys, files_only, names_or_files, parameters
-from softstart.cli.completing import settings as settings_of
+from softstart.cli.completion import controllers, drive_keys, files_only, names_or_files, parameters
+from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.errors import InputError
 from softstart.plugins import registered

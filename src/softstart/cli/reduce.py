@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.commands import Command
-from softstart.cli.completing import Keys, names_or_files, table_keys
-from softstart.cli.completing import settings as settings_of
+from softstart.cli.completion import Keys, names_or_files, table_keys
+from softstart.cli.completion import settings as settings_of
 from softstart.cli.optimal_options import read_choice, read_positive
 from softstart.cli.options import (
     Mistakes,

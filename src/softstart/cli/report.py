@@ -24,13 +24,22 @@ from softstart.cli.options import (
     read_params_of,
     set_option,
 )
+from softstart.cli.running import Attributed, make_controllers, working
+from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.input.files import write_whole
+from softstart.late import late
+from softstart.quantities import to_si
+from softstart.views.drives import drive_lines
+from softstart.views.terminal import console, print_json, print_lines, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.drive import Drive
-    from softstart.reporting import Report
+    from softstart import reporting
+    from softstart.reporting import document
+else:
+    reporting, document = late("softstart.reporting"), late("softstart.reporting.document")
 
 
 @click.command(cls=Command)
@@ -99,10 +108,8 @@ def report(
     with mistakes.noted():
         given = read_params_of(params, names or controller_names())
     if resolution is not None:
-        from softstart.reporting.resolution import Resolution
-
         with mistakes.noted():
-            asked["resolution"] = Resolution.read(resolution, "--resolution")
+            asked["resolution"] = reporting.Resolution.read(resolution, "--resolution")
     for name, text, read in (("slower", slower, _share), ("budget", budget, _seconds)):
         if text is not None:
             with mistakes.noted():
@@ -112,11 +119,7 @@ def report(
 
     made, page = _made(one, names, given, asked, out is not None)
     if out is not None:
-        from softstart.input.files import write_whole
-
         write_whole(Path(out), lambda stream: stream.write(page))
-
-    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(made.summary())
@@ -130,22 +133,19 @@ def _made(
     given: dict[str, dict[str, str]],
     asked: dict[str, Any],
     drawn: bool,
-) -> tuple[Report, str]:
+) -> tuple[reporting.Report, str]:
     """The report and, if it is `drawn`, its page."""
-    from softstart.cli.running import Attributed, make_controllers, working
-
     with working("starting the drive ...") as status:
-        from softstart.controller import ready_controller_names
-
-        controllers = make_controllers(names or ready_controller_names(given), given, prefix=True)
-        from softstart.reporting import report as make
+        controllers = make_controllers(names, given, prefix=True)
 
         def progress(share: float, what: str) -> None:
             if status is not None:
                 status.update(f"{100.0 * share:.0f} %: {what} ...")
 
         with Attributed():
-            made = make(drive, controllers=controllers, progress=progress, command=command_line(), **asked)
+            made = reporting.report(
+                drive, controllers=controllers, progress=progress, command=command_line(), **asked
+            )
         if status is not None:
             status.update("drawing the figures ...")
         return made, made.to_html() if drawn else ""
@@ -183,8 +183,6 @@ def _share(text: str) -> float:
     >>> _share("15%"), _share("0.15")
     (0.15, 0.15)
     """
-    from softstart.quantities import to_si
-
     stripped = text.strip()
     try:
         if stripped.endswith("%"):
@@ -200,23 +198,16 @@ def _share(text: str) -> float:
 
 def _seconds(text: str) -> float:
     """A time in s, 0 or more."""
-    from softstart.quantities import to_si
-
     value = float(to_si(text, "s", name="--budget"))
     if value < 0.0:
         raise InputError(f'--budget = "{text}": give a time, as 20 or "60 s", or 0 for no search.')
     return value
 
 
-def _show(to: Console, made: Report, out: str) -> None:
-    from softstart.reporting.document import answer
-    from softstart.views.drives import drive_lines
-    from softstart.views.terminal import sentence
-
-    for index, line in enumerate(drive_lines(made.drive)):
-        sentence(to, line, "bold" if index == 0 else "")
+def _show(to: Console, made: reporting.Report, out: str) -> None:
+    print_lines(to, drive_lines(made.drive))
     to.print()
-    sentence(to, answer(made), "bold")
+    sentence(to, document.answer(made), "bold")
     for sheet in made.sheets:
         if sheet.rounded is None:
             sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")

@@ -3,11 +3,29 @@
 from __future__ import annotations
 
 import os
+import threading
+import webbrowser
+from typing import TYPE_CHECKING
 
 import click
 
+# linear algebra libraries spin on small matrices, and the page must answer within milliseconds: one thread
+# each, which they read when numpy is imported
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("MKL_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 from softstart.cli.commands import Command
 from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_drive, set_option
+from softstart.cli.running import working
+from softstart.late import late
+from softstart.page.serve import Address, check_installed, listening, run
+
+if TYPE_CHECKING:
+    from softstart.page import bench as benches
+    from softstart.page import map as maps
+else:
+    benches, maps = late("softstart.page.bench"), late("softstart.page.map")
 
 
 @click.command(cls=Command)
@@ -30,11 +48,6 @@ def serve(
     The page is served to this machine alone, unless it is told otherwise. Without DRIVE it begins with the
     crane drive of the literature. Ctrl-C ends it. Needs NiceGUI: pip install 'softstart[ui]'.
     """
-    # threads of linear algebra libraries spin on small matrices, and the page must answer within milliseconds
-    for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
-        os.environ.setdefault(library, "1")
-    from softstart.page.serve import Address, check_installed, listening, run
-
     address = Address(host, port, token, expose)
     mistakes = Mistakes()
     for check in (address.check, check_installed):
@@ -50,9 +63,6 @@ def serve(
         def ready(url: str) -> None:
             print(f"softstart is at {url}  (Ctrl-C ends it)", flush=True)
             if not no_browser and address.is_loopback:
-                import threading
-                import webbrowser
-
                 # some browsers take the terminal until they are closed; the page must not wait for that
                 threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
@@ -61,12 +71,8 @@ def serve(
 
 def _warm_up() -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
-    from softstart.cli.running import working
-    from softstart.page.bench import Bench
-    from softstart.page.map import axes_about, k_dyn_row
-
     with working("getting the engine ready ..."):
-        bench = Bench()
+        bench = benches.Bench()
         _ = bench.strategies
-        axes = axes_about(bench.drive, 3, 3)
-        k_dyn_row(bench.drive, bench.controllers[bench.selected], axes.gaps, axes.inertias[1])
+        axes = maps.axes_about(bench.drive, 3, 3)
+        maps.k_dyn_row(bench.drive, bench.controllers[bench.selected], axes.gaps, axes.inertias[1])

@@ -5,22 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from softstart.cli.commands import Command
-from softstart.cli.completing import studies
+from softstart.cli.completion import studies
 from softstart.cli.options import Mistakes, json_option, out_option
+from softstart.cli.running import working
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
+from softstart.views.drawing import PICTURE_ENDINGS, save_figure
 from softstart.views.markdown import file_stem, output_folder, write_table
+from softstart.views.numbers import Column, printable
+from softstart.views.terminal import console, print_json, print_table, sentence
 
 if TYPE_CHECKING:
+    import rich.text as rich_text
     from rich.console import Console
+else:
+    rich_text = late("rich.text")
 
 HEADINGS = ("study", "question", "pictures, each as .svg and .png")
-PICTURE_ENDINGS = ("svg", "png")  # as save_figure writes them, which would bring matplotlib along
 MARKS = {Verdict.CONFIRMED: "green", Verdict.REFUTED: "red", Verdict.PARTLY: "yellow"}
 
 
@@ -37,21 +45,16 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
         _list(as_json)
         return
     found = find_study(name)
-    with output_folder(out) as folder:
-        from softstart.cli.running import working
+    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as status:
 
-        with working(f"{found.name}: beginning ...") as status:
+        def progress(doing: str) -> None:
+            if status is not None:
+                status.update(f"{found.name}: {doing} ...")
 
-            def progress(doing: str) -> None:
-                if status is not None:
-                    status.update(f"{found.name}: {doing} ...")
-
-            result = found.run(folder, progress)
-            if folder is not None:
-                progress("writing")
-                write_study(found, result, folder)
-
-    from softstart.views.terminal import console, print_json
+        result = found.run(folder, progress)
+        if folder is not None:
+            progress("writing")
+            write_study(found, result, folder)
 
     if as_json:
         print_json({"study": found.name, "title": found.title, **result.summary()})
@@ -65,8 +68,6 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
 def write_study(found: Study, result: StudyResult, folder: Path) -> None:
     """Pictures as SVG and PNG, each table and the claims as CSV."""
     if result.figures:
-        from softstart.views.drawing import save_figure
-
         for stem, figure in result.figures.items():
             save_figure(figure, folder, stem)
     taken: list[str] = ["claims"]
@@ -85,9 +86,6 @@ def _listed(one: Study) -> dict[str, Any]:
 
 
 def _list(as_json: bool) -> None:
-    from softstart.views.numbers import Column
-    from softstart.views.terminal import console, print_json, print_table, sentence
-
     found: list[Study] = []
     broken = Mistakes()
     for name in study_names():
@@ -106,8 +104,6 @@ def _list(as_json: bool) -> None:
 
 
 def _show(to: Console, found: Study, result: StudyResult) -> None:
-    from softstart.views.terminal import sentence
-
     sentence(to, f"{found.name}: {found.title}", "bold")
     for table in result.tables:
         to.print()
@@ -118,9 +114,6 @@ def _show(to: Console, found: Study, result: StudyResult) -> None:
 
 
 def _show_table(to: Console, table: Table) -> None:
-    from softstart.views.numbers import Column, printable
-    from softstart.views.terminal import print_table
-
     numeric = [
         all(isinstance(row[i], int | float | None) for row in table.rows) for i in range(len(table.columns))
     ]
@@ -137,20 +130,15 @@ def _cell(value: Any) -> str:
 
 def _show_claims(to: Console, claims: Sequence[Claim]) -> None:
     """Each claim with its verdict, wrapped to the right of it, and the evidence below."""
-    from textwrap import wrap
-
-    from rich.text import Text
-
-    from softstart.views.numbers import printable
-
-    to.print(Text("Claims", style="bold"))
+    to.print(rich_text.Text("Claims", style="bold"))
     for number, claim in enumerate(claims, start=1):
         verdict = Verdict(claim.verdict)
         head = f"{number:2}. {verdict.value:9}  "
         width, margin = to.width - len(head), " " * len(head)
         statement = f"\n{margin}".join(wrap(printable(claim.statement), width))
         to.print(
-            Text(head, style=f"bold {MARKS[verdict]}").append(statement, style="default"), soft_wrap=True
+            rich_text.Text(head, style=f"bold {MARKS[verdict]}").append(statement, style="default"),
+            soft_wrap=True,
         )
         for line in wrap(printable(claim.evidence), width):
-            to.print(Text(margin + line, style="dim"), soft_wrap=True)
+            to.print(rich_text.Text(margin + line, style="dim"), soft_wrap=True)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.commands import Command
-from softstart.cli.completing import axes as axes_known
-from softstart.cli.completing import files_only
+from softstart.cli.completion import axes as axes_known
+from softstart.cli.completion import files_only
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,

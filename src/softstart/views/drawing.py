@@ -25,6 +25,8 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0,
 GREY, SMALL = "#666666", 9.5
 GAP_SHADE = "#E8ECEF"
 
+PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
+
 STYLE: dict[str, Any] = {
     "figure.figsize": (8.0, 5.0),
     "figure.constrained_layout.use": True,
@@ -61,7 +63,7 @@ def new_figure(
 def save_figure(figure: mpl_figure.Figure, folder: Path, stem: str) -> list[Path]:
     """Write stem.svg and stem.png into the folder, each whole or not at all."""
     written = []
-    for ending, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 160})):
+    for ending, options in zip(PICTURE_ENDINGS, ({"metadata": {"Date": None}}, {"dpi": 160}), strict=True):
         path = folder / f"{stem}.{ending}"
         with drawing():
             write_whole(path, lambda f, e=ending, o=options: figure.savefig(f, format=e, **o), binary=True)  # type: ignore[misc]

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from softstart.cli.commands import cli
-from softstart.cli.completing import drive_keys
-from softstart.cli.completion import SHELLS
+from softstart.cli.completion import SHELLS, drive_keys
 from softstart.drive import PARAMETERS, Drive
 from softstart.plugins import registered
 
