@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.drive.parameters import ContactLaw
+from softstart.drive import ContactLaw
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain

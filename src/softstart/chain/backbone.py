@@ -16,7 +16,7 @@ from softstart.chain.model import Chain, Mass, Shaft
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration import natural_vibration
-from softstart.drive.reading import elastic_frequency
+from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
 from softstart.quantities import Value
 

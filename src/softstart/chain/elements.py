@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from softstart.chain.tables import MASS, MOTOR, SHAFT
-from softstart.drive.parameters import ContactLaw, LoadKind
+from softstart.drive import ContactLaw, LoadKind
 from softstart.errors import InputError
 from softstart.input.documents import read_table
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from softstart.drive import PARAMETERS
-from softstart.drive.parameters import ContactLaw, LoadKind
+from softstart.drive import PARAMETERS, ContactLaw, LoadKind
 from softstart.input.documents import Table
 from softstart.input.files import Library
 from softstart.input.parameters import Parameter

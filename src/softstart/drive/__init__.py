@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-from softstart.drive.model import Drive
-from softstart.drive.parameters import PARAMETERS, TABLES, Parameter, library
+from softstart.drive.model import PARAMETERS, TABLES, ContactLaw, Drive, LoadKind, library
 
-__all__ = ["PARAMETERS", "TABLES", "Drive", "Parameter", "library"]
+__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]

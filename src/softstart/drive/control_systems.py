@@ -20,16 +20,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.quantities import Value
+from softstart.late import late
 
 if TYPE_CHECKING:
     import control
+
+    from softstart.drive.model import Drive
+else:
+    control = late("control")
 
 __all__ = ["in_contact", "initial_state", "shaft_torque", "whole_drive"]
 
@@ -41,51 +45,7 @@ _SMOOTHING = 1e-3
 _STUCK = 1e-6
 
 
-class _Drive(Protocol):
-    """The parameters used here; `softstart.Drive` has them."""
-
-    # properties, since a frozen drive offers no more
-    @property
-    def name(self) -> str: ...
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-    @property
-    def J1(self) -> Value: ...
-    @property
-    def J2(self) -> Value: ...
-    @property
-    def c(self) -> Value: ...
-    @property
-    def d(self) -> Value: ...
-    @property
-    def gap(self) -> Value: ...
-    @property
-    def Mc(self) -> Value: ...
-    @property
-    def elastic_period(self) -> Value: ...
-    @property
-    def minimum_torque(self) -> Value: ...
-    @property
-    def maximum_torque(self) -> Value: ...
-    @property
-    def torque_lag(self) -> Value: ...
-    @property
-    def torque_rate(self) -> Value: ...
-    @property
-    def contact_law(self) -> str: ...
-    @property
-    def load_kind(self) -> str: ...
-    @property
-    def target_speed(self) -> Value: ...
-    @property
-    def start_position(self) -> Value: ...
-    @property
-    def initial_motor_speed(self) -> Value: ...
-    @property
-    def initial_load_speed(self) -> Value: ...
-
-
-def in_contact(drive: _Drive) -> control.StateSpace:
+def in_contact(drive: Drive) -> control.StateSpace:
     """The drive in contact: inputs `motor_torque`, `load_torque` (N m, braking); states `z`, `w1`, `w2`.
 
     Outputs are the states and `shaft_torque`. Holds while the flank presses (`shaft_torque > 0`; with
@@ -97,8 +57,6 @@ def in_contact(drive: _Drive) -> control.StateSpace:
     >>> in_contact(Drive.load("crane-4amtkf")).output_labels
     ['z', 'w1', 'w2', 'shaft_torque']
     """
-    import control
-
     _single(drive)
     J1, J2, c, d = (float(value) for value in (drive.J1, drive.J2, drive.c, drive.d))
     torque = np.array([[c, d, -d]])
@@ -135,7 +93,7 @@ def shaft_torque(theta: float, rate: float, c: float, d: float, gap: float, *, l
     return side * (spring + (min(spring, damper) if law == "modelica" else damper))
 
 
-def whole_drive(drive: _Drive) -> control.NonlinearIOSystem:
+def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     """The whole drive: input `demand` (N m), outputs `phi1, w1, phi2, w2, u, T` in SI.
 
     States `phi1, w1, phi2, w2`, then `reference` (the demand behind the rate limit) if `torque_rate` is
@@ -147,8 +105,6 @@ def whole_drive(drive: _Drive) -> control.NonlinearIOSystem:
     >>> whole_drive(Drive.load("servo-axis-small")).state_labels
     ['phi1', 'w1', 'phi2', 'w2', 'u']
     """
-    import control
-
     _single(drive)
     states = _states(drive)
     actuator = _actuator(drive, states)
@@ -190,7 +146,7 @@ def whole_drive(drive: _Drive) -> control.NonlinearIOSystem:
     return system
 
 
-def initial_state(drive: _Drive) -> Vector:
+def initial_state(drive: Drive) -> Vector:
     """The state in which `whole_drive(drive)` starts; the motor torque and its reference start at 0.
 
     >>> from softstart.drive import Drive
@@ -207,7 +163,7 @@ def initial_state(drive: _Drive) -> Vector:
     return np.array([*mechanical, *(0.0 for _ in _states(drive)[4:])])
 
 
-def _states(drive: _Drive) -> list[str]:
+def _states(drive: Drive) -> list[str]:
     states = ["phi1", "w1", "phi2", "w2"]
     if math.isfinite(float(drive.torque_rate)):
         states.append("reference")
@@ -216,7 +172,7 @@ def _states(drive: _Drive) -> list[str]:
     return states
 
 
-def _actuator(drive: _Drive, states: list[str]) -> Callable[[Vector, float], tuple[float, list[float]]]:
+def _actuator(drive: Drive, states: list[str]) -> Callable[[Vector, float], tuple[float, list[float]]]:
     """The function that gives motor torque and the rates of the actuator's states."""
     low, high = float(drive.minimum_torque), float(drive.maximum_torque)
     lag, rate = float(drive.torque_lag), float(drive.torque_rate)
@@ -239,13 +195,13 @@ def _actuator(drive: _Drive, states: list[str]) -> Callable[[Vector, float], tup
     return actuator
 
 
-def _single(drive: _Drive) -> None:
+def _single(drive: Drive) -> None:
     if drive.shape != ():
         raise InputError(
             f"{drive.name}: a batch of shape {drive.shape} is not one system; take one of drive.elements()."
         )
 
 
-def _system_name(drive: _Drive) -> str:
+def _system_name(drive: Drive) -> str:
     """The name without the dots and brackets that python-control gives a meaning."""
     return re.sub(r"\W+", "_", drive.name).strip("_") or "drive"

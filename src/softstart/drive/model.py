@@ -5,43 +5,51 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal, Self, Unpack, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args, overload
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
-from softstart.drive import toml_file
-from softstart.drive.frozen import FrozenModel
-from softstart.drive.keywords import DriveChanges, DriveKeywords
-from softstart.drive.parameters import PARAMETERS, ContactLaw, LoadKind, library
-from softstart.drive.reading import cross_checks, elastic_frequency, read_parameter
-from softstart.drive.sentences import Mistake, Wording, mistakes_of, told
-from softstart.drive.settings import read_settings
-from softstart.errors import InputError
-from softstart.quantities import RefusedError, Value
+from softstart.drive.checks import contradictions, elastic_frequency
+from softstart.input.documents import Table, document_text, parsed, placed
+from softstart.input.files import Library
+from softstart.input.parameter_set import MaybeNumbers, Numbers, ParameterSet, parameter, read_settings
+from softstart.input.parameters import Parameter, Wording
+from softstart.late import late
+from softstart.quantities import Value
 
 if TYPE_CHECKING:
     import control
 
-__all__ = ["Drive"]
+    from softstart.drive import control_systems
+else:
+    control_systems = late("softstart.drive.control_systems")
+
+__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
+
+LoadKind = Literal["active", "reactive"]
+ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
+
+library = Library("softstart.drive", "a drive", "drives")
 
 
-def _default(name: str) -> Any:
-    """The field of a parameter that may be left out: its default is in the table of parameters."""
-    parameter = PARAMETERS[name]
-    if parameter.follows:
-        followed = parameter.follows
-        return Field(default_factory=lambda earlier: earlier[followed])
-    return Field(default=parameter.default)
-
-
-class Drive(FrozenModel):
+class Drive(ParameterSet):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
     Each quantity is a number in SI, a string with a unit, or an array of such (a batch: arrays broadcast
     together to `shape`). Angles are in rad at the motor shaft. A drive is frozen and its arrays are
-    read-only; equal drives hash alike. All mistakes of one input raise a single `InputError`.
+    read-only; equal drives hash alike.
 
+    Parameters
+    ----------
+    {parameters}
+
+    Raises
+    ------
+    InputError
+        With a sentence for every mistake of the input.
+
+    Examples
+    --------
     >>> drive = Drive(
     ...     motor_inertia=0.035, starting_torque="62 N*m", stiffness=368.465, gap="0.5 rad",
     ...     load_inertia="0.175 kg*m^2", load_torque=7.16, rated_speed="880 rpm",
@@ -56,59 +64,101 @@ class Drive(FrozenModel):
     target_speed is missing: the speed that the load is to reach is needed, or rated_speed ...
     """
 
-    name: str = _default("name")
-    source: str = _default("source")
-    motor_inertia: Value
-    starting_torque: Value
-    maximum_torque: Value = _default("maximum_torque")
-    minimum_torque: Value = _default("minimum_torque")
-    rated_power: Value | None = _default("rated_power")
-    rated_speed: Value | None = _default("rated_speed")
-    torque_lag: Value = _default("torque_lag")
-    torque_rate: Value = _default("torque_rate")
-    encoder_lines: Value = _default("encoder_lines")
-    encoder_phase: Value = _default("encoder_phase")
-    torque_noise: Value = _default("torque_noise")
-    noise_seed: Value = _default("noise_seed")
-    computing_delay: Value = _default("computing_delay")
-    stiffness: Value
-    damping: Value = _default("damping")
-    gap: Value
-    contact_law: ContactLaw = _default("contact_law")
-    start_position: Value = _default("start_position")
-    load_inertia: Value
-    load_torque: Value
-    load_kind: LoadKind = _default("load_kind")
-    target_speed: Value = _default("target_speed")
-    initial_load_speed: Value = _default("initial_load_speed")
-    initial_motor_speed: Value = _default("initial_motor_speed")
+    WHAT: ClassVar[str] = "a drive"
+    BATCH: ClassVar[bool] = True
 
-    def __init__(self, **given: Unpack[DriveKeywords]) -> None:
-        self._fill(given, Wording(), [])
+    name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
+    source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
+    motor_inertia: Numbers = parameter(
+        "motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"', "above 0", symbol="J1"
+    )
+    starting_torque: Numbers = parameter(
+        "motor.starting_torque", "N*m", "starting torque of the motor", '"62 N*m"', "above 0", symbol="Ms"
+    )
+    maximum_torque: Numbers = parameter(
+        "motor.maximum_torque", "N*m", "largest torque of the motor", '"64 N*m"', "above 0",
+        default=None, follows="starting_torque",
+    )  # fmt: skip
+    minimum_torque: Numbers = parameter(
+        "motor.minimum_torque", "N*m", "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less",
+        default=0.0,
+    )  # fmt: skip
+    rated_power: MaybeNumbers = parameter(
+        "motor.rated_power", "W", "rated power of the motor", '"2.2 kW"', "above 0", default=None
+    )
+    rated_speed: MaybeNumbers = parameter(
+        "motor.rated_speed", "rad/s", "rated speed of the motor", '"880 rpm"', "above 0", default=None
+    )
+    torque_lag: Numbers = parameter(
+        "motor.torque_lag", "s", "time constant of the torque behind its demand", '"2 ms"', "0 or more",
+        default=0.0,
+    )  # fmt: skip
+    torque_rate: Numbers = parameter(
+        "motor.torque_rate", "N*m/s", "largest rate of the torque demand", '"500 N*m/s"', "above 0",
+        default=math.inf, infinite=True,
+    )  # fmt: skip
+    encoder_lines: Numbers = parameter(
+        "motor.encoder_lines", "1", "number of encoder lines (four counts each; 0 for an ideal encoder)",
+        "4096", "a whole number, 0 or more", default=4096.0,
+    )  # fmt: skip
+    encoder_phase: Numbers = parameter(
+        "motor.encoder_phase", "1",
+        "where between two edges of the encoder the start lies, as a share of a count",
+        "0.5", "from 0 to 1", default=0.0,
+    )  # fmt: skip
+    torque_noise: Numbers = parameter(
+        "motor.torque_noise", "N*m",
+        "standard deviation of the noise on the measured motor torque, in each sample",
+        '"0.2 N*m"', "0 or more", default=0.0,
+    )  # fmt: skip
+    noise_seed: Numbers = parameter(
+        "motor.noise_seed", "1", "number of the noise: the same number gives the same noise",
+        "1", "a whole number, 0 or more", default=0.0,
+    )  # fmt: skip
+    computing_delay: Numbers = parameter(
+        "motor.computing_delay", "s",
+        "dead time between what a controller measures and the torque demand that follows from it",
+        '"1 ms"', "0 or more", default=0.0,
+    )  # fmt: skip
+    stiffness: Numbers = parameter(
+        "shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"', "above 0", symbol="c"
+    )
+    damping: Numbers = parameter(
+        "shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"', "0 or more",
+        default=0.0, symbol="d",
+    )  # fmt: skip
+    gap: Numbers = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap")
+    contact_law: ContactLaw = parameter(
+        "shaft.contact_law", "", "law of the shaft torque in contact", '"no-pull"',
+        default="no-pull", choices=get_args(ContactLaw),
+    )  # fmt: skip
+    start_position: Numbers = parameter(
+        "shaft.start_position", "rad", "twist phi1 - phi2 at the start (0 is mid-gap)", '"-0.25 rad"',
+        default=0.0, symbol="theta",
+    )  # fmt: skip
+    load_inertia: Numbers = parameter(
+        "load.inertia", "kg*m^2", "inertia of the load at the motor shaft", '"0.175 kg*m^2"', "above 0",
+        symbol="J2",
+    )  # fmt: skip
+    load_torque: Numbers = parameter(
+        "load.torque", "N*m", "torque of the load at the motor shaft", '"7.16 N*m"', symbol="Mc"
+    )
+    load_kind: LoadKind = parameter(
+        "load.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
+    )
+    target_speed: Numbers = parameter(
+        "start.target_speed", "rad/s", "speed that the load is to reach", '"880 rpm"', "above 0",
+        default=None, follows="rated_speed",
+    )  # fmt: skip
+    initial_load_speed: Numbers = parameter(
+        "start.initial_load_speed", "rad/s", "speed of the load at the start", '"0 rad/s"', default=0.0
+    )
+    initial_motor_speed: Numbers = parameter(
+        "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"', default=0.0
+    )
 
-    def _fill(self, given: Mapping[str, object], wording: Wording, mistakes: list[Mistake]) -> None:
-        """Read all parameters, or raise one `InputError` for everything that is wrong with them."""
-        # None stands for "not given" where there is no default of its own, so that what follows can follow.
-        left_out = {p.name for p in PARAMETERS.values() if p.default is None and not p.required}
-        given = {name: v for name, v in given.items() if not (v is None and name in left_out)}
-        try:
-            BaseModel.__init__(self, **given)
-        except ValidationError as error:
-            mistakes = [*mistakes, *mistakes_of(error, wording, given)]
-            values = _valid(given)
-        else:
-            values = dict(self)
-        named = given.keys() | {mistake.meant for mistake in mistakes}
-        if not {"target_speed", "rated_speed"} & named:
-            mistakes = [*mistakes, Mistake(wording.missing("target_speed"), missing="target_speed")]
-        sentences = [*told(mistakes), *cross_checks(values, wording)]
-        if sentences:
-            raise InputError(sentences)
-
-    @field_validator("*", mode="plain")
-    @classmethod
-    def _read(cls, value: object, info: ValidationInfo) -> object:
-        return read_parameter(PARAMETERS[str(info.field_name)], value)
+    def _contradictions(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
+        return contradictions(values, self.PARAMETERS, wording)
 
     # ---- where drives come from --------------------------------------------------------------------------
 
@@ -116,6 +166,18 @@ class Drive(FrozenModel):
     def load(cls, drive: str | os.PathLike[str]) -> Self:
         """A drive from its TOML file, or a shipped one by its name (`softstart.drive.library.names()`).
 
+        Parameters
+        ----------
+        drive : str or path
+            A shipped name, or the path of a TOML file.
+
+        Raises
+        ------
+        InputError
+            With a sentence for every mistake, each with the file, the table and the key.
+
+        Examples
+        --------
         >>> Drive.load("crane-4amtkf").gap
         0.5
         """
@@ -131,26 +193,20 @@ class Drive(FrozenModel):
         True
         """
         wording = Wording(where, style="toml")
-        given, mistakes = toml_file.flatten(text, wording)
+        document = parsed(text, wording, cls.WHAT, _TABLES)
+        content, mistakes = placed(document, _TABLES, cls.WHAT, wording)
+        given = {_NAMES[table, key]: v for table, keys in content.items() for key, v in keys.items()}
         return cls._made(given, wording, mistakes)
-
-    @classmethod
-    def _made(cls, given: Mapping[str, object], wording: Wording, mistakes: list[Mistake]) -> Self:
-        drive = cls.__new__(cls)
-        drive._fill(given, wording, mistakes)
-        return drive
 
     # ---- the drive changed -------------------------------------------------------------------------------
 
-    def replace(self, **changes: Unpack[DriveChanges]) -> Self:
+    def replace(self, **changes: Any) -> Self:
         """The same drive with some parameters changed; those that follow another one follow it still.
 
         >>> Drive.load("crane-4amtkf").replace(gap="2 rad", load_inertia="700 kg*cm^2").gap
         2.0
         """
-        return self._made(self.given() | dict(changes), Wording(), [])
-
-    __replace__ = replace  # copy.replace of Python 3.13
+        return self._changed(changes, Wording(), [])
 
     def with_settings(self, settings: Iterable[str]) -> Self:
         """The drive with changes as typed at a command line: `table.key=value` or `name=value`.
@@ -158,8 +214,7 @@ class Drive(FrozenModel):
         >>> Drive.load("crane-4amtkf").with_settings(["load.inertia=0.07", "gap=2 rad"]).J2
         0.07
         """
-        changes, wording, mistakes = read_settings(settings)
-        return self._made(self.given() | changes, wording, mistakes)
+        return self._changed(*read_settings(settings, PARAMETERS))
 
     def to_toml(self) -> str:
         """The drive as TOML text in SI units, which `from_toml` reads back to an equal drive.
@@ -167,7 +222,8 @@ class Drive(FrozenModel):
         >>> print(Drive.load("crane-4amtkf").to_toml().splitlines()[4])
         inertia = 0.035  # kg*m^2: inertia of the motor
         """
-        return toml_file.write(self.given())
+        given = self.given()
+        return document_text((table, given) for table in _TABLES)
 
     # ---- batches -----------------------------------------------------------------------------------------
 
@@ -178,7 +234,7 @@ class Drive(FrozenModel):
         >>> Drive.load("crane-4amtkf").replace(gap=[0.5, 1, 2]).shape
         (3,)
         """
-        return np.broadcast_shapes(*(v.shape for _, v in self if isinstance(v, np.ndarray)))
+        return np.broadcast_shapes(*(v.shape for v in vars(self).values() if isinstance(v, np.ndarray)))
 
     def elements(self) -> Iterator[Self]:
         """The single drives of a batch, last index fastest; a single drive is its own only element.
@@ -190,16 +246,16 @@ class Drive(FrozenModel):
         if shape == ():
             yield self
             return
-        fixed = {name: value for name, value in self if not isinstance(value, np.ndarray)}
         varied = {
             name: np.broadcast_to(value, shape).ravel().tolist()
-            for name, value in self
+            for name, value in vars(self).items()
             if isinstance(value, np.ndarray)
         }
         for row in zip(*varied.values(), strict=True):
             # each element was checked with the batch
-            one = fixed | dict(zip(varied, row, strict=True))
-            yield cast("Self", type(self).model_construct(set(self.model_fields_set), **one))
+            one = type(self).__new__(type(self))
+            vars(one).update(vars(self) | dict(zip(varied, row, strict=True)))
+            yield one
 
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
@@ -261,20 +317,14 @@ class Drive(FrozenModel):
         >>> sorted(round(float(abs(pole)), 3) for pole in Drive.load("crane-4amtkf").to_control().poles())
         [0.0, 112.397, 112.397]
         """
-        from softstart.drive import control_systems
-
         if nonlinear:
             return control_systems.whole_drive(self)
         return control_systems.in_contact(self)
 
 
-def _valid(given: Mapping[str, object]) -> dict[str, object]:
-    """Those parameters that are right in themselves, read."""
-    values: dict[str, object] = {}
-    for name, value in given.items():
-        if name in PARAMETERS:
-            try:
-                values[name] = read_parameter(PARAMETERS[name], value)
-            except RefusedError:
-                continue
-    return values
+PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS
+TABLES: tuple[str, ...] = tuple(dict.fromkeys(p.table for p in PARAMETERS.values() if p.table))
+_TABLES = tuple(
+    Table(table, tuple(p for p in PARAMETERS.values() if p.table == table)) for table in ("", *TABLES)
+)
+_NAMES = {(p.table, p.key): p.name for p in PARAMETERS.values()}

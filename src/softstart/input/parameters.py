@@ -150,22 +150,22 @@ class Wording:
 
 @dataclass(frozen=True)
 class Mistake:
-    """One sentence; `missing` is the path of the parameter that it misses, `meant` of one misspelt."""
+    """One sentence; `missing`: paths of parameters of which one is needed, `meant`: that of one misspelt."""
 
     sentence: str
-    missing: str | None = None
+    missing: tuple[str, ...] = ()
     meant: str | None = None
 
 
 def sentences_of(mistakes: Iterable[Mistake]) -> list[str]:
     """The sentences, each once; a parameter that was only misspelt is not also called missing.
 
-    >>> sentences_of([Mistake("gapp: did you mean gap?", meant="gap"), Mistake("no gap", missing="gap")])
+    >>> sentences_of([Mistake("gapp: did you mean gap?", meant="gap"), Mistake("no gap", ("gap",))])
     ['gapp: did you mean gap?']
     """
     mistakes = list(mistakes)
     misspelt = {mistake.meant for mistake in mistakes if mistake.meant}
-    kept = (m.sentence for m in mistakes if m.missing is None or m.missing not in misspelt)
+    kept = (m.sentence for m in mistakes if not misspelt.intersection(m.missing))
     return list(dict.fromkeys(kept))
 
 
@@ -193,9 +193,15 @@ def read_values(
             except RefusedError as refusal:
                 mistakes.append(Mistake(wording.refused(parameter, value, refusal)))
         elif parameter.default is REQUIRED:
-            mistakes.append(Mistake(wording.missing(parameter), missing=parameter.path))
+            mistakes.append(Mistake(wording.missing(parameter), (parameter.path,)))
+        elif parameter.follows:
+            values[name] = values.get(parameter.follows)
+            other = parameters[parameter.follows]
+            if values[name] is None and not other.required and given.get(other.name) is None:
+                sentence = wording.missing(parameter, f", or {wording.label(other)} in its place")
+                mistakes.append(Mistake(sentence, (parameter.path, other.path)))
         else:
-            values[name] = values.get(parameter.follows) if parameter.follows else parameter.default
+            values[name] = parameter.default
     return values, mistakes
 
 

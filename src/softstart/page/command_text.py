@@ -11,7 +11,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
-from softstart.drive.parameters import Parameter
+from softstart.input.parameters import Parameter
 from softstart.page.downloads import file_name
 from softstart.page.drift import changes
 

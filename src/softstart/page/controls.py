@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
-from softstart.drive.parameters import PARAMETERS
+from softstart.drive import PARAMETERS
 from softstart.errors import InputError
 from softstart.page.bench import Bench
 from softstart.page.frames import SERVER, Screen

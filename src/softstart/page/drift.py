@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from softstart.drive import PARAMETERS, Drive
-from softstart.drive.parameters import Parameter
+from softstart.input.parameters import Parameter
 
 NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source")  # they change no result

@@ -9,8 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from softstart.controller.base import Controller
-from softstart.drive import Drive
-from softstart.drive.parameters import PARAMETERS
+from softstart.drive import PARAMETERS, Drive
 from softstart.page.bench import Bench, Strategy
 from softstart.page.live import Frame
 from softstart.page.map import Axes, axes_about, k_dyn_row

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart import stages
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
-from softstart.drive import Drive
+from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
@@ -185,7 +185,7 @@ def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -
     }
     coordinates = {
         name: (dims, np.broadcast_to(values, shape).copy())
-        for name in type(drive).model_fields
+        for name in PARAMETERS
         if isinstance(values := getattr(drive, name), np.ndarray)
     }
     return xarray.Dataset(data, coords=coordinates)
@@ -202,7 +202,7 @@ def _label_list(
         for name, (values, unit, meaning) in figures(results, per_start, until).items()
     }
     coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
-    for name in type(drives[0]).model_fields:
+    for name in PARAMETERS:
         values = [getattr(drive, name) for drive in drives]
         if name != "name" and any(value != values[0] for value in values):
             coordinates[name] = (("start",), values)

@@ -10,9 +10,9 @@ import numpy as np
 
 from softstart.controller.finding import quantity
 from softstart.drive import PARAMETERS
-from softstart.drive.reading import read_parameter
-from softstart.drive.sentences import Wording, flat_name_meant, refused
 from softstart.errors import InputError
+from softstart.input.parameter_set import meant_by
+from softstart.input.parameters import Wording, read_value
 from softstart.quantities import RefusedError, nearest, show
 from softstart.sweeping.maker import Maker, Parameters
 
@@ -194,13 +194,13 @@ def _of_drive(key: str, name: str, values: object) -> Column:
             texts = _texts(key, values)
             for text in texts:
                 try:
-                    read_parameter(parameter, text)
+                    read_value(parameter, text)
                 except RefusedError as reason:
-                    raise InputError(refused(wording, name, text, reason)) from None
+                    raise InputError(wording.refused(parameter, text, reason)) from None
             return Column(name, "drive", name, "", parameter.meaning, texts)
-        read = read_parameter(parameter, values)
+        read = read_value(parameter, values, batch=True)
     except RefusedError as reason:
-        raise InputError(refused(wording, name, values, reason)) from None
+        raise InputError(wording.refused(parameter, values, reason)) from None
     return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
 
 
@@ -246,7 +246,7 @@ def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> l
 
 
 def _unknown(key: str, parameters: Parameters | None) -> str:
-    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else list(flat_name_meant(key, []))
+    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else list(meant_by(key, PARAMETERS))
     if not meant:
         own = [f"{PREFIX}.{name}" for name in parameters or ()]
         close = nearest(key, [*_BY_PATH, *own, *(parameters or ()), PREFIX])

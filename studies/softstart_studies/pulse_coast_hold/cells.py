@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.study import Progress, Table
 from softstart_studies.pulse_coast_hold.crane import TOLD, Extent, ideal, optimum, run, starts
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softstart import Drive
 from softstart.controller import Controller, make_controller
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.optimal.result import OptimumError
 from softstart.optimal.solving import optimize
 from softstart.start.batch import array_starts, figures

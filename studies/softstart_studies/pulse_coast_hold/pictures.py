@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart import simulate
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.start.metrics import base_torque
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER, Cell

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.study import Progress, Table
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER
 from softstart_studies.pulse_coast_hold.crane import TOLD, Extent, run, starts

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.study import Progress, Table
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER
 from softstart_studies.pulse_coast_hold.crane import LAG, TOLD, Extent, ideal, optimum, run, starts

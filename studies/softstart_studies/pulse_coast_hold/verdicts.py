@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softstart.drive.parameters import LoadKind
+from softstart.drive import LoadKind
 from softstart.study import Claim, Verdict
 from softstart_studies.pulse_coast_hold.cells import CONTROLLER, Cell, spread, spread_of_optimum
 from softstart_studies.pulse_coast_hold.rivals import REDUCED, Rival

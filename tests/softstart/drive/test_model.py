@@ -1,6 +1,8 @@
 """The drive as a value: defaults, changes, batches, equality, and what follows from the parameters."""
 
 import copy
+import dataclasses
+import inspect
 import math
 import pickle
 import subprocess
@@ -11,10 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from softstart.drive import PARAMETERS, TABLES, Drive
-from softstart.drive.keywords import DriveChanges, DriveKeywords
 from softstart.errors import InputError
 
 CRANE = {
@@ -67,7 +67,7 @@ def test_symbols(crane):
 
 def test_everything_numeric_is_a_float():
     drive = Drive(**CRANE | {"gap": 1, "load_inertia": np.float32(0.5), "damping": np.array(2)})
-    numbers = [value for name, value in drive if PARAMETERS[name].unit and value is not None]
+    numbers = [value for name, value in drive.values().items() if PARAMETERS[name].unit and value is not None]
     assert all(type(value) is float for value in numbers)
 
 
@@ -180,17 +180,15 @@ def test_batches(crane):
 
 
 def test_the_table_the_fields_and_the_keywords_agree():
-    fields = Drive.model_fields
-    assert list(fields) == list(PARAMETERS)
-    assert set(DriveKeywords.__annotations__) == set(DriveChanges.__annotations__) == set(PARAMETERS)
+    keywords = inspect.signature(Drive).parameters
+    fields = {field.name: field for field in dataclasses.fields(Drive)}
+    assert list(keywords) == list(fields) == list(PARAMETERS)
     required = {name for name, parameter in PARAMETERS.items() if parameter.required}
-    assert required == set(DriveKeywords.__required_keys__)
-    assert required == {name for name, field in fields.items() if field.is_required()}
-    assert not DriveChanges.__required_keys__
+    assert required == {name for name, keyword in keywords.items() if keyword.default is keyword.empty}
     assert TABLES == ("motor", "shaft", "load", "start")
     assert len({p.path for p in PARAMETERS.values()}) == len(PARAMETERS)
     for parameter in PARAMETERS.values():
-        choices = typing.get_args(fields[parameter.name].annotation)
+        choices = typing.get_args(typing.get_type_hints(Drive)[parameter.name])
         assert not parameter.choices or parameter.choices == choices
 
 
@@ -203,23 +201,19 @@ def test_the_example_of_each_parameter_is_valid(crane, parameter):
 
 
 def test_no_way_in_past_the_checks(crane):
-    assert Drive.model_validate(CRANE) == crane
-    assert Drive.model_validate(crane) is crane
-    assert crane.model_copy(update={"gap": "1 rad"}).gap == 1
+    assert dataclasses.replace(crane, gap="1 rad").gap == 1
     for attempt in (
-        lambda: Drive.model_validate(CRANE | {"gap": -1}),
-        lambda: Drive.model_validate({1: 2}),
-        lambda: Drive.model_validate(3),
-        lambda: crane.model_copy(update={"gap": -1}),
+        lambda: Drive(**CRANE | {"gap": -1}),
+        lambda: crane.replace(gap=-1),
+        lambda: crane.__replace__(gap=-1),
+        lambda: dataclasses.replace(crane, gap=-1),
+        lambda: type(crane).__reduce__(crane)[0](Drive, CRANE | {"gap": -1}),
     ):
         with pytest.raises(InputError) as error:
             attempt()
-        assert not isinstance(error.value.__cause__, ValidationError)
         assert error.value.__suppress_context__ or error.value.__context__ is None
-
-
-def test_json_of_a_batch_is_plain(crane):
-    assert '"gap":[0.5,2.0]' in crane.replace(gap=[0.5, 2]).model_dump_json()
+    with pytest.raises(TypeError, match="0 positional arguments"):
+        Drive(5)
 
 
 def test_the_import_stays_light():

@@ -48,7 +48,7 @@ def drives(draw):
 def test_round_trip(drive):
     again = Drive.from_toml(drive.to_toml())
     assert again == drive
-    assert again.model_fields_set == drive.model_fields_set
+    assert again.given().keys() == drive.given().keys()
     assert again.to_toml() == drive.to_toml()
 
 

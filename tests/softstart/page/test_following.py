@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from softstart import simulate
 from softstart.controller import make_controller
-from softstart.drive.parameters import PARAMETERS
+from softstart.drive import PARAMETERS
 from softstart.page.bench import Bench
 from softstart.page.controls import GROUPS, Controls
 from softstart.page.frames import Screen

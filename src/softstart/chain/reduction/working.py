@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.chain.model import Chain, Mass, Shaft
-from softstart.drive.parameters import ContactLaw, LoadKind
+from softstart.drive import ContactLaw, LoadKind
 
 __all__ = ["Section", "Station", "Working"]
 
