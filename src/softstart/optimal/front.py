@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import IO, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,13 +17,14 @@ from softstart.controller import Controller, make_controller, ready_controller_n
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
-from softstart.optimal.front_saved import SavedPoints
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
 from softstart.optimal.shortest import shortest_start_time
 from softstart.optimal.solving import optimize
+from softstart.processes import Pool, checked_workers
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
+from softstart.store import Records, Target
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
@@ -239,6 +240,8 @@ def pareto(
     save_to: str | Path | None = None,
     progress: Progress | None = None,
     each: Callable[[FrontPoint], object] | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
 ) -> Front:
     """The least K_dyn for each of several bounds on the start time, with its lower bound.
 
@@ -254,10 +257,13 @@ def pareto(
         them from there; other inputs are refused.
     progress : told, before each point that is computed, what is being done.
     each : given each point at once, also those of the controllers' own start times.
+    workers : processes of this machine; by default all is computed in this one.
+    scheduler : address of a dask scheduler whose workers compute instead.
 
-    The sweep goes from long start times to short ones, each optimum starting from the one before. Start times
-    too short for any start are marked infeasible, no error. Raises InputError, and OptimumError if not a
-    single point could be computed.
+    The sweep goes from long start times to short ones. An optimum by collocation starts from the one before,
+    so such points are computed one after another; all others at once. The results do not depend on who
+    computes them. Start times too short for any start are marked infeasible, no error. Raises InputError, and
+    OptimumError if not a single point could be computed.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
@@ -271,7 +277,8 @@ def pareto(
         make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
     ]
     inputs = _inputs(drive, base, terminal, method, torque_speed, smoothness)
-    saved = SavedPoints(None if save_to is None else Path(save_to), inputs)
+    count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
+    target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
     runs = [simulate(drive, one, base=base) for one in made]
     if times is None:
         _tell(progress, "looking for the shortest start time")
@@ -279,7 +286,11 @@ def pareto(
     options = {"method": method, "torque_speed": torque_speed, "smoothness": smoothness, "base": base}
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
-    found = _Sweep(drive, options, saved, progress, each).through(asked)
+    with (
+        Records(target, inputs, ["terminal", "start_time_bound"]) as saved,
+        Pool(count, scheduler=scheduler, describe=_Point.__str__, kept="Finished points are kept.") as pool,
+    ):
+        found = _Sweep(drive, options, saved, progress, each, pool).through(asked)
     points = tuple(found[terminal, t] for t in times)
     if not any(point.found for point in points) and any(point.status == "NOT_FOUND" for point in points):
         raise OptimumError(next(point.status_text for point in points if point.status == "NOT_FOUND"))
@@ -316,55 +327,116 @@ def even_start_times(first: float, last: float, count: int) -> list[float]:
     return times
 
 
-@dataclass(frozen=True)
-class _Sweep:
-    """Optima for many start times, the longest first, each from the one before."""
+class _Point(NamedTuple):
+    """A point to be computed, and the optimum from which collocation may start."""
 
     drive: Drive
     options: dict[str, Any]
-    saved: SavedPoints
+    terminal: Terminal
+    start_time: float
+    warm: Any = None
+
+    def __str__(self) -> str:
+        return f"the optimum for a start time of {self.start_time:.5g} s"
+
+
+def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
+    """The point, and what the next one can start from."""
+    terminal, start_time, warm = asked.terminal, asked.start_time, asked.warm
+    why = ""
+    for start in (warm, None) if warm is not None else (None,):
+        try:
+            best = optimize(asked.drive, start_time, terminal=terminal, warm=start, **asked.options)
+        except InfeasibleError as error:
+            return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
+        except (OptimumError, NotConverged) as error:
+            why = str(error)
+            continue  # where the last optimum led astray, it is tried without
+        return FrontPoint.of_optimum(best, start_time), best.warm
+    return FrontPoint.not_found(why, start_time, terminal), None
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """Optima for many start times, the longest first."""
+
+    drive: Drive
+    options: dict[str, Any]
+    saved: Records
     progress: Progress | None
     each: Callable[[FrontPoint], object] | None
+    pool: Pool
 
     def through(self, asked: set[tuple[Terminal, float]]) -> dict[tuple[Terminal, float], FrontPoint]:
         """All points asked for."""
         found: dict[tuple[Terminal, float], FrontPoint] = {}
-        warm: Any = None
-        too_short: FrontPoint | None = None
         order = sorted(asked, key=lambda one: (one[0], -one[1]))
-        for number, (terminal, start_time) in enumerate(order, start=1):
-            if number > 1 and order[number - 2][0] != terminal:
-                warm = too_short = None
-            record = self.saved.find(terminal, start_time)
-            if record is not None:
-                point = FrontPoint.of_record(record)
-            elif too_short is not None:  # what no longer start time allowed, no shorter one does
-                point = too_short.for_shorter(start_time)
-            else:
-                _tell(self.progress, f"start time {number} of {len(order)}: {start_time:.5g} s, {terminal}")
-                point, warm = self._computed(terminal, start_time, warm)
-                if point.status != "NOT_FOUND":  # another attempt may find it
-                    self.saved.add(point.record())
-            if point.status == "INFEASIBLE":
-                too_short = point
-            found[terminal, start_time] = point
-            if self.each is not None:
-                self.each(point)
+        for terminal in dict.fromkeys(terminal for terminal, _ in order):
+            chain = _Chain(self, terminal, [t for other, t in order if other == terminal])
+            too_short: FrontPoint | None = None
+            for start_time in chain.start_times:
+                record = self.saved.find(terminal, start_time)
+                if record is not None:
+                    point = FrontPoint.of_record(record)
+                elif too_short is not None:  # what no longer start time allowed, no shorter one does
+                    point = too_short.for_shorter(start_time)
+                else:
+                    number = order.index((terminal, start_time)) + 1
+                    _tell(
+                        self.progress, f"start time {number} of {len(order)}: {start_time:.5g} s, {terminal}"
+                    )
+                    point = chain.computed(start_time)
+                    if point.status != "NOT_FOUND":  # another attempt may find it
+                        self.saved.add(point.record())
+                if point.status == "INFEASIBLE":
+                    too_short = point
+                    chain.stopped = True
+                found[terminal, start_time] = point
+                if self.each is not None:
+                    self.each(point)
         return found
 
-    def _computed(self, terminal: Terminal, start_time: float, warm: Any) -> tuple[FrontPoint, Any]:
-        """The point, and what the next one can start from."""
-        why = ""
-        for start in (warm, None) if warm is not None else (None,):
-            try:
-                best = optimize(self.drive, start_time, terminal=terminal, warm=start, **self.options)
-            except InfeasibleError as error:
-                return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
-            except (OptimumError, NotConverged) as error:
-                why = str(error)
-                continue  # where the last optimum led astray, it is tried without
-            return FrontPoint.of_optimum(best, start_time), best.warm
-        return FrontPoint.not_found(why, start_time, terminal), None
+
+class _Chain:
+    """Points of one terminal condition, from long start times to short ones.
+
+    A point of the collocation leaves something for the next one to start from: these are computed one after
+    another. Where the first point leaves nothing, the others are computed at once, in advance.
+    """
+
+    def __init__(self, sweep: _Sweep, terminal: Terminal, start_times: list[float]) -> None:
+        self.sweep, self.terminal, self.start_times = sweep, terminal, start_times
+        self.stopped = False  # the last point was infeasible, and so are all shorter ones
+        self._warm: Any = None
+        self._ahead: Iterator[tuple[_Point, tuple[FrontPoint, Any]]] | None = None
+        self._done: dict[float, tuple[FrontPoint, Any]] = {}
+
+    def computed(self, start_time: float) -> FrontPoint:
+        """The point of a start time."""
+        results = self.sweep.pool.results
+        if self._warm is None and self._ahead is not None:
+            while start_time not in self._done:
+                asked, answer = next(self._ahead, (None, None))
+                if asked is None or answer is None:
+                    break  # it was not computed in advance
+                self._done[asked.start_time] = answer
+        if self._warm is not None or start_time not in self._done:
+            ((_, answer),) = results(_computed, [self._point(start_time, self._warm)])
+            self._done[start_time] = answer
+        point, self._warm = self._done[start_time]
+        if self._ahead is None and self._warm is None:
+            self._ahead = results(_computed, self._shorter_than(start_time))
+        return point
+
+    def _shorter_than(self, start_time: float) -> Iterator[_Point]:
+        for other in self.start_times:
+            if self.stopped or self._warm is not None:
+                return
+            if other < start_time and self.sweep.saved.find(self.terminal, other) is None:
+                yield self._point(other)
+
+    def _point(self, start_time: float, warm: Any = None) -> _Point:
+        return _Point(self.sweep.drive, self.sweep.options, self.terminal, start_time, warm)
 
 
 def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:

@@ -19,13 +19,12 @@ from softstart.quantities import nearest, show
 from softstart.sweeping import netcdf as netcdf_file
 from softstart.sweeping.axes import Axis, read_grid
 from softstart.sweeping.checking import check_corners, first_start
-from softstart.sweeping.lock import locked
 from softstart.sweeping.maker import Maker, with_whole_path
 from softstart.sweeping.memory import Memory
 from softstart.sweeping.plan import Plan, checked_chunk, plan_for
 from softstart.sweeping.progress import Told, Watch
 from softstart.sweeping.starts import Question, Task, cut, known_figures
-from softstart.sweeping.store import Folder, compute_and_keep, open_folder, write_block
+from softstart.sweeping.store import Folder, compute_and_keep, open_folder, target_of, write_block
 
 if TYPE_CHECKING:
     import xarray
@@ -96,7 +95,7 @@ def sweep(
         drive, maker, tuple(dict.fromkeys(figures)), _time(until), fitted_to, base, _time(time_limit)
     )
     most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
-    target = None if to is None else Path(to)
+    target = None if to is None else target_of(Path(to))
     if netcdf is not None:
         netcdf_file.check_place(Path(netcdf))
     check_corners(question, axes)
@@ -112,7 +111,7 @@ def sweep(
         Pool, min(count, plan.chunks), threads=threads, scheduler=scheduler, describe=_described,
         advice="take fewer workers or smaller chunks", kept="Finished chunks are kept.",
     )  # fmt: skip
-    with nullcontext() if target is None else locked(target):
+    with nullcontext() if target is None else target.locked():
         if target is None:
             memory = Memory(plan, axes, question)
             _run(memory, None, plan, axes, question, pool, progress)
@@ -121,7 +120,7 @@ def sweep(
             folder = Folder(target, plan, axes, question, most)
             plan = folder.plan
             _run(None, folder, plan, axes, question, pool, progress)
-            results = open_folder(target)
+            results = open_folder(target.path)
         if netcdf is not None:
             netcdf_file.write_netcdf(Path(netcdf), results, plan, axes, question)
     return results

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from softstart import __version__
 from softstart.errors import InputError
+from softstart.store import Target
 from softstart.sweeping.axes import Axis
 from softstart.sweeping.maker import about_name
 from softstart.sweeping.plan import Plan
@@ -61,16 +62,16 @@ class Folder:
     """The Zarr group of a sweep: made anew, or found with the same inputs."""
 
     def __init__(
-        self, path: Path, plan: Plan, axes: tuple[Axis, ...], question: Question, chunk: int | None
+        self, target: Target, plan: Plan, axes: tuple[Axis, ...], question: Question, chunk: int | None
     ) -> None:
-        self.path = path
+        self.path = target.path
         inputs = inputs_of(question, axes)
-        if path.is_dir() and any(path.iterdir()):
-            self.plan = _resumed(path, inputs, plan, chunk)
+        if self.path.is_dir() and any(self.path.iterdir()):
+            self.plan = _resumed(target, inputs, plan, chunk)
             self.sweep_up()
         else:
             self.plan = plan
-            _create(path, plan, axes, question, inputs)
+            _create(target, plan, axes, question, inputs)
 
     def finished(self, number: int) -> bool:
         """Whether a chunk is finished."""
@@ -150,35 +151,31 @@ def _is_sweep(path: Path) -> bool:
     return INPUTS in _attributes(path)
 
 
-def _resumed(path: Path, inputs: dict[str, Any], plan: Plan, chunk: int | None) -> Plan:
+def target_of(path: Path) -> Target:
+    """The folder of a sweep, as `to` names it."""
+    return Target("to", path, "sweep", "folder")
+
+
+def _resumed(target: Target, inputs: dict[str, Any], plan: Plan, chunk: int | None) -> Plan:
     """The plan of the sweep that is there, if it is this one."""
-    attributes = _attributes(path)
+    attributes = _attributes(target.path)
     if INPUTS not in attributes:
-        raise InputError(f"to = {path}: this folder holds something else than a sweep; give another one.")
-    before = json.loads(attributes[INPUTS])
-    other = [name for name in {**before, **inputs} if before.get(name) != inputs.get(name)]
-    if other:
-        raise InputError(
-            f"to = {path}: it holds a sweep with another {_listed(other)}; give another folder, or delete "
-            "this one to begin anew."
-        )
+        raise target.foreign()
+    target.check_same(json.loads(attributes[INPUTS]), inputs)
     there = Plan(plan.shape, tuple(attributes["softstart_chunk"]))
     if chunk is not None and there != plan:
         raise InputError(
-            f"chunk = {chunk}: the sweep in {path} was begun in chunks of "
-            f"{' x '.join(map(str, there.chunk))} starts; leave chunk out to go on, or give another folder."
+            f"chunk = {chunk}: the sweep in {target.path} was begun in chunks of "
+            f"{' x '.join(map(str, there.chunk))} starts; leave chunk out to go on, or {target.other}."
         )
     return there
 
 
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-
-
 def _create(
-    path: Path, plan: Plan, axes: tuple[Axis, ...], question: Question, inputs: dict[str, Any]
+    target: Target, plan: Plan, axes: tuple[Axis, ...], question: Question, inputs: dict[str, Any]
 ) -> None:
     """An empty sweep, put in place by one rename."""
+    path = target.path
     try:
         fresh = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
         try:
@@ -192,10 +189,7 @@ def _create(
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
     except OSError as error:
-        raise InputError(
-            f"to = {path}: no folder can be made there ({error.strerror or error}); give one that you may "
-            "write to."
-        ) from None
+        raise target.unwritable(error) from None
 
 
 def _fill(

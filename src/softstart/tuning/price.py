@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool
+from softstart.store import Records
 from softstart.tuning.log import Log
 from softstart.tuning.question import Question
-from softstart.tuning.saved import SavedParts
 
 Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
 
@@ -25,7 +25,7 @@ class Asked(NamedTuple):
 
 
 def optima(
-    pool: Pool, question: Question, saved: SavedParts, log: Log, bounds: list[tuple[int, float]]
+    pool: Pool, question: Question, saved: Records, log: Log, bounds: list[tuple[int, float]]
 ) -> Optima:
     """The least K_dyn of cells within bounds on the start time, each with its lower bound."""
     asked = list(dict.fromkeys((cell, bound) for cell, bound in bounds if math.isfinite(bound)))
@@ -33,7 +33,7 @@ def optima(
     for cell, bound in asked:
         record = saved.find(("optimum", cell, bound))
         if record is not None:
-            found[cell, bound] = record
+            found[cell, bound] = {name: value for name, value in record.items() if name != "part"}
     missing = [
         Asked(cell, bound, question.drive_of(cell), question.base)
         for cell, bound in asked
@@ -43,7 +43,7 @@ def optima(
     for one, record in pool.results(optimum_of, missing):
         found[one.cell, one.bound] = record
         if record["status"] != "NOT_FOUND":  # another attempt may find it
-            saved.add(("optimum", one.cell, one.bound), record)
+            saved.add({"part": ("optimum", one.cell, one.bound), **record})
         log.did(0)
     return found
 

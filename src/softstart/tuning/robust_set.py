@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.store import Records
 from softstart.tuning.log import Log
 from softstart.tuning.ranges import inside
 from softstart.tuning.ranking import cost
-from softstart.tuning.saved import SavedParts
 from softstart.tuning.schedule import ScheduleFound
 from softstart.tuning.search import Found, search
 from softstart.tuning.trials import Judged, Trials
@@ -34,7 +34,7 @@ class SetFound:
     kept_default: bool
 
 
-def robust_set(workers: Workers, saved: SavedParts, log: Log, scheduled: ScheduleFound | None) -> SetFound:
+def robust_set(workers: Workers, saved: Records, log: Log, scheduled: ScheduleFound | None) -> SetFound:
     """The set whose worst case, or quantile, over all starts is least."""
     trials = workers.trials
     question = trials.question
@@ -58,7 +58,7 @@ def robust_set(workers: Workers, saved: SavedParts, log: Log, scheduled: Schedul
             population = WIDER * question.population
             seeds = _seeds(trials, scheduled if helped else None, population // 2)
             one = search(costs, seeds, (question.seed, 4, restart), population, question.generations)
-            saved.add(part, {"place": one.place.tolist(), "cost": one.cost, "tried": one.tried})
+            saved.add({"part": part, "place": one.place.tolist(), "cost": one.cost, "tried": one.tried})
         else:
             one = Found(np.array(record["place"]), record["cost"], record["tried"])
         found.append(one)

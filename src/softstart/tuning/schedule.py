@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.store import Records
 from softstart.tuning.log import Log
 from softstart.tuning.ranges import inside
 from softstart.tuning.ranking import cost, in_time
-from softstart.tuning.saved import SavedParts
 from softstart.tuning.search import Found
 from softstart.tuning.trials import Judged
 from softstart.tuning.work import Advice, CellSearch, ask_neighbours, cell_costs, own_values, search_cells
@@ -37,7 +37,7 @@ class ScheduleFound:
     kept_default: Any  # whether a cell's defaults were best, one a cell
 
 
-def schedule(workers: Workers, saved: SavedParts, log: Log) -> ScheduleFound:
+def schedule(workers: Workers, saved: Records, log: Log) -> ScheduleFound:
     """The best gains of every cell."""
     trials = workers.trials
     question = trials.question
@@ -67,7 +67,7 @@ def schedule(workers: Workers, saved: SavedParts, log: Log) -> ScheduleFound:
 
 
 def _parts(
-    workers: Workers, saved: SavedParts, log: Log, title: str, work: Any, items: list[Any]
+    workers: Workers, saved: Records, log: Log, title: str, work: Any, items: list[Any]
 ) -> list[Found]:
     """The results of all items, those saved taken from there; several a call, whatever the workers."""
     question = workers.trials.question
@@ -84,7 +84,7 @@ def _parts(
         for index, one in zip(blocks[k], results, strict=True):
             found[index] = one
             record = {"place": one.place.tolist(), "cost": one.cost, "tried": one.tried}
-            saved.add(_key(items[index]), record)
+            saved.add({"part": _key(items[index]), **record})
             log.did(one.tried * len(question.scenarios))
     return [found[index] for index in range(len(items))]
 

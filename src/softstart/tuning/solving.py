@@ -10,6 +10,7 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers
+from softstart.store import Records, Target
 from softstart.tuning.grid import gaps_of, inertias_of
 from softstart.tuning.log import Log, Progress
 from softstart.tuning.outcome import Tuning
@@ -18,7 +19,6 @@ from softstart.tuning.question import Metric, Question, bound_of
 from softstart.tuning.ranges import Free, check_number, ranges_of
 from softstart.tuning.recipe import recipe_of
 from softstart.tuning.robust_set import robust_set
-from softstart.tuning.saved import SavedParts
 from softstart.tuning.schedule import schedule as tuned_schedule
 from softstart.tuning.tables import between_table, check_metric, price_table, robust_outcome, schedule_table
 from softstart.tuning.tolerances import scenarios_of
@@ -114,18 +114,19 @@ def tune(
     trials = Trials(question)
     check_metric(trials)
     size = len(question.cells) * len(question.scenarios) * question.restarts
-    kept = SavedParts(None if save_to is None else Path(save_to), question.inputs())
     found, one = None, None
     best: Optima = {}
-    with pool_for(trials, workers, scheduler, size * question.population * question.generations) as pool:
-        work = Workers(trials, pool)
-        if schedule:
-            found = tuned_schedule(work, kept, log)
-        if robust:
-            one = robust_set(work, kept, log, found)
-    if certified and metric == "k_dyn":
-        with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
-            best = optima(pool, question, kept, log, _bounds(trials, schedule, robust))
+    target = None if save_to is None else Target("save_to", Path(save_to), "tuning")
+    with Records(target, question.inputs(), ["part"]) as kept:
+        with pool_for(trials, workers, scheduler, size * question.population * question.generations) as pool:
+            work = Workers(trials, pool)
+            if schedule:
+                found = tuned_schedule(work, kept, log)
+            if robust:
+                one = robust_set(work, kept, log, found)
+        if certified and metric == "k_dyn":
+            with Pool(checked_workers(workers, scheduler), scheduler=scheduler, describe=_described) as pool:
+                best = optima(pool, question, kept, log, _bounds(trials, schedule, robust))
     return Tuning(
         question,
         None if found is None else schedule_table(trials, found),

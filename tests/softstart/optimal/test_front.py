@@ -9,7 +9,6 @@ import pytest
 from softstart import Drive, InputError, simulate
 from softstart.controller import ready_controller_names
 from softstart.optimal.front import ControllerPoint, FrontPoint, default_start_times, even_start_times, pareto
-from softstart.optimal.front_saved import SavedPoints
 from softstart.optimal.problem import Problem
 from softstart.optimal.shortest import shortest_start_time
 from softstart.optimal.solving import optimize
@@ -139,7 +138,7 @@ def test_points_of_other_inputs_are_refused_and_kept(tmp_path, kept_point, chang
     kept.write_bytes(kept_point)
     options = {"drive": CRANE, "controllers": [], "save_to": kept}
     before = kept.read_bytes()
-    with pytest.raises(InputError, match=f"computed with another {names}; ") as refused:
+    with pytest.raises(InputError, match=f"holds a limit curve with another {names}; ") as refused:
         pareto(start_times=[0.32], **options | change)
     assert len(refused.value.sentences) == 1
     assert kept.read_bytes() == before
@@ -150,26 +149,12 @@ def test_points_of_other_inputs_are_refused_and_kept(tmp_path, kept_point, chang
 )
 def test_a_file_that_holds_something_else_is_refused(tmp_path, text):
     (tmp_path / "notes").write_text(text)
-    with pytest.raises(InputError, match=r"no file of saved points|another input"):
-        SavedPoints(tmp_path / "notes", {})
+    with pytest.raises(
+        InputError, match="this file holds something else than a limit curve; name another file"
+    ):
+        pareto(CRANE, [0.3], controllers=[], save_to=tmp_path / "notes")
     assert (tmp_path / "notes").read_text() == text
-
-
-def test_a_torn_last_line_costs_that_point_only(tmp_path):
-    path = tmp_path / "front.jsonl"
-    saved = SavedPoints(path, {"a": 1})
-    for time in (0.3, 0.31):
-        saved.add({"terminal": "reached", "start_time_bound": time})
-    path.write_text(path.read_text()[:-9])
-    again = SavedPoints(path, {"a": 1})
-    assert again.find("reached", 0.3)
-    assert again.find("reached", 0.31) is None
-
-
-def test_an_unwritable_place_is_one_sentence(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="its folder cannot be made"):
-        SavedPoints(tmp_path / "file" / "x.jsonl", {}).add({"terminal": "reached", "start_time_bound": 0.3})
+    assert [path.name for path in tmp_path.iterdir()] == ["notes"]
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ import pytest
 import xarray
 
 from softstart import Drive, InputError, sweep
-from softstart.sweeping.lock import locked
-from softstart.sweeping.store import open_folder
+from softstart.sweeping.store import open_folder, target_of
 
 from .conftest import alive, children
 
@@ -144,8 +143,14 @@ def test_folders_that_hold_something_else(tmp_path):
         open_folder(tmp_path / "full")
 
 
-HOLDER = "import sys, time\nfrom pathlib import Path\nfrom softstart.sweeping.lock import locked\n" \
-    "with locked(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)\n"  # fmt: skip
+HOLDER = """
+import sys, time
+from pathlib import Path
+from softstart.sweeping.store import target_of
+with target_of(Path(sys.argv[1])).locked():
+    print("held", flush=True)
+    time.sleep(60)
+"""
 
 
 def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
@@ -160,7 +165,7 @@ def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
     assert (tmp_path / ".a.lock").exists()  # what the dead one left
     sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
-    with locked(folder), pytest.raises(InputError, match="is writing this sweep now"):
+    with target_of(folder).locked(), pytest.raises(InputError, match="is writing this sweep now"):
         sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
 
 

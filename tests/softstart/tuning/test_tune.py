@@ -211,7 +211,7 @@ def test_parts_of_another_question_are_refused_and_kept(tmp_path):
         tune(CRANE.replace(damping=0.1), "reduced-first-stage", **options, seed=3)
     kept_elsewhere = tmp_path / "notes"
     kept_elsewhere.write_text("[1]\n")
-    with pytest.raises(InputError, match="no file of a saved tuning"):
+    with pytest.raises(InputError, match="holds something else than a tuning; name another file"):
         tune(CRANE, "reduced-first-stage", **(options | {"save_to": kept_elsewhere}))
     assert kept.read_bytes() == before
     assert kept_elsewhere.read_text() == "[1]\n"
