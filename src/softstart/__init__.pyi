@@ -1,0 +1,50 @@
+"""The public names of softstart, each with the module that defines it; `__init__.py` reads this list."""
+
+from softstart.balancing import Engine as Engine
+from softstart.balancing import PeriodicTorque as PeriodicTorque
+from softstart.balancing import balance as balance
+from softstart.chain import Chain as Chain
+from softstart.chain import ChainRun as ChainRun
+from softstart.chain import natural_vibration as natural_vibration
+from softstart.chain import reduce_chain as reduce_chain
+from softstart.chain import simulate_chain as simulate_chain
+from softstart.chain import verify_on_chain as verify_on_chain
+from softstart.clutch import Clutch as Clutch
+from softstart.clutch import Engagement as Engagement
+from softstart.clutch import EngagementFront as EngagementFront
+from softstart.clutch import engage as engage
+from softstart.clutch import optimize_engagement as optimize_engagement
+from softstart.controller import Command as Command
+from softstart.controller import CompiledController as CompiledController
+from softstart.controller import Controller as Controller
+from softstart.controller import Measured as Measured
+from softstart.controller import PlainController as PlainController
+from softstart.controller import Sensor as Sensor
+from softstart.drive import Drive as Drive
+from softstart.errors import InputError as InputError
+from softstart.errors import SimulationError as SimulationError
+from softstart.linear.view import LinearView as LinearView
+from softstart.linear.view import linear_view as linear_view
+from softstart.optimal.front import Front as Front
+from softstart.optimal.front import pareto as pareto
+from softstart.optimal.problem import Problem as Problem
+from softstart.optimal.result import InfeasibleError as InfeasibleError
+from softstart.optimal.result import Optimum as Optimum
+from softstart.optimal.result import OptimumError as OptimumError
+from softstart.optimal.robust import RobustOptimum as RobustOptimum
+from softstart.optimal.robust import optimize_robust as optimize_robust
+from softstart.optimal.robust import worth_of_contact_sensor as worth_of_contact_sensor
+from softstart.optimal.solving import optimize as optimize
+from softstart.profile import TorqueProfile as TorqueProfile
+from softstart.reporting.result import Report as Report
+from softstart.reporting.result import report as report
+from softstart.start.comparison import Comparison as Comparison
+from softstart.start.comparison import compare as compare
+from softstart.start.run import Run as Run
+from softstart.start.simulation import simulate as simulate
+from softstart.start.status import Status as Status
+from softstart.sweeping.entry import sweep as sweep
+from softstart.tuning.outcome import Tuning as Tuning
+from softstart.tuning.solving import tune as tune
+
+__version__: str
