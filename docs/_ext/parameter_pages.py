@@ -11,7 +11,7 @@ from command_pages import cell, prose
 
 from softstart.balancing.tables import TABLES as ENGINE
 from softstart.chain.tables import TABLES as CHAIN
-from softstart.clutch.parameters import TABLES as CLUTCH
+from softstart.clutch.model import TABLES as CLUTCH
 from softstart.controller import controller_class, controller_names
 from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS

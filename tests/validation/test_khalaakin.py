@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softstart.balancing import Counterweights, Cylinders, Engine, Masses, balance
-from softstart.balancing.shaking import shaking_of_crank
+from softstart.balancing.engine import shaking_of_crank
 
 RPM = math.pi / 30.0
 TUNING = 4500.0 * RPM

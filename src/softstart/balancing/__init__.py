@@ -10,12 +10,11 @@
 
 from __future__ import annotations
 
-from softstart.balancing.cycle import SimpleCycle
+from softstart.balancing.design import Balance, Residual, balance
 from softstart.balancing.engine import Engine
-from softstart.balancing.indicator import MeasuredCycle
+from softstart.balancing.gas import MeasuredCycle, SimpleCycle
 from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Layout, Masses, Operation
 from softstart.balancing.periodic_torque import PeriodicTorque
-from softstart.balancing.result import Balance, Residual, balance
 
 __all__ = [
     "Balance",

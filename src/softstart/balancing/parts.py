@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.balancing.slider_crank import SliderCrank, Vector
+from softstart.arrays import Vector
+from softstart.balancing.slider_crank import SliderCrank
 from softstart.balancing.tables import BALANCER, COUNTERWEIGHTS, CYLINDERS, MASSES, OPERATION, SHAFT
 from softstart.errors import InputError
 from softstart.input.documents import Table, read_table
@@ -43,18 +44,13 @@ class Part:
         given = {one.name: getattr(self, one.name) for one in fields(known)}
         for key, value in read_table(given, self.TABLE).items():
             object.__setattr__(self, key, tuple(value.tolist()) if isinstance(value, np.ndarray) else value)
-        wrong = list(self.mistakes())
+        wrong = list(self.contradictions())
         if wrong:
             raise InputError(wrong)
 
-    def mistakes(self) -> Sequence[str]:
-        """What the values say against one another."""
+    def contradictions(self) -> Sequence[str]:
+        """Sentences on values that contradict one another."""
         return ()
-
-    @classmethod
-    def of(cls, values: dict[str, Any]) -> Any:
-        """The part from the values of its table."""
-        return cls(**values)
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ class Cylinders(Part):
 
     TABLE: ClassVar[Table] = CYLINDERS
 
-    def mistakes(self) -> Sequence[str]:
+    def contradictions(self) -> Sequence[str]:
         """The rod, and when the cylinders fire."""
         wrong = []
         if self.rod_length <= 0.5 * self.stroke:
@@ -157,7 +153,7 @@ class Cylinders(Part):
 class Masses(Part):
     """Masses in kg of one cylinder; the rod is split between piston pin and crank pin.
 
-    `inertia` in kg m^2 of crank and flywheel is only asked for the fluctuation of the speed.
+    `inertia` in kg m^2 of crank and flywheel is only needed for the speed fluctuation.
     """
 
     reciprocating: float
@@ -179,7 +175,7 @@ class Counterweights(Part):
 
 @dataclass(frozen=True)
 class Operation(Part):
-    """Speeds in rad/s between which the engine works, and its load: 1 is full, 0 is idling."""
+    """Speed range in rad/s, and load: 1 is full, 0 is idling."""
 
     lowest_speed: float
     highest_speed: float
@@ -187,7 +183,7 @@ class Operation(Part):
 
     TABLE: ClassVar[Table] = OPERATION
 
-    def mistakes(self) -> Sequence[str]:
+    def contradictions(self) -> Sequence[str]:
         """The range."""
         if self.lowest_speed < self.highest_speed:
             return ()
@@ -199,7 +195,7 @@ class Operation(Part):
 
 @dataclass(frozen=True)
 class Layout(Part):
-    """What is fixed of a two-shaft balancer to be designed: tuning speed in rad/s, shaft distance in m."""
+    """Given values of a two-shaft balancer to be designed: tuning speed in rad/s, shaft distance in m."""
 
     tuning_speed: float
     spacing: float = 0.0
@@ -227,7 +223,7 @@ class BalancerShaft(Part):
 
     TABLE: ClassVar[Table] = SHAFT
 
-    def mistakes(self) -> Sequence[str]:
+    def contradictions(self) -> Sequence[str]:
         """The ratio."""
         if self.ratio and self.ratio == round(self.ratio):
             return ()

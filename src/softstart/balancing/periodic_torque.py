@@ -1,4 +1,4 @@
-"""A torque that repeats with the crank: its mean and its harmonics."""
+"""A torque that is periodic in the crank angle: its mean and its harmonics."""
 
 from __future__ import annotations
 
@@ -7,22 +7,38 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 
 __all__ = ["PeriodicTorque"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicTorque:
     """mean + sum cosine_k cos(orders_k speed t) + sine_k sin(orders_k speed t), in N m.
 
-    `orders` are multiples of the crank `speed` in rad/s, halves too for a four-stroke engine. Time 0 is the
-    firing dead centre of the first cylinder, where crank angle 0 is.
+    Time 0 is the firing dead centre of the first cylinder, where crank angle 0 is.
 
+    Parameters
+    ----------
+    mean : float
+        Mean torque, N m.
+    orders : array_like of shape (n,)
+        Multiples of the crank speed above 0, with halves for a four-stroke engine.
+    cosine, sine : array_like of shape (n,)
+        Amplitudes of the harmonics, N m.
+    speed : float
+        Crank speed, rad/s.
+
+    Raises
+    ------
+    InputError
+        If the arrays differ in size, a value is not finite, or an order or the speed is not above 0.
+
+    Examples
+    --------
     >>> torque = PeriodicTorque(50.0, [1.0], [0.0], [20.0], speed=100.0)
     >>> float(torque.at(math.pi / 200))
     70.0
@@ -47,7 +63,7 @@ class PeriodicTorque:
         if not np.all(np.isfinite([self.mean, *self.orders, *self.cosine, *self.sine])):
             raise InputError("mean, orders, cosine, sine: all must be finite numbers.")
         if np.any(self.orders <= 0.0):
-            raise InputError("orders: each must be above 0; what is constant belongs into mean.")
+            raise InputError("orders: each must be above 0; the constant part is mean.")
 
     def at(self, t: ArrayLike) -> Vector:
         """The torque in N m at times in s."""

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from softstart.arrays import Vector
 
 __all__ = [
     "SliderCrank",
@@ -19,8 +21,6 @@ __all__ = [
     "inertia_torque_harmonics",
     "inertia_torque_series",
 ]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from softstart.clutch import (
     engage,
     optimize_engagement,
 )
-from softstart.clutch.law_files import read_law
-from softstart.clutch.parameters import LIBRARY, TABLES
+from softstart.clutch.laws import read_law
+from softstart.clutch.model import LIBRARY, TABLES
 from softstart.errors import InputError
 from softstart.quantities import to_si
 from softstart.views import clutches as views

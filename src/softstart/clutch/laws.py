@@ -1,12 +1,16 @@
 """Engagement laws: how the friction torque MM(t) of a clutch rises, in pieces that are known exactly.
 
 A piece is a polynomial of at most second degree plus one exponential term, so that its Taylor series is known
-from any instant on. Behind the last piece the torque is held. Symbols and the laws' numbers are those of [C].
+from any instant on. After the last piece the torque is held. Symbols and the laws' numbers are those of [C].
+A law can be read from a CSV file: instants and friction torques, with straight lines between.
 """
 
 from __future__ import annotations
 
+import csv
 import math
+import os
+import re
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +22,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
-
-__all__ = ["LAWS", "Law", "LawKind", "Piece", "shaped_law", "table_law"]
+from softstart.errors import InputError
+from softstart.input.files import text_of
+from softstart.quantities import RefusedError, parse, show
 
 LawKind = Literal["linear", "quadratic-concave", "quadratic-convex", "exponential"]
 LAWS: tuple[LawKind, ...] = get_args(LawKind)
+
+MOST_SENTENCES = 5
+_UNIT = re.compile(r"\[(.+)\]\s*$")
 
 
 @dataclass(frozen=True)
@@ -140,3 +148,53 @@ def table_law(times: Sequence[float], torques: Sequence[float], label: str = "ta
     while pieces and pieces[-1].b == 0.0 and pieces[-1].a == last:
         end = pieces.pop().start
     return Law(label, (*pieces, Piece(end, last)))
+
+
+def read_law(path: str | os.PathLike[str]) -> tuple[list[float], list[float]]:
+    """(times in s, torques in N m) of a CSV file with two columns.
+
+    A first line that holds no numbers is a heading, which may give units, as `t [ms],M [kgf*m]`; without them
+    numbers are s and N m. Two lines with the same instant are a step. Raises InputError for all lines that
+    are wrong.
+    """
+    where = show(os.fspath(path))
+    rows = [
+        row
+        for row in enumerate(csv.reader(text_of(path, "a table of the law", "CSV").splitlines()), 1)
+        if any(row[1])
+    ]
+    units = ["", ""]
+    if rows and not _is_number(rows[0][1][0]):
+        found = [_UNIT.search(cell) for cell in rows[0][1][:2]]
+        units = [match.group(1) if match else "" for match in found] + [""] * (2 - len(found))
+        rows = rows[1:]
+    if not rows:
+        raise InputError(f"{where}: there are no numbers in it; write lines of time, torque, as 0.5,200.")
+    columns: tuple[list[float], list[float]] = [], []
+    wrong = []
+    for number, row in rows:
+        if len(row) != 2:
+            wrong.append(
+                f"{where}, line {number}: {len(row)} columns; write two, time and torque, as 0.5,200."
+            )
+            continue
+        for column, cell, unit, own in zip(columns, row, units, ("s", "N*m"), strict=True):
+            text = f"{cell.strip()} {unit}".strip() if _is_number(cell) else cell.strip()
+            try:
+                column.append(float(parse(text, own)))
+            except RefusedError as refusal:
+                wrong.append(f"{where}, line {number}, {show(text)}: {refusal.reason}.")
+    if wrong:
+        more = len(wrong) - MOST_SENTENCES
+        raise InputError(
+            [*wrong[:MOST_SENTENCES], *([f"{where}: {more} more lines are wrong."] if more > 0 else [])]
+        )
+    return columns
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -14,29 +14,132 @@ from typing import Any, Self, cast
 import numpy as np
 
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
-from softstart.clutch.parameters import LIBRARY, PARAMETERS, TABLES, WHAT
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, read_document, read_table
+from softstart.input.files import Library
+from softstart.input.parameters import Parameter
 from softstart.quantities import nearest, show
 
-__all__ = ["Clutch"]
+WHAT = "a clutch"
+LIBRARY = Library("softstart.clutch", "a clutch", "clutches")
 
+PARAMETERS = (
+    Parameter("name", "", "name of the clutch", '"my clutch"', default="unnamed clutch"),
+    Parameter("source", "", "source of the numbers", '"data sheet"', default="not given"),
+    Parameter(
+        "inertia", "kg*m^2", "inertia IM of the clutch side", '"0.98 kg*m^2"', "above 0", table="clutch",
+        name="clutch_inertia",
+    ),
+    Parameter(
+        "torque", "N*m", "friction torque MM of the engaged clutch", '"588 N*m"', "above 0", table="clutch",
+        name="clutch_torque",
+    ),
+    Parameter(
+        "speed", "rad/s", "constant speed w0 of the driving side", '"230 rad/s"', "above 0", table="clutch",
+        name="drive_speed",
+    ),
+    Parameter(
+        "engagement_time", "s", "time tM in which the friction torque rises", '"1 s"', "above 0",
+        table="clutch",
+    ),
+    Parameter(
+        "lining_area", "m^2", "area of all friction faces", '"0.05 m^2"', "above 0", default=None,
+        table="clutch",
+    ),
+    Parameter("stiffness", "N*m/rad", "stiffness cp of the shaft", '"49 N*m/rad"', "above 0", table="shaft"),
+    Parameter(
+        "damping", "N*m*s/rad", "damping of the shaft", '"0.5 N*m*s/rad"', "0 or more", default=0.0,
+        table="shaft",
+    ),
+    Parameter("gap", "rad", "total angular gap", '"0.02 rad"', "0 or more", default=0.0, table="shaft"),
+    Parameter(
+        "inertia", "kg*m^2", "inertia Ic of the load", '"4.9 kg*m^2"', "above 0", table="load",
+        name="load_inertia",
+    ),
+    Parameter(
+        "torque", "N*m", "torque Mc of the load", '"196 N*m"', "0 or more", table="load", name="load_torque",
+    ),
+    Parameter(
+        "kind", "", "kind of the load torque", '"active"', default="active", choices=("active", "reactive"),
+        table="load", name="load_kind",
+    ),
+    Parameter(
+        "kind", "", "engagement law", '"linear"', default="linear", choices=(*LAWS, "table"), table="law",
+        name="law",
+    ),
+    Parameter(
+        "time_constant", "s", "time constant of the exponential law", '"1 s"', default=1.0, table="law",
+    ),
+    Parameter(
+        "times", "s", "instants of the table", "[0, 0.5, 1]", "0 or more", default=None, many=True,
+        table="law", name="law_times",
+    ),
+    Parameter(
+        "torques", "N*m", "friction torques of the table", "[0, 200, 588]", "0 or more", default=None,
+        many=True, table="law", name="law_torques",
+    ),
+)  # fmt: skip
+
+TABLES = tuple(
+    Table(table, tuple(p for p in PARAMETERS if p.table == table), required=table != "law")
+    for table in ("", "clutch", "shaft", "load", "law")
+)
 KEYWORDS = Table("", PARAMETERS)
 
-ABOVE = 1.0 + 1e-9  # a table may lie above MM by rounding
-SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate is no number any more
+ABOVE = 1.0 + 1e-9  # a table may exceed MM by rounding
+SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate overflows
 
 
 @dataclass(frozen=True)
 class Clutch:
-    """All that an engagement depends on, in SI; see [C] (1). Numbers, or text with a unit.
+    """A slipping clutch with constant driving speed, a shaft and a load: [C] (1).
 
-    `clutch_inertia` IM, `clutch_torque` MM, `drive_speed` w0, `engagement_time` tM, `stiffness` cp and
-    `damping` of the shaft, `gap`, `load_inertia` Ic, `load_torque` Mc. A load is "active" (acts always, may
-    turn the load back) or "reactive" (friction: holds the load at rest). `law` is linear, quadratic-concave,
-    quadratic-convex, exponential (with `time_constant`) or "table" (`law_times`, `law_torques`). Raises
-    InputError for everything that is wrong.
+    All values are numbers in SI, or text with a unit.
 
+    Parameters
+    ----------
+    clutch_inertia : float
+        IM, inertia of the clutch side, kg m^2.
+    clutch_torque : float
+        MM, friction torque of the engaged clutch, N m.
+    drive_speed : float
+        w0, constant speed of the driving side, rad/s.
+    engagement_time : float
+        tM, time in which the friction torque rises, s.
+    stiffness : float
+        cp, stiffness of the shaft, N m/rad.
+    load_inertia : float
+        Ic, inertia of the load, kg m^2.
+    load_torque : float
+        Mc, torque of the load, N m.
+    lining_area : float, optional
+        Area of all friction faces, m^2.
+    damping : float, optional
+        Damping of the shaft, N m s/rad.
+    gap : float, optional
+        Total angular gap (backlash) of the shaft, rad.
+    load_kind : str, optional
+        "active" (acts always, may turn the load back) or "reactive" (friction: holds the load at rest).
+    law : str, optional
+        Engagement law: "linear", "quadratic-concave", "quadratic-convex", "exponential" or "table".
+    time_constant : float, optional
+        Time constant of the exponential law, s.
+    law_times, law_torques : tuple of float, optional
+        Points of the table: s, N m.
+    name, source : str, optional
+        Name of the clutch, and source of its numbers.
+
+    Raises
+    ------
+    InputError
+        If any value is wrong; with one sentence for each.
+
+    References
+    ----------
+    [C] (1); see docs/paper-c.md.
+
+    Examples
+    --------
     >>> clutch = Clutch.load("paper-c")
     >>> round(clutch.clutch_torque, 3), round(clutch.mean_torque / clutch.clutch_torque, 6)
     (588.399, 0.888889)
@@ -136,9 +239,7 @@ class Clutch:
 
     @property
     def mean_torque(self) -> float:
-        """(MM Ic + Mc IM)/(IM + Ic): shaft torque in N m about which the shaft swings while the clutch
-        slips.
-        """
+        """(MM Ic + Mc IM)/(IM + Ic): mean shaft torque in N m while the clutch slips."""
         IM, Ic = self.clutch_inertia, self.load_inertia
         return (self.clutch_torque * Ic + self.load_torque * IM) / (IM + Ic)
 

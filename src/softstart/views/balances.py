@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.balancing.indicator import MeasuredCycle
+from softstart.balancing.gas import MeasuredCycle
 from softstart.balancing.parts import CYCLE_ANGLE
 from softstart.views.drawing import COLOURS, DASHES, GREY, SMALL, drawing, new_figure
 from softstart.views.numbers import NOTHING, Table, column_of, number, printable, short
@@ -16,7 +16,7 @@ from softstart.views.numbers import NOTHING, Table, column_of, number, printable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.balancing.result import Balance, Residual
+    from softstart.balancing.design import Balance, Residual
 
 RPM = math.pi / 30.0
 STEPS = 1440  # of the torque over the cycle: half degrees

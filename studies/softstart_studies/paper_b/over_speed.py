@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.balancing import Balance
 from softstart.balancing.design import arm, free_force
-from softstart.balancing.shaking import moment_harmonic
-from softstart.balancing.slider_crank import Vector
+from softstart.balancing.engine import moment_harmonic
 from softstart.study import Table
 from softstart_studies.paper_b.vaz import LOADS, MOMENTS, RPM, SPEEDS, VAZ
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.balancing import Balance, Engine, balance
-from softstart.balancing.slider_crank import Vector
 
 RPM = math.pi / 30.0  # rad/s
 TUNING = 4500.0  # rpm

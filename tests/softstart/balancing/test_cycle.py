@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from tests.softstart.balancing.engines import RPM, engine
 
 from softstart.balancing import Cylinders, MeasuredCycle, SimpleCycle
-from softstart.balancing.work import shape_work
+from softstart.balancing.gas import shape_work
 from softstart.errors import InputError
 
 ONE = Cylinders(0.08, 0.084, 0.14, firing_angles=(0.0,))

@@ -146,7 +146,7 @@ def test_bad_periodic_torques_are_refused():
     for arguments, says in (
         ((0.0, [1.0], [1.0], [], 10.0), "give as many of each"),
         ((0.0, [1.0], [1.0], [0.0], 0.0), "above 0 rad/s"),
-        ((0.0, [0.0], [1.0], [0.0], 10.0), "belongs into mean"),
+        ((0.0, [0.0], [1.0], [0.0], 10.0), "the constant part is mean"),
         ((math.nan, [1.0], [1.0], [0.0], 10.0), "finite"),
     ):
         with pytest.raises(InputError, match=says):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from softstart.clutch import Clutch, engage
-from softstart.clutch.law_files import read_law
-from softstart.clutch.parameters import LIBRARY
+from softstart.clutch.laws import read_law
+from softstart.clutch.model import LIBRARY
 from softstart.errors import InputError, SimulationError
 
 PAPER = Clutch.load("paper-c")
