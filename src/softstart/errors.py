@@ -1,4 +1,4 @@
-"""The two ways in which softstart refuses to go on."""
+"""The two errors that softstart raises."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """What was asked for cannot be done; every sentence names key, value, reason and remedy.
+    """The input is wrong; each sentence names the key, the value, the reason and the remedy.
 
-    All mistakes found in one input are collected, so that a user mends them in one go.
+    All mistakes of one input are collected, so that they can be corrected in one go.
 
+    Parameters
+    ----------
+    sentences : str or iterable of str
+        One sentence for each mistake; the attribute `sentences` is the tuple of them.
+
+    Examples
+    --------
     >>> raise InputError(["gap = -1 rad: a gap is 0 or more."])
     Traceback (most recent call last):
     softstart.errors.InputError: gap = -1 rad: a gap is 0 or more.
@@ -21,4 +28,16 @@ class InputError(ValueError):
 
 
 class SimulationError(RuntimeError):
-    """A start that was begun and cannot be finished: never a shortened result returned as a good one."""
+    """A simulation cannot be finished; a shortened result is never returned as a good one.
+
+    Parameters
+    ----------
+    *args
+        The sentence that says which start failed, and why.
+
+    Examples
+    --------
+    >>> from softstart import SimulationError
+    >>> issubclass(SimulationError, RuntimeError)
+    True
+    """

@@ -1,4 +1,4 @@
-"""A torque over time: what an optimum is, and what the `profile` controller plays."""
+"""A torque over time: the form of an optimum, and what the `profile` controller follows."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softstart import profile_code, profile_files
 from softstart.errors import InputError
+from softstart.late import late
+
+if TYPE_CHECKING:
+    from softstart import profile_files
+else:
+    profile_files = late("softstart.profile_files")
 
 Vector = NDArray[np.float64]
 
@@ -23,12 +28,25 @@ MOST_SAMPLES = 1_000_000
 class TorqueProfile:
     """A torque demand that is linear between its knots; two knots at the same instant are a step.
 
-    `time` in s from 0 on and not falling, `torque` in N m, both of shape (n,). After the last knot the last
-    torque is held. `after_contact` is a second profile, on a clock that starts when the gap first closes: it
-    takes over there (a drive that senses the contact); None plays the first one to its end.
+    After the last knot the last torque is held.
 
-    Raises InputError where the knots are no profile.
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Instants of the knots in s, from 0 on and not falling.
+    torque : array_like, shape (n,)
+        Torque demands in N m at these instants.
+    after_contact : TorqueProfile, optional
+        A second profile, on a clock that starts when the gap first closes; it takes over there (a drive that
+        detects the contact). None follows the first one to its end.
 
+    Raises
+    ------
+    InputError
+        If the lists are not of one length, hold values that are not finite, or the times fall.
+
+    Examples
+    --------
     >>> pulse = TorqueProfile([0.0, 0.25, 0.25, 1.0], [62.0, 62.0, 0.0, 48.0])
     >>> pulse.at([0.0, 0.25, 0.5, 2.0]).tolist()
     [62.0, 0.0, 16.0, 48.0]
@@ -63,7 +81,18 @@ class TorqueProfile:
         return float(self.time[-1])
 
     def at(self, times: ArrayLike) -> Vector:
-        """Torque demand in N m at any instants, shape of `times`; at a step the value after it."""
+        """Torque demand at any instants; at a step the value after it.
+
+        Parameters
+        ----------
+        times : array_like
+            Instants in s.
+
+        Returns
+        -------
+        ndarray
+            Torque demands in N m, in the shape of `times`.
+        """
         when = np.asarray(times, dtype=np.float64)
         last = np.searchsorted(self.time, when, side="right") - 1
         last = last.clip(0, self.time.size - 1)
@@ -77,6 +106,15 @@ class TorqueProfile:
     def steps(cls, edges: ArrayLike, levels: ArrayLike) -> TorqueProfile:
         """Constant torque `levels[i]` from `edges[i]` to `edges[i + 1]`; the last level is then held.
 
+        Parameters
+        ----------
+        edges : array_like, shape (n + 1,)
+            Instants in s at which the torque changes, from 0 on.
+        levels : array_like, shape (n,)
+            Torques in N m in between.
+
+        Examples
+        --------
         >>> TorqueProfile.steps([0.0, 0.01, 0.02], [62.0, 0.0]).at([0.005, 0.01, 3.0]).tolist()
         [62.0, 0.0, 0.0]
         """
@@ -135,11 +173,22 @@ class TorqueProfile:
         return TorqueProfile(times, np.clip(torques, lowest, highest), after)
 
     def sampled(self, period: float) -> TorqueProfile:
-        """Held from sample to sample (`period` in s), at the mean of this profile until the next sample.
+        """Held from sample to sample, at the mean of this profile until the next sample.
 
         Its integral is that of this profile at every sample; `after_contact` is sampled on its own clock.
-        Raises InputError for more than a million samples.
 
+        Parameters
+        ----------
+        period : float
+            Sample period in s.
+
+        Raises
+        ------
+        InputError
+            For more than a million samples.
+
+        Examples
+        --------
         >>> TorqueProfile([0.0, 1.0], [0.0, 10.0]).sampled(0.5).at([0.0, 0.5, 1.0]).tolist()
         [2.5, 7.5, 10.0]
         """
@@ -148,7 +197,7 @@ class TorqueProfile:
         if not share <= MOST_SAMPLES:
             raise InputError(
                 f"period = {period:g} s: that is {share:.3g} samples until the profile ends at "
-                f"{self.end:g} s, and at most {MOST_SAMPLES:,} are played; give a longer one, or 0 for none."
+                f"{self.end:g} s, and at most {MOST_SAMPLES:,} are allowed; give a longer one, or 0 for none."
             )
         count = math.ceil(share)
         samples = np.arange(count + 1) * period
@@ -188,20 +237,30 @@ class TorqueProfile:
         profile_files.write_csv(self, Path(path))
 
     def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
-        """Write TOML that the `profile` controller plays; `about` says where the profile comes from."""
+        """Write TOML that the `profile` controller follows; `about` says where the profile comes from."""
         profile_files.write_toml(self, Path(path), about or {})
 
     def to_c(
         self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
     ) -> None:
         """Write C code with the function `double torque_profile(double time)`; `about` as in `to_toml`."""
-        profile_code.write_c(self, Path(path), name, about)
+        profile_files.write_c(self, Path(path), name, about)
 
     @classmethod
     def load(cls, path: str | Path) -> TorqueProfile:
-        """Read a profile from CSV or TOML. Raises InputError that names file, line and value."""
-        time, torque, after = profile_files.read_profile(Path(path))
-        return cls(time, torque, None if after is None else cls(after.time, after.torque))
+        """Read a profile from CSV or TOML.
+
+        Parameters
+        ----------
+        path : str or Path
+            A file whose name ends in .csv, .txt, .dat or .toml.
+
+        Raises
+        ------
+        InputError
+            In one sentence that names the file, the line and the value.
+        """
+        return cls(*profile_files.read_profile(Path(path)))
 
     def heat(self, until: float, reference: float) -> float:
         """I2t heat in s: the integral of (torque/reference)^2 from 0 to `until`; torque as demanded."""

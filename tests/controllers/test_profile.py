@@ -180,7 +180,7 @@ def test_it_is_compared_only_when_it_is_given_a_profile(tmp_path: Path) -> None:
         ({"file": "a.csv", "profile": SENSED}, "both were given"),
         ({"profile": "62.0"}, "this is no TorqueProfile"),
         ({"file": 3.0}, "this parameter is a text"),
-        ({"file": "nowhere.csv"}, "cannot be read"),
+        ({"file": "nowhere.csv"}, "there is no such file"),
         ({"file": "nowhere.xls"}, "ends in .csv or .toml"),
         ({"profile": SENSED, "period": -0.001}, "0 or more"),
         ({"profile": SENSED, "period": math.nan}, "not a number"),

@@ -172,7 +172,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     (tmp_path / "latin.csv").write_bytes(b"\xe9\n0,1\n")
     for name, words in (
         ("latin.csv", "UTF-8"),
-        ("none.toml", "cannot be read"),
+        ("none.toml", "there is no such file"),
         ("p.bin", "ends in .csv or .toml"),
     ):
         with pytest.raises(InputError, match=words):

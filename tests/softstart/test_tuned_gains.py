@@ -9,8 +9,16 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, compare, pareto, simulate, tune
 from softstart.controller import make_controller
-from softstart.controller.gain_files import Gain, RobustFile, ScheduleFile, read_gain_file, read_gains
-from softstart.controller.gain_text import robust_text, schedule_csv, schedule_text
+from softstart.controller.gain_files import (
+    Gain,
+    RobustFile,
+    ScheduleFile,
+    read_gain_file,
+    read_gains,
+    robust_text,
+    schedule_csv,
+    schedule_text,
+)
 from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -223,7 +231,10 @@ BAD = {
     ),
     "nodrive.toml": ('kind = "robust set"\ncontroller = "ramp"\n[parameters]\n', ["[drive]"]),
     "baddrive.toml": (ROBUST_TOML.replace("gap = 0.5", 'gap = "0.5 kg"'), ["[drive]", "0.5 kg"]),
-    "key.toml": (ROBUST_TOML.replace("[drive.load]", "[drive.load]\nmass = 3"), ["[drive.load] mass"]),
+    "key.toml": (
+        ROBUST_TOML.replace("[drive.load]", "[drive.load]\nmass = 3"),
+        ["[drive]", "[load] has no key mass"],
+    ),
     "parameter.toml": (ROBUST_TOML.replace("time = 0.1", "tme = 0.1"), ["did you mean", "time"]),
     "rows.csv": (CSV.rsplit("\n", 2)[0] + "\n", ["one row for each combination"]),
     "number.csv": (CSV.replace("0.1,8.0", "soon,8.0"), ['time = "soon"']),

@@ -1,10 +1,11 @@
-"""Tuned gains from files: TOML for a robust set and for a schedule, CSV for a schedule."""
+"""Tuned gains in files: TOML for a robust set, TOML or CSV for a schedule; read back to the last bit."""
 
 from __future__ import annotations
 
 import csv
+import io
 import json
-import tomllib
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -12,8 +13,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.input.documents import literal, parsed
+from softstart.input.files import ABSENT, read_text
+from softstart.input.parameters import Wording
+from softstart.quantities import RefusedError
 
 Scale = Literal["linear", "logarithmic"]
 
@@ -51,14 +56,10 @@ class ScheduleFile(NamedTuple):
 def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
     """Tuned gains from a file. Raises InputError in sentences that name file, key and remedy."""
     try:
-        text = path.read_text("utf-8")
-    except FileNotFoundError:
-        raise _wrong(
-            path, "there is no such file; softstart tune --out DIR writes robust.toml and schedule.toml"
-        ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
-        raise _wrong(path, f"the file cannot be read ({reason})") from None
+        text = read_text(path)
+    except RefusedError as refusal:
+        remedy = "; softstart tune --out DIR writes robust.toml and schedule.toml"
+        raise _wrong(path, refusal.reason + (remedy if refusal.reason == ABSENT else "")) from None
     return read_gains(text, path)
 
 
@@ -66,10 +67,7 @@ def read_gains(text: str, path: Path) -> RobustFile | ScheduleFile:
     """Tuned gains from text; the name of `path` tells TOML from CSV."""
     if path.suffix.lower() == ".csv":
         return _read_csv(text, path)
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise _wrong(path, f"this is not valid TOML ({error})") from None
+    document = parsed(text, Wording(f'controller = "{path}"', style="toml"), "a gain")
     kind = document.get("kind")
     if kind == ROBUST:
         return _read_robust(document, path)
@@ -109,29 +107,9 @@ def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = T
 def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
     name = _name(document, path)
     parameters = _section(document, "parameters", path)
-    return RobustFile(name, dict(parameters), _drive(_section(document, "drive", path), path))
-
-
-def _drive(tables: Mapping[str, Any], path: Path) -> Drive:
-    """The drive below [drive]."""
-    given: dict[str, Any] = {}
-    wrong: list[str] = []
-    places = {(p.table, p.key): p.name for p in PARAMETERS.values()}
-    for key, value in tables.items():
-        entries = value.items() if isinstance(value, dict) else [(key, value)]
-        table = key if isinstance(value, dict) else ""
-        for inner, content in entries:
-            if (table, inner) in places:
-                given[places[table, inner]] = content
-            else:
-                place = f"[drive.{table}] {inner}" if table else f"[drive] {inner}"
-                wrong.append(f'controller = "{path}": {place}: a drive has no such key; delete the line.')
-    if wrong:
-        raise InputError(wrong)
-    try:
-        return Drive(**given)
-    except InputError as error:
-        raise InputError([f'controller = "{path}", [drive]: {one}' for one in error.sentences]) from None
+    tables = _section(document, "drive", path)
+    drive = Drive.from_tables(tables, where=f'controller = "{path}", [drive]')
+    return RobustFile(name, dict(parameters), drive)
 
 
 def _read_schedule(document: Mapping[str, Any], path: Path) -> ScheduleFile:
@@ -242,3 +220,78 @@ def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
     width = len({cell["load_inertia"] for cell in cells})
     values = [cell[name] for cell in ordered]
     return [values[k : k + width] for k in range(0, len(values), width)]
+
+
+# ---- writing --------------------------------------------------------------------------------------------
+
+
+def robust_text(saved: RobustFile, about: Mapping[str, Any] | None = None) -> str:
+    """The TOML text of a robust set; `about` says where it comes from and is not read.
+
+    >>> from pathlib import Path
+    >>> saved = RobustFile("ramp", {"time": 0.12}, Drive.load("crane-4amtkf"))
+    >>> read_gains(robust_text(saved), Path("robust.toml")) == saved
+    True
+    """
+    blocks = [
+        f"# softstart simulate DRIVE --controller FILE plays it\nkind = {literal(ROBUST)}\n"
+        f"controller = {literal(saved.controller)}",
+        _table("parameters", saved.parameters),
+        *([_table("about", about)] if about else []),
+        _nested(saved.drive),
+    ]
+    return "\n\n".join(blocks) + "\n"
+
+
+def schedule_text(saved: ScheduleFile, about: Mapping[str, Any] | None = None) -> str:
+    """The TOML text of a schedule; `about` says where it comes from and is not read."""
+    blocks = [
+        "# softstart simulate DRIVE --controller FILE plays it, with the gap and load inertia that DRIVE "
+        f"declares\nkind = {literal(SCHEDULE)}\ncontroller = {literal(saved.controller)}\n"
+        f"gaps = {literal(saved.gaps)}  # rad, the rows of each table of values\n"
+        f"load_inertias = {literal(saved.load_inertias)}  # kg*m^2, its columns",
+        *([_table("fixed", saved.fixed)] if saved.fixed else []),
+    ]
+    for name, gain in saved.gains.items():
+        rows = "".join(f"    {literal(row)},\n" for row in gain.values)
+        blocks.append(f"[gains.{name}]\nscale = {literal(gain.scale)}\nvalues = [\n{rows}]")
+    if about:
+        blocks.append(_table("about", about))
+    return "\n\n".join(blocks) + "\n"
+
+
+def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:
+    """The CSV text of a schedule: comment lines that say what it is, then one row a cell.
+
+    `columns` are further figures of each cell; they are not read back.
+    """
+    stream = io.StringIO()
+    stream.write(f"{CSV_TITLE}\n# controller: {saved.controller}\n")
+    stream.write(f"# gains: {json.dumps({name: gain.scale for name, gain in saved.gains.items()})}\n")
+    stream.write(f"# fixed: {json.dumps(saved.fixed)}\n")
+    tables = {name: gain.values for name, gain in saved.gains.items()} | dict(columns or {})
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([*AXES, *tables])
+    for i, gap in enumerate(saved.gaps):
+        for j, inertia in enumerate(saved.load_inertias):
+            writer.writerow([_cell(value) for value in (gap, inertia, *(t[i, j] for t in tables.values()))])
+    return stream.getvalue()
+
+
+def _cell(value: Any) -> str:
+    plain = value.item() if hasattr(value, "item") else value
+    if isinstance(plain, float):
+        return "" if math.isnan(plain) else repr(plain)
+    return str(plain)
+
+
+def _table(name: str, values: Mapping[str, Any]) -> str:
+    lines = [f"{key} = {literal(value)}" for key, value in values.items() if value is not None]
+    return "\n".join([f"[{name}]", *lines])
+
+
+def _nested(drive: Drive) -> str:
+    """The drive's own file, below the table [drive]."""
+    lines = drive.to_toml().splitlines()
+    nested = [f"[drive.{line[1:]}" if line.startswith("[") else line for line in lines]
+    return "\n".join(["[drive]", *nested])

@@ -192,8 +192,13 @@ class Drive(ParameterSet):
         >>> Drive.from_toml(drive.to_toml()) == drive
         True
         """
+        document = parsed(text, Wording(where, style="toml"), cls.WHAT, _TABLES)
+        return cls.from_tables(document, where=where)
+
+    @classmethod
+    def from_tables(cls, document: Mapping[str, Any], *, where: str = "") -> Self:
+        """A drive from the tables of a document, {"shaft": {"gap": 0.5}, ...}; `where` as in `from_toml`."""
         wording = Wording(where, style="toml")
-        document = parsed(text, wording, cls.WHAT, _TABLES)
         content, mistakes = placed(document, _TABLES, cls.WHAT, wording)
         given = {_NAMES[table, key]: v for table, keys in content.items() for key, v in keys.items()}
         return cls._made(given, wording, mistakes)

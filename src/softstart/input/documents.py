@@ -148,9 +148,9 @@ def read_table(given: Mapping[str, object], table: Table, *, style: str = "pytho
 
 
 def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ()) -> dict[str, Any]:
-    """The document that the TOML text holds; `what` and its `tables` are named if it holds none.
+    """The document that the TOML text holds; `what` names what it describes.
 
-    Raises `InputError`, with the line, for text that is no TOML, or that is empty.
+    Raises `InputError`, with the line, for text that is no TOML, or that is empty where there are `tables`.
 
     >>> parsed("gap = 0.5 rad", Wording(), "a drive")
     Traceback (most recent call last):
@@ -162,7 +162,7 @@ def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ())
         raise InputError(_invalid(str(error), text, wording)) from None
     except RecursionError:
         raise InputError(wording.whole(f"lists or tables are nested too deeply for {what} file")) from None
-    if not document:
+    if tables and not document:
         named = " and ".join(f"[{table.name}]" for table in tables if table.name)
         raise InputError(wording.whole(f"it is empty; {what} file has the tables {named}"))
     return document

@@ -13,7 +13,7 @@ from typing import IO, Any
 from softstart.errors import InputError
 from softstart.quantities import RefusedError, nearest, show
 
-__all__ = ["Library", "read_text", "text_of", "write_whole"]
+__all__ = ["ABSENT", "Library", "read_text", "text_of", "write_whole"]
 
 
 class Library:

@@ -11,8 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from softstart import __version__
-from softstart.controller.gain_files import Gain, RobustFile, ScheduleFile
-from softstart.controller.gain_text import robust_text, schedule_csv, schedule_text
+from softstart.controller.gain_files import (
+    Gain,
+    RobustFile,
+    ScheduleFile,
+    robust_text,
+    schedule_csv,
+    schedule_text,
+)
 from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
 from softstart.errors import InputError
 from softstart.input.files import write_whole
