@@ -176,7 +176,7 @@ def test_tuned_gains_are_those_of_tune_and_join_the_strategies(page: Any, tmp_pa
         assert simulate(CRANE, make_controller(str(tmp_path / file))).k_dyn == expected
 
 
-def test_two_users_have_their_own_benches_and_turns_and_a_closed_tab_ends_its_jobs(
+def test_two_users_have_their_own_sessions_and_turns_and_a_closed_tab_ends_its_jobs(
     visit: Callable[..., Any], server: Any
 ) -> None:
     first, second = visit(), visit()

@@ -22,10 +22,11 @@ from softstart.late import late
 from softstart.page.serve import Address, check_installed, listening, run
 
 if TYPE_CHECKING:
-    from softstart.page import bench as benches
-    from softstart.page import map as maps
+    from softstart.page import frames, ranges
+    from softstart.page import session as sessions
 else:
-    benches, maps = late("softstart.page.bench"), late("softstart.page.map")
+    frames, ranges = late("softstart.page.frames"), late("softstart.page.ranges")
+    sessions = late("softstart.page.session")
 
 
 @click.command(cls=Command)
@@ -72,7 +73,7 @@ def serve(
 def _warm_up() -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
     with working("getting the engine ready ..."):
-        bench = benches.Bench()
-        _ = bench.strategies
-        axes = maps.axes_about(bench.drive, 3, 3)
-        maps.k_dyn_row(bench.drive, bench.controllers[bench.selected], axes.gaps, axes.inertias[1])
+        session = sessions.Session()
+        _ = session.strategies
+        axes = ranges.axes_about(session.drive, 3, 3)
+        frames.k_dyn_row(session.drive, session.controllers[session.selected], axes.gaps, axes.inertias[1])

@@ -1,4 +1,4 @@
-"""What a user does on the page, taken onto the bench; a mistake becomes a sentence beside its field."""
+"""What a user does on the page, applied to the session; an error message appears next to its field."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
-from softstart.page.bench import Bench
 from softstart.page.frames import SERVER, Screen
-from softstart.page.trouble import sentence_of
+from softstart.page.sentences import sentence_of
+from softstart.page.session import Session
 
-DRIFT = 2e-4  # of two clocks against one another: more than any have
+DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LATEST = 1e15  # ms, beyond any clock of a browser
 BY_PATH = {parameter.path: parameter for parameter in PARAMETERS.values()}
 
@@ -117,54 +117,54 @@ class Delay:
 class Controls:
     """Takes messages of the browser, dictionaries with `what` and more; never raises for a wrong one.
 
-    `poke` is called after each message that may change what is to be seen but has left the bench as it is: of
-    its own changes the bench tells itself.
+    `poke` is called after each message that may change what is shown but has left the session unchanged; of
+    its own changes the session informs its listeners.
     """
 
-    def __init__(self, bench: Bench, screen: Screen, poke: Callable[[], None]) -> None:
-        self._bench = bench
+    def __init__(self, session: Session, screen: Screen, poke: Callable[[], None]) -> None:
+        self._session = session
         self._screen = screen
         self._poke = poke
         self._delay = Delay()
-        self._ways: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+        self._actions: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
             "slide": self._slide,
             "edit": self._edit,
             "jump": self._jump,
-            "select": lambda message: bench.select(str(message["name"])),
-            "show": lambda message: bench.show(str(message["name"]), bool(message["visible"])),
-            "remove": lambda message: bench.remove(str(message["name"])),
+            "select": lambda message: session.select(str(message["name"])),
+            "show": lambda message: session.show(str(message["name"]), bool(message["visible"])),
+            "remove": lambda message: session.remove(str(message["name"])),
             "keep": self._keep,
             "leave": self._leave,
             "hello": self._hello,
         }
 
     def take(self, message: object) -> None:
-        """One message. What is wrong with it is told in the next frame, beside the field if it has one."""
+        """One message. What is wrong with it is said in the next frame, next to its field if it has one."""
         if not isinstance(message, Mapping):
             return
-        way = self._ways.get(str(message.get("what")))
-        if way is None:
+        act = self._actions.get(str(message.get("what")))
+        if act is None:
             return
         path = str(message.get("path", ""))
-        place = path if path in BY_PATH else ""  # where no field is, a mistake stands beside the figure
-        version = self._bench.version
+        place = path if path in BY_PATH else ""  # without a field, the message appears next to the figure
+        version = self._session.version
         stamp = message.get("stamp")
         if isinstance(stamp, int | float) and abs(stamp) < LATEST:
             self._screen.stamp = float(stamp)
             self._screen.late = self._delay.of(float(stamp) / 1000.0)
         try:
-            way(message)
+            act(message)
         except Exception as error:  # a message may hold anything
             self._screen.mistakes[place] = sentence_of(error)
         else:
             self._screen.mistakes.pop(place, None)
-        if self._bench.version == version:
+        if self._session.version == version:
             self._poke()
 
     def _slide(self, message: Mapping[str, Any]) -> None:
         parameter = BY_PATH[str(message["path"])]
         scale = self._screen.scales[parameter.name]
-        self._bench.set(parameter.path, scale.value(float(message["position"])))
+        self._session.set(parameter.path, scale.value(float(message["position"])))
 
     def _edit(self, message: Mapping[str, Any]) -> None:
         path, text = str(message["path"]), str(message["text"]).strip()
@@ -172,14 +172,14 @@ class Controls:
             raise InputError(f'"{path}": there is no such field.')
         if not text:
             raise InputError(f"{path}: the field is empty; write for example {BY_PATH[path].example}.")
-        self._bench.set(path, " ".join(text.split()))
+        self._session.set(path, " ".join(text.split()))
 
     def _leave(self, message: Mapping[str, Any]) -> None:
-        """What was written in a field is taken back: nothing changes, and its mistake goes with it."""
+        """What was written in a field is undone: nothing changes, and its error message disappears."""
 
     def _jump(self, message: Mapping[str, Any]) -> None:
         gap, inertia = float(message["gap"]), float(message["inertia"])
-        self._bench.set_all({"shaft.gap": gap, "load.inertia": inertia})
+        self._session.set_all({"shaft.gap": gap, "load.inertia": inertia})
         for path in ("shaft.gap", "load.inertia"):
             self._screen.mistakes.pop(path, None)
 
@@ -188,7 +188,7 @@ class Controls:
         self._screen.forget()
         kept = message.get("kept")
         if isinstance(kept, Mapping) and kept.get("server") == SERVER:
-            self._bench.load(str(kept["drive"]))
+            self._session.load(str(kept["drive"]))
 
     def _keep(self, message: Mapping[str, Any]) -> None:
         self._screen.kept = bool(message["kept"])

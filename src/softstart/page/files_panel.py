@@ -10,16 +10,22 @@ from nicegui import ui
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.page import works
-from softstart.page.background import jobs_of
-from softstart.page.bench import Bench
-from softstart.page.command_text import command_text, drive_file, profile_of, shipped_drives
-from softstart.page.downloads import file_name, text_of
-from softstart.page.drift import clipped
-from softstart.page.job_view import LOOK, JobView
-from softstart.page.jobs import Jobs
-from softstart.page.panel_parts import action, box, choice, guarded, hint, save, tell
-from softstart.page.trouble import sentence_of
+from softstart.page import tasks
+from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
+from softstart.page.panel_parts import (
+    POLL,
+    JobView,
+    action,
+    box,
+    choice,
+    guarded,
+    hint,
+    jobs_of,
+    notify,
+    save,
+)
+from softstart.page.sentences import clipped, sentence_of
+from softstart.page.session import Session
 
 if TYPE_CHECKING:
     from nicegui.events import UploadEventArguments
@@ -31,16 +37,16 @@ LONGEST_LINE = 2000  # letters; a key of thousands of parts is read for many sec
 MOST_SENTENCES = 12  # about one file; whoever has mended these sees the next ones
 
 
-def files_panel(bench: Bench, user: Hashable) -> None:
-    """Build the panel of the client of the moment."""
-    jobs = jobs_of(user)
-    with ui.element("div").classes("panel"):
+class FilesPanel:
+    """Drive files, exports and the command line; built in the current slot."""
+
+    def __init__(self, session: Session, user: Hashable) -> None:
         _title("Drive")
-        DriveFiles(bench)
+        DriveFiles(session)
         _title("Export")
-        Exports(bench, user, jobs)
+        Exports(session, user)
         _title("Command line")
-        CommandLine(bench)
+        CommandLine(session)
 
 
 def _title(text: str) -> None:
@@ -48,13 +54,13 @@ def _title(text: str) -> None:
 
 
 class DriveFiles:
-    """Load a drive from a file or from the shipped ones; save the one on the bench."""
+    """Load a drive from a file or from the shipped ones; save the present one."""
 
-    def __init__(self, bench: Bench) -> None:
-        self._bench = bench
+    def __init__(self, session: Session) -> None:
+        self._session = session
         shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box().classes("panel-form"):
-            own = weakref.ref(self)  # the route of an upload outlives its tab, and must not keep its bench
+            own = weakref.ref(self)  # the route of an upload outlives its tab, and must not keep its session
 
             async def uploaded(event: UploadEventArguments) -> None:
                 if (panel := own()) is not None:
@@ -88,7 +94,7 @@ class DriveFiles:
         try:
             if large:
                 raise InputError(TOO_LARGE)
-            self._bench.take(drive_of(content, name))
+            self._session.take(drive_of(content, name))
         except Exception as error:  # a file may hold anything
             self._refuse(name, error)
         else:
@@ -100,26 +106,24 @@ class DriveFiles:
 
     def _take(self, name: str) -> None:
         if name:
-            self._bench.take(Drive.load(name))
+            self._session.take(Drive.load(name))
             self._shipped.set_value("")
             self._taken()
 
     def _taken(self) -> None:
         self._troubles.set_visibility(False)
-        tell(f"{clipped(self._bench.drive.name)} is on the bench.")
+        notify(f"{clipped(self._session.drive.name)} is loaded.")
 
     def _refuse(self, name: str, error: Exception) -> None:
         self._troubles.clear()
         self._troubles.set_visibility(True)
         with self._troubles:
-            ui.label(f"{clipped(name)} was not loaded; the drive on the bench is as it was.").classes(
-                "trouble-title"
-            )
+            ui.label(f"{clipped(name)} was not loaded; the drive is unchanged.").classes("trouble-title")
             for sentence in few(error.sentences if isinstance(error, InputError) else [sentence_of(error)]):
                 ui.label(sentence).classes("trouble")
 
     def _save(self) -> None:
-        save(self._bench.drive.to_toml(), drive_file(self._bench.drive))
+        save(self._session.drive.to_toml(), drive_file(self._session.drive))
 
 
 TOO_LARGE = f"It has more than {LARGEST // 1024} kB; a drive file has one or two."
@@ -158,8 +162,8 @@ def drive_of(content: bytes, name: str) -> Drive:
 class Exports:
     """Traces and profile of the selected strategy, and the report, as files."""
 
-    def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
-        self._bench = bench
+    def __init__(self, session: Session, user: Hashable) -> None:
+        self._session = session
         self._saved_as = self._text = ""
         self._seen = -1
         with box().classes("panel-actions"):
@@ -176,20 +180,20 @@ class Exports:
             "The report is one file that opens offline and prints: drive, strategies, limit, robustness, "
             "parameter sheet. It takes a while and is computed in the background."
         )
-        self._view = JobView(jobs, user, "export", on_done=self._done, on_state=self._state)
+        self._view = JobView(jobs_of(user), user, "export", on_done=self._done, on_state=self._state)
         # some browsers hold back a file that comes long after the press of a button
         with box().classes("panel-actions"):
             self._again = action("Save it again", guarded(self._save), "export-again")
         self._again.set_visibility(False)
-        ui.timer(LOOK, self._look)
-        self._look()
+        ui.timer(POLL, self._refresh)
+        self._refresh()
 
-    def _look(self) -> None:
+    def _refresh(self) -> None:
         """The strategy that the buttons mean."""
-        if self._bench.version == self._seen:
+        if self._session.version == self._seen:
             return
-        self._seen = self._bench.version
-        self._caption.set_text(f"Selected: {self._bench.selected}")
+        self._seen = self._session.version
+        self._caption.set_text(f"Selected: {self._session.selected}")
         self._of_profile.set_visibility(self._profile_of_selected() is not None)
 
     def _state(self) -> None:
@@ -198,49 +202,49 @@ class Exports:
         self._again.set_visibility(bool(self._text) and not self._view.busy and not self._view.failed)
 
     def _named(self, *parts: str, suffix: str) -> str:
-        return file_name(self._bench.drive.name, *parts, suffix=suffix)
+        return file_name(self._session.drive.name, *parts, suffix=suffix)
 
     def _traces(self) -> None:
-        found = self._bench.result(self._bench.selected)
+        found = self._session.result(self._session.selected)
         if found.run is None:
             raise InputError(f"{found.name} has no traces: {found.trouble}")
         save(text_of(found.run.to_csv, ".csv"), self._named(found.name, "traces", suffix=".csv"))
 
     def _profile_of_selected(self) -> TorqueProfile | None:
-        return profile_of(self._bench.controllers[self._bench.selected])
+        return profile_of(self._session.controllers[self._session.selected])
 
     def _needed(self) -> TorqueProfile:
         profile = self._profile_of_selected()
         if profile is None:  # another strategy was selected a moment ago
-            raise InputError(f"{self._bench.selected}: this strategy plays no torque profile.")
+            raise InputError(f"{self._session.selected}: this strategy plays no torque profile.")
         return profile
 
     def _profile(self, suffix: str) -> None:
         profile = self._needed()
-        about = {"drive": self._bench.drive.name, "strategy": self._bench.selected}
+        about = {"drive": self._session.drive.name, "strategy": self._session.selected}
         write: Any = profile.to_csv if suffix == ".csv" else lambda path: profile.to_toml(path, about)
-        save(text_of(write, suffix), file_name(self._bench.selected, suffix=suffix))
+        save(text_of(write, suffix), file_name(self._session.selected, suffix=suffix))
 
     def _code(self) -> None:
         if self._view.busy:
             return
         profile = self._needed()
-        self._saved_as, self._text = file_name(self._bench.selected, suffix=".c"), ""
-        about = {"drive": self._bench.drive.name, "strategy": self._bench.selected}
-        self._view.begin("C code", works.code, profile, about)
+        self._saved_as, self._text = file_name(self._session.selected, suffix=".c"), ""
+        about = {"drive": self._session.drive.name, "strategy": self._session.selected}
+        self._view.begin("C code", tasks.code, profile, about)
 
     def _begin_report(self) -> None:
         if self._view.busy:
             return
-        bench = self._bench
-        strategies = dict(bench.controllers)
+        session = self._session
+        strategies = dict(session.controllers)
         self._saved_as, self._text = self._named("report", suffix=".html"), ""
         self._view.begin(
             "report",
-            works.report,
-            bench.drive,
+            tasks.report,
+            session.drive,
             list(strategies.values()),
-            command_text(bench.drive, strategies, "report", f"--out={self._saved_as}"),
+            command_text(session.drive, strategies, "report", f"--out={self._saved_as}"),
         )
 
     def _done(self, text: str) -> None:
@@ -254,30 +258,30 @@ class Exports:
 class CommandLine:
     """What to type in a terminal for the same drive and strategies."""
 
-    def __init__(self, bench: Bench) -> None:
-        self._bench = bench
+    def __init__(self, session: Session) -> None:
+        self._session = session
         self._seen = -1
         self._text = ui.label().classes("command").props('data-testid="command" tabindex=0')
         with box().classes("panel-actions"):
-            copy = action("Copy", lambda: tell("Copied."), "command-copy")
+            copy = action("Copy", lambda: notify("Copied."), "command-copy")
             copy.on("click", js_handler=COPY % self._text.id)
         self._note = ui.label().classes("panel-hint")
-        ui.timer(2 * LOOK, self._look)
-        self._look()
+        ui.timer(2 * POLL, self._refresh)
+        self._refresh()
 
-    def _look(self) -> None:
-        if self._bench.version == self._seen:
+    def _refresh(self) -> None:
+        if self._session.version == self._seen:
             return
-        self._seen = self._bench.version
-        bench = self._bench
-        text = command_text(bench.drive, {label: bench.controllers[label] for label in bench.shown})
+        self._seen = self._session.version
+        session = self._session
+        text = command_text(session.drive, {label: session.controllers[label] for label in session.shown})
         self._text.set_text(text)
         needed = [
             word
             for word in text.replace(",", " ").replace("=", " ").split()
             if word.endswith((".toml", ".csv"))
         ]
-        profiles = [label for label in bench.shown if profile_of(bench.controllers[label]) is not None]
+        profiles = [label for label in session.shown if profile_of(session.controllers[label]) is not None]
         self._note.set_text(
             (f"First save from here: {', '.join(needed)}. " if needed else "")
             + (f"Of the {len(profiles)} profiles a command takes one. " if len(profiles) > 1 else "")

@@ -1,21 +1,27 @@
-"""What the page shows of a bench, as plain data: fields, table, figures, traces, map."""
+"""What the page shows of a session, as plain data: fields, table, figures, traces, map."""
 
 from __future__ import annotations
 
 import math
 import secrets
+from base64 import b64encode
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
-from softstart.page.bench import Bench, Strategy
 from softstart.page.live import Frame
-from softstart.page.map import Axes, axes_about, k_dyn_row
-from softstart.page.scales import Scale, scales_about
-from softstart.page.traces import traces_of
+from softstart.page.ranges import Axes, Scale, axes_about, scales_about
+from softstart.page.session import Session, Strategy
+from softstart.plant import layout as at
 from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
+from softstart.start.run import Run
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
@@ -24,21 +30,29 @@ TOO_LATE = 0.3  # s
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded anew comes back, or does not
 PACKED = ("t", "T", "u", "w1", "w2", "theta")
+CHANNELS = ("T", "u", "w1", "w2", "theta")
+BUCKETS = 320  # about one for three pixels of the widest plot; each keeps the extrema of each channel
+PER_PERIOD = 16  # points an elastic period before thinning: its crests are then within 2 % at worst
+COARSEST, FINEST = 500, 8000
+JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
+MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
+
+Vector = NDArray[np.float64]
 
 
 class Screen:
-    """The frames of one bench; keeps what the browser has already, so that nothing is sent twice."""
+    """The frames of one session; keeps what the browser has already, so that nothing is sent twice."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
-        self.scales = scales_about(bench.origin)
-        self.axes = axes_about(bench.origin)
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.scales = scales_about(session.origin)
+        self.axes = axes_about(session.origin)
         self.kept = False  # the map keeps the controller as it is set up for the drive of the moment
         self.stamp = 0.0  # the browser's clock at the last input that has been taken
         self.late = 0.0  # s, how long the last message has waited to be read
         self.mistakes: dict[str, str] = {}  # sentences by the field they stand beside
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
-        self._origin = bench.origin
+        self._origin = session.origin
         self._next = 0  # whose turn it is among the other strategies
         self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has all rows
         self._map_seen = False  # it has some rows, of whatever
@@ -46,14 +60,14 @@ class Screen:
 
     @property
     def version(self) -> int:
-        """That of the bench."""
-        return self.bench.version
+        """That of the session."""
+        return self.session.version
 
     def follow_origin(self) -> bool:
         """Set sliders and map anew when another drive was loaded; True if so."""
-        if self._origin is self.bench.origin:
+        if self._origin is self.session.origin:
             return False
-        self._origin = self.bench.origin
+        self._origin = self.session.origin
         self.scales = scales_about(self._origin)
         self.axes = axes_about(self._origin)
         self._map_of = None
@@ -70,16 +84,16 @@ class Screen:
 
         None while messages wait to be read: then each start would make the others wait longer.
         """
-        bench = self.bench
+        session = self.session
         if self.late > TOO_LATE:
             return None
-        if self._origin is not bench.origin or min(self._costs.get(bench.selected, LONG)) > QUICK:
+        if self._origin is not session.origin or min(self._costs.get(session.selected, LONG)) > QUICK:
             return None
-        found = self._result(bench.selected)
-        return {"stamp": self.stamp, "version": bench.version, "figure": figure(bench, found)}
+        found = self._result(session.selected)
+        return {"stamp": self.stamp, "version": session.version, "figure": figure(session, found)}
 
     def _result(self, label: str) -> Strategy:
-        found = self.bench.result(label, QUICK_EVENTS)
+        found = self.session.result(label, QUICK_EVENTS)
         self._costs[label] = (self._costs.get(label, LONG)[1], found.cost)
         return found
 
@@ -88,22 +102,22 @@ class Screen:
     def first(self) -> Frame:
         """Fields, the large figure and the traces of the selected strategy."""
         self.follow_origin()
-        bench = self.bench
-        found = self._result(bench.selected)
+        session = self.session
+        found = self._result(session.selected)
         return {
             "stamp": self.stamp,
-            "version": bench.version,
+            "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": fields(bench.drive, self.scales),
-            "drive": bench.drive.name,
-            "order": list(bench.controllers),
-            "shown": list(bench.shown),
-            "added": list(bench.added),
-            "selected": bench.selected,
-            "figure": figure(bench, found),
-            "traces": {bench.selected: drawn(found)},
-            "rows": [row(bench, found)],
-            "here": here(bench.drive),
+            "fields": fields(session.drive, self.scales),
+            "drive": session.drive.name,
+            "order": list(session.controllers),
+            "shown": list(session.shown),
+            "added": list(session.added),
+            "selected": session.selected,
+            "figure": figure(session, found),
+            "traces": {session.selected: drawn(found)},
+            "rows": [row(session, found)],
+            "here": here(session.drive),
             "map_is_old": self._map_seen and not self._map_is_right(),
         }
 
@@ -112,16 +126,16 @@ class Screen:
 
         While a hand keeps moving, each call goes on where the last one was left, so that all have their turn.
         """
-        bench = self.bench
-        labels = [label for label in bench.controllers if label != bench.selected]
+        session = self.session
+        labels = [label for label in session.controllers if label != session.selected]
         begun = perf_counter()
         frame: Frame = {"rows": [], "traces": {}}
         for _ in range(len(labels)):
             label = labels[self._next % len(labels)]
             self._next += 1
             found = self._result(label)
-            frame["rows"].append(row(bench, found))
-            if label in bench.shown:
+            frame["rows"].append(row(session, found))
+            if label in session.shown:
                 frame["traces"][label] = drawn(found, ("t", "T"))
             if perf_counter() - begun > SLICE:
                 yield frame
@@ -133,29 +147,29 @@ class Screen:
 
     def at_rest(self) -> Iterator[Frame | None]:
         """The drive, for the tab to keep; long starts, K_dyn with a worn gap, then the map."""
-        bench = self.bench
-        if self._drive_kept is not bench.drive:
-            self._drive_kept = bench.drive
-            yield {"keep": {"server": SERVER, "drive": bench.drive.to_toml()}}
-        for label in bench.controllers:
-            if bench.ready(label) is None:
-                found = bench.result(label)
-                frame: Frame = {"rows": [row(bench, found)]}
-                if label == bench.selected:
+        session = self.session
+        if self._drive_kept is not session.drive:
+            self._drive_kept = session.drive
+            yield {"keep": {"server": SERVER, "drive": session.drive.to_toml()}}
+        for label in session.controllers:
+            if session.ready(label) is None:
+                found = session.result(label)
+                frame: Frame = {"rows": [row(session, found)]}
+                if label == session.selected:
                     frame |= self.first() | {"at_rest": True}
-                elif label in bench.shown:
+                elif label in session.shown:
                     frame["traces"] = {label: drawn(found, ("t", "T"))}
                 yield frame
-            bench.worn(label)
+            session.worn(label)
             yield None
-        yield {"rows": [row(bench, found) for found in bench.strategies]}
+        yield {"rows": [row(session, found) for found in session.strategies]}
         yield from self._map()
 
     def _map(self) -> Iterator[Frame | None]:
-        bench, axes = self.bench, self.axes
+        session, axes = self.session, self.axes
         if self._map_is_right():
             return
-        drive, controller = bench.drive, bench.controllers[bench.selected]
+        drive, controller = session.drive, session.controllers[session.selected]
         wanted = self._map_drive(), controller, self.kept, axes
         nominal = drive if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
@@ -182,19 +196,19 @@ class Screen:
         if self._map_of is None:
             return False
         drive, controller, kept, axes = self._map_of
-        same = controller is self.bench.controllers[self.bench.selected]
+        same = controller is self.session.controllers[self.session.selected]
         return same and kept == self.kept and axes == self.axes and drive == self._map_drive()
 
     def _map_drive(self) -> Drive:
         """What of the drive a map depends on: not its gap and inertia, unless the controller is kept."""
-        drive, axes = self.bench.drive, self.axes
+        drive, axes = self.session.drive, self.axes
         return drive if self.kept else drive.replace(gap=axes.gaps[0], load_inertia=axes.inertias[0])
 
     def _map_head(self) -> dict[str, Any]:
         return {
             "gaps": list(self.axes.gaps),
             "inertias": list(self.axes.inertias),
-            "strategy": self.bench.selected,
+            "strategy": self.session.selected,
             "kept": self.kept,
         }
 
@@ -256,17 +270,17 @@ def otherwise(unit: str, value: Any) -> str:
     return ""
 
 
-def figure(bench: Bench, found: Strategy) -> dict[str, Any]:
+def figure(session: Session, found: Strategy) -> dict[str, Any]:
     """The large figure and what stands about it."""
     run = found.run
     facts: dict[str, Any] = {
         "name": found.name,
         "status": found.status,
-        "base": number(float(metrics.base_torque(bench.drive))),
+        "base": number(float(metrics.base_torque(session.drive))),
         "k_dyn": number(found.k_dyn),
         "start_time": number(found.start_time),
         "peak_torque": number(found.peak_torque),
-        "time_lost": number(bench.time_lost(found.name)) if run is not None else None,
+        "time_lost": number(session.time_lost(found.name)) if run is not None else None,
     }
     if run is not None:
         facts |= {
@@ -279,7 +293,7 @@ def figure(bench: Bench, found: Strategy) -> dict[str, Any]:
     return facts
 
 
-def row(bench: Bench, found: Strategy) -> dict[str, Any]:
+def row(session: Session, found: Strategy) -> dict[str, Any]:
     """One line of the table; `worn` is left out while it is not computed."""
     label = found.name
     line: dict[str, Any] = {
@@ -287,10 +301,10 @@ def row(bench: Bench, found: Strategy) -> dict[str, Any]:
         "k_dyn": number(found.k_dyn),
         "peak_torque": number(found.peak_torque),
         "start_time": number(found.start_time),
-        "time_lost": number(bench.time_lost(label)) if found.run is not None else None,
+        "time_lost": number(session.time_lost(label)) if found.run is not None else None,
         "trouble": found.trouble or ("" if math.isfinite(found.start_time) else found.status),
     }
-    worn = bench.worn_ready(label)
+    worn = session.worn_ready(label)
     if worn is not None:
         line["worn"] = number(worn)
     return line
@@ -317,3 +331,98 @@ def drawn(found: Strategy, channels: tuple[str, ...] = PACKED) -> dict[str, Any]
 def here(drive: Drive) -> tuple[float, float]:
     """Where the drive stands in the map: gap and load inertia."""
     return float(drive.gap), float(drive.load_inertia)
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """Instants in s and the channels there: torques in N m, speeds in rad/s, twist in rad."""
+
+    t: Vector
+    T: Vector
+    u: Vector
+    w1: Vector
+    w2: Vector
+    theta: Vector
+
+    def packed(self, *names: str) -> str:
+        """Rows of the named channels as single-precision numbers, one after the other, in base 64."""
+        rows = np.stack([getattr(self, name) for name in names]).astype("<f4")
+        return b64encode(rows.tobytes()).decode("ascii")
+
+
+def traces_of(run: Run, buckets: int = BUCKETS) -> Traces:
+    """The traces of a run with a few points a bucket, and every instant of `landmarks`.
+
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
+    >>> traces = traces_of(run)
+    >>> run.peak_time in traces.t, round(float(abs(traces.T).max()), 6) == round(run.peak_torque, 6)
+    (True, True)
+    """
+    fixed = landmarks(run)
+    periods = run.end_time / float(run.drive.elastic_period)
+    count = int(min(max(COARSEST, PER_PERIOD * periods), FINEST))
+    times = np.union1d(np.linspace(0.0, run.end_time, count), fixed)
+    states = run.at(times)
+    if times.size > 2 * COARSEST:
+        keep = thinned(np.stack([states[name] for name in CHANNELS]), buckets)
+        keep[np.searchsorted(times, fixed)] = True
+        times = times[keep]
+        states = {name: values[keep] for name, values in states.items()}
+    return Traces(times, *(states[name] for name in CHANNELS))
+
+
+def landmarks(run: Run) -> Vector:
+    """Instants that are never thinned away: events and the instants just before, peaks of all stages, the
+    peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
+    """
+    events = run.event_rows[:, at.E_TIME]
+    joints = run.segments[:, at.S_START]
+    if joints.size > JUMPS:
+        joints = joints[:0]
+    sudden = np.concatenate([events, joints])
+    others = [run.peak_time, run.start_time, 0.0, run.end_time]
+    peaks = run.stage_rows[:, at.G_PEAK_TIME]
+    found = np.concatenate([sudden, np.nextafter(sudden, 0.0), peaks, others])
+    return np.unique(found[~np.isnan(found)].clip(0.0, run.end_time))
+
+
+def thinned(rows: Vector, buckets: int) -> NDArray[np.bool_]:
+    """Which columns to keep so that each bucket keeps the least and the largest value of each row.
+
+    >>> thinned(np.array([[0.0, 1.0, 9.0, 1.0, 0.0, -3.0, 0.0, 1.0]]), 2).tolist()
+    [True, False, True, False, False, True, False, True]
+    """
+    size = rows.shape[1]
+    width = max(1, math.ceil(size / buckets))
+    whole = size // width * width
+    keep = np.zeros(size, dtype=np.bool_)
+    keep[[0, -1]] = True
+    starts = np.arange(0, whole, width)
+    boxes = rows[:, :whole].reshape(rows.shape[0], -1, width)
+    for found in (boxes.argmin(axis=2), boxes.argmax(axis=2)):
+        keep[(found + starts).ravel()] = True
+    if whole < size:
+        rest = rows[:, whole:]
+        keep[whole + rest.argmin(axis=1)] = True
+        keep[whole + rest.argmax(axis=1)] = True
+    return keep
+
+
+def k_dyn_row(
+    drive: Drive,
+    controller: Controller,
+    gaps: tuple[float, ...],
+    inertia: float,
+    nominal: Drive | None = None,
+) -> Vector:
+    """K_dyn at one load inertia over the gaps; NaN where a start fails or is refused.
+
+    The controller is set up for each drive, or for `nominal`, to whose mean torque K_dyn then refers. These
+    are the figures of `softstart.simulate`, to the bit.
+    """
+    drives = drive.replace(gap=list(gaps), load_inertia=inertia)
+    notes = array_starts(drives, controller, fitted_to=nominal, max_events=MAP_EVENTS)
+    base = np.broadcast_to(metrics.base_torque(nominal or drives), (len(gaps),))
+    k: Vector = figures(notes, base)["k_dyn"][0]
+    return k

@@ -1,43 +1,65 @@
-"""The page: one instrument for each client, joined to a bench of its own. Only glue to NiceGUI is here."""
+"""The page: one instrument for each client, joined to a session of its own. Only glue to NiceGUI is here."""
 
 from __future__ import annotations
 
 import asyncio
+from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
+from pathlib import Path
+from types import new_class
 from typing import TYPE_CHECKING, Any
 
 from softstart.drive import Drive
-from softstart.page.bench import Bench
+from softstart.late import late
 from softstart.page.controls import Controls, groups
-from softstart.page.elements import instrument, style
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
-from softstart.page.trouble import log, sentence_of
+from softstart.page.sentences import log, sentence_of
+from softstart.page.session import Session
 
 if TYPE_CHECKING:
+    import nicegui
+    from nicegui import ui
     from nicegui.client import Client
+    from nicegui.element import Element
+else:  # the state and the server need no NiceGUI until a page is built
+    nicegui, ui = late("nicegui"), late("nicegui.ui")
 
-# tabs beside the live part: title, module and function that builds it
+WEB = Path(__file__).with_name("web")
+# tabs beside the live part: title, module and class
 PANELS = (
-    ("Optimum", "softstart.page.background", "optimum_panel"),
-    ("Limit", "softstart.page.background", "curve_panel"),
-    ("Tuning", "softstart.page.background", "tuning_panel"),
-    ("Files", "softstart.page.files_panel", "files_panel"),
+    ("Optimum", "optimum_panel", "OptimumPanel"),
+    ("Limit", "curve_panel", "CurvePanel"),
+    ("Tuning", "tuning_panel", "TuningPanel"),
+    ("Files", "files_panel", "FilesPanel"),
 )
 
 
-def build(drive: Drive) -> Bench:
-    """Build the page for the client of the moment, on a bench of its own; returns that bench."""
-    from nicegui import background_tasks, context, ui
+@cache
+def instrument() -> type[Element]:
+    """The element that draws everything live: `web/softstart_instrument.js`, over the modules beside it."""
+    return new_class(
+        "Instrument",
+        (late("nicegui.element").Element,),
+        {"component": WEB / "softstart_instrument.js", "esm": {"softstart-page": str(WEB / "modules")}},
+    )
 
-    client = context.client
+
+def style() -> str:
+    """The style sheets of the page, in order."""
+    names = ("style.css", "quasar.css", "panels.css")
+    return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
+
+
+def build(drive: Drive) -> Session:
+    """Build the page for the client of the moment, in a session of its own; returns that session."""
+    client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
-    bench = Bench(drive)
-    bench.show_gentlest()
-    screen = Screen(bench)
+    session = Session(drive)
+    session.show_gentlest()
+    screen = Screen(session)
     with instrument()() as element:
-        _panels(bench, client)
+        _panels(session, client)
     element.props["groups"] = groups(screen)
 
     def send(number: int, frame: Frame) -> None:
@@ -50,7 +72,7 @@ def build(drive: Drive) -> Bench:
                 ui.notify(sentence, type="negative", position="bottom-left", close_button="close")
 
     live = Live(screen, send, tell)
-    controls = Controls(bench, screen, live.poke)
+    controls = Controls(session, screen, live.poke)
 
     def take(message: Any) -> None:
         if isinstance(message, dict) and message.get("what") == "drawn":
@@ -59,44 +81,39 @@ def build(drive: Drive) -> Bench:
             controls.take(message)
 
     element.on("act", lambda event: take(event.args))
-    bench.on_change(live.poke)
-    task = background_tasks.create(live.run(), name=f"softstart live {client.id}")
-    client.on_delete(lambda: _end(task, bench))
+    session.on_change(live.poke)
+    task = nicegui.background_tasks.create(live.run(), name=f"softstart live {client.id}")
+    client.on_delete(lambda: _end(task, session))
     client.on_exception(lambda error: tell(sentence_of(error)))
-    return bench
+    return session
 
 
 def page(drive: Drive) -> None:
     """The page of one client; what stands in its way is said instead."""
-    from nicegui import ui
-
     try:
         build(drive)
     except Exception as error:  # whatever a drive or a controller does: a sentence, never a traceback
         ui.label(sentence_of(error))
 
 
-def _end(task: asyncio.Task[Any], bench: Bench) -> None:
+def _end(task: asyncio.Task[Any], session: Session) -> None:
     """A tab was closed: nothing of it stays."""
     task.cancel()
-    bench.close()
+    session.close()
 
 
-def _panels(bench: Bench, client: Client) -> None:
-    """The tabs for what runs in the background and for files."""
-    from nicegui import ui
-
-    found = [panel for panel in PANELS if find_spec(panel[1]) is not None]
-    if not found:
-        return
+def _panels(session: Session, client: Client) -> None:
+    """The tabs for what is computed in the background, and for files."""
     with ui.tabs().props("dense no-caps align=left").classes("panel-tabs") as tabs:
-        for title, _, _ in found:
+        for title, _, _ in PANELS:
             ui.tab(title)
-    with ui.tab_panels(tabs, value=found[0][0], animated=False).classes("panel-body"):
-        for title, module, function in found:
+    with ui.tab_panels(tabs, value=PANELS[0][0], animated=False).classes("panel-body"):
+        for title, module, name in PANELS:
             with ui.tab_panel(title):
                 try:
-                    getattr(import_module(module), function)(bench, client.id)
+                    panel = getattr(import_module(f"softstart.page.{module}"), name)
+                    with ui.element("div").classes("panel"):
+                        panel(session, client.id)
                 except Exception as error:  # the live part must work without it
                     log.debug("the panel %s cannot be built", title, exc_info=error)
                     ui.label(sentence_of(error))

@@ -12,7 +12,7 @@ import asyncio
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
-from softstart.page.trouble import log, sentence_of
+from softstart.page.sentences import log, sentence_of
 
 WINDOW = 3  # frames sent and not yet drawn
 GLANCES = 24  # small frames between two that were drawn: more, and the browser is not keeping up

@@ -11,13 +11,13 @@ from nicegui import ui
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.page import works
-from softstart.page.bench import Bench
+from softstart.page import tasks
 from softstart.page.downloads import file_name
-from softstart.page.job_view import LOOK, JobView
 from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import (
-    Mark,
+    POLL,
+    JobView,
+    StaleNote,
     action,
     box,
     choice,
@@ -25,11 +25,14 @@ from softstart.page.panel_parts import (
     field,
     guarded,
     hint,
+    jobs_of,
     number,
     percent,
     save,
 )
+from softstart.page.session import Session
 from softstart.start.comparison import REFERENCE
+from softstart.tuning.question import bound_of
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
@@ -47,10 +50,10 @@ BOUNDS = {"certificate": "certified for", "momentum": "by momentum, for", "none"
 class OptimumPanel:
     """Form, progress and result; built in the current slot."""
 
-    def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
-        self._bench = bench
-        self._drive: Drive = bench.drive
-        self._found: works.Gentlest | None = None
+    def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
+        self._session = session
+        self._drive: Drive = session.drive
+        self._found: tasks.Gentlest | None = None
         with box().classes("panel-form"):
             self._time = field(
                 "Start time", "1.2x", "optimum-time", "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
@@ -61,9 +64,9 @@ class OptimumPanel:
         self._hint = hint(
             "The torque over time with the least K_dyn, and a bound that no torque can go below."
         )
-        self._view = JobView(jobs, user, "optimum", on_done=self._done, on_state=self._state)
+        self._view = JobView(jobs or jobs_of(user), user, "optimum", on_done=self._done, on_state=self._state)
         with box().classes("panel-result") as self._result:
-            self._mark = Mark(bench, "optimum")
+            self._stale = StaleNote(session, "optimum")
             self._figures = ui.html("", sanitize=False).classes("w-full")
             self._sentence = ui.label().classes("panel-sentence").props('data-testid="optimum-sentence"')
             self._why = ui.label().classes("panel-hint")
@@ -73,7 +76,7 @@ class OptimumPanel:
                     text = suffix[1:].upper()
                     action(text, guarded(partial(self._save, suffix)), f"optimum-{suffix[1:]}")
         self._result.set_visibility(False)
-        ui.timer(LOOK, self._mark.look)
+        ui.timer(POLL, self._stale.refresh)
 
     def _begin(self) -> None:
         if self._view.busy:  # the Enter key is heard while the button is not
@@ -84,14 +87,14 @@ class OptimumPanel:
         except InputError as error:
             self._view.refuse(error)
             return
-        self._drive = self._bench.drive
+        self._drive = self._session.drive
         terminal = cast("Terminal", self._end.value)
-        self._view.begin("optimal start", works.gentlest, self._drive, text, terminal)
+        self._view.begin("optimal start", tasks.gentlest, self._drive, text, terminal)
 
     def _state(self) -> None:
         self._view.settle(self._go, self._result)
 
-    def _done(self, found: works.Gentlest) -> None:
+    def _done(self, found: tasks.Gentlest) -> None:
         self._found = found
         self._figures.set_content(facts(figures(found.best), "optimum-figures"))
         bound = found.best.bound
@@ -101,10 +104,10 @@ class OptimumPanel:
             + "."
         )
         self._result.set_visibility(True)
-        self._mark.of(self._drive)
+        self._stale.show_for(self._drive)
         self._hint.set_visibility(False)
         try:
-            self._bench.add(label_of(found.best), player_of(found.best), select=False)
+            self._session.add(label_of(found.best), player_of(found.best), select=False)
         except InputError as error:  # the table is full
             self._sentence.set_text(" ".join(error.sentences))
         else:
@@ -113,9 +116,9 @@ class OptimumPanel:
     def _beside(self, best: Optimum) -> str:
         """What it is worth, against the constant torque."""
         said = f"It is among the strategies: {label_of(best)}."
-        if self._mark.stale or REFERENCE not in self._bench.controllers:
+        if self._stale.stale or REFERENCE not in self._session.controllers:
             return said
-        direct = self._bench.result(REFERENCE)
+        direct = self._session.result(REFERENCE)
         if direct.run is None:
             return said
         return f"{said} Direct has {direct.k_dyn:.4g} in {direct.start_time:.4g} s."
@@ -154,8 +157,6 @@ def figures(best: Optimum) -> list[tuple[str, str]]:
 
 def _check(text: str) -> None:
     """A start time, or an InputError."""
-    from softstart.tuning.question import bound_of
-
     try:
         if not text:
             raise InputError("")

@@ -17,10 +17,19 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.page.guard import App, Guard
 
 if TYPE_CHECKING:
+    import fastapi
+    import uvicorn
+    from nicegui import ui
+
     from softstart.drive import Drive
+    from softstart.page import layout
+else:  # of the extra "ui", and only for a server
+    fastapi, uvicorn, ui = late("fastapi"), late("uvicorn"), late("nicegui.ui")
+    layout = late("softstart.page.layout")
 
 DEFAULT_PORT = 8765
 SHORTEST_TOKEN = 16
@@ -134,12 +143,7 @@ def application(drive: Drive) -> App:
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / "softstart-stores-nothing")
     for noisy in ("nicegui", "uvicorn", "uvicorn.error", "engineio", "socketio"):
         logging.getLogger(noisy).setLevel(logging.CRITICAL)
-    from fastapi import FastAPI
-    from nicegui import ui
-
-    from softstart.page import layout
-
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @ui.page("/", title=f"softstart: {drive.name}")
     def page() -> None:
@@ -163,8 +167,6 @@ def application(drive: Drive) -> App:
 
 def run(drive: Drive, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
-    import uvicorn
-
     port = int(listener.getsockname()[1])
     app = guarded(application(drive), address, port)
     config = uvicorn.Config(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +14,31 @@ from softstart.controller.gain_files import RobustFile, read_gains
 from softstart.controller.tuned import RobustGains, Tuned, scheduled
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.page import works
-from softstart.page.bench import Bench
+from softstart.page import tasks
+from softstart.page.controls import readable
 from softstart.page.downloads import file_name
-from softstart.page.job_view import LOOK, JobView, duration
 from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import (
-    Mark,
+    POLL,
+    JobView,
+    StaleNote,
     action,
     box,
     choice,
+    duration,
     facts,
     field,
     fixed,
     guarded,
     hint,
+    jobs_of,
+    notify,
     number,
     save,
     table,
-    tell,
 )
+from softstart.page.session import Session
+from softstart.tuning.grid import gaps_of, inertias_of
 
 FIRST = "shaped"  # the controller offered first, if it is there
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
@@ -42,10 +48,10 @@ MOST_CELLS = 60
 class TuningPanel:
     """Form, progress and result; built in the current slot."""
 
-    def __init__(self, bench: Bench, user: Hashable, jobs: Jobs) -> None:
-        self._bench = bench
-        self._drive: Drive = bench.drive
-        self._found: works.Tuned | None = None
+    def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
+        self._session = session
+        self._drive: Drive = session.drive
+        self._found: tasks.Tuned | None = None
         names = tunable()
         with box().classes("panel-form"):
             first = FIRST if FIRST in names else names[0]
@@ -67,9 +73,9 @@ class TuningPanel:
             "Gains with the least K_dyn that start no slower than the defaults: for each gap and load "
             "inertia, and one set for all of them."
         )
-        self._view = JobView(jobs, user, "tuning", on_done=self._done, on_state=self._state)
+        self._view = JobView(jobs or jobs_of(user), user, "tuning", on_done=self._done, on_state=self._state)
         with box().classes("panel-result") as self._result:
-            self._mark = Mark(bench, "tuning")
+            self._stale = StaleNote(session, "tuning")
             self._figures = ui.html("", sanitize=False)
             self._gains = ui.html("", sanitize=False)
             with box().classes("panel-actions"):
@@ -83,12 +89,12 @@ class TuningPanel:
                 action("TOML", guarded(lambda: self._save("schedule.toml")), "tuning-schedule-toml")
                 action("CSV", guarded(lambda: self._save("schedule.csv")), "tuning-schedule-csv")
         self._result.set_visibility(False)
-        ui.timer(LOOK, self._mark.look)
+        ui.timer(POLL, self._stale.refresh)
 
     def _begin(self) -> None:
         if self._view.busy:
             return
-        self._drive = self._bench.drive
+        self._drive = self._session.drive
         try:
             gaps, inertias = grid_of(self._drive, str(self._gaps.value), str(self._inertias.value))
         except InputError as error:
@@ -96,27 +102,27 @@ class TuningPanel:
             return
         name = str(self._name.value)
         self._view.begin(
-            f"tuning of {name}", works.tuning, self._drive, name, gaps, inertias,
+            f"tuning of {name}", tasks.tuning, self._drive, name, gaps, inertias,
             bool(self._certified.value), int(self._searches.value),
         )  # fmt: skip
 
     def _state(self) -> None:
         self._view.settle(self._go, self._result)
 
-    def _done(self, found: works.Tuned) -> None:
+    def _done(self, found: tasks.Tuned) -> None:
         self._found = found
         self._figures.set_content(facts(figures(found), "tuning-figures"))
         self._gains.set_content(gain_table(found))
         self._cells.set_content(cell_table(found))
         self._hint.set_visibility(False)
         self._result.set_visibility(True)
-        self._mark.of(self._drive)
+        self._stale.show_for(self._drive)
 
     def _add(self, file: str) -> None:
         assert self._found is not None
         controller = controller_of(self._found.files[file], file)
-        label = self._bench.add(controller.name or file, controller)
-        tell(f"{label} is among the strategies.")
+        label = self._session.add(controller.name or file, controller)
+        notify(f"{label} is among the strategies.")
 
     def _save(self, file: str) -> None:
         assert self._found is not None
@@ -130,8 +136,6 @@ def tunable() -> list[str]:
     >>> "shaped" in tunable(), "direct" in tunable()
     (True, False)
     """
-    from dataclasses import fields
-
     found = []
     for name in controller_names():
         try:
@@ -149,8 +153,6 @@ def grid_of(drive: Drive, gaps: str, inertias: str) -> tuple[list[float], list[f
     >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1")
     ([0.25, 1.0], [0.175])
     """
-    from softstart.tuning.grid import gaps_of, inertias_of
-
     wrong: list[str] = []
     found: list[list[float]] = []
     for text, name, read in ((gaps, "Gaps", gaps_of), (inertias, "Load inertias", inertias_of)):
@@ -183,7 +185,7 @@ def controller_of(text: str, file: str) -> Tuned:
     return scheduled(saved, path.stem)
 
 
-def figures(found: works.Tuned) -> list[tuple[str, str]]:
+def figures(found: tasks.Tuned) -> list[tuple[str, str]]:
     """What one set for all gains over the defaults."""
     one = found.summary["robust"]
     return [
@@ -195,7 +197,7 @@ def figures(found: works.Tuned) -> list[tuple[str, str]]:
     ]
 
 
-def gain_table(found: works.Tuned) -> str:
+def gain_table(found: tasks.Tuned) -> str:
     """The gains of the set for all, beside the defaults."""
     one = found.summary["robust"]
     meta = {name: one["defaults"].get(name) for name in one["gains"]}
@@ -209,14 +211,10 @@ def gain_table(found: works.Tuned) -> str:
 
 def units_of(name: str) -> dict[str, str]:
     """Units of a controller's parameters, readable."""
-    from dataclasses import fields
-
-    from softstart.page.controls import readable
-
     return {one.name: readable(str(one.metadata.get("unit", ""))) for one in fields(controller_class(name))}
 
 
-def cell_table(found: works.Tuned) -> str:
+def cell_table(found: tasks.Tuned) -> str:
     """One row a cell: gap, inertia, K_dyn before and after, the optimum where it was asked for, the gains."""
     schedule: dict[str, Any] = found.summary["schedule"]
     price: dict[str, Any] = found.summary["price"] or {}

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from softstart import simulate
 from softstart.controller import make_controller
 from softstart.drive import PARAMETERS
-from softstart.page.bench import Bench
 from softstart.page.controls import GROUPS, Controls
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
+from softstart.page.session import Session
 
 
 class Line:
@@ -44,13 +44,13 @@ async def until(true, seconds: float = 30.0) -> None:
             await asyncio.sleep(0.005)
 
 
-async def followed(bench: Bench, hand, line: Line | None = None, rest: float = 0.01) -> Line:
+async def followed(session: Session, hand, line: Line | None = None, rest: float = 0.01) -> Line:
     """Run a page without a browser while `hand` moves."""
     line = line or Line()
-    screen = Screen(bench)
+    screen = Screen(session)
     live = line.live = Live(screen, line.send, rest=rest)
-    controls = Controls(bench, screen, lambda: None)
-    bench.on_change(live.poke)
+    controls = Controls(session, screen, lambda: None)
+    session.on_change(live.poke)
     task = asyncio.create_task(live.run())
     try:
         await hand(controls, line)
@@ -64,7 +64,7 @@ def rows_of_map(line: Line) -> dict[int, Any]:
 
 
 def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
-    bench = Bench(controllers=["direct", "ramp", "shaped"])
+    session = Session(controllers=["direct", "ramp", "shaped"])
 
     async def hand(controls, line):
         for position in range(100, 400, 5):
@@ -72,22 +72,22 @@ def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
             await asyncio.sleep(0)
         await until(lambda: "map_row" in line.frames[-1][1])  # the last thing that is done at rest
 
-    line = asyncio.run(followed(bench, hand))
+    line = asyncio.run(followed(session, hand))
     assert line.most_on_their_way <= WINDOW
     frames = [frame for number, frame in line.frames if number and "figure" in frame]
     assert len(frames) < 60  # coalesced
     assert frames[-1]["stamp"] == 395
-    assert frames[-1]["figure"]["k_dyn"] == simulate(bench.drive, "direct").k_dyn
+    assert frames[-1]["figure"]["k_dyn"] == simulate(session.drive, "direct").k_dyn
     rows = {}
     for _, frame in line.frames:
         rows |= {row["name"]: row for row in frame.get("rows", [])}
-    for name in bench.controllers:
-        assert rows[name]["k_dyn"] == simulate(bench.drive, name).k_dyn
-        assert rows[name]["worn"] == bench.worn(name)
+    for name in session.controllers:
+        assert rows[name]["k_dyn"] == simulate(session.drive, name).k_dyn
+        assert rows[name]["worn"] == session.worn(name)
 
 
 def test_every_step_has_its_glance_until_the_browser_stops_drawing():
-    bench = Bench(controllers=["direct"])
+    session = Session(controllers=["direct"])
     line = Line()
     steps = 60
 
@@ -99,7 +99,7 @@ def test_every_step_has_its_glance_until_the_browser_stops_drawing():
             controls.take({"what": "slide", "path": "shaft.gap", "position": position + 100})
         await asyncio.sleep(0.05)
 
-    asyncio.run(followed(bench, hand, line, rest=9.0))
+    asyncio.run(followed(session, hand, line, rest=9.0))
     glances = [frame for number, frame in line.frames if number == 0]
     assert len(glances) == GLANCES
     numbered = [frame for number, frame in line.frames if number]
@@ -107,7 +107,7 @@ def test_every_step_has_its_glance_until_the_browser_stops_drawing():
 
 
 def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
-    bench = Bench(controllers=["direct"])
+    session = Session(controllers=["direct"])
 
     async def hand(controls, line):
         await until(lambda: len(rows_of_map(line)) == 17)
@@ -120,15 +120,15 @@ def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
         assert any(frame.get("map_is_old") for _, frame in line.frames)
         rows = rows_of_map(line)
         head = rows[8]["map"]
-        here = bench.drive.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
+        here = session.drive.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
         assert rows[8]["map_row"]["k"][6] == simulate(here, "direct").k_dyn
 
-    asyncio.run(followed(bench, hand))
+    asyncio.run(followed(session, hand))
 
 
 def test_a_map_left_half_way_is_old_until_all_its_rows_have_come():
     """Going back to the strategy before does not make the rows of both a map of one."""
-    bench = Bench(controllers=["direct", "ramp"])
+    session = Session(controllers=["direct", "ramp"])
 
     async def hand(controls, line):
         await until(lambda: len(rows_of_map(line)) == 17)
@@ -141,7 +141,7 @@ def test_a_map_left_half_way_is_old_until_all_its_rows_have_come():
         assert now["map_is_old"]
         assert {row["map"]["strategy"] for row in rows_of_map(line).values()} == {"direct"}
 
-    asyncio.run(followed(bench, hand))
+    asyncio.run(followed(session, hand))
 
 
 def test_what_fails_is_told_and_following_goes_on():
@@ -153,10 +153,10 @@ def test_what_fails_is_told_and_following_goes_on():
                 raise KeyError("lost")
             return super().first()
 
-    bench, line, told = Bench(controllers=["direct"]), Line(), []
+    session, line, told = Session(controllers=["direct"]), Line(), []
 
     async def scene():
-        screen = Broken(bench)
+        screen = Broken(session)
         line.live = Live(screen, line.send, told.append)
         task = asyncio.create_task(line.live.run())
         await until(lambda: told)
@@ -170,19 +170,19 @@ def test_what_fails_is_told_and_following_goes_on():
     assert "KeyError" in told[0]
 
 
-def controls_of(bench: Bench) -> tuple[Controls, Screen]:
-    screen = Screen(bench)
-    return Controls(bench, screen, lambda: None), screen
+def controls_of(session: Session) -> tuple[Controls, Screen]:
+    screen = Screen(session)
+    return Controls(session, screen, lambda: None), screen
 
 
 def test_a_mistake_stays_beside_its_field_until_it_is_mended():
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 metres"})
     assert "not an angle" in screen.first()["mistakes"]["shaft.gap"]
     controls.take({"what": "edit", "path": "load.torque", "text": "8"})
     assert list(screen.mistakes) == ["shaft.gap"]
-    assert bench.drive.gap == 0.5
+    assert session.drive.gap == 0.5
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
     assert screen.first()["fields"]["shaft.gap"] == ["0.0698132", 21, "4\N{DEGREE SIGN}"]
@@ -190,22 +190,22 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
 
 def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
     """Escape: the field shows six digits, so its text is not sent."""
-    bench = Bench(controllers=["direct"])
-    bench.set("shaft.stiffness", 368.4651234567)
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    session.set("shaft.stiffness", 368.4651234567)
+    controls, screen = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.stiffness", "text": "soft"})
     assert screen.mistakes
     controls.take({"what": "leave", "path": "shaft.stiffness"})
     assert not screen.mistakes
-    assert bench.drive.stiffness == 368.4651234567
+    assert session.drive.stiffness == 368.4651234567
 
 
 def test_each_message_is_told_of_once_and_no_place_is_made_up():
-    bench = Bench(controllers=["direct"])
+    session = Session(controllers=["direct"])
     pokes: list[int] = []
-    screen = Screen(bench)
-    bench.on_change(lambda: pokes.append(1))
-    controls = Controls(bench, screen, lambda: pokes.append(2))
+    screen = Screen(session)
+    session.on_change(lambda: pokes.append(1))
+    controls = Controls(session, screen, lambda: pokes.append(2))
     controls.take({"what": "slide", "path": "shaft.gap", "position": 200, "stamp": 10**400})
     controls.take({"what": "edit", "path": "shaft.gap", "text": "wide"})
     controls.take({"what": "edit", "path": "no.field", "text": "1"})
@@ -214,23 +214,23 @@ def test_each_message_is_told_of_once_and_no_place_is_made_up():
 
 
 def test_a_page_loaded_anew_goes_on_with_the_drive_that_its_tab_has_kept():
-    before = Bench(controllers=["direct"])
+    before = Session(controllers=["direct"])
     before.set_all({"shaft.gap": 0.1 + 0.2, "name": 'my "own" drive'})
     (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
     controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}})
-    assert bench.drive == bench.origin != before.drive
+    assert session.drive == session.origin != before.drive
     controls.take({"what": "hello", "kept": kept})
-    assert bench.drive == before.drive
+    assert session.drive == before.drive
     assert not screen.mistakes
     assert len([frame for frame in screen.at_rest() if frame and "keep" in frame]) == 1
     assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
 
 
 def test_a_slider_sets_exactly_the_value_that_its_field_shows():
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
     for name, scale in screen.scales.items():
         path = PARAMETERS[name].path
         controls.take({"what": "slide", "path": path, "position": 300})
@@ -241,9 +241,9 @@ def test_a_slider_sets_exactly_the_value_that_its_field_shows():
 
 
 def test_a_strategy_that_has_joined_can_be_taken_out_again():
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
-    bench.add("tuned", make_controller("ramp"))
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
+    session.add("tuned", make_controller("ramp"))
     assert screen.first()["added"] == ["tuned"]
     controls.take({"what": "remove", "name": "tuned"})
     assert (screen.first()["order"], screen.first()["selected"]) == (["direct"], "direct")
@@ -252,11 +252,11 @@ def test_a_strategy_that_has_joined_can_be_taken_out_again():
 
 
 def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.gap", "text": ""})
     assert "empty" in screen.mistakes["shaft.gap"]
-    bench.take(bench.drive.replace(gap=0.005))
+    session.take(session.drive.replace(gap=0.005))
     assert not screen.first()["mistakes"]
     assert screen.scales["gap"].high == 0.02
     assert max(screen.axes.gaps) == 0.02
@@ -265,7 +265,7 @@ def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
 def test_every_parameter_with_a_field_is_one_of_the_drive():
     shown = [name for rows in GROUPS.values() for name, _ in rows]
     assert len(set(shown)) == len(shown)
-    assert set(Screen(Bench(controllers=["direct"])).scales) <= set(shown)
+    assert set(Screen(Session(controllers=["direct"])).scales) <= set(shown)
 
 
 KEYS = ("path", "text", "position", "gap", "inertia", "name", "visible", "kept", "stamp")
@@ -289,8 +289,8 @@ JSON = st.recursive(
     | JSON
 )
 def test_no_message_whatever_kills_the_page(message):
-    bench = Bench(controllers=["direct"])
-    controls, screen = controls_of(bench)
+    session = Session(controllers=["direct"])
+    controls, screen = controls_of(session)
     controls.take(message)
     frame = screen.first()
     json.dumps(frame, allow_nan=False)

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from softstart import Drive, InputError
-from softstart.page.bench import Bench
 from softstart.page.jobs import State
+from softstart.page.session import Session
 
 pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
 
@@ -54,7 +54,7 @@ class Hasty:
 
 @pytest.mark.parametrize("looks", [1, 2, 3, 4])
 def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
-    from softstart.page.job_view import JobView
+    from softstart.page.panel_parts import JobView
 
     class Queue:
         def begin(self, *args: Any) -> Hasty:
@@ -67,7 +67,7 @@ def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks
     view.begin("it", print)
     job.looks = looks
     for _ in range(looks + 2):
-        view._look()
+        view._refresh()
     assert given == ["the result"]
     assert states[-1] is False
 
@@ -83,7 +83,7 @@ def test_the_enter_key_does_not_lose_a_job_that_runs(client: Any) -> None:
             return begun[-1]
 
     begun: list[Hasty] = []
-    panel = OptimumPanel(Bench(controllers=["direct"]), "A", Queue())
+    panel = OptimumPanel(Session(controllers=["direct"]), "A", Queue())
     panel._begin()
     panel._time.value = "soon"
     panel._begin()
@@ -95,7 +95,7 @@ def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
     """NiceGUI gives itself to a handler that has a parameter; what fails in one ends the shutdown unseen."""
     from nicegui import app
 
-    from softstart.page.background import server_jobs
+    from softstart.page.panel_parts import server_jobs
 
     handlers: list[Any] = []
     monkeypatch.setattr(app, "on_shutdown", handlers.append)
@@ -111,10 +111,10 @@ def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
     """The web framework remembers the function of each upload's route."""
     from softstart.page.files_panel import DriveFiles
 
-    bench = Bench(controllers=["direct"])
-    DriveFiles(bench)
-    kept = weakref.ref(bench)
-    del bench
+    session = Session(controllers=["direct"])
+    DriveFiles(session)
+    kept = weakref.ref(session)
+    del session
     gc.collect()
     assert kept() is not None
     client.delete()

@@ -12,9 +12,8 @@ from hypothesis.extra.numpy import arrays
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.page.map import axes_about, k_dyn_row
-from softstart.page.scales import STEPS, Scale, scales_about
-from softstart.page.traces import CHANNELS, landmarks, thinned, traces_of
+from softstart.page.frames import CHANNELS, k_dyn_row, landmarks, thinned, traces_of
+from softstart.page.ranges import STEPS, Scale, axes_about, scales_about
 
 CRANE = Drive.load("crane-4amtkf")
 

@@ -14,12 +14,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from softstart import reporting
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal.shortest import start_time_of_direct
+from softstart.optimal.front import pareto
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.optimal.shortest import shortest_start_time, start_time_of_direct
+from softstart.optimal.solving import optimize
 from softstart.page.downloads import text_of
 from softstart.page.job_process import Tell
 from softstart.start.simulation import simulate
+from softstart.tuning.question import bound_of
+from softstart.tuning.solving import tune
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
@@ -29,15 +36,7 @@ if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
     from softstart.tuning.outcome import Tuning
 
-LONG_MULTIPLES = (
-    1.05,
-    1.1,
-    1.15,
-    1.2,
-    1.3,
-    1.4,
-    1.6,
-)  # of the start time of direct: the easy end of the curve
+LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
 SHORT_SHARES = (0.0, 0.06, 0.2, 0.5)  # of the way from the shortest start time to the shortest easy one
 SHORT = 1.02  # how far above the shortest feasible start time the curve ends
 TUNING_SHARES = {
@@ -46,7 +45,7 @@ TUNING_SHARES = {
     "robust": (0.45, 0.8),
     "certified": (0.8, 1.0),
 }
-SELDOM = 0.1  # s between two reports of a work that would report thousands of times
+INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
 
 @dataclass(frozen=True)
@@ -60,9 +59,7 @@ class Gentlest:
 def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -> Gentlest:
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     tell(None, "looking for the gentlest start")
-    from softstart.optimal.solving import optimize
-
-    with no_solution_told():
+    with no_solution_as_sentence():
         best = optimize(drive, seconds_of(drive, start_time), terminal=terminal)
     tell(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
@@ -82,8 +79,6 @@ def seconds_of(drive: Drive, start_time: str) -> float:
     >>> round(seconds_of(crane, "1.2x"), 4), seconds_of(crane, "300 ms")
     (0.4482, 0.3)
     """
-    from softstart.tuning.question import bound_of
-
     bound = bound_of(start_time)
     return bound.value * (start_time_of_direct(drive) if bound.kind == "direct" else 1.0)
 
@@ -93,12 +88,8 @@ def curve(
 ) -> list[FrontPoint]:
     """The least K_dyn over the start time: the easy long ones first, those of the strategies, the short ones.
 
-    Each point is told as a part as soon as it is known; the result is all of them in order of start time.
+    Each point is sent as a part as soon as it is known; the result is all of them in order of start time.
     """
-    from softstart.optimal.front import pareto
-    from softstart.optimal.problem import Problem
-    from softstart.optimal.shortest import shortest_start_time
-
     points: list[FrontPoint] = []
     direct = simulate(drive, "direct").start_time
     easy = [one * direct for one in LONG_MULTIPLES] if math.isfinite(direct) else []
@@ -121,7 +112,7 @@ def curve(
         if times:
             pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
 
-    with no_solution_told():
+    with no_solution_as_sentence():
         through(long)
         tell(done / total, "the shortest start time")
         shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
@@ -138,10 +129,8 @@ def curve(
 
 
 @contextmanager
-def no_solution_told() -> Iterator[None]:
-    """That there is no solution, or that none was found, is said in its own sentence."""
-    from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-
+def no_solution_as_sentence() -> Iterator[None]:
+    """Turns "there is no solution" and "none was found" into a SimulationError with that sentence."""
     try:
         yield
     except (InfeasibleError, OptimumError, NotConverged) as error:
@@ -174,11 +163,9 @@ def tuning(
     tell: Tell,
 ) -> Tuned:
     """Gains of a controller for each gap and load inertia, and one set for all."""
-    from softstart.tuning.solving import tune
-
     found = tune(
         drive, controller, gaps, inertias, certified=certified, restarts=restarts, workers=1,
-        progress=_Seldom(tell),
+        progress=_Throttled(tell),
     )  # fmt: skip
     tell(1.0, "writing the gains")
     return Tuned(found.summary(), _files(found), found.seconds, found.starts)
@@ -192,8 +179,8 @@ def _files(found: Tuning) -> dict[str, str]:
     }
 
 
-class _Seldom:
-    """Tells what a tuning does, not more than some times a second, with a share made of its parts."""
+class _Throttled:
+    """Reports the progress of a tuning at most ten times a second, with a share made of its parts."""
 
     def __init__(self, tell: Tell) -> None:
         self.tell = tell
@@ -202,14 +189,14 @@ class _Seldom:
     def __call__(self, doing: str) -> None:
         now = time.monotonic()
         title = doing.partition(",")[0]
-        if title == self.title and now < self.last + SELDOM:
+        if title == self.title and now < self.last + INTERVAL:
             return
         self.title, self.last = title, now
         self.tell(tuning_share(doing), doing)
 
 
 def tuning_share(doing: str) -> float | None:
-    """How much of a tuning is done, from what it says it is doing.
+    """How much of a tuning is done, from its message.
 
     >>> tuning_share("schedule, searches 2 of 4, 3,088 starts, 6,314/s"), tuning_share("something else")
     (0.25, None)
@@ -233,6 +220,4 @@ def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> 
 def report(drive: Drive, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:
     """The report for a customer, as one HTML text."""
     tell(0.0, "starting the drive")
-    from softstart.reporting import report as made
-
-    return made(drive, controllers=controllers, progress=tell, command=command).to_html()
+    return reporting.report(drive, controllers=controllers, progress=tell, command=command).to_html()

@@ -1,6 +1,6 @@
 """The state of one user: a drive, the strategies that start it, and what came out. No NiceGUI here.
 
-Everything happens in the thread of the page's event loop; a bench belongs to one client and is never shared.
+Everything happens in the thread of the page's event loop; a session belongs to one client.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.page.trouble import sentence_of
+from softstart.page.sentences import sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
 from softstart.start.simulation import simulate
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
-    from softstart.page.traces import Traces
     from softstart.start.run import Run
 
 MAX_STRATEGIES = 24
@@ -60,26 +59,17 @@ class Strategy:
         """How the start ended, as a sentence."""
         return self.trouble if self.run is None else self.run.status.value
 
-    @property
-    def traces(self) -> Traces | None:
-        """Torques, speeds and twist over time, thinned without losing an extremum; None without a start."""
-        if self.run is None:
-            return None
-        from softstart.page.traces import traces_of
 
-        return traces_of(self.run)
-
-
-class Bench:
-    """A drive and its strategies, changed step by step; a mistake raises InputError and changes nothing.
+class Session:
+    """The drive and the strategies of one user; a refused change raises InputError and changes nothing.
 
     Results are computed when they are asked for and kept until the drive changes.
 
-    >>> bench = Bench()
-    >>> round(bench.result("direct").k_dyn, 3)
+    >>> session = Session()
+    >>> round(session.result("direct").k_dyn, 3)
     3.118
-    >>> bench.set("shaft.gap", "2 rad")
-    >>> round(bench.result("direct").k_dyn, 3), bench.version
+    >>> session.set("shaft.gap", "2 rad")
+    >>> round(session.result("direct").k_dyn, 3), session.version
     (4.865, 1)
     """
 
@@ -149,11 +139,11 @@ class Bench:
     def set(self, path: str, value: str | float) -> None:
         """Change one parameter, `shaft.gap` or `gap`, to an SI number or a text with a unit.
 
-        >>> bench = Bench()
-        >>> bench.set("gap", "4 metres")
+        >>> session = Session()
+        >>> session.set("gap", "4 metres")
         Traceback (most recent call last):
         softstart.errors.InputError: gap = "4 metres": metres is a length, not an angle; ...
-        >>> bench.drive.gap
+        >>> session.drive.gap
         0.5
         """
         self.set_all({path: value})

@@ -1,15 +1,41 @@
-"""Results belong to the drive they were computed for: what to say when the bench has another one by now."""
+"""Sentences that the page shows: what went wrong, and for which earlier drive a result is."""
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 
+log = logging.getLogger("softstart.page")
+LONGEST = 300  # letters of an exception
+LONGEST_NAME = 60  # letters of a name in a sentence
 NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source")  # they change no result
-LONGEST = 60  # letters of a name in a sentence
+
+
+def sentence_of(error: BaseException) -> str:
+    """One plain sentence for an exception: nobody who uses the page sees a traceback.
+
+    >>> sentence_of(InputError(["gap = -1: a gap is 0 or more.", "inertia = 0: above 0."]))
+    'gap = -1: a gap is 0 or more. inertia = 0: above 0.'
+    >>> sentence_of(KeyError("x"))
+    "This did not work, and that is a mistake in softstart, not in your input (KeyError: 'x')."
+    """
+    if isinstance(error, InputError):
+        return " ".join(error.sentences)
+    if isinstance(error, SimulationError):
+        return " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        return "There is not enough memory for this."
+    said = " ".join(str(error).split())
+    if len(said) > LONGEST:
+        said = said[:LONGEST] + " ..."
+    what = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    log.debug("told the user: %s", what, exc_info=error)
+    return f"This did not work, and that is a mistake in softstart, not in your input ({what})."
 
 
 def clipped(name: str) -> str:
@@ -18,25 +44,25 @@ def clipped(name: str) -> str:
     >>> clipped("Crane"), len(clipped("Crane " * 100))
     ('Crane', 60)
     """
-    return name if len(name) <= LONGEST else name[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def drift(computed: Drive, now: Drive) -> str:
+def changed_since(computed: Drive, now: Drive) -> str:
     """What a result was computed for, where that is not the drive of now; empty where it is.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> drift(crane, crane)
+    >>> changed_since(crane, crane)
     ''
-    >>> drift(crane, crane.replace(name="the same by another name"))
+    >>> changed_since(crane, crane.replace(name="the same by another name"))
     ''
-    >>> drift(crane, crane.replace(gap=1.0))
+    >>> changed_since(crane, crane.replace(gap=1.0))
     'For shaft.gap 0.5 rad; the drive has changed since.'
     """
     changed = [p for p in changes(computed, now) if p.name not in WORDS]
     if not changed:
         return ""
     if computed.name != now.name:
-        return f"For {clipped(computed.name)}; another drive is on the bench."
+        return f"For {clipped(computed.name)}; another drive is loaded now."
     named = ", ".join(f"{p.path} {_value(p, getattr(computed, p.name))}" for p in changed[:NAMED])
     more = f" and {len(changed) - NAMED} more" if len(changed) > NAMED else ""
     return f"For {named}{more}; the drive has changed since."

@@ -17,13 +17,11 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, SimulationError, optimize, simulate, tune
 from softstart.controller import make_controller
 from softstart.optimal.result import OptimumError
-from softstart.page import works
-from softstart.page.command_text import command_text
-from softstart.page.curve_chart import Mark, curve_svg
-from softstart.page.curve_panel import against, csv_of
-from softstart.page.downloads import file_name
-from softstart.page.drift import drift
+from softstart.page import tasks
+from softstart.page.curve_panel import StrategyPoint, against, csv_of, curve_svg
+from softstart.page.downloads import command_text, file_name
 from softstart.page.optimum_panel import label_of, player_of
+from softstart.page.sentences import changed_since
 from softstart.page.tuning_panel import controller_of, tunable
 
 CRANE = Drive.load("crane-4amtkf")
@@ -44,7 +42,7 @@ class Heard:
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
-    found = works.gentlest(CRANE, "1.2x", "reached", tell=Heard())  # type: ignore[arg-type]
+    found = tasks.gentlest(CRANE, "1.2x", "reached", tell=Heard())  # type: ignore[arg-type]
     best = optimize(CRANE, 1.2 * simulate(CRANE, "direct").start_time, terminal="reached")
     assert found.best.k_dyn == best.k_dyn
     assert simulate(CRANE, player_of(found.best)).k_dyn == best.k_dyn
@@ -53,10 +51,10 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
         path = tmp_path / f"profile{suffix}"
         path.write_text(found.files[suffix], encoding="utf-8")
         assert simulate(CRANE, "profile", parameters={"file": str(path)}).k_dyn == best.k_dyn
-    with pytest.raises(SimulationError, match="no way"), works.no_solution_told():
+    with pytest.raises(SimulationError, match="no way"), tasks.no_solution_as_sentence():
         raise OptimumError("no way")
     with pytest.raises(InputError, match="start_time"):
-        works.gentlest(CRANE, "-1", "reached", tell=Heard())  # type: ignore[arg-type]
+        tasks.gentlest(CRANE, "-1", "reached", tell=Heard())  # type: ignore[arg-type]
 
 
 def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,7 +62,7 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
     monkeypatch.setattr("softstart.optimal.shortest.shortest_start_time", lambda problem: math.inf)
     runs = {name: simulate(CRANE, name) for name in ("current-limit-feedback", "ramp")}
     heard = Heard()
-    points = works.curve(CRANE, [run.start_time for run in runs.values()], tell=heard)  # type: ignore[arg-type]
+    points = tasks.curve(CRANE, [run.start_time for run in runs.values()], tell=heard)  # type: ignore[arg-type]
     assert {p.start_time_bound for p in heard.parts} == {p.start_time_bound for p in points}
     times = [p.start_time_bound for p in points]
     assert times == sorted(times)
@@ -74,7 +72,7 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
     assert shares == sorted(shares)
     assert 0.0 <= shares[0] <= shares[-1] <= 1.0
 
-    marks = [Mark(name, run.start_time, run.k_dyn) for name, run in runs.items()]
+    marks = [StrategyPoint(name, run.start_time, run.k_dyn) for name, run in runs.items()]
     rows = against(points, marks)
     assert [row[0] for row in rows] == ["current-limit-feedback", "ramp"]
     for row in rows:
@@ -83,7 +81,9 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
     table = list(csv.DictReader(csv_of(points).splitlines()))
     assert [float(line["k_dyn"]) for line in table] == least
 
-    drawn = ET.fromstring(curve_svg(points, [*marks, Mark("<b>&", 0.5, 2.0), Mark("never", math.nan, 1.0)]))
+    drawn = ET.fromstring(
+        curve_svg(points, [*marks, StrategyPoint("<b>&", 0.5, 2.0), StrategyPoint("never", math.nan, 1.0)])
+    )
     names = [e.text for e in drawn.iter("text") if e.get("class") == "curve-name"]
     assert sorted(str(name) for name in names) == ["<b>&", "current-limit-feedback", "ramp"]
     assert sum(e.get("class") == "curve-point" for e in drawn.iter("circle")) == len(points)
@@ -91,7 +91,10 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
 
 
 def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
-    marks = [Mark(f"optimum {0.60 + 0.002 * k:.3f} s", 0.60 + 0.002 * k, 0.7 - 0.001 * k) for k in range(40)]
+    marks = [
+        StrategyPoint(f"optimum {0.60 + 0.002 * k:.3f} s", 0.60 + 0.002 * k, 0.7 - 0.001 * k)
+        for k in range(40)
+    ]
     drawn = ET.fromstring(curve_svg([], marks))
     assert sum(e.get("class") == "curve-mark" for e in drawn.iter("rect")) == 40
     places = [
@@ -106,7 +109,7 @@ def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
 
 def test_tuned_gains_come_as_files() -> None:
     heard = Heard()
-    found = works.tuning(
+    found = tasks.tuning(
         CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, tell=heard  # type: ignore[arg-type]
     )  # fmt: skip
     same = tune(CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, workers=1)
@@ -146,7 +149,9 @@ def test_the_command_line_starts_the_same_drive() -> None:
 
 
 def test_drift_names_what_was_and_what_is_another_drive() -> None:
-    assert drift(CRANE, CRANE.replace(gap=CRANE.gap)) == ""
-    assert drift(CRANE, CRANE.replace(starting_torque=60.0)).startswith("For motor.starting_torque 62 N m;")
+    assert changed_since(CRANE, CRANE.replace(gap=CRANE.gap)) == ""
+    assert changed_since(CRANE, CRANE.replace(starting_torque=60.0)).startswith(
+        "For motor.starting_torque 62 N m;"
+    )
     other = Drive.load("servo-axis-small")
-    assert drift(CRANE, other) == f"For {CRANE.name}; another drive is on the bench."
+    assert changed_since(CRANE, other) == f"For {CRANE.name}; another drive is loaded now."

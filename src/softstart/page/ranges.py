@@ -1,4 +1,4 @@
-"""Sliders: which values they run over, and what a position stands for."""
+"""The ranges of sliders and of the map, about the drive as it was loaded."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
+
 from softstart.drive import Drive
 
 STEPS = 600
 DIGITS = 4
+GAPS, INERTIAS = 25, 17  # of the map
 
 
 def rounded(value: float, digits: int = DIGITS) -> float:
@@ -81,4 +84,33 @@ def scales_about(origin: Drive) -> Mapping[str, Scale]:
             "load_torque": Scale(min(0.0, 2.0 * Mc), rounded(0.95 * Ms, 3)),
             "target_speed": Scale(rounded(0.2 * target), rounded(2.0 * target)),
         }
+    )
+
+
+@dataclass(frozen=True)
+class Axes:
+    """The gaps (rad) and load inertias (kg m2) of a map, ascending."""
+
+    gaps: tuple[float, ...]
+    inertias: tuple[float, ...]
+
+    def nearest(self, gap: float, inertia: float) -> tuple[int, int]:
+        """Indices of the cell in which a drive lies: the gap's scale is even, the inertia's logarithmic."""
+        column = int(np.argmin(np.abs(np.array(self.gaps) - gap)))
+        row = int(np.argmin(np.abs(np.log(np.array(self.inertias) / inertia))))
+        return column, row
+
+
+def axes_about(origin: Drive, gaps: int = GAPS, inertias: int = INERTIAS) -> Axes:
+    """Gaps up to four times that of the drive as it was loaded, inertias from a fifth to five times its own.
+
+    >>> axes = axes_about(Drive.load("crane-4amtkf"), 5, 3)
+    >>> axes.gaps, axes.inertias
+    ((0.0, 0.5, 1.0, 1.5, 2.0), (0.035, 0.175, 0.875))
+    """
+    gap, inertia = float(origin.gap), float(origin.load_inertia)
+    widest = 4.0 * gap if gap > 0.0 else 0.1
+    return Axes(
+        tuple(rounded(v, 6) for v in np.linspace(0.0, widest, gaps)),
+        tuple(rounded(v, 6) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
     )

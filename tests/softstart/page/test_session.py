@@ -1,0 +1,169 @@
+"""The state of one user: exact figures, and a mistake that changes nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, compare, simulate
+from softstart.controller import Command, PlainController, make_controller
+from softstart.page.downloads import command_text
+from softstart.page.session import MAX_STRATEGIES, Session
+
+
+class Failing(PlainController):
+    name = "failing"
+
+    def step(self, measured, state):
+        raise ZeroDivisionError("no way")
+
+
+def test_all_figures_are_those_of_compare_to_the_bit():
+    session = Session()
+    session.set_all({"shaft.gap": "0.7 rad", "shaft.damping": 0.4})
+    for row, strategy in zip(compare(session.drive).rows, session.strategies, strict=True):
+        assert strategy.name == row.run.controller.name
+        assert strategy.k_dyn == row.run.k_dyn
+        assert strategy.start_time == row.run.start_time
+        assert session.worn(strategy.name) == row.k_dyn_worn_gap
+        assert session.time_lost(strategy.name) == row.time_lost
+
+
+def test_set_takes_numbers_and_texts_and_counts_changes():
+    session = Session(controllers=["direct"])
+    calls = []
+    stop = session.on_change(lambda: calls.append(session.version))
+    session.set("shaft.gap", 0.1 + 0.2)
+    assert session.drive.gap == 0.1 + 0.2  # to the bit, not through a rounded text
+    session.set("target_speed", "880 rpm")
+    stop()
+    session.set("load.kind", "reactive")
+    assert calls == [1, 2]
+    assert session.version == 3
+    assert session.drive.load_kind == "reactive"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("shaft.gap", "-1", "0 or more"),
+        ("shaft.gap", "4 m", "length"),
+        ("shaft.gap", "[1, 2]", "gap"),
+        ("motor.starting_torque", "7 N*m", "starting_torque"),
+        ("load.inertia", float("nan"), "not a number"),
+        ("nothing.here", 1.0, "no parameter"),
+        ("load.kind", "rective", "reactive"),
+    ],
+)
+def test_a_mistake_is_a_sentence_and_changes_nothing(path, value, said):
+    session = Session(controllers=["direct"])
+    before, known = session.drive, session.result("direct")
+    with pytest.raises(InputError, match=said):
+        session.set(path, value)
+    assert session.drive is before
+    assert session.version == 0
+    assert session.result("direct") is known
+
+
+def test_several_changes_are_one_step_or_none():
+    session = Session(controllers=["direct"])
+    with pytest.raises(InputError):
+        session.set_all({"shaft.gap": 1.0, "load.inertia": -1.0})
+    assert session.drive.gap == 0.5
+    session.set_all({"shaft.gap": 1.0, "load.inertia": 0.1})
+    assert (session.drive.gap, session.drive.J2, session.version) == (1.0, 0.1, 1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.text(max_size=40), st.text(max_size=40))
+def test_no_text_whatever_breaks_the_bench(path, text):
+    session = Session(controllers=["direct"])
+    before = session.drive
+    for change in (lambda: session.set(path, text), lambda: session.load(text)):
+        with contextlib.suppress(InputError):
+            change()
+        assert session.drive is before or session.version > 0
+        assert session.result("direct").k_dyn > 0.0
+
+
+def test_load_takes_a_file_or_leaves_everything():
+    session = Session(controllers=["direct"])
+    other = Drive.load("nordin-servo-60kw")
+    session.load(other.to_toml())
+    assert session.drive == session.origin == other
+    with pytest.raises(InputError, match=r"mine.toml: \[shaft\]"):
+        session.load(other.to_toml().replace("gap =", "gapp ="), where="mine.toml")
+    assert session.drive == other
+
+
+def test_a_failing_controller_is_a_sentence_in_its_row():
+    session = Session(controllers=["direct"])
+    label = session.add("mine", Failing())
+    found = session.result(label)
+    assert found.run is None
+    assert "ZeroDivisionError" in found.status
+    assert "Traceback" not in found.status
+    assert found.k_dyn != found.k_dyn
+    assert session.selected == "mine"
+    session.remove(label)
+    assert session.selected == "direct"
+    with pytest.raises(InputError, match="last strategy"):
+        session.remove("direct")
+
+
+def test_an_added_controller_joins_with_its_own_figures():
+    session = Session(controllers=["direct"])
+    soft = make_controller("ramp", {"time": "300 ms"})
+    assert session.add("  ramp  300 ms ", soft, select=False) == "ramp 300 ms"
+    assert session.result("ramp 300 ms").k_dyn == simulate(session.drive, soft).k_dyn
+    assert session.shown == ("direct", "ramp 300 ms")
+    for number in range(MAX_STRATEGIES - 2):
+        session.add(f"more {number}", soft)
+    with pytest.raises(InputError, match="remove one first"):
+        session.add("too many", soft)
+
+
+def test_the_selected_strategy_is_always_one_of_those_drawn():
+    session = Session(controllers=["direct", "ramp"])
+    session.show("direct", visible=False)
+    assert session.shown == ("direct",)
+    assert command_text(
+        session.drive, {label: session.controllers[label] for label in session.shown}
+    ).endswith("--controllers direct")
+    session.select("ramp")
+    assert session.shown == ("ramp",)
+    session.add("tuned", make_controller("ramp"))
+    session.remove("tuned")
+    assert session.selected in session.shown
+
+
+def test_a_start_with_too_many_events_waits_for_rest():
+    class Busy(PlainController):
+        def step(self, measured, state):
+            return Command(62.0, measured.time + 1e-4)
+
+    session = Session(controllers=["direct"])
+    session.add("busy", Busy())
+    quick = session.result("busy", max_events=100)
+    assert quick.run is None
+    assert session.ready("busy") is None  # given up for now, not for good
+    assert session.result("busy").k_dyn == pytest.approx(session.result("direct").k_dyn, rel=1e-12)
+
+
+def test_an_unknown_strategy_is_told_with_the_nearest_name():
+    with pytest.raises(InputError, match="did you mean ramp"):
+        Session().select("rammp")
+
+
+def test_state_and_server_need_no_nicegui_until_the_page_is_built():
+    code = (
+        "import sys, softstart.page.serve, softstart.page.layout, softstart.page.session;"
+        "import softstart.cli.serve;"
+        "sys.exit('nicegui' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
