@@ -14,14 +14,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from softstart import reporting
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal.front import pareto
+from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-from softstart.optimal.shortest import shortest_start_time, start_time_of_direct
-from softstart.optimal.solving import optimize
 from softstart.page.downloads import text_of
 from softstart.page.job_process import Tell
 from softstart.start.simulation import simulate
@@ -29,12 +26,17 @@ from softstart.tuning.question import bound_of
 from softstart.tuning.solving import tune
 
 if TYPE_CHECKING:
+    from softstart import reporting
     from softstart.controller.base import Controller
+    from softstart.optimal import front, shortest, solving
     from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
     from softstart.profile import TorqueProfile
     from softstart.tuning.outcome import Tuning
+else:  # they import scipy.optimize; in the server the first page would wait for that
+    reporting, front = late("softstart.reporting"), late("softstart.optimal.front")
+    shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
 
 LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
 SHORT_SHARES = (0.0, 0.06, 0.2, 0.5)  # of the way from the shortest start time to the shortest easy one
@@ -60,7 +62,7 @@ def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     tell(None, "looking for the gentlest start")
     with no_solution_as_sentence():
-        best = optimize(drive, seconds_of(drive, start_time), terminal=terminal)
+        best = solving.optimize(drive, seconds_of(drive, start_time), terminal=terminal)
     tell(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     profile = best.profile
@@ -80,7 +82,7 @@ def seconds_of(drive: Drive, start_time: str) -> float:
     (0.4482, 0.3)
     """
     bound = bound_of(start_time)
-    return bound.value * (start_time_of_direct(drive) if bound.kind == "direct" else 1.0)
+    return bound.value * (shortest.start_time_of_direct(drive) if bound.kind == "direct" else 1.0)
 
 
 def curve(
@@ -110,17 +112,17 @@ def curve(
 
     def through(times: Sequence[float]) -> None:
         if times:
-            pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
+            front.pareto(drive, times, terminal=terminal, controllers=[], progress=doing, each=each)
 
     with no_solution_as_sentence():
         through(long)
         tell(done / total, "the shortest start time")
-        shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
+        least = shortest.shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
         done += 1
-        if math.isfinite(shortest):
-            first, last = SHORT * shortest, easy[0] if easy and easy[0] > SHORT * shortest else 1.6 * shortest
+        if math.isfinite(least):
+            first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
             through([first + share * (last - first) for share in SHORT_SHARES])
-            through([one for one in own if shortest <= one < (easy[0] if easy else math.inf)])
+            through([one for one in own if least <= one < (easy[0] if easy else math.inf)])
     if not points:
         raise SimulationError(
             "None of these start times is feasible; give this drive more torque or a lower target."
