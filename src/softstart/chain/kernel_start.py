@@ -50,18 +50,21 @@ from softstart.plant.layout import (
     EVENT_LIMIT,
     EVENTS,
     LAG,
+    MOTION,
     N_EVENTS,
     N_SEGMENTS,
     NOT_FINITE,
     NOT_LOCATED,
     PENDING,
     PHI2,
+    PLANT,
     Q_TIME,
     QUEUE,
     REF,
     SLEW_END,
     STAGE,
     START_TIME,
+    STATE,
     STATUS,
     T_END,
     TIME,
@@ -187,11 +190,11 @@ def advance(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shaf
         if t >= stop:
             return ENDED
         if m[PENDING] > 0.0 and t >= m[QUEUE + Q_TIME]:
-            next_in_queue(x, m)
+            next_in_queue(x.view(STATE)[0], m.view(MOTION)[0])
             continue
         if t >= x[ASK_AT]:
             return ASK if x[ASKED] < p[EVENT_CAP] else EVENT_LIMIT
-        torque_course(p, x, m)
+        torque_course(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0])
         until = min(x[ASK_AT], stop)
         if m[PENDING] > 0.0:
             until = min(until, m[QUEUE + Q_TIME])
@@ -277,7 +280,7 @@ def look(p: Vector, x: Vector, m: Vector, sees: int, place: Vector, masses: Matr
         if (
             shaft[k, MODE] == PRESSED or shaft[k, MODE] == WELDED
         ):  # what the joint carries: of a span of no length
-            torque_course(p, x, m)
+            torque_course(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0])
             join_bodies(masses, shafts, mass, shaft)
             expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, 0.0, 0)
         sign = 1.0 if motor <= k else -1.0

@@ -19,7 +19,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout
 from softstart.plant import start as kernel
-from softstart.plant.advance import advance
 from softstart.plant.vector import plant_vector
 from softstart.start.engine import Book
 
@@ -124,7 +123,7 @@ class SampledStart:
 
     def _continued(self, book: Book, state: Vector) -> Iterator[Sample]:
         while True:
-            reason = advance(self.p, book.x, book.m, book.segments, book.events, book.stages)
+            reason = kernel.advance(self.p, book.x, book.m, book.segments, book.events, book.stages)
             if reason == layout.BUFFER_FULL:
                 book.grow()
                 continue

@@ -17,9 +17,7 @@ from __future__ import annotations
 import math
 
 from softstart.plant.jit import compiled
-from softstart.plant.layout import (
-    DD, FA, FB, FREE, K, LAMBDA, P0, P1, Q, ROOT_Q, V0, W0, W0SQ, Z0, ZETA, Quintuple, Septuple, Vector,
-)  # fmt: skip
+from softstart.plant.layout import Motion, Quintuple, Septuple
 from softstart.plant.motion import derivatives, forcing_tail, motion
 
 NO_CROSSING = -1.0
@@ -33,12 +31,12 @@ MAX_STEPS = 20_000
 
 
 @compiled
-def overdamped_bounds(m: Vector, s: float, end: float, y: float, yv: float, tail: float) -> Quintuple:
+def overdamped_bounds(m: Motion, s: float, end: float, y: float, yv: float, tail: float) -> Quintuple:
     """The same for two real decay rates: the energy bound would hold the fast one against the slow motion."""
-    zeta = m[ZETA]
-    w0sq = m[W0SQ]
-    rate = m[LAMBDA]
-    fast = zeta + m[ROOT_Q]
+    zeta = m.zeta
+    w0sq = m.w0sq
+    rate = m.rate
+    fast = zeta + m.root_q
     slow = w0sq / fast
     apart = fast - slow
     a = abs(yv + fast * y) / apart
@@ -57,48 +55,48 @@ def overdamped_bounds(m: Vector, s: float, end: float, y: float, yv: float, tail
         w4 = rate * rate * tail + 2.0 * zeta * w3 + w0sq * w2
         w5 = rate * rate * rate * tail + 2.0 * zeta * w4 + w0sq * w3
         y1, y2, y3, y4, y5 = y1 + w1, y2 + w2, y3 + w3, y4 + w4, y5 + w5
-    return y1 + abs(m[P1]), y2, y3, y4, y5
+    return y1 + abs(m.p1), y2, y3, y4, y5
 
 
 @compiled
-def bounds(m: Vector, s: float, end: float, z: float, v: float, tail: float) -> Quintuple:
+def bounds(m: Motion, s: float, end: float, z: float, v: float, tail: float) -> Quintuple:
     """Upper bounds of |z'| to |z'''''| on [s, end]."""
     tail = abs(tail)
-    rate = m[LAMBDA]
-    if m[FREE] != 0.0:
-        y2 = abs(m[FA]) + abs(m[FB]) * end + tail
-        y3 = abs(m[FB]) + rate * tail
+    rate = m.rate
+    if m.free != 0.0:
+        y2 = abs(m.A) + abs(m.B) * end + tail
+        y3 = abs(m.B) + rate * tail
         y4 = rate * rate * tail
         return abs(v) + y2 * (end - s), y2, y3, y4, rate * y4
-    y = z - m[P0] - m[P1] * s
-    yv = v - m[P1]
-    w0sq = m[W0SQ]
-    w0 = m[W0]
-    if m[Q] < -0.01 * w0sq:
+    y = z - m.p0 - m.p1 * s
+    yv = v - m.p1
+    w0sq = m.w0sq
+    w0 = m.w0
+    if m.q < -0.01 * w0sq:
         return overdamped_bounds(m, s, end, y, yv, tail)
     radius = math.sqrt(yv * yv + w0sq * y * y)
     if tail > 0.0:
         radius += tail * min(1.0 / rate, end - s)
-    twice = 2.0 * m[ZETA]
+    twice = 2.0 * m.zeta
     y2 = (twice + w0) * radius + tail
     y3 = twice * y2 + w0sq * radius + rate * tail
     y4 = twice * y3 + w0sq * y2 + rate * rate * tail
     y5 = twice * y4 + w0sq * y3 + rate * rate * rate * tail
-    return radius + abs(m[P1]), y2, y3, y4, y5
+    return radius + abs(m.p1), y2, y3, y4, y5
 
 
 @compiled
-def load_speed(m: Vector, load: Septuple, s: float, v: float) -> float:
+def load_speed(m: Motion, load: Septuple, s: float, v: float) -> float:
     """w2 at s from the total momentum; load = (w2_0, a, b, e, ratio, factor, offset), see `advance`."""
-    w2 = load[0] + s * (load[1] + 0.5 * s * load[2]) - load[4] * (v - m[V0])
+    w2 = load[0] + s * (load[1] + 0.5 * s * load[2]) - load[4] * (v - m.v0)
     if load[3] != 0.0:
-        w2 -= load[3] * math.expm1(-m[LAMBDA] * s) / m[LAMBDA]
+        w2 -= load[3] * math.expm1(-m.rate * s) / m.rate
     return w2
 
 
 @compiled
 def first_crossing(
-    m: Vector, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
+    m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
     load: Septuple, start: int, begin: float, end: float,
 ) -> float:  # fmt: skip
     """First s in [begin, end] at which f falls through zero, or NO_CROSSING."""
@@ -108,7 +106,7 @@ def first_crossing(
     origin = begin
     for _ in range(MAX_STEPS):
         if s == 0.0:
-            z, v = m[Z0], m[V0]  # the state at the start needs no evaluation
+            z, v = m.z0, m.v0  # the state at the start needs no evaluation
         else:
             z, v = motion(m, s)
         tail = forcing_tail(m, s)
@@ -119,15 +117,15 @@ def first_crossing(
         curve = alpha * a + beta * jerk + gamma * snap
         most = abs(alpha) * b2 + abs(beta) * b3 + abs(gamma) * b4
         third = abs(alpha) * b3 + abs(beta) * b4 + abs(gamma) * b5
-        rest = abs(m[P0]) if m[FREE] == 0.0 else 0.0
+        rest = abs(m.p0) if m.free == 0.0 else 0.0
         scale = abs(c0) + abs(alpha) * (abs(z) + rest) + abs(beta * v) + abs(gamma * a)
         if kappa != 0.0:
             w2 = load_speed(m, load, s, v)
             f += kappa * w2
-            slope += kappa * (load[5] * (m[K] * z + m[DD] * v) + load[6])
-            curve += kappa * load[5] * (m[K] * v + m[DD] * a)
-            most += abs(kappa * load[5]) * (m[K] * b1 + m[DD] * b2)
-            third += abs(kappa * load[5]) * (m[K] * b2 + m[DD] * b3)
+            slope += kappa * (load[5] * (m.k * z + m.dd * v) + load[6])
+            curve += kappa * load[5] * (m.k * v + m.dd * a)
+            most += abs(kappa * load[5]) * (m.k * b1 + m.dd * b2)
+            third += abs(kappa * load[5]) * (m.k * b2 + m.dd * b3)
             scale += abs(kappa) * (abs(w2) + abs(load[4] * v))
         if flat:
             if f < -ROUNDING * scale and start == WATCH:
@@ -141,7 +139,7 @@ def first_crossing(
         if not begun or f <= ROUNDING * scale:
             if most == 0.0 and slope <= 0.0 and curve == 0.0:
                 return s if (begun and slope < 0.0) else NO_CROSSING
-            reach = 1.0 / (m[LAMBDA] + math.sqrt(m[W0SQ]) + 1.0 / end)
+            reach = 1.0 / (m.rate + math.sqrt(m.w0sq) + 1.0 / end)
             if abs(slope) <= 1e-13 * most * reach and abs(curve) <= 1e-13 * most:
                 # Nothing but rounding: u and u' start from zero on a closed gap. See which way it goes.
                 origin = s

@@ -1,12 +1,13 @@
-"""Where each number of the plant stands in the kernel's flat arrays.
+"""The records that the compiled kernel works on: the drive, the state of one start, the motion of one span.
 
-The compiled kernel works on float64 vectors: `p` (the drive), `x` (the state of one start and what
-has been noted of it), `m` (the motion of the span being solved). The names below are their indices.
+Each record is a class of fields and a NumPy type made from it. Outside the kernel a record is a row of
+float64 numbers; `row.view(STATE)[0]` is the same memory with names: `x.theta`, `p.c`. The entry functions
+(`start`, `record`) do that once a call; all others take records.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,67 +19,228 @@ Triple = tuple[float, float, float]
 Quintuple = tuple[float, float, float, float, float]
 Septuple = tuple[float, float, float, float, float, float, float]
 
-# p: the drive
-(
-    J1, J2, C, D, GAP, MC, REACTIVE, LAW, LAG, RATE, U_MIN, U_MAX,
-    TARGET, ENCODER, THETA_0, W1_0, W2_0, PERIOD, TIME_LIMIT, EVENT_CAP,
-    INV_J1, INV_J2, INV_J, W0SQ_SLIP, INV_W0SQ, W0_SLIP,  # derived: divisions are dear
-    ENCODER_PHASE, TORQUE_NOISE, NOISE_SEED, DEAD_TIME,
-) = range(30)  # fmt: skip
-N_P: Final = 30
+MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
+
+
+def record(fields: type) -> Any:
+    """The NumPy type of a record: a float64 for each field of the class, in order; MOST_PENDING for a Vector.
+
+    >>> class Point:
+    ...     x: float
+    ...     y: float
+    >>> row = np.array([3.0, 4.0])
+    >>> float(row.view(record(Point))[0].y)
+    4.0
+    """
+    types = [
+        (name, np.float64, (MOST_PENDING,)) if kind == "Vector" else (name, np.float64)
+        for name, kind in fields.__annotations__.items()
+    ]
+    return np.dtype((np.record, np.dtype(types)))
+
+
+def size(dtype: Any) -> int:
+    """How many float64 numbers a record takes."""
+    return int(dtype.itemsize) // 8
+
+
+class Plant:
+    """The drive, in SI units."""
+
+    J1: float
+    J2: float
+    c: float
+    d: float
+    gap: float
+    Mc: float
+    reactive: float  # 1 where the load torque opposes motion
+    law: float  # one of the contact laws below
+    lag: float
+    rate: float  # of the slew limiter, N m/s
+    u_min: float
+    u_max: float
+    target: float
+    encoder: float  # angle of one count; 0 for an ideal encoder
+    theta_0: float
+    w1_0: float
+    w2_0: float
+    period: float  # 2 pi/Omega
+    time_limit: float
+    event_cap: float
+    inv_J1: float  # derived, since divisions are slow: 1/J1
+    inv_J2: float
+    inv_J: float  # 1/(J1 + J2)
+    w0sq_slip: float  # Omega^2, of the load that moves
+    inv_w0sq: float
+    w0_slip: float
+    encoder_phase: float
+    torque_noise: float
+    noise_seed: float
+    dead_time: float
+
+
+class State:
+    """The state of one start and what has been noted of it.
+
+    theta = phi1 - phi2 and v = w1 - w2 are kept, not their parts: the gap is then as sharp after a minute as
+    at the start.
+    """
+
+    time: float
+    theta: float
+    v: float
+    phi2: float
+    w2: float
+    ref: float  # the demand after the slew limiter
+    u: float
+    demand: float
+    demand_slope: float
+    side: float  # 0 gap open, +1 or -1 the flank in contact
+    doubled: float  # 1 while the `modelica` law's damping is capped by its spring: T = 2 c z
+    beyond: float  # +1 or -1: no torque though the flanks overlap, as a damped spring must not pull back
+    load: float  # 0 stuck, +1 or -1 sign of the speed that Mc opposes; an active load has +1 always
+    mask: float  # the event that has just fired, one of the masks below
+    ask_at: float
+    ask_on_gap: float
+    t_end: float
+    sample_angle: float
+    sample_time: float
+    asked: float
+    # what is noted
+    stage: float
+    stage_start: float
+    stage_peak: float
+    stage_peak_time: float
+    peak: float
+    peak_time: float
+    gap_events: float
+    contacts: float
+    first_contact: float
+    stage_2_end: float
+    impact_speed: float
+    contact_torque: float
+    first_peak: float
+    start_time: float
+    events: float
+    n_segments: float
+    n_events: float
+    n_stages: float
+    status: float
+
+
+class Motion:
+    """The motion of the span being solved, see `motion`."""
+
+    free: float
+    z0: float
+    v0: float
+    A: float
+    B: float
+    E: float
+    rate: float  # lambda
+    w0sq: float
+    zeta: float
+    q: float
+    root_q: float
+    p0: float
+    p1: float
+    p2: float
+    y0: float
+    yv0: float
+    branch: float
+    k: float
+    dd: float
+    ua: float  # motor torque of the span
+    ub: float
+    ue: float
+    slew_end: float
+    last_v: float  # the speed at its end where that is known without evaluating the motion
+    w0: float
+    steady: float  # 1 for an undamped spring under constant torque, whose events are closed formulas
+    memo_v: float  # the last contact's entry and duration: under constant torque it repeats
+    memo_p: float
+    memo_w: float
+    memo_s: float
+    memo_done: float  # 1 once that contact has run from flank to flank, its peak noted
+    end_known: float  # the motion at the end of the span, once it has been evaluated
+    end_z: float
+    end_v: float
+    passing: float  # when, within this contact, the load passes its target speed; NaN if it does not
+    pending: float  # how many answers of the controller wait for their computing delay
+    due_time: Vector  # when each of them takes effect, and what it is
+    due_demand: Vector
+    due_slope: Vector
+
+
+class Segment:
+    """A recorded span: enough to evaluate every state within it exactly."""
+
+    start: float
+    end: float
+    stage: float
+    side: float
+    load: float
+    theta: float
+    v: float
+    phi2: float
+    w2: float
+    ua: float
+    ub: float
+    ue: float
+    k: float
+    dd: float
+
+
+class EventRow:
+    """A recorded event."""
+
+    time: float
+    kind: float
+    value: float
+
+
+class StageRow:
+    """A recorded stage."""
+
+    number: float
+    start: float
+    end: float
+    side: float
+    peak: float
+    peak_time: float
+
+
+class Measured(NamedTuple):
+    """What is measured at the instant of asking. What the controller has not declared is NaN."""
+
+    time: float  # s since the start
+    motor_angle: float  # rad, rounded to the encoder's counts
+    motor_speed: float  # rad/s, difference of encoder angles since the last asking
+    motor_torque: float  # N m, the realised torque, after limits, slew and lag
+    stage: float  # 1, 2, ... as in [G]: odd gap open, even gap closed
+    shaft_torque: float  # N m
+    load_speed: float  # rad/s
+
+
+class Answer:
+    """What a controller answers; its new state follows."""
+
+    torque: float
+    ask_again: float
+    slope: float
+
+
+PLANT, STATE, MOTION = record(Plant), record(State), record(Motion)
+SEGMENT, EVENT, STAGE_ROW, MEASURED = record(Segment), record(EventRow), record(StageRow), record(Measured)
+ANSWER = record(Answer)
+N_P, N_X, N_M = size(PLANT), size(STATE), size(MOTION)
+N_SEGMENT, N_EVENT, N_STAGE = size(SEGMENT), size(EVENT), size(STAGE_ROW)
 
 # contact laws
 NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 
-# x: the state. theta = phi1 - phi2 and v = w1 - w2 are kept, not their parts: the gap is then as
-# sharp after a minute as at the start.
-(
-    TIME, THETA, V, PHI2, W2, REF, U, DEMAND, DEMAND_SLOPE,  # REF: the demand after the slew limiter
-    SIDE,  # 0 gap open, +1 or -1 the flank in contact
-    DOUBLED,  # 1 while the `modelica` law's damping is capped by its spring: T = 2 c z
-    BEYOND,  # +1 or -1: no torque though the flanks overlap: a damped spring that must not pull springs back
-    LOAD,  # 0 stuck, +1 or -1 sign of the speed that Mc opposes; an active load has +1 always
-    MASK,  # the event that has just fired, see advance.py
-    ASK_AT, ASK_ON_GAP, T_END, SAMPLE_ANGLE, SAMPLE_TIME, ASKED,
-    # what is noted
-    STAGE, STAGE_START, STAGE_PEAK, STAGE_PEAK_TIME, PEAK, PEAK_TIME, GAP_EVENTS, CONTACTS,
-    FIRST_CONTACT, STAGE_2_END, IMPACT_SPEED, CONTACT_TORQUE, FIRST_PEAK, START_TIME, EVENTS,
-    N_SEGMENTS, N_EVENTS, N_STAGES, STATUS,
-) = range(39)  # fmt: skip
-N_X: Final = 39
-
-# m: the motion of one span, see motion.py
-(
-    FREE, Z0, V0, FA, FB, FE, LAMBDA, W0SQ, ZETA, Q, ROOT_Q, P0, P1, P2, Y0, YV0, BRANCH, K, DD,
-    UA, UB, UE, SLEW_END,  # motor torque of the span
-    LAST_V,  # the speed at its end where that is known without evaluating the motion
-    W0, STEADY,  # w0; 1 for an undamped spring under constant torque, whose events are closed formulas
-    MEMO_V, MEMO_P, MEMO_W, MEMO_S,  # the last contact's entry and duration: under constant torque it repeats
-    MEMO_DONE,  # 1 once that contact has run from flank to flank, its peak noted
-    END_KNOWN, END_Z, END_V,  # the motion at the end of the span, once it has been evaluated
-    PASSING,  # when, within this contact, the load passes its target speed; NaN if it does not
-    PENDING,  # how many answers of the controller are on their way (computing_delay); from QUEUE on they wait
-    QUEUE,
-) = range(37)  # fmt: skip
-Q_TIME, Q_DEMAND, Q_SLOPE = range(3)  # of an answer that waits: when it takes effect, and what it is
-N_WAITING: Final = 3
-MOST_PENDING: Final = 16
-N_M: Final = QUEUE + N_WAITING * MOST_PENDING
-
-# a recorded span: enough to evaluate every state within it exactly
-(
-    S_START, S_END, S_STAGE, S_SIDE, S_LOAD, S_THETA, S_V, S_PHI2, S_W2, S_UA, S_UB, S_UE, S_K, S_DD,
-) = range(14)  # fmt: skip
-N_SEGMENT: Final = 14
-
-# a recorded event
-E_TIME, E_KIND, E_VALUE = range(3)
-N_EVENT: Final = 3
+# kinds of recorded events
 CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED = 1.0, 2.0, 3.0, 4.0, 5.0
-
-# a recorded stage
-G_NUMBER, G_START, G_END, G_SIDE, G_PEAK, G_PEAK_TIME = range(6)
-N_STAGE: Final = 6
 
 # why `advance` came back
 ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL = range(8)
@@ -91,3 +253,20 @@ ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEU
 
 # masks: the event that has just fired must not fire again at the instant at which the span begins
 NOTHING, LEFT_UPPER, LEFT_LOWER, LEFT_BEYOND, SWITCHED, BROKE_AWAY = range(6)
+
+
+_PREFIXES = (("", (PLANT, STATE, MOTION)), ("S_", (SEGMENT,)), ("E_", (EVENT,)), ("G_", (STAGE_ROW,)))
+_INDEX = {
+    prefix + name.upper(): dtype.fields[name][1] // 8
+    for prefix, types in _PREFIXES
+    for dtype in reversed(types)
+    for name in dtype.names
+} | {"QUEUE": MOTION.fields["due_time"][1] // 8, "Q_TIME": 0}
+
+
+def __getattr__(name: str) -> int:
+    """The index of a field in its row, by its name in capitals: `x[PEAK]` is `x.peak`."""
+    if name not in _INDEX:
+        raise AttributeError(name)
+    globals()[name] = _INDEX[name]  # found without this function from now on
+    return _INDEX[name]

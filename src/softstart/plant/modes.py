@@ -6,118 +6,116 @@ import math
 
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, CLOSED, CONTACTS, CONTACT_TORQUE, D, DEAD_ZONE, DOUBLED,
-    EXIT, FIRST_CONTACT, GAP, GAP_EVENTS, GRAZE_LOWER, GRAZE_UPPER, IMPACT_SPEED, LAW, LEFT_BEYOND,
-    LEFT_LOWER, LEFT_UPPER, LOAD, LOAD_STARTS, LOAD_STOPS, LOWER, MASK, MC, MODELICA, NOTHING, OPENED,
-    PERIOD, REACHED, REJOIN, SIDE, START_TIME, STOP, SWITCH, SWITCHED, TARGET_REACHED, THETA, TIME,
-    T_END, U, UPPER, V, W2, Vector,
+    BACK, BREAKAWAY, BROKE_AWAY, CLOSED, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND,
+    LEFT_LOWER, LEFT_UPPER, LOAD_STARTS, LOAD_STOPS, LOWER, MODELICA, NOTHING, OPENED, REACHED, REJOIN,
+    STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
 )  # fmt: skip
 from softstart.plant.notes import end_stage, note_event, note_event_at
 
 
 @inlined
-def shaft_torque(p: Vector, x: Vector) -> float:
+def shaft_torque(p: Plant, x: State) -> float:
     """T of the present state."""
-    side = x[SIDE]
+    side = x.side
     if side == 0.0:
         return 0.0
-    z = side * x[THETA] - 0.5 * p[GAP]
-    if x[DOUBLED] != 0.0:
-        return side * 2.0 * p[C] * z
-    return side * (p[C] * z + p[D] * side * x[V])
+    z = side * x.theta - 0.5 * p.gap
+    if x.doubled != 0.0:
+        return side * 2.0 * p.c * z
+    return side * (p.c * z + p.d * side * x.v)
 
 
 @inlined
-def engage(p: Vector, x: Vector, events: Vector) -> None:
+def engage(p: Plant, x: State, events: Matrix) -> None:
     """Damping regime and, since damping makes the torque jump, breakaway at the start of a contact."""
-    side = x[SIDE]
-    z = side * x[THETA] - 0.5 * p[GAP]
-    v = side * x[V]
-    x[DOUBLED] = 1.0 if p[LAW] == MODELICA and p[D] * v > p[C] * z else 0.0
-    torque = side * (2.0 * p[C] * z if x[DOUBLED] != 0.0 else p[C] * z + p[D] * v)
-    if x[LOAD] == 0.0 and abs(torque) > p[MC]:
-        x[LOAD] = math.copysign(1.0, torque)
-        note_event(x, events, LOAD_STARTS, x[LOAD])
+    side = x.side
+    z = side * x.theta - 0.5 * p.gap
+    v = side * x.v
+    x.doubled = 1.0 if p.law == MODELICA and p.d * v > p.c * z else 0.0
+    torque = side * (2.0 * p.c * z if x.doubled != 0.0 else p.c * z + p.d * v)
+    if x.load == 0.0 and abs(torque) > p.Mc:
+        x.load = math.copysign(1.0, torque)
+        note_event(x, events, LOAD_STARTS, x.load)
 
 
 @inlined
-def close_gap(p: Vector, x: Vector, side: float, events: Vector, stages: Vector) -> None:
+def close_gap(p: Plant, x: State, side: float, events: Matrix, stages: Matrix) -> None:
     """The flank `side` comes into contact."""
     end_stage(x, stages)
-    x[GAP_EVENTS] += 1.0
-    x[CONTACTS] += 1.0
-    speed = side * x[V]
-    if x[CONTACTS] == 1.0:
-        x[FIRST_CONTACT] = x[TIME]
-        x[IMPACT_SPEED] = speed
-        x[CONTACT_TORQUE] = x[U]
-    x[SIDE] = side
+    x.gap_events += 1.0
+    x.contacts += 1.0
+    speed = side * x.v
+    if x.contacts == 1.0:
+        x.first_contact = x.time
+        x.impact_speed = speed
+        x.contact_torque = x.u
+    x.side = side
     note_event(x, events, CLOSED, side)
     engage(p, x, events)
 
 
 @inlined
-def reach_target(p: Vector, x: Vector, time: float, speed: float, events: Vector) -> None:
+def reach_target(p: Plant, x: State, time: float, speed: float, events: Matrix) -> None:
     """The load has its target speed; without `until` the run ends one elastic period later."""
-    x[START_TIME] = time
+    x.start_time = time
     note_event_at(time, x, events, TARGET_REACHED, speed)
-    if x[T_END] == math.inf:
-        x[T_END] = time + p[PERIOD]
+    if x.t_end == math.inf:
+        x.t_end = time + p.period
 
 
 @inlined
-def handle(p: Vector, x: Vector, m: Vector, event: int, events: Vector, stages: Vector) -> bool:
+def handle(p: Plant, x: State, m: Motion, event: int, events: Matrix, stages: Matrix) -> bool:
     """Change of mode at an event; True if the gap closed or opened."""
-    half = 0.5 * p[GAP]
-    x[MASK] = NOTHING
+    half = 0.5 * p.gap
+    x.mask = NOTHING
     if event in (UPPER, LOWER):
         side = 1.0 if event == UPPER else -1.0
-        x[THETA] = side * half
+        x.theta = side * half
         close_gap(p, x, side, events, stages)
         return True
     if event == REJOIN:
-        side = x[BEYOND]
-        x[BEYOND] = 0.0
+        side = x.beyond
+        x.beyond = 0.0
         close_gap(p, x, side, events, stages)
         return True
     if event == EXIT:
-        side = x[SIDE]
+        side = x.side
         end_stage(x, stages)
-        x[GAP_EVENTS] += 1.0
-        x[SIDE] = 0.0
+        x.gap_events += 1.0
+        x.side = 0.0
         note_event(x, events, OPENED, side)
-        if p[LAW] != DEAD_ZONE and p[D] > 0.0 and side * x[THETA] > half:
-            x[BEYOND] = side
-            x[MASK] = LEFT_BEYOND
+        if p.law != DEAD_ZONE and p.d > 0.0 and side * x.theta > half:
+            x.beyond = side
+            x.mask = LEFT_BEYOND
         else:
-            x[THETA] = side * half
-            x[MASK] = LEFT_UPPER if side > 0.0 else LEFT_LOWER
+            x.theta = side * half
+            x.mask = LEFT_UPPER if side > 0.0 else LEFT_LOWER
         return True
     if event == BACK:
-        x[THETA] = x[BEYOND] * half
-        x[MASK] = LEFT_UPPER if x[BEYOND] > 0.0 else LEFT_LOWER
-        x[BEYOND] = 0.0
+        x.theta = x.beyond * half
+        x.mask = LEFT_UPPER if x.beyond > 0.0 else LEFT_LOWER
+        x.beyond = 0.0
     elif event == GRAZE_UPPER:
-        x[MASK] = LEFT_UPPER
+        x.mask = LEFT_UPPER
     elif event == GRAZE_LOWER:
-        x[MASK] = LEFT_LOWER
+        x.mask = LEFT_LOWER
     elif event == SWITCH:
-        x[DOUBLED] = 1.0 - x[DOUBLED]
-        x[MASK] = SWITCHED
+        x.doubled = 1.0 - x.doubled
+        x.mask = SWITCHED
     elif event == BREAKAWAY:
-        x[LOAD] = math.copysign(1.0, shaft_torque(p, x))
-        x[MASK] = BROKE_AWAY
-        note_event(x, events, LOAD_STARTS, x[LOAD])
+        x.load = math.copysign(1.0, shaft_torque(p, x))
+        x.mask = BROKE_AWAY
+        note_event(x, events, LOAD_STARTS, x.load)
     elif event == STOP:
-        x[V] += x[W2]
-        x[W2] = 0.0
+        x.v += x.w2
+        x.w2 = 0.0
         torque = shaft_torque(p, x)
-        note_event(x, events, LOAD_STOPS, x[LOAD])
-        if abs(torque) <= p[MC]:
-            x[LOAD] = 0.0
+        note_event(x, events, LOAD_STOPS, x.load)
+        if abs(torque) <= p.Mc:
+            x.load = 0.0
         else:
-            x[LOAD] = math.copysign(1.0, torque)
-            note_event(x, events, LOAD_STARTS, x[LOAD])
+            x.load = math.copysign(1.0, torque)
+            note_event(x, events, LOAD_STARTS, x.load)
     elif event == REACHED:
-        reach_target(p, x, x[TIME], x[W2], events)
+        reach_target(p, x, x.time, x.w2, events)
     return False

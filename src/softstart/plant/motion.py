@@ -15,10 +15,7 @@ from __future__ import annotations
 import math
 
 from softstart.plant.jit import compiled, inlined
-from softstart.plant.layout import (
-    BRANCH, DD, FA, FB, FE, FREE, K, LAMBDA, P0, P1, P2, Q, ROOT_Q, V0, W0, W0SQ, Y0, YV0, Z0, ZETA,
-    Pair, Triple, Vector,
-)  # fmt: skip
+from softstart.plant.layout import Motion, Pair, Triple
 
 # how the response to the exponential is computed
 NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0
@@ -26,55 +23,55 @@ NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0
 
 @inlined
 def prepare(
-    m: Vector, z0: float, v0: float, k: float, dd: float, w0sq: float, w0: float, inverse_w0sq: float,
+    m: Motion, z0: float, v0: float, k: float, dd: float, w0sq: float, w0: float, inverse_w0sq: float,
     zeta: float, a: float, b: float, e: float, rate: float,
 ) -> None:  # fmt: skip
     """Coefficients of the span that starts at (z0, v0); a, b, e are accelerations, rate = lambda."""
-    m[Z0] = z0
-    m[V0] = v0
-    m[FA] = a
-    m[FB] = b
-    m[FE] = e
-    m[LAMBDA] = rate
-    m[K] = k
-    m[DD] = dd
+    m.z0 = z0
+    m.v0 = v0
+    m.A = a
+    m.B = b
+    m.E = e
+    m.rate = rate
+    m.k = k
+    m.dd = dd
     if k == 0.0:
-        m[FREE] = 1.0
-        m[W0SQ] = 0.0
-        m[ZETA] = 0.0
+        m.free = 1.0
+        m.w0sq = 0.0
+        m.zeta = 0.0
         return
-    m[FREE] = 0.0
-    m[W0SQ] = w0sq
-    m[W0] = w0
-    m[ZETA] = zeta
+    m.free = 0.0
+    m.w0sq = w0sq
+    m.w0 = w0
+    m.zeta = zeta
     if zeta == 0.0:
         q = w0sq
-        m[ROOT_Q] = w0
+        m.root_q = w0
     else:
         q = w0sq - zeta * zeta
-        m[ROOT_Q] = math.sqrt(abs(q))
-    m[Q] = q
+        m.root_q = math.sqrt(abs(q))
+    m.q = q
     p1 = b * inverse_w0sq
     p0 = (a - 2.0 * zeta * p1) * inverse_w0sq
-    m[P0] = p0
-    m[P1] = p1
-    m[Y0] = z0 - p0
-    m[YV0] = v0 - p1
-    m[P2] = 0.0
+    m.p0 = p0
+    m.p1 = p1
+    m.y0 = z0 - p0
+    m.yv0 = v0 - p1
+    m.p2 = 0.0
     if e == 0.0:
-        m[BRANCH] = NO_EXPONENTIAL
+        m.branch = NO_EXPONENTIAL
         return
     # the particular solution E exp(-lambda s)/resonance serves unless lambda is (nearly) a decay rate
     shift = zeta - rate
     resonance = shift * shift + q
     if q > 1e-4 * w0sq or abs(resonance) > 1e-3 * (w0sq + rate * rate):
-        m[BRANCH] = PARTICULAR
+        m.branch = PARTICULAR
         p2 = e / resonance
-        m[P2] = p2
-        m[Y0] -= p2
-        m[YV0] += rate * p2
+        m.p2 = p2
+        m.y0 -= p2
+        m.yv0 += rate * p2
     else:
-        m[BRANCH] = REAL_ROOTS if -q > 1e-4 * w0sq else NEAR_TRIPLE
+        m.branch = REAL_ROOTS if -q > 1e-4 * w0sq else NEAR_TRIPLE
 
 
 @inlined
@@ -98,16 +95,16 @@ def decaying_pair(zeta: float, q: float, root_q: float, s: float) -> Pair:
 
 
 @compiled
-def exponential_response(m: Vector, s: float) -> Pair:
+def exponential_response(m: Motion, s: float) -> Pair:
     """Z and z' from rest under E exp(-lambda s) alone, where lambda meets a decay rate of the spring."""
-    e = m[FE]
-    rate = m[LAMBDA]
-    zeta = m[ZETA]
-    q = m[Q]
+    e = m.E
+    rate = m.rate
+    zeta = m.zeta
+    q = m.q
     tail = math.exp(-rate * s)
-    if m[BRANCH] == REAL_ROOTS:
-        root = m[ROOT_Q]
-        slow = -m[W0SQ] / (zeta + root)
+    if m.branch == REAL_ROOTS:
+        root = m.root_q
+        slow = -m.w0sq / (zeta + root)
         fast = -(zeta + root)
         x = (slow + rate) * s
         g_slow = tail * s * (math.expm1(x) / x if abs(x) > 1e-8 else 1.0 + 0.5 * x)
@@ -141,32 +138,32 @@ def exponential_response(m: Vector, s: float) -> Pair:
 
 
 @inlined
-def motion(m: Vector, s: float) -> Pair:
+def motion(m: Motion, s: float) -> Pair:
     """Z and z' at s."""
-    if m[FREE] != 0.0:
-        z = m[Z0] + s * (m[V0] + s * (0.5 * m[FA] + s * (m[FB] / 6.0)))
-        v = m[V0] + s * (m[FA] + 0.5 * s * m[FB])
-        e = m[FE]
+    if m.free != 0.0:
+        z = m.z0 + s * (m.v0 + s * (0.5 * m.A + s * (m.B / 6.0)))
+        v = m.v0 + s * (m.A + 0.5 * s * m.B)
+        e = m.E
         if e != 0.0:
-            x = m[LAMBDA] * s
+            x = m.rate * s
             e1 = -math.expm1(-x)
-            v += e * e1 / m[LAMBDA]
+            v += e * e1 / m.rate
             if x > 0.02:
-                z += e * (x - e1) / (m[LAMBDA] * m[LAMBDA])
+                z += e * (x - e1) / (m.rate * m.rate)
             else:  # x - (1 - exp(-x)) without cancellation
                 z += e * s * s * (0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x / 5040)))))
         return z, v
-    cos, sin = decaying_pair(m[ZETA], m[Q], m[ROOT_Q], s)
-    slope = m[YV0] + m[ZETA] * m[Y0]
-    y = m[Y0] * cos + slope * sin
-    yv = m[YV0] * cos - (m[ZETA] * m[YV0] + m[W0SQ] * m[Y0]) * sin
-    z = y + m[P0] + m[P1] * s
-    v = yv + m[P1]
-    if m[FE] != 0.0:
-        if m[BRANCH] == PARTICULAR:
-            tail = m[P2] * math.exp(-m[LAMBDA] * s)
+    cos, sin = decaying_pair(m.zeta, m.q, m.root_q, s)
+    slope = m.yv0 + m.zeta * m.y0
+    y = m.y0 * cos + slope * sin
+    yv = m.yv0 * cos - (m.zeta * m.yv0 + m.w0sq * m.y0) * sin
+    z = y + m.p0 + m.p1 * s
+    v = yv + m.p1
+    if m.E != 0.0:
+        if m.branch == PARTICULAR:
+            tail = m.p2 * math.exp(-m.rate * s)
             z += tail
-            v -= m[LAMBDA] * tail
+            v -= m.rate * tail
         else:
             dz, dv = exponential_response(m, s)
             z += dz
@@ -175,17 +172,17 @@ def motion(m: Vector, s: float) -> Pair:
 
 
 @inlined
-def forcing_tail(m: Vector, s: float) -> float:
+def forcing_tail(m: Motion, s: float) -> float:
     """E exp(-lambda s), what is left of the torque lag."""
-    if m[FE] == 0.0 or s == 0.0:
-        return m[FE]
-    return m[FE] * math.exp(-m[LAMBDA] * s)
+    if m.E == 0.0 or s == 0.0:
+        return m.E
+    return m.E * math.exp(-m.rate * s)
 
 
 @inlined
-def derivatives(m: Vector, s: float, z: float, v: float, tail: float) -> Triple:
+def derivatives(m: Motion, s: float, z: float, v: float, tail: float) -> Triple:
     """z'', z''' and z'''' at s, from the equation of motion."""
-    a = m[FA] + m[FB] * s + tail - 2.0 * m[ZETA] * v - m[W0SQ] * z
-    jerk = m[FB] - m[LAMBDA] * tail - 2.0 * m[ZETA] * a - m[W0SQ] * v
-    snap = m[LAMBDA] * m[LAMBDA] * tail - 2.0 * m[ZETA] * jerk - m[W0SQ] * a
+    a = m.A + m.B * s + tail - 2.0 * m.zeta * v - m.w0sq * z
+    jerk = m.B - m.rate * tail - 2.0 * m.zeta * a - m.w0sq * v
+    snap = m.rate * m.rate * tail - 2.0 * m.zeta * jerk - m.w0sq * a
     return a, jerk, snap

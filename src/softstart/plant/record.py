@@ -7,10 +7,7 @@ from numpy.typing import NDArray
 
 from softstart.plant.advance import move
 from softstart.plant.jit import compiled
-from softstart.plant.layout import (
-    C, D, DEMAND, DEMAND_SLOPE, DOUBLED, LOAD, PHI2, SIDE, SLEW_END, S_DD, S_END, S_K, S_LOAD, S_PHI2, S_SIDE,
-    S_START, S_THETA, S_UA, S_UB, S_UE, S_V, S_W2, THETA, U, UA, UB, UE, V, W2, Matrix, Vector,
-)  # fmt: skip
+from softstart.plant.layout import MOTION, PLANT, SEGMENT, STATE, Matrix, Vector
 from softstart.plant.modes import shaft_torque
 from softstart.plant.span import begin_span
 
@@ -21,35 +18,37 @@ N_OUT = 8
 
 @compiled
 def states_at(
-    p: Vector, segments: Matrix, index: NDArray[np.int64], times: Vector, x: Vector, m: Vector, out: Matrix
-) -> None:
-    """Row i of out is the state at times[i], which lies in the span segments[index[i]]; x, m are scratch."""
+    drive: Vector, segments: Matrix, index: NDArray[np.int64], times: Vector, state: Vector, motion: Vector,
+    out: Matrix,
+) -> None:  # fmt: skip
+    """Row i of out is the state at times[i], in the span segments[index[i]]; state and motion are scratch."""
+    p = drive.view(PLANT)[0]
+    x = state.view(STATE)[0]
+    m = motion.view(MOTION)[0]
     for i in range(times.shape[0]):
-        row = segments[index[i]]
-        s = times[i] - row[S_START]
-        s = min(max(s, 0.0), row[S_END] - row[S_START])
-        x[SIDE] = row[S_SIDE]
-        x[LOAD] = row[S_LOAD]
-        x[THETA] = row[S_THETA]
-        x[V] = row[S_V]
-        x[PHI2] = row[S_PHI2]
-        x[W2] = row[S_W2]
-        x[DOUBLED] = (
-            1.0 if row[S_K] > p[C] or (p[D] > 0.0 and row[S_SIDE] != 0.0 and row[S_DD] == 0.0) else 0.0
-        )
-        x[DEMAND] = 0.0
-        x[DEMAND_SLOPE] = 0.0
-        m[UA] = row[S_UA]
-        m[UB] = row[S_UB]
-        m[UE] = row[S_UE]
-        m[SLEW_END] = np.inf
+        row = segments[index[i]].view(SEGMENT)[0]
+        s = times[i] - row.start
+        s = min(max(s, 0.0), row.end - row.start)
+        x.side = row.side
+        x.load = row.load
+        x.theta = row.theta
+        x.v = row.v
+        x.phi2 = row.phi2
+        x.w2 = row.w2
+        x.doubled = 1.0 if row.k > p.c or (p.d > 0.0 and row.side != 0.0 and row.dd == 0.0) else 0.0
+        x.demand = 0.0
+        x.demand_slope = 0.0
+        m.ua = row.ua
+        m.ub = row.ub
+        m.ue = row.ue
+        m.slew_end = np.inf
         load = begin_span(p, x, m)
         move(p, x, m, load, s)
-        out[i, PHI1_OUT] = x[PHI2] + x[THETA]
-        out[i, PHI2_OUT] = x[PHI2]
-        out[i, W1_OUT] = x[W2] + x[V]
-        out[i, W2_OUT] = x[W2]
-        out[i, U_OUT] = x[U]
+        out[i, PHI1_OUT] = x.phi2 + x.theta
+        out[i, PHI2_OUT] = x.phi2
+        out[i, W1_OUT] = x.w2 + x.v
+        out[i, W2_OUT] = x.w2
+        out[i, U_OUT] = x.u
         out[i, T_OUT] = shaft_torque(p, x)
-        out[i, THETA_OUT] = x[THETA]
-        out[i, V_OUT] = x[V]
+        out[i, THETA_OUT] = x.theta
+        out[i, V_OUT] = x.v

@@ -12,99 +12,97 @@ import math
 from softstart.plant.crossing import RISING, WATCH, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
-    BACK, BEYOND, BREAKAWAY, BROKE_AWAY, C, D, DD, DEAD_ZONE, DEMAND, DEMAND_SLOPE, DOUBLED, END_KNOWN, EXIT,
-    FA, GAP, GRAZE_LOWER, GRAZE_UPPER, INV_J, INV_J1, INV_J2, INV_W0SQ, J1, K, LAG, LAST_V, LAW, LEFT_BEYOND,
-    LEFT_LOWER, LEFT_UPPER, LOAD, LOWER, MASK, MC, MODELICA, NO_EVENT, PASSING, RATE, REACHED, REACTIVE,
-    REF, REJOIN, SIDE, SLEW_END, START_TIME, STEADY, STOP, SWITCH, SWITCHED, TARGET, THETA, U, UA, UB,
-    UE, UNSOLVED, UPPER, V, V0, W0SQ, W0SQ_SLIP, W0_SLIP, W2, Y0, Z0, Septuple, Vector,
+    BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
+    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, STOP, SWITCH, SWITCHED, UNSOLVED, UPPER,
+    Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 
 
 @inlined
-def torque_course(p: Vector, x: Vector, m: Vector) -> None:
+def torque_course(p: Plant, x: State, m: Motion) -> None:
     """The motor torque of the span: u(s) = ua + ub s + ue exp(-s/lag), after slew limiter and lag.
 
     The demand is a line, DEMAND + DEMAND_SLOPE s. A slew limiter that is not on it runs towards it at its
     rate and meets it at SLEW_END; one that is on it follows, unless the line is too steep.
     """
-    demand = x[DEMAND]
-    ub = x[DEMAND_SLOPE]
-    m[SLEW_END] = math.inf
-    if x[REF] != demand:
-        if p[RATE] < math.inf:
-            away = demand - x[REF]
+    demand = x.demand
+    ub = x.demand_slope
+    m.slew_end = math.inf
+    if x.ref != demand:
+        if p.rate < math.inf:
+            away = demand - x.ref
             slope = ub
-            ub = math.copysign(p[RATE], away)
+            ub = math.copysign(p.rate, away)
             if slope == 0.0:
-                m[SLEW_END] = away / ub
+                m.slew_end = away / ub
             elif (ub - slope) * away > 0.0:
-                m[SLEW_END] = away / (ub - slope)
+                m.slew_end = away / (ub - slope)
         else:
-            x[REF] = demand
-    elif abs(ub) > p[RATE]:
-        ub = math.copysign(p[RATE], ub)
-    ua = x[REF] - ub * p[LAG]
+            x.ref = demand
+    elif abs(ub) > p.rate:
+        ub = math.copysign(p.rate, ub)
+    ua = x.ref - ub * p.lag
     ue = 0.0
-    if p[LAG] > 0.0:
-        ue = x[U] - ua
-        if abs(ue) <= 1e-16 * (abs(ua) + abs(x[U])):
+    if p.lag > 0.0:
+        ue = x.u - ua
+        if abs(ue) <= 1e-16 * (abs(ua) + abs(x.u)):
             ue = 0.0
     else:
-        x[U] = ua
-    m[UA] = ua
-    m[UB] = ub
-    m[UE] = ue
+        x.u = ua
+    m.ua = ua
+    m.ub = ub
+    m.ue = ue
 
 
 @inlined
-def begin_span(p: Vector, x: Vector, m: Vector) -> Septuple:
+def begin_span(p: Plant, x: State, m: Motion) -> Septuple:
     """Coefficients of the motion from the state x on; returns those of the load speed."""
-    ua = m[UA]
-    ub = m[UB]
-    ue = m[UE]
-    rate = 1.0 / p[LAG] if p[LAG] > 0.0 else 0.0
-    m[LAST_V] = math.nan
-    m[END_KNOWN] = 0.0
-    m[PASSING] = math.nan
-    side = x[SIDE]
-    stuck = x[LOAD] == 0.0
-    a = ua * p[INV_J1]
-    b = ub * p[INV_J1]
-    e = ue * p[INV_J1]
-    friction = x[LOAD] * p[MC]
+    ua = m.ua
+    ub = m.ub
+    ue = m.ue
+    rate = 1.0 / p.lag if p.lag > 0.0 else 0.0
+    m.last_v = math.nan
+    m.end_known = 0.0
+    m.passing = math.nan
+    side = x.side
+    stuck = x.load == 0.0
+    a = ua * p.inv_J1
+    b = ub * p.inv_J1
+    e = ue * p.inv_J1
+    friction = x.load * p.Mc
     if not stuck:
-        a += friction * p[INV_J2]
-    m[STEADY] = 0.0
+        a += friction * p.inv_J2
+    m.steady = 0.0
     if side == 0.0:
-        prepare(m, x[THETA], x[V], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, e, rate)
+        prepare(m, x.theta, x.v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, e, rate)
         side = 1.0
     else:
-        k = p[C]
-        dd = p[D]
-        if x[DOUBLED] != 0.0:
+        k = p.c
+        dd = p.d
+        if x.doubled != 0.0:
             k *= 2.0
             dd = 0.0
-        w0sq, w0, inverse_w0sq = p[W0SQ_SLIP], p[W0_SLIP], p[INV_W0SQ]
-        inverse_inertia = p[INV_J1] + p[INV_J2]
-        if stuck or x[DOUBLED] != 0.0:
+        w0sq, w0, inverse_w0sq = p.w0sq_slip, p.w0_slip, p.inv_w0sq
+        inverse_inertia = p.inv_J1 + p.inv_J2
+        if stuck or x.doubled != 0.0:
             if stuck:
-                inverse_inertia = p[INV_J1]
+                inverse_inertia = p.inv_J1
             w0sq = k * inverse_inertia
             w0 = math.sqrt(w0sq)
             inverse_w0sq = 1.0 / w0sq
         if dd == 0.0 and ub == 0.0 and ue == 0.0:
-            m[STEADY] = 1.0
-        z0 = side * x[THETA] - 0.5 * p[GAP]
+            m.steady = 1.0
+        z0 = side * x.theta - 0.5 * p.gap
         zeta = 0.5 * dd * inverse_inertia
-        prepare(m, z0, side * x[V], k, dd, w0sq, w0, inverse_w0sq, zeta, side * a, side * b, side * e, rate)
+        prepare(m, z0, side * x.v, k, dd, w0sq, w0, inverse_w0sq, zeta, side * a, side * b, side * e, rate)
     if stuck:
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    inverse = p[INV_J]
+    inverse = p.inv_J
     return (
-        x[W2], (ua - friction) * inverse, ub * inverse, ue * inverse,
-        side * p[J1] * inverse, side * p[INV_J2], -friction * p[INV_J2],
+        x.w2, (ua - friction) * inverse, ub * inverse, ue * inverse,
+        side * p.J1 * inverse, side * p.inv_J2, -friction * p.inv_J2,
     )  # fmt: skip
 
 
@@ -125,34 +123,34 @@ def time_to_flank(distance: float, v: float, a: float, just_left: bool, toleranc
 
 
 @inlined
-def flank_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
+def flank_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The flank that is reached first while the gap is open."""
-    half = 0.5 * p[GAP]
-    tolerance = GRAZE * p[GAP]
-    if x[BEYOND] != 0.0:
-        b = x[BEYOND]
-        start = RISING if x[MASK] == LEFT_BEYOND else WATCH
-        s = first_crossing(m, p[C] * half, -b * p[C], -b * p[D], 0.0, 0.0, load, start, 0.0, horizon)
+    half = 0.5 * p.gap
+    tolerance = GRAZE * p.gap
+    if x.beyond != 0.0:
+        b = x.beyond
+        start = RISING if x.mask == LEFT_BEYOND else WATCH
+        s = first_crossing(m, p.c * half, -b * p.c, -b * p.d, 0.0, 0.0, load, start, 0.0, horizon)
         back = first_crossing(m, -half, b, 0.0, 0.0, 0.0, load, WATCH, 0.0, s if s >= 0.0 else horizon)
         if back >= 0.0:
             return BACK, back
         if s < -1.0 or back < -1.0:
             return UNSOLVED, 0.0
         return (REJOIN, s) if s >= 0.0 else (NO_EVENT, horizon)
-    left_upper = x[MASK] == LEFT_UPPER
-    left_lower = x[MASK] == LEFT_LOWER
-    v = x[V]
-    if m[UB] == 0.0 and m[UE] == 0.0:
-        a = m[FA]
-        up = time_to_flank(half - x[THETA], v, a, left_upper, tolerance)
-        down = time_to_flank(half + x[THETA], -v, -a, left_lower, tolerance)
+    left_upper = x.mask == LEFT_UPPER
+    left_lower = x.mask == LEFT_LOWER
+    v = x.v
+    if m.ub == 0.0 and m.ue == 0.0:
+        a = m.A
+        up = time_to_flank(half - x.theta, v, a, left_upper, tolerance)
+        down = time_to_flank(half + x.theta, -v, -a, left_lower, tolerance)
         s = min(up, down)
         if s >= horizon:
             return NO_EVENT, horizon
         if up <= down:
-            m[LAST_V] = math.sqrt(max(0.0, v * v + 2.0 * a * (half - x[THETA])))
+            m.last_v = math.sqrt(max(0.0, v * v + 2.0 * a * (half - x.theta)))
             return UPPER, up
-        m[LAST_V] = -math.sqrt(max(0.0, v * v - 2.0 * a * (half + x[THETA])))
+        m.last_v = -math.sqrt(max(0.0, v * v - 2.0 * a * (half + x.theta)))
         return LOWER, down
     start = RISING if left_upper else WATCH
     up = first_crossing(m, half, -1.0, 0.0, 0.0, 0.0, load, start, 0.0, horizon)
@@ -167,31 +165,31 @@ def flank_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float)
     sign = -1.0 if lower else 1.0
     z, v = motion(m, s)
     a, _, _ = derivatives(m, s, z, v, forcing_tail(m, s))
-    if p[GAP] > 0.0 and sign * a < 0.0 and v * v <= -2.0 * sign * a * tolerance:
+    if p.gap > 0.0 and sign * a < 0.0 and v * v <= -2.0 * sign * a * tolerance:
         return (GRAZE_LOWER if lower else GRAZE_UPPER), s
     return (LOWER if lower else UPPER), s
 
 
 @inlined
-def exit_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
+def exit_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The instant at which the flanks part (or the damping regime of `modelica` changes)."""
-    modelica = p[LAW] == MODELICA and p[D] > 0.0
+    modelica = p.law == MODELICA and p.d > 0.0
     if modelica:
-        sign = 1.0 if x[DOUBLED] != 0.0 else -1.0
-        start = RISING if x[MASK] == SWITCHED else WATCH
-        s = first_crossing(m, 0.0, -sign * p[C], sign * p[D], 0.0, 0.0, load, start, 0.0, horizon)
+        sign = 1.0 if x.doubled != 0.0 else -1.0
+        start = RISING if x.mask == SWITCHED else WATCH
+        s = first_crossing(m, 0.0, -sign * p.c, sign * p.d, 0.0, 0.0, load, start, 0.0, horizon)
         if s < -1.0:
             return UNSOLVED, 0.0
-        if x[DOUBLED] != 0.0:
+        if x.doubled != 0.0:
             return (SWITCH, s) if s >= 0.0 else (NO_EVENT, horizon)
-        out = first_crossing(m, 0.0, m[K], m[DD], 0.0, 0.0, load, WATCH, 0.0, s if s >= 0.0 else horizon)
+        out = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, WATCH, 0.0, s if s >= 0.0 else horizon)
         if out >= 0.0:
             return EXIT, out
         return (SWITCH, s) if s >= 0.0 else (NO_EVENT, horizon)
-    if m[STEADY] != 0.0:
+    if m.steady != 0.0:
         return steady_exit(m, horizon)
-    if p[LAW] != DEAD_ZONE and m[DD] > 0.0:
-        s = first_crossing(m, 0.0, m[K], m[DD], 0.0, 0.0, load, WATCH, 0.0, horizon)
+    if p.law != DEAD_ZONE and m.dd > 0.0:
+        s = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, WATCH, 0.0, horizon)
     else:
         s = first_crossing(m, 0.0, 1.0, 0.0, 0.0, 0.0, load, WATCH, 0.0, horizon)
     if s < -1.0:
@@ -200,60 +198,60 @@ def exit_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) 
 
 
 @inlined
-def load_event_open(p: Vector, x: Vector, load: Septuple) -> tuple[int, float]:
+def load_event_open(p: Plant, x: State, load: Septuple) -> tuple[int, float]:
     """Stop of the load or target speed while the gap is open: the load speed is linear then."""
     slope = load[6]
-    if x[LOAD] == 0.0 or slope == 0.0:
+    if x.load == 0.0 or slope == 0.0:
         return NO_EVENT, math.inf
-    if p[REACTIVE] != 0.0:
-        return STOP, max(0.0, -x[W2] / slope)
-    if math.isnan(x[START_TIME]):
-        s = (p[TARGET] - x[W2]) / slope
+    if p.reactive != 0.0:
+        return STOP, max(0.0, -x.w2 / slope)
+    if math.isnan(x.start_time):
+        s = (p.target - x.w2) / slope
         if s >= 0.0:
             return REACHED, s
     return NO_EVENT, math.inf
 
 
 @inlined
-def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
+def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """Breakaway, stop or target speed of the load while the gap is closed."""
     event = NO_EVENT
     end = horizon
-    if x[LOAD] == 0.0:
-        s = first_crossing(m, p[MC], -m[K], -m[DD], 0.0, 0.0, load, WATCH, 0.0, end)
+    if x.load == 0.0:
+        s = first_crossing(m, p.Mc, -m.k, -m.dd, 0.0, 0.0, load, WATCH, 0.0, end)
         if s >= 0.0:
             event = BREAKAWAY
             end = s
-        if p[LAW] == DEAD_ZONE and m[DD] > 0.0 and s >= -1.0:
-            s = first_crossing(m, p[MC], m[K], m[DD], 0.0, 0.0, load, WATCH, 0.0, end)
+        if p.law == DEAD_ZONE and m.dd > 0.0 and s >= -1.0:
+            s = first_crossing(m, p.Mc, m.k, m.dd, 0.0, 0.0, load, WATCH, 0.0, end)
             if s >= 0.0:
                 event = BREAKAWAY
                 end = s
         return (event, end) if s >= -1.0 else (UNSOLVED, 0.0)
     low = -math.inf
     high = math.inf
-    if m[STEADY] != 0.0:
+    if m.steady != 0.0:
         # how far the load speed can swing at all: most spans need no search
-        swing = abs(load[4]) * (math.sqrt(m[V0] * m[V0] + m[W0SQ] * m[Y0] * m[Y0]) + abs(m[V0]))
-        low = x[W2] + min(0.0, load[1] * end) - swing
-        high = x[W2] + max(0.0, load[1] * end) + swing
+        swing = abs(load[4]) * (math.sqrt(m.v0 * m.v0 + m.w0sq * m.y0 * m.y0) + abs(m.v0))
+        low = x.w2 + min(0.0, load[1] * end) - swing
+        high = x.w2 + max(0.0, load[1] * end) + swing
     s = -1.0
-    if p[REACTIVE] != 0.0 and (low if x[LOAD] > 0.0 else -high) <= 0.0:
-        start = RISING if x[MASK] == BROKE_AWAY else WATCH
-        s = first_crossing(m, 0.0, 0.0, 0.0, 0.0, x[LOAD], load, start, 0.0, end)
+    if p.reactive != 0.0 and (low if x.load > 0.0 else -high) <= 0.0:
+        start = RISING if x.mask == BROKE_AWAY else WATCH
+        s = first_crossing(m, 0.0, 0.0, 0.0, 0.0, x.load, load, start, 0.0, end)
         if s >= 0.0:
             event = STOP
             end = s
-    if s >= -1.0 and high >= p[TARGET] and math.isnan(x[START_TIME]):
-        flank_to_flank = event == NO_EVENT and m[Z0] == 0.0 and not math.isnan(m[LAST_V])
-        if flank_to_flank and x[SIDE] > 0.0 and x[LOAD] > 0.0:
-            if p[MC] < 0.0 or x[W2] + largest_gain(p, m, load, end) >= p[TARGET]:
-                s = steady_target(m, load, p[TARGET], end)
+    if s >= -1.0 and high >= p.target and math.isnan(x.start_time):
+        flank_to_flank = event == NO_EVENT and m.z0 == 0.0 and not math.isnan(m.last_v)
+        if flank_to_flank and x.side > 0.0 and x.load > 0.0:
+            if p.Mc < 0.0 or x.w2 + largest_gain(p, m, load, end) >= p.target:
+                s = steady_target(m, load, p.target, end)
             if s >= 0.0:  # no change of motion: noted on the way to the other end of the contact
-                m[PASSING] = s
+                m.passing = s
                 s = -1.0
         else:
-            s = first_crossing(m, p[TARGET], 0.0, 0.0, 0.0, -1.0, load, WATCH, 0.0, end)
+            s = first_crossing(m, p.target, 0.0, 0.0, 0.0, -1.0, load, WATCH, 0.0, end)
         if s >= 0.0:
             event = REACHED
             end = s
@@ -261,13 +259,13 @@ def load_event_contact(p: Vector, x: Vector, m: Vector, load: Septuple, horizon:
 
 
 @inlined
-def next_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) -> tuple[int, float]:
+def next_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The event that ends this span and when, at most `horizon` from now."""
-    if x[SIDE] == 0.0:
+    if x.side == 0.0:
         event, s = flank_event(p, x, m, load, horizon)
         other, at = load_event_open(p, x, load)
         if at < s:
-            m[LAST_V] = math.nan
+            m.last_v = math.nan
             return other, at
         return event, s
     event, s = exit_event(p, x, m, load, horizon)
@@ -275,6 +273,6 @@ def next_event(p: Vector, x: Vector, m: Vector, load: Septuple, horizon: float) 
         return event, s
     other, at = load_event_contact(p, x, m, load, s)
     if other != NO_EVENT:
-        m[LAST_V] = math.nan
+        m.last_v = math.nan
         return other, at
     return event, s

@@ -40,30 +40,31 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     J1, J2, c = column(drive.J1), column(drive.J2), column(drive.c)
     Mc, Ms = column(drive.Mc), column(drive.Ms)
     target = column(drive.target_speed)
-    p = np.zeros((count, at.N_P))
-    p[:, at.J1], p[:, at.J2], p[:, at.C], p[:, at.D] = J1, J2, c, column(drive.d)
-    p[:, at.GAP], p[:, at.MC] = column(drive.gap), Mc
+    rows = np.zeros((count, at.N_P))
+    p = rows.view(at.PLANT)[:, 0]
+    p["J1"], p["J2"], p["c"], p["d"] = J1, J2, c, column(drive.d)
+    p["gap"], p["Mc"] = column(drive.gap), Mc
     # a reactive load without torque never sticks: it is the same as an active one
-    p[:, at.REACTIVE] = (Mc > 0.0) if drive.load_kind == "reactive" else 0.0
-    p[:, at.LAW] = LAWS[drive.contact_law]
-    p[:, at.RATE] = column(drive.torque_rate)
-    p[:, at.U_MIN], p[:, at.U_MAX] = column(drive.minimum_torque), column(drive.maximum_torque)
-    p[:, at.TARGET] = target
-    p[:, at.ENCODER] = column(encoder_count(drive))
-    p[:, at.ENCODER_PHASE] = column(drive.encoder_phase)
-    p[:, at.TORQUE_NOISE], p[:, at.NOISE_SEED] = column(drive.torque_noise), column(drive.noise_seed)
-    p[:, at.DEAD_TIME] = column(drive.computing_delay)
-    p[:, at.THETA_0] = column(drive.start_position)
-    p[:, at.W1_0] = column(drive.initial_motor_speed)
-    p[:, at.W2_0] = column(drive.initial_load_speed)
+    p["reactive"] = (Mc > 0.0) if drive.load_kind == "reactive" else 0.0
+    p["law"] = LAWS[drive.contact_law]
+    p["rate"] = column(drive.torque_rate)
+    p["u_min"], p["u_max"] = column(drive.minimum_torque), column(drive.maximum_torque)
+    p["target"] = target
+    p["encoder"] = column(encoder_count(drive))
+    p["encoder_phase"] = column(drive.encoder_phase)
+    p["torque_noise"], p["noise_seed"] = column(drive.torque_noise), column(drive.noise_seed)
+    p["dead_time"] = column(drive.computing_delay)
+    p["theta_0"] = column(drive.start_position)
+    p["w1_0"] = column(drive.initial_motor_speed)
+    p["w2_0"] = column(drive.initial_load_speed)
     w0sq = c * (1.0 / J1 + 1.0 / J2)
-    p[:, at.PERIOD] = 2.0 * math.pi / np.sqrt(w0sq)
+    p["period"] = 2.0 * math.pi / np.sqrt(w0sq)
     # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
     lag = column(drive.torque_lag)
-    p[:, at.LAG] = np.where(lag > 1e-12 * p[:, at.PERIOD], lag, 0.0)
-    stiff = (J1 + J2) * (target + np.abs(p[:, at.W2_0]) + np.abs(p[:, at.W1_0])) / (Ms - Mc)
-    p[:, at.TIME_LIMIT] = 100.0 * (stiff + p[:, at.PERIOD]) if time_limit is None else time_limit
-    p[:, at.EVENT_CAP] = max_events
-    p[:, at.INV_J1], p[:, at.INV_J2], p[:, at.INV_J] = 1.0 / J1, 1.0 / J2, 1.0 / (J1 + J2)
-    p[:, at.W0SQ_SLIP], p[:, at.INV_W0SQ], p[:, at.W0_SLIP] = w0sq, 1.0 / w0sq, np.sqrt(w0sq)
-    return p
+    p["lag"] = np.where(lag > 1e-12 * p["period"], lag, 0.0)
+    stiff = (J1 + J2) * (target + np.abs(p["w2_0"]) + np.abs(p["w1_0"])) / (Ms - Mc)
+    p["time_limit"] = 100.0 * (stiff + p["period"]) if time_limit is None else time_limit
+    p["event_cap"] = max_events
+    p["inv_J1"], p["inv_J2"], p["inv_J"] = 1.0 / J1, 1.0 / J2, 1.0 / (J1 + J2)
+    p["w0sq_slip"], p["inv_w0sq"], p["w0_slip"] = w0sq, 1.0 / w0sq, np.sqrt(w0sq)
+    return rows

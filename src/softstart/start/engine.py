@@ -12,7 +12,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
-from softstart.plant.advance import advance
 
 FIRST_ROWS = 256
 
@@ -84,7 +83,7 @@ def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> i
     book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
     state = tuple(controller.initial_state)
     while True:
-        reason: int = advance(p, book.x, book.m, book.segments, book.events, book.stages)
+        reason: int = kernel.advance(p, book.x, book.m, book.segments, book.events, book.stages)
         if reason == at.BUFFER_FULL:
             book.grow()
         elif reason == at.ASK:

@@ -20,7 +20,7 @@ NO_LOAD = (0.0,) * 7
 def swing(
     z0: float, v0: float, w0: float, zeta: float, forcing: tuple[float, float, float], rate: float
 ) -> np.ndarray:
-    m = np.zeros(at.N_M)
+    m = np.zeros(at.N_M).view(at.MOTION)[0]
     prepare(m, z0, v0, w0 * w0, 1.0, w0 * w0, w0, 1.0 / w0**2, zeta, *forcing, rate)
     return m
 
@@ -115,16 +115,16 @@ def test_the_target_search_of_steady_contacts_agrees(
     w0, J1 = 2.0, 1.0
     k = w0 * w0 * J1 * J2 / (J1 + J2)
     u = mean * k - load * J1 / J2 * 1.0  # so that z swings about some place near `mean`
-    m = np.zeros(at.N_M)
+    m = np.zeros(at.N_M).view(at.MOTION)[0]
     prepare(m, 0.0, v0, k, 0.0, w0 * w0, w0, 1.0 / w0**2, 0.0, u / J1 + load / J2, 0.0, 0.0, 0.0)
-    m[at.W0] = w0
-    end = 2.0 * math.atan2(v0, -w0 * m[at.P0]) / w0
+    m.w0 = w0
+    end = 2.0 * math.atan2(v0, -w0 * m.p0) / w0
     total = J1 + J2
     speeds = (0.3, (u - load) / total, 0.0, 0.0, J1 / total, 1.0 / J2, -load / J2)
     times = np.linspace(0.0, end, 400)
     w2 = np.array([load_speed(m, speeds, s, motion(m, s)[1]) for s in times])
-    p = np.zeros(at.N_P)
-    p[at.MC] = load
+    p = np.zeros(at.N_P).view(at.PLANT)[0]
+    p.Mc = load
     assert w2.max() <= 0.3 + largest_gain(p, m, speeds, end) * (1 + 1e-12) + 1e-12
     target = 0.3 + share * (w2.max() - 0.3) + 1e-6
     found = steady_target(m, speeds, target, end)

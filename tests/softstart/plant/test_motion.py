@@ -16,7 +16,7 @@ from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 
 def span(w0: float, ratio: float, rate: float, forcing: tuple[float, float, float]) -> np.ndarray:
     """Coefficients of a span that starts at z = 0.3, z' = -0.7."""
-    m = np.zeros(at.N_M)
+    m = np.zeros(at.N_M).view(at.MOTION)[0]
     prepare(m, 0.3, -0.7, w0 * w0, 1.0, w0 * w0, w0, 1.0 / w0**2, ratio * w0, *forcing, rate)
     return m
 
@@ -65,7 +65,7 @@ def test_contact(
 @settings(max_examples=200, deadline=None)
 @given(rate=st.floats(1e-3, 1e4), forcing=st.tuples(*[st.floats(-5.0, 5.0)] * 3), s=st.floats(0.0, 2.0))
 def test_open_gap(rate: float, forcing: tuple[float, float, float], s: float) -> None:
-    m = np.zeros(at.N_M)
+    m = np.zeros(at.N_M).view(at.MOTION)[0]
     prepare(m, 0.3, -0.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *forcing, rate)
     a, b, e = forcing
     x = rate * s

@@ -23,7 +23,7 @@ from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.plant import start as kernel
 from softstart.plant.jit import compiled_as
-from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run
+from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run_native
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile, Vector
 from softstart.start.engine import Book
@@ -253,7 +253,8 @@ def all_moved(
     while True:
         recorders = (np.zeros((records, n)) for n in (at.N_SEGMENT, at.N_EVENT, at.N_STAGE))
         if _all_moved(
-            run, record.states_at, step, p, rows, begun, sees, times, np.zeros(times.size, dtype=np.int64),
+            run_native, record.states_at, step, p, rows, begun, sees, times,
+            np.zeros(times.size, dtype=np.int64),
             np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(N_MEASURED), np.zeros(state_size),
             np.zeros(command_size), *recorders, np.zeros(at.N_X), np.zeros(at.N_M), out, T, w2, positions,
         ):  # fmt: skip
