@@ -112,7 +112,7 @@ class Worker:
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,
         )
-        self._lock = threading.Lock()
+        self._lock, self._over = threading.Lock(), False
         self._frames: SimpleQueue[bytes | None] = SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -125,7 +125,7 @@ class Worker:
     @property
     def alive(self) -> bool:
         """Whether the process has not ended."""
-        return self._reader.is_alive()
+        return self._process.poll() is None
 
     def submit(self, function: Callable[..., Any], *args: Any, tells: bool = False, **keywords: Any) -> None:
         """Start `function(*args, **keywords)`, importable; with `tells` it is given a `tell`."""
@@ -168,7 +168,8 @@ class Worker:
         """End the process after `grace` seconds; its exit code, negative for a signal."""
         with self._lock:
             process = self._process
-            if process.returncode is None:
+            if not self._over:
+                self._over = True
                 if process.stdin is not None:
                     with suppress(OSError):
                         process.stdin.close()

@@ -12,13 +12,14 @@ from collections.abc import Callable, Hashable, Sequence
 from enum import Enum
 from typing import Any
 
-from softstart.errors import InputError
-from softstart.page.job_place import Place
-from softstart.page.job_process import Told
+from softstart.errors import InputError, SimulationError
+from softstart.processes import DiedError, Tell, Worker
 
-PATIENCE = 0.1  # s between two looks at whether a job is to stop
+NICENESS = 10  # the live page comes first
+STOP_CHECK = 0.1  # s between two checks whether a job is to stop
 MOST_WAITING = 8  # jobs of one user
 
+OUT_OF_MEMORY = "The computation needs more memory than there is; ask for fewer points or a smaller grid."
 MISTAKE = (
     "There is a mistake in softstart, and this could not be computed; the log of the server, where "
     "softstart serve was started, says more. Everything else goes on."
@@ -115,7 +116,7 @@ class Jobs:
     def __init__(self, limit: int | None = None, modules: Sequence[str] = ()) -> None:
         self.limit = limit or max(2, (os.cpu_count() or 1) - 1)
         self.modules = modules
-        self._spare: Place | None = None
+        self._spare: Worker | None = None
         self._warming = False
         self._lock = threading.RLock()
         self._waiting: list[Job] = []
@@ -128,7 +129,7 @@ class Jobs:
         """Put `work(*args, tell=..., **keywords)` into the queue of `user`.
 
         The function must be importable, its arguments and its result picklable; `tell` is a
-        `softstart.page.job_process.Tell`. Raises InputError if too many jobs of this user wait already.
+        `softstart.processes.Tell`. Raises InputError if too many jobs of this user wait already.
         """
         job = Job(self, user, title, pickle.dumps((work, args, keywords)))
         with self._lock:
@@ -169,7 +170,7 @@ class Jobs:
             for job in (*self._waiting, *self._running):
                 job.cancel()
         if spare is not None:
-            spare.leave()
+            spare.end()
         latest = time.monotonic() + timeout
         for thread in threads:
             thread.join(max(0.0, latest - time.monotonic()))
@@ -213,18 +214,18 @@ class Jobs:
     # one job -------------------------------------------------------------------------------------------
 
     def _attend(self, job: Job) -> None:
-        """Start the process of a job, listen to it, and see it to its end: the work of one thread."""
+        """Run a job in a process, listen to it, and end the process: the work of one thread."""
         state = State.FAILED
         sentences: tuple[str, ...] = (MISTAKE,)
         try:
-            place = self._place()
+            worker = self._worker()
             try:
-                job.pid = place.process.pid
-                place.connection.send_bytes(job._packed)
-                state, sentences = _listen(job, place)
+                job.pid = worker.pid
+                worker.submit(_run, job._packed, tells=True)
+                state, sentences = _listen(job, worker)
             finally:
-                place.leave()
-        except Exception:  # a thread that died would hold its place in the queue for ever
+                worker.end()
+        except Exception:  # a thread that died would keep its turn in the queue indefinitely
             log.exception("The process of %r could not be attended.", job.title)
         with self._lock:
             del self._running[job]
@@ -241,28 +242,36 @@ class Jobs:
         threading.Thread(target=self._warm, daemon=True).start()
 
     def _warm(self) -> None:
+        worker: Worker | None = None
         try:
-            place = Place(self.modules)
+            worker = self._started()
         except OSError:  # no process to be had now: a job will say so, or find one
             log.exception("No process could be made ready.")
-            place = None
         with self._lock:
             self._warming = False
-            if self._ended and place is not None:
-                place.leave()
+            if self._ended and worker is not None:
+                worker.end()
             else:
-                self._spare = place
+                self._spare = worker
 
-    def _place(self) -> Place:
+    def _worker(self) -> Worker:
         """The process that waits, or a new one."""
         with self._lock:
-            place, self._spare = self._spare, None
-        if place is None:
-            return Place(self.modules)
-        if place.process.is_alive():
-            return place
-        place.leave()
-        return Place(self.modules)
+            spare, self._spare = self._spare, None
+        if spare is not None:
+            if spare.alive:
+                return spare
+            spare.end()
+        return self._started()
+
+    def _started(self) -> Worker:
+        return Worker(self.modules, NICENESS)
+
+
+def _run(packed: bytes, *, tell: Tell) -> Any:
+    """What a job's process does."""
+    work, arguments, keywords = pickle.loads(packed)
+    return work(*arguments, tell=tell, **keywords)
 
 
 def _conclude(job: Job, state: State, sentences: tuple[str, ...] = ()) -> None:
@@ -273,34 +282,38 @@ def _conclude(job: Job, state: State, sentences: tuple[str, ...] = ()) -> None:
     job._over.set()
 
 
-def _listen(job: Job, place: Place) -> tuple[State, tuple[str, ...]]:
-    """Take in what the process says until it has ended or is to stop."""
-    connection = place.connection
+def _listen(job: Job, worker: Worker) -> tuple[State, tuple[str, ...]]:
+    """Take in what the process sends until it has ended or is to stop."""
     while not job._stop.is_set():
         try:
-            if not connection.poll(PATIENCE):
-                continue
-            told: Told = connection.recv()
-        except (EOFError, OSError):
-            return State.FAILED, (_ended_by_itself(place),)
-        if told.kind == "progress":
-            job.share, job.message = told.content
-        elif told.kind == "part":
-            job.parts.append(told.content)
-        elif told.kind == "result":
-            job.result, job.share = pickle.loads(told.content), 1.0
+            message = worker.receive(STOP_CHECK)
+        except DiedError as death:
+            return State.FAILED, (
+                f"The process of this computation was ended from outside ({death}), perhaps because memory "
+                "ran out; start it again, or ask for less.",
+            )
+        if message is None:
+            continue
+        if message.kind == "progress":
+            job.share, job.message = message.content
+        elif message.kind == "part":
+            job.parts.append(message.content)
+        elif message.kind == "result":
+            job.result, job.share = message.content, 1.0
             return State.DONE, ()
-        elif told.kind == "refused":
-            return State.FAILED, tuple(told.content)
         else:
-            log.error("In the process of %r:\n%s", job.title, told.content)
-            return State.FAILED, (MISTAKE,)
+            return State.FAILED, _sentences(job, *message.content)
         job.changes += 1
     return State.CANCELLED, ()
 
 
-def _ended_by_itself(place: Place) -> str:
-    return (
-        f"The process of this computation was ended from outside ({place.how_it_ended()}), perhaps because "
-        "memory ran out; start it again, or ask for less."
-    )
+def _sentences(job: Job, error: Exception, text: str) -> tuple[str, ...]:
+    """What a user is told of an exception."""
+    if isinstance(error, InputError):
+        return tuple(error.sentences)
+    if isinstance(error, SimulationError):
+        return (str(error),)
+    if isinstance(error, MemoryError):
+        return (OUT_OF_MEMORY,)
+    log.error("In the process of %r:\n%s", job.title, text)
+    return (MISTAKE,)

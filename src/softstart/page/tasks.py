@@ -20,7 +20,7 @@ from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
-from softstart.page.job_process import Tell
+from softstart.processes import Tell
 from softstart.start.simulation import simulate
 from softstart.tuning.question import bound_of
 from softstart.tuning.solving import tune

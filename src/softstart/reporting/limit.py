@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +19,10 @@ from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.pulse_coast_hold import applies
-from softstart.optimal.result import InfeasibleError, OptimumError
+from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.optimal.solving import optimize
+from softstart.processes import DiedError, Worker
+from softstart.processes import Tell as WorkerTell
 from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
@@ -181,26 +178,35 @@ def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint],
 
 def _in_own_process(drive: Drive, asked: Sequence[float], budget: float, tell: Tell) -> list[FrontPoint]:
     """Optima by the other methods, as many as are found in time."""
-    task = json.dumps({"drive": drive.to_toml(), "start_times": list(asked), "terminal": TERMINAL})
-    with tempfile.TemporaryFile("w+", encoding="utf-8") as told:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "softstart.reporting.limit_worker"],
-            stdin=subprocess.PIPE, stdout=told, stderr=subprocess.DEVNULL, text=True,
-        )  # fmt: skip
+    points: list[FrontPoint] = []
+    worker = Worker(quiet=True)
+    try:
+        worker.submit(optima, drive, asked, tells=True)
+        began = time.monotonic()
+        while (spent := time.monotonic() - began) < budget:
+            tell(spent / budget, f"looking for the optimum, at most {budget:g} s")
+            message = worker.receive(min(POLL, budget - spent))
+            if message is not None and message.kind != "part":
+                break  # it is done
+            if message is not None:
+                points.append(message.content)
+    except DiedError:
+        pass  # what it found counts
+    finally:
+        worker.end()
+    return points
+
+
+def optima(drive: Drive, start_times: Sequence[float], *, tell: WorkerTell) -> None:
+    """Look for the optima of start times, one after the other, and send each at once."""
+    for start_time in start_times:
         try:
-            assert process.stdin is not None
-            with suppress(BrokenPipeError), process.stdin:  # it may have ended already
-                process.stdin.write(task)
-            began = time.monotonic()
-            while process.poll() is None and (spent := time.monotonic() - began) < budget:
-                tell(spent / budget, f"looking for the optimum, at most {budget:g} s")
-                time.sleep(POLL)
-        finally:
-            process.kill()
-            process.wait()
-        told.seek(0)
-        lines = told.read().split("\n")[:-1]  # what follows the last line break was cut off
-    return [FrontPoint.of_record(json.loads(line)) for line in lines]
+            point = FrontPoint.of_optimum(optimize(drive, start_time, terminal=TERMINAL), start_time)
+        except InfeasibleError as error:
+            point = FrontPoint.of_verdict(error.verdict, start_time, TERMINAL)
+        except (OptimumError, NotConverged, InputError) as error:  # InputError: of no class it solves
+            point = FrontPoint.not_found(str(error), start_time, TERMINAL)
+        tell.part(point)
 
 
 def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:

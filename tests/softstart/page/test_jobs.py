@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 from softstart import InputError
-from softstart.page.job_process import NICENESS, OUT_OF_MEMORY
-from softstart.page.jobs import MISTAKE, MOST_WAITING, Job, Jobs, State
+from softstart.page.jobs import MISTAKE, MOST_WAITING, NICENESS, OUT_OF_MEMORY, Job, Jobs, State
 
 HERE = Path(__file__).parent
 
@@ -149,21 +148,19 @@ def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
         jobs.warm()
         until(lambda: jobs._spare is not None)
         assert jobs._spare is not None
-        waiting = jobs._spare.process.pid
+        waiting = jobs._spare.pid
         job = jobs.begin("A", "quick", works.noted, str(tmp_path / "log"), "quick")
         assert job.wait(20)
         assert (job.pid, job.state) == (waiting, State.DONE)
         until(lambda: jobs._spare is not None)
-        dead = jobs._spare.process.pid
-        assert dead is not None
+        dead = jobs._spare.pid
         os.kill(dead, signal.SIGKILL)
         until(lambda: not alive(dead))
         again = jobs.begin("A", "again", works.noted, str(tmp_path / "log"), "again")
         assert again.wait(20)
         assert again.state is State.DONE
         until(lambda: jobs._spare is not None)
-        last = jobs._spare.process.pid
-        assert last is not None
+        last = jobs._spare.pid
     finally:
         jobs.end()
     assert not alive(last)
@@ -183,9 +180,8 @@ import sys, time
 sys.path.insert(0, sys.argv[1])
 import works_for_jobs
 from softstart.page.jobs import Jobs
-if __name__ == "__main__":
-    job = Jobs().begin("A", "endless", works_for_jobs.endless, sys.argv[2])
-    time.sleep(60)
+job = Jobs().begin("A", "endless", works_for_jobs.endless, sys.argv[2])
+time.sleep(60)
 """
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, PlainController, simulate
+from softstart.processes import Tell
 from softstart.reporting import report
 from softstart.reporting.choice import choice_section, choose
 from softstart.reporting.document import answer
-from softstart.reporting.limit import bound_at, limit, limit_section
+from softstart.reporting.limit import bound_at, limit, limit_section, optima
 from softstart.reporting.markup import Figures
 from softstart.reporting.robustness import robustness
 
@@ -130,16 +131,11 @@ def test_search_for_optima_ends_when_its_time_is_up():
     assert all(p.k_dyn >= p.k_dyn_lower_bound * (1.0 - 1e-9) for p in found.found)
 
 
-def test_worker_answers_line_by_line():
-    import io
-    import json
-
-    from softstart.optimal.front import FrontPoint
-    from softstart.reporting.limit_worker import work
-
+def test_the_process_sends_each_optimum():
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-    out = io.StringIO()
-    work(json.dumps({"drive": crane.to_toml(), "start_times": [0.2883042], "terminal": "reached"}), out)
-    point = FrontPoint.of_record(json.loads(out.getvalue()))
+    sent = []
+    optima(crane, [0.2883042], tell=Tell(sent.append))
+    ((kind, point),) = sent
+    assert kind == "part"
     assert point.found
     assert point.k_dyn == pytest.approx(point.k_dyn_lower_bound, rel=1e-6)

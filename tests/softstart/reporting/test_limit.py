@@ -1,18 +1,16 @@
 """What the report says of the limit: what is proved, against which starts, and what is only known."""
 
-import json
 from dataclasses import replace
-from io import StringIO
 
 import pytest
 
 from softstart import Drive, simulate
 from softstart.optimal.front import FrontPoint
+from softstart.processes import Tell
 from softstart.reporting import report
 from softstart.reporting.document import answer
 from softstart.reporting.gentle_starts import gentle_starts
-from softstart.reporting.limit import bound_at, limit_section
-from softstart.reporting.limit_worker import work
+from softstart.reporting.limit import bound_at, limit_section, optima
 from softstart.reporting.markup import Figures
 
 from .test_page import Page, rows_of
@@ -100,9 +98,8 @@ def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostil
 
 def test_a_drive_of_no_class_that_is_solved_is_an_answer_not_a_crash():
     drive = LAGGING.replace(load_kind="reactive", contact_law="modelica", damping=1.0)
-    out = StringIO()
-    task = {"drive": drive.to_toml(), "start_times": [0.3, 0.4], "terminal": "reached"}
-    work(json.dumps(task), out)
-    points = [FrontPoint.of_record(json.loads(line)) for line in out.getvalue().splitlines()]
+    sent = []
+    optima(drive, [0.3, 0.4], tell=Tell(sent.append))
+    points = [message.content for message in sent]
     assert [p.status for p in points] == ["NOT_FOUND", "NOT_FOUND"]
     assert "modelica" in points[0].status_text
