@@ -8,7 +8,7 @@ future?
 
 # %%
 # Crane drive of [G], gap 0.5 rad, to 60 rad/s; fewer points than the study takes.
-from softstart.optimal.pictures import front_figure
+from softstart.views.optima import front_figure
 from softstart_studies.optimal_starts import fronts, pictures, terminals
 from softstart_studies.optimal_starts.crane import Extent
 

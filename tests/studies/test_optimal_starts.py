@@ -10,11 +10,11 @@ import pytest
 
 from softstart import TorqueProfile
 from softstart.optimal.exact import replay
-from softstart.optimal.pictures import front_figure
 from softstart.optimal.robust import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
 from softstart.start.metrics import base_torque
 from softstart.study import Verdict, find_study
+from softstart.views.optima import front_figure
 from softstart_studies.optimal_starts import OptimalStarts, find, limits, pictures, present, sensor, smooth
 from softstart_studies.optimal_starts.crane import (
     DAMPING,

@@ -5,25 +5,25 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import click
 
 from softstart.cli.commands import did_you_mean
 from softstart.cli.options import Decorator, Mistakes
 from softstart.errors import InputError, SimulationError
-
-if TYPE_CHECKING:
-    pass
+from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.quantities import to_si
+from softstart.views.terminal import print_json
 
 METHODS = ("auto", "closed-form", "collocation", "lp")
 OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
-OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("terminal", "minimise", "method")}
-OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("torque_speed", "smoothness")}
+KEYWORDS = ("terminal", "minimise", "method", "torque_speed", "smoothness")
+OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in KEYWORDS}
 OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("gaps", "inertias", "load_torques")}
 
 
-class Asked(NamedTuple):
+class StartTime(NamedTuple):
     """A start time as it was asked for: in s, or as a multiple of the start time of `direct`."""
 
     value: float
@@ -79,42 +79,40 @@ def read_choice(text: str, option: str, choices: Sequence[str]) -> Any:
     return text
 
 
-def read_start_time(text: str, option: str = "--start-time") -> Asked:
+def read_start_time(text: str, option: str = "--start-time") -> StartTime:
     """A start time in s, or a multiple of that of `direct`.
 
     >>> read_start_time("250 ms"), read_start_time("1.2x")
-    (Asked(value=0.25, multiple=False), Asked(value=1.2, multiple=True))
+    (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
     """
     stripped = text.strip()
     if stripped[-1:] in ("x", "X"):
         value = read_positive(
             stripped[:-1], option, "1", "a multiple of the start time of direct, as 1.2x", text
         )
-        return Asked(value, multiple=True)
-    return Asked(read_positive(text, option, "s", 'a time above 0 s, as 0.3, "300 ms" or 1.2x'))
+        return StartTime(value, multiple=True)
+    return StartTime(read_positive(text, option, "s", 'a time above 0 s, as 0.3, "300 ms" or 1.2x'))
 
 
 def read_positive(text: str, option: str, unit: str, meaning: str, shown: str | None = None) -> float:
     """A finite quantity above 0."""
-    from softstart.quantities import to_si
-
-    said = text if shown is None else shown
+    given = text if shown is None else shown
     try:
         value = float(to_si(text, unit, name=option))
     except InputError as error:
         if shown is None:
             raise
-        raise InputError(f'{option} = "{said}": give {meaning}.') from error
+        raise InputError(f'{option} = "{given}": give {meaning}.') from error
     if not value > 0.0:
-        raise InputError(f'{option} = "{said}": give {meaning}.')
+        raise InputError(f'{option} = "{given}": give {meaning}.')
     return value
 
 
-def read_start_times(text: str) -> list[Asked]:
+def read_start_times(text: str) -> list[StartTime]:
     """Start times with commas between, or as from:to:count.
 
     >>> read_start_times("0.25, 1.2x")
-    [Asked(value=0.25, multiple=False), Asked(value=1.2, multiple=True)]
+    [StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True)]
     >>> [round(one.value, 3) for one in read_start_times("0.25:0.5:3")]
     [0.25, 0.375, 0.5]
     """
@@ -125,7 +123,7 @@ def read_start_times(text: str) -> list[Asked]:
     if len(parts) != 3:
         raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
     mistakes = Mistakes()
-    ends: list[Asked] = []
+    ends: list[StartTime] = []
     for part in parts[:2]:
         with mistakes.noted():
             ends.append(read_start_time(part, option))
@@ -140,7 +138,7 @@ def read_start_times(text: str) -> list[Asked]:
             f'{option} = "{text}": give both ends as times, or both as multiples of direct (1.2x).'
         )
     step = (last.value - first.value) / (count - 1)
-    return [Asked(first.value + index * step, first.multiple) for index in range(count)]
+    return [StartTime(first.value + index * step, first.multiple) for index in range(count)]
 
 
 def read_quantities(text: str | None, option: str, unit: str) -> list[float]:
@@ -151,8 +149,6 @@ def read_quantities(text: str | None, option: str, unit: str) -> list[float]:
     """
     if text is None:
         return []
-    from softstart.quantities import to_si
-
     return _each(text, option, lambda part: float(to_si(part, unit, name=option)))
 
 
@@ -164,7 +160,6 @@ def read_corners(text: str | None) -> tuple[tuple[float, float], ...]:
     """
     if text is None:
         return ()
-    from softstart.quantities import to_si
 
     def corner(part: str) -> tuple[float, float]:
         speed, colon, torque = part.partition(":")
@@ -217,16 +212,13 @@ def as_option(sentence: str) -> str:
 
 
 @contextmanager
-def no_solution_told(as_json: bool) -> Iterator[None]:
+def no_solution_reported(as_json: bool) -> Iterator[None]:
     """Where there is no optimum: its verdict as the JSON object, one sentence, and exit code 3."""
     try:
         yield
     except RuntimeError as error:
         if isinstance(error, SimulationError | RecursionError | NotImplementedError):
             raise
-        from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-        from softstart.views.terminal import print_json
-
         if not isinstance(error, InfeasibleError | OptimumError | NotConverged):
             raise
         if as_json and isinstance(error, InfeasibleError):

@@ -1,9 +1,12 @@
-"""`softstart optimize`: the gentlest start within a given time, and how much better any start could be."""
+"""`softstart optimize`: the gentlest start within a given time, and how much better any start could be.
+
+With --gaps, --inertias or --load-torques: one profile for several drives, and what a contact sensor is worth.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +16,10 @@ from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
     OPTION_OF,
-    Asked,
+    StartTime,
     method_option,
     named_as_options,
-    no_solution_told,
+    no_solution_reported,
     read_choice,
     read_corners,
     read_positive,
@@ -26,7 +29,6 @@ from softstart.cli.optimal_options import (
     terminal_option,
     torque_speed_option,
 )
-from softstart.cli.optimum_text import AIMS, controller_summary, show_optimum
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
@@ -37,14 +39,39 @@ from softstart.cli.options import (
     read_drive,
     set_option,
 )
+from softstart.cli.running import Attributed, working
+from softstart.controller import ready_controller_names
+from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.optimal import solving
+from softstart.optimal.problem import OBJECTIVES, TERMINALS, Problem
+from softstart.optimal.result import Optimum
+from softstart.optimal.robust import SensorWorth, scenarios_of, worth_of_contact_sensor
 from softstart.optimal.shortest import start_time_of_direct
+from softstart.quantities import to_si
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
+from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
+from softstart.views.numbers import Column
+from softstart.views.optima import (
+    AIMS,
+    bound_sentence,
+    comparison,
+    controller_summary,
+    figure_rows,
+    question,
+    robust_bound_sentence,
+    robust_question,
+    scenario_table,
+    worth_conclusion,
+    write_optimum,
+    write_worth,
+)
+from softstart.views.terminal import console, print_json, print_lines, print_table, sentence
 
 if TYPE_CHECKING:
-    from softstart.drive import Drive
-    from softstart.optimal.result import Optimum
-    from softstart.start.run import Run
+    from rich.console import Console
 
 
 @click.command(cls=Command)
@@ -84,11 +111,9 @@ def optimize(
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
     of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
     """
-    from softstart.optimal.problem import Problem
-
     mistakes = Mistakes()
     one: Drive | None = None
-    asked: Asked | None = None
+    asked: StartTime | None = None
     varied: dict[str, list[float]] = {}
     with mistakes.noted():
         one = read_drive(drive, settings)
@@ -118,18 +143,14 @@ def optimize(
     mistakes.settle()
     assert one is not None
     if several:
-        from softstart.cli.optimize_robust import optimize_for_all
-
         assert asked is not None
-        optimize_for_all(one, asked, varied, as_json, out)
+        _optimize_for_all(one, asked, varied, as_json, out)
     else:
         _optimize_one(one, asked, bounds, as_json, out)
 
 
 def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, Any]:
     """The options that were given, read, under the names of the keywords of `softstart.optimize`."""
-    from softstart.optimal.problem import OBJECTIVES, TERMINALS
-
     readers: dict[str, tuple[str, Callable[[str], Any]]] = {
         "terminal": ("terminal", lambda text: read_choice(text, "--terminal", TERMINALS)),
         "method": ("method", lambda text: read_choice(text, "--method", METHODS)),
@@ -160,8 +181,6 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
 
 
 def _weight(text: str) -> float:
-    from softstart.quantities import to_si
-
     value = float(to_si(text, "s", name="--smoothness"))
     if value < 0.0:
         raise InputError(f'--smoothness = "{text}": a weight in s, 0 or more.')
@@ -175,8 +194,6 @@ def _missing(bounds: Mapping[str, Any]) -> str:
 
 def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
     """What to type instead, from what `direct` needs."""
-    from softstart.cli.running import working
-
     with working("starting the drive ..."):
         direct = start_time_of_direct(drive)
     return (
@@ -186,45 +203,87 @@ def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
 
 
 def _optimize_one(
-    drive: Drive, asked: Asked | None, bounds: dict[str, Any], as_json: bool, out: str | None
+    drive: Drive, asked: StartTime | None, bounds: dict[str, Any], as_json: bool, out: str | None
 ) -> None:
-    with no_solution_told(as_json), output_folder(out) as folder:
-        from softstart.cli.running import working
-
+    with no_solution_reported(as_json), output_folder(out) as folder:
         with working("looking for the gentlest start ..."):
-            from softstart.optimal.solving import optimize as solve
-
             direct = start_time_of_direct(drive) if asked is not None and asked.multiple else math.nan
             seconds = None if asked is None else asked.seconds(direct)
             with named_as_options():
-                best = solve(drive, seconds, **bounds)
+                best = solving.optimize(drive, seconds, **bounds)
         with working("starting the drive under the shipped controllers ..."):
             others = runs_beside(best)
         if folder is not None:
-            from softstart.cli.optimal_report import write_optimum
-
             with working("drawing the figure ..."):
                 write_optimum(best, others, folder, command_line())
-
-    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json({**best.summary(), "controllers": [controller_summary(run) for run in others]})
     else:
-        show_optimum(console(), best, others)
+        _show(console(), best, others)
         if out is not None:
             print(f"\nWritten to {out}: report.md, the profile (CSV, TOML, C), figure and traces.")
 
 
 def runs_beside(best: Optimum) -> list[Run]:
     """The same drive under every controller that runs without being given a parameter, and does not fail."""
-    from softstart.cli.running import Attributed
-    from softstart.controller import ready_controller_names
-    from softstart.start.simulation import simulate
-
     drive, base = best.problem.drive, best.problem.base
     runs = []
     for name in ready_controller_names():
         with suppress(InputError, SimulationError), Attributed(name):
             runs.append(simulate(drive, name, base=base))
     return runs
+
+
+def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
+    print_lines(to, drive_lines(best.problem.drive))
+    sentence(to, f"  asked  {question(best)}")
+    sentence(to, f"  method {best.method}: {best.why}")
+    to.print()
+    print_table(to, [Column("", False), Column("", False)], figure_rows(best), headings=False)
+    to.print()
+    sentence(to, comparison(best, others), "bold")
+    sentence(to, bound_sentence(best), "dim")
+
+
+# one profile for several drives ---------------------------------------------------------------------------
+
+
+def _optimize_for_all(
+    drive: Drive, asked: StartTime, varied: Mapping[str, Sequence[float]], as_json: bool, out: str | None
+) -> None:
+    """One profile for all combinations of the values given, blind and with a contact sensor."""
+    with no_solution_reported(as_json), output_folder(out) as folder:
+        with working("looking for the gentlest start of all drives ...") as status:
+
+            def progress(doing: str) -> None:
+                if status is not None:
+                    status.update(f"{doing} ...")
+
+            with named_as_options():
+                scenarios = scenarios_of(drive, **varied)
+                direct = start_time_of_direct(drive) if asked.multiple else math.nan
+                worth = worth_of_contact_sensor(scenarios, asked.seconds(direct), progress=progress)
+        if folder is not None:
+            with working("drawing the figure ..."):
+                write_worth(worth, folder, command_line())
+
+    if as_json:
+        print_json(worth.summary())
+    else:
+        _show_worth(console(), worth)
+        if out is not None:
+            print(f"\nWritten to {out}: report.md, both profiles, the figure and traces.")
+
+
+def _show_worth(to: Console, worth: SensorWorth) -> None:
+    blind = worth.blind
+    print_lines(to, drive_lines(blind.base))
+    sentence(to, f"  asked  {robust_question(blind)}")
+    to.print()
+    table = scenario_table(worth)
+    print_table(to, table.columns, table.rows, bold=[blind.worst])
+    to.print()
+    sentence(to, worth_conclusion(worth), "bold")
+    sentence(to, robust_bound_sentence(blind), "dim")
+    sentence(to, "K_dyn refers to the mean shaft torque of the first drive.", "dim")

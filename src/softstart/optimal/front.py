@@ -17,6 +17,7 @@ from softstart.controller import Controller, make_controller, ready_controller_n
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.late import late
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
 from softstart.optimal.shortest import shortest_start_time
@@ -25,6 +26,8 @@ from softstart.processes import Pool, checked_workers
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
+
+optima = late("softstart.views.optima")  # it draws results of this module
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
@@ -222,9 +225,7 @@ class Front:
 
     def plot(self) -> Any:
         """The curve with its bound, and the controllers as points."""
-        from softstart.optimal.pictures import front_figure
-
-        return front_figure(self)
+        return optima.front_figure(self)
 
 
 def pareto(

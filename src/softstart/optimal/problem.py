@@ -22,7 +22,7 @@ OBJECTIVES = get_args(Objective)
 
 @dataclass(frozen=True)
 class Problem:
-    """An optimal start.
+    """What an optimal start minimises, within which bounds, and how it ends.
 
         minimise   K_dyn = peak |T| over the whole run / M12avg_base, or heat, or the start time
         subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
@@ -31,15 +31,41 @@ class Problem:
                    steady:      also T = Mc
                    reached:     only w2 = target_speed for the first time; the motor coasts until T peaks
 
-    heat is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque. `torque_speed` are corners
-    (rad/s, N m) of a concave limit of the motor's torque over its speed. `smoothness` in s weighs
-    integral (du/dt)^2 dt / Ms^2 against K_dyn: it makes the demand continuous from 0 on. `k_dyn` as a bound
-    and all times refer to the drive itself unless `base` is another one. The drive's computing_delay is left
-    out: a profile that is known beforehand is sent that much earlier. Raises InputError.
+    The drive's computing_delay is left out: a profile that is known beforehand is sent that much earlier.
 
+    Parameters
+    ----------
+    drive : Drive
+        The drive, a single one.
+    start_time : float, optional
+        Bound on t_f, s; None only where the start time is minimised.
+    terminal : {"synchronous", "steady", "reached"}
+        What holds at t_f.
+    minimise : {"k_dyn", "heat", "start_time"}
+        `heat` is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque.
+    k_dyn, heat : float, optional
+        Bounds on what is not minimised (1, s).
+    torque_speed : sequence of (float, float)
+        Corners (rad/s, N m) of a concave limit of the motor's torque over its speed.
+    smoothness : float
+        Weight in s of integral (du/dt)^2 dt / Ms^2 against K_dyn: makes the demand continuous from 0 on.
+    base : Drive, optional
+        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
+
+    Raises
+    ------
+    InputError
+        For everything that is wrong, at once.
+
+    Examples
+    --------
     >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
     >>> problem.terminal, problem.highest_torque, round(problem.base_torque, 2)
     ('synchronous', 62.0, 52.86)
+
+    References
+    ----------
+    The mathematics: docs/theory/optimum.md.
     """
 
     drive: Drive

@@ -59,7 +59,33 @@ class LowerBound:
 class Optimum:
     """The best start found, as the exact plant runs it, and how much better any start could be.
 
-    `run` is the exact re-simulation to one elastic period after t_f; all figures are taken from it.
+    Parameters
+    ----------
+    problem : Problem
+        What was minimised, within which bounds.
+    profile : TorqueProfile
+        The demand over time, with what follows t_f.
+    run : Run
+        The exact re-simulation to one elastic period after t_f; all figures are taken from it.
+    bound : LowerBound
+        What no other start can go below, and for which starts that is proved.
+    method, why : str
+        The method, and why it was chosen.
+    claimed : float
+        The minimised figure as the method computed it, before the re-simulation.
+    end_time : float
+        t_f, s.
+    seconds : float
+        Computing time, s.
+    warm : object
+        What `optimize` can start a similar problem from.
+
+    Examples
+    --------
+    >>> from softstart import Drive, optimize
+    >>> best = optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
+    >>> round(best.k_dyn, 4), round(best.heat, 4), best.run.contacts
+    (0.9092, 0.2153, 1)
     """
 
     problem: Problem
@@ -67,10 +93,10 @@ class Optimum:
     run: Run
     bound: LowerBound
     method: Method
-    why: str  # why this method
-    claimed: float  # what the method said, before the re-simulation
-    end_time: float  # t_f, s
-    seconds: float  # computing time
+    why: str
+    claimed: float
+    end_time: float
+    seconds: float
     warm: Any = field(default=None, repr=False)
 
     @property
@@ -151,7 +177,22 @@ class Verdict:
 
 
 class InfeasibleError(RuntimeError):
-    """No torque profile meets the bounds: `verdict` says which constraint forbids it and what would do."""
+    """No torque profile meets the bounds.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Which constraint forbids it, and what start time would do.
+
+    Examples
+    --------
+    >>> from softstart import Drive, InfeasibleError, optimize
+    >>> try:
+    ...     optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.1)
+    ... except InfeasibleError as error:
+    ...     print(error.verdict.constraint)
+    the largest motor torque of 62 N m, even if it acted all the time
+    """
 
     def __init__(self, verdict: Verdict) -> None:
         self.verdict = verdict
@@ -159,7 +200,14 @@ class InfeasibleError(RuntimeError):
 
 
 class OptimumError(RuntimeError):
-    """A method's answer does not stand: the exact plant or the lower bound contradicts it."""
+    """A method's answer does not stand: the exact plant or the lower bound contradicts it.
+
+    Examples
+    --------
+    >>> from softstart import OptimumError
+    >>> issubclass(OptimumError, RuntimeError)
+    True
+    """
 
 
 class NotConverged(RuntimeError):  # noqa: N818 - the name says what happened

@@ -51,29 +51,59 @@ def optimize(
 ) -> Optimum:
     """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
 
+    The figures are those of the exact plant running the profile; the bound says how much better any other
+    start could be.
+
     Parameters
     ----------
-    drive : a Drive, or the name or file of one.
-    start_time : bound on t_f in s; None only where the start time is what is minimised.
-    terminal : what holds at t_f: `synchronous` w1 = w2 = target_speed, `steady` also T = Mc, `reached` only
-        w2 = target_speed.
-    minimise : `k_dyn`, `heat` (integral of (u/Ms)^2 in s) or `start_time`.
-    k_dyn, heat : bounds on those that are not minimised.
-    torque_speed : corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
-    smoothness : weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
-    method : `closed-form` (pulse, coast, hold), `lp`, `collocation`, or `auto`, the
-        cheapest that is exact here.
-    base : the drive to whose mean torque K_dyn refers, if not `drive`.
-    warm : `warm` of the optimum of a similar problem, to start the collocation from.
+    drive : Drive or str
+        The drive, or the name or file of one.
+    start_time : float, optional
+        Bound on t_f, s; None only where the start time is minimised.
+    terminal : {"synchronous", "steady", "reached"}
+        What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed.
+    minimise : {"k_dyn", "heat", "start_time"}
+        `heat` is the integral of (u/Ms)^2 from 0 to t_f, s.
+    k_dyn, heat : float, optional
+        Bounds on those that are not minimised (1, s).
+    torque_speed : sequence of (float, float)
+        Corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
+    smoothness : float
+        Weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
+    method : {"auto", "closed-form", "lp", "collocation"}
+        `closed-form` is pulse, coast, hold; `lp` linear programs; `auto` the cheapest that is exact here.
+    base : Drive, optional
+        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
+    warm : object, optional
+        `warm` of the optimum of a similar problem, from which the collocation starts.
 
-    Returns an Optimum: its figures are those of the exact plant running the profile, its bound says
-    how much better any other start could be. Raises InputError for bad input, InfeasibleError with a verdict
-    where no torque meets the terms, OptimumError if an answer does not stand up to the exact plant.
+    Returns
+    -------
+    Optimum
+        Profile, exact run, figures and lower bound.
 
+    Raises
+    ------
+    InputError
+        For bad input.
+    InfeasibleError
+        Where no torque meets the bounds, with a verdict.
+    OptimumError
+        If an answer does not stand up to the exact plant.
+
+    Examples
+    --------
     >>> from softstart import Drive, optimize
     >>> best = optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
     >>> round(best.k_dyn, 6), best.method, best.bound.kind
     (0.909247, 'closed-form', 'momentum')
+
+    References
+    ----------
+    Why it is optimal, and the bounds: docs/theory/optimum.md.
+    HiGHS: Huangfu and Hall, Math. Prog. Comp. 10 (2018), doi 10.1007/s12532-017-0130-5.
+    IPOPT: Waechter and Biegler, Math. Prog. 106 (2006), doi 10.1007/s10107-004-0559-y.
+    CasADi: Andersson et al., Math. Prog. Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)

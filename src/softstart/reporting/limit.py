@@ -14,7 +14,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal.front import FrontPoint
-from softstart.optimal.labels import name_points
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
@@ -29,7 +28,7 @@ from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.reporting.strategies import GREY, SMALL, WIDE, label_of, name_in_figure, ordered
 from softstart.reporting.values import digits, fixed, listed, percent, short
 from softstart.start.comparison import REFERENCE, Row
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, drawing, name_points, new_figure
 
 if TYPE_CHECKING:
     from matplotlib import ticker

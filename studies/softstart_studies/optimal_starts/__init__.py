@@ -84,7 +84,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
         *kinds.claims(found.kinds),
     )
     progress("drawing")
-    from softstart.optimal.pictures import front_figure, worth_figure
+    from softstart.views.optima import front_figure, worth_figure
     from softstart_studies.optimal_starts import pictures
 
     new, worn = found.fronts[0], found.fronts[-1]

@@ -9,13 +9,12 @@ from softstart import Drive, simulate
 from softstart.controller import make_controller
 from softstart.optimal.exact import replay
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
-from softstart.optimal.labels import name_points, shared
-from softstart.optimal.pictures import front_figure, optimum_figure, worth_figure
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound, Optimum
 from softstart.optimal.robust.solving import RobustOptimum, SensorWorth
 from softstart.profile import TorqueProfile
-from softstart.views.drawing import save_figure
+from softstart.views.drawing import name_points, save_figure, shared
+from softstart.views.optima import front_figure, optimum_figure, worth_figure
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 

@@ -31,20 +31,45 @@ from softstart.start.simulation import simulate
 class RobustOptimum:
     """One torque profile for several drives, as the exact plant runs it on each of them.
 
-    Every run goes to one elastic period after its own start time, the profile still playing. All K_dyn refer
-    to `base`. `lower_bound` is the largest bound of a scenario by itself: no profile, reacting or not, does
-    better on all of them.
+    Parameters
+    ----------
+    scenarios : tuple of Drive
+        The drives, in the order given.
+    start_time : float
+        The time allowed, s.
+    base : Drive
+        The drive to whose mean shaft torque all K_dyn refer.
+    react_to_contact : bool
+        Whether a second part of the profile may start with the first contact.
+    profile : TorqueProfile
+        The demand over time.
+    runs : tuple of Run
+        One for each scenario, to one elastic period after its own start time.
+    lower_bound : LowerBound
+        The largest bound of a scenario by itself: no profile, reacting or not, does better on all of them.
+    seconds : float
+        Computing time, s.
+    note : str
+        Says so where a contact sensor is left unused.
+
+    Examples
+    --------
+    >>> from softstart import Drive, optimize_robust
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
+    >>> best = optimize_robust([drive], start_time=0.2883042)
+    >>> best.worst, best.k_dyn == best.k_dyn_each[0]
+    (0, True)
     """
 
     scenarios: tuple[Drive, ...]
-    start_time: float  # s allowed
+    start_time: float
     base: Drive
     react_to_contact: bool
     profile: TorqueProfile
     runs: tuple[Run, ...]
     lower_bound: LowerBound
-    seconds: float  # computing time
-    note: str = ""  # where a contact sensor is left unused, that this is so
+    seconds: float
+    note: str = ""
 
     @property
     def k_dyn_each(self) -> tuple[float, ...]:
@@ -427,28 +452,56 @@ def optimize_robust(
     progress: Progress | None = None,
     bound_of: BoundOf | None = None,
 ) -> RobustOptimum:
-    """The torque profile with the least worst K_dyn over several drives, all in time.
+    """Find the torque profile with the least worst K_dyn over several drives, all in time.
 
         minimise over u   max_i  peak |T_i| / M12avg_base
         subject to        w2_i reaches target_speed_i by start_time, lowest_torque <= u <= highest_torque
 
-    u is a function of time that is common to all drives; with `react_to_contact` it is one function until
-    the gap first closes and another one, on a clock that starts there, from then on (or the blind profile,
-    where that is better: see `note`; both are searched, so this takes twice as long). The peak is that of the
-    whole run, to one elastic period after the drive's own start time. `base` (the first scenario, if none is
-    given) is the drive that K_dyn refers to. Any drive goes: damped, reactive load, lag, rate.
+    u is a function of time that is common to all drives; the peak is that of the whole run, to one elastic
+    period after the drive's own start time. Any drive goes: damped, reactive load, lag, rate.
 
-    What comes out is the best of several searches on the exact plant, not proved best: a blind profile over
-    wide gaps has many local optima, and a gentler one may be missed. `lower_bound` says how much better any
-    profile could be. `bound_of(drive)` gives the bound of one scenario by itself, in K_dyn of `base` (the
-    momentum bound, if none is given).
+    The result is the best of several searches on the exact plant, not proved best: a blind profile over wide
+    gaps has many local optima, and a gentler one may be missed. `lower_bound` says how much better any
+    profile could be.
 
-    Raises InputError for bad input, InfeasibleError where no profile was found that starts all in time.
+    Parameters
+    ----------
+    scenarios : sequence of Drive
+        The drives; `softstart.optimal.robust.scenarios_of` makes them from gaps, inertias and load torques.
+    start_time : float
+        The time allowed, s.
+    react_to_contact : bool
+        Allow one profile until the gap first closes and another one, on a clock that starts there, from then
+        on, or the blind profile where that is better (see `note`). Both are searched: twice the time.
+    base : Drive, optional
+        The drive to whose mean shaft torque K_dyn refers; by default the first scenario.
+    progress : callable, optional
+        Called with a text after each stage of the search.
+    bound_of : callable, optional
+        Gives the bound of one scenario by itself, in K_dyn of `base`; by default the momentum bound.
 
+    Returns
+    -------
+    RobustOptimum
+        The profile, its exact run on each drive, and the bound.
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    InfeasibleError
+        Where no profile was found that starts all drives in time.
+
+    Examples
+    --------
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
     >>> best = optimize_robust([drive], start_time=0.2883042)
     >>> 0.909 < best.k_dyn < 0.912, max(best.start_times) <= 0.2883042
     (True, True)
+
+    References
+    ----------
+    How good it is, and how it is searched: docs/optimal-starts.md, docs/theory/optimum.md.
     """
     blind = _optimum(scenarios, start_time, False, base, progress or _quiet, bound_of)
     if not react_to_contact:
@@ -502,10 +555,37 @@ def worth_of_contact_sensor(
     bound_of: BoundOf | None = None,
     k_dyn_alone: Callable[[Drive], float] | None = None,
 ) -> SensorWorth:
-    """The robust optima with and without a sensor of the contact, side by side.
+    """Find the robust optima with and without a sensor of the contact, side by side.
 
-    `k_dyn_alone(drive)` gives the least K_dyn of one scenario by itself, in K_dyn of the base drive: what a
-    drive could have whose gap, inertia and load torque were known. Raises as `optimize_robust`.
+    Parameters
+    ----------
+    scenarios, start_time, base, progress, bound_of
+        As in `optimize_robust`.
+    k_dyn_alone : callable, optional
+        Gives the least K_dyn of one scenario by itself, in K_dyn of the base drive: what a drive could have
+        whose gap, inertia and load torque were known.
+
+    Returns
+    -------
+    SensorWorth
+        Both optima, and by how many per cent the sensor lowers the worst K_dyn.
+
+    Raises
+    ------
+    InputError, InfeasibleError
+        As `optimize_robust`.
+
+    Examples
+    --------
+    A search takes some seconds for each drive; that its input is wrong is known at once:
+
+    >>> worth_of_contact_sensor([], start_time=0.3)
+    Traceback (most recent call last):
+    softstart.errors.InputError: scenarios: the list is empty; give one Drive or more.
+
+    References
+    ----------
+    docs/optimal-starts.md.
     """
     progress = progress or _quiet
 

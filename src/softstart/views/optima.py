@@ -1,0 +1,570 @@
+"""What is shown of an optimal start, a front and a robust optimum: words, tables, figures, files of --out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.drive import Drive
+from softstart.late import late
+from softstart.optimal.front import ControllerPoint, Front
+from softstart.optimal.result import Optimum
+from softstart.optimal.robust import RobustOptimum, SensorWorth
+from softstart.start.run import Run
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    SMALL,
+    drawing,
+    name_points,
+    new_figure,
+    save_figure,
+    shade_open_gap,
+)
+from softstart.views.markdown import (
+    drive_table,
+    markdown,
+    markdown_table,
+    provenance,
+    write_table,
+    write_text,
+)
+from softstart.views.numbers import NOTHING, Table, column_of, number, short
+from softstart.views.starts import name_of
+
+if TYPE_CHECKING:
+    from matplotlib import ticker
+    from matplotlib.axes import Axes
+else:
+    ticker = late("matplotlib.ticker")
+
+AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
+REPLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"
+MARKERS = "osD^vPX*"
+TALL = 4.0  # largest over smallest K_dyn from which on the axis is logarithmic
+TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
+
+
+# one optimal start ------------------------------------------------------------------------------------------
+
+
+def controller_summary(run: Run) -> dict[str, Any]:
+    """The figures of a controller that matter beside an optimum."""
+    return {"controller": name_of(run), "k_dyn": run.k_dyn, "start_time": run.start_time}
+
+
+def figure_rows(best: Optimum) -> list[list[str]]:
+    """The figures of the optimum, as words and numbers."""
+    run, bound, problem = best.run, best.bound, best.problem
+    bounded = bound.kind != "none"
+    allowed = "" if problem.start_time is None else f", {short(problem.start_time)} s allowed"
+    most = "" if problem.k_dyn is None else f", {short(problem.k_dyn)} allowed"
+    hottest = "" if problem.heat is None else f", {short(problem.heat)} s allowed"
+    return [
+        ["K_dyn", number(best.k_dyn, 6) + most],
+        ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
+        ["gap between them", f"{best.gap_percent:.3g} %" if bounded else NOTHING],
+        ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
+        ["start time", f"{short(best.end_time)} s{allowed}"],
+        ["I2t heat", f"{short(best.heat)} s of starting torque{hottest}"],
+        ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
+        ["contacts", str(run.contacts)],
+        ["knots of the profile", str(best.profile.time.size)],
+        ["computed in", f"{best.seconds:.2g} s"],
+    ]
+
+
+def question(best: Optimum) -> str:
+    """What was asked for."""
+    problem = best.problem
+    words = [f"least {AIMS[problem.minimise]}"]
+    if problem.start_time is not None:
+        words.append(f"start time at most {problem.start_time:.6g} s")
+    if problem.k_dyn is not None:
+        words.append(f"K_dyn at most {problem.k_dyn:.6g}")
+    if problem.heat is not None:
+        words.append(f"heat at most {problem.heat:.6g} s")
+    words.append(f"terminal {problem.terminal}")
+    if problem.torque_speed:
+        words.append("motor torque limited over its speed")
+    if problem.smoothness:
+        words.append(f"smoothness {problem.smoothness:.6g} s")
+    return ", ".join(words)
+
+
+def comparison(best: Optimum, others: Sequence[Run]) -> str:
+    """The optimum beside `direct` and beside the gentlest shipped controller."""
+    text = f"K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
+    reaching = [run for run in others if not math.isnan(run.start_time)]
+    direct = next((run for run in reaching if name_of(run) == "direct"), None)
+    if direct is not None:
+        text += f"; direct has {direct.k_dyn:.3f} in {direct.start_time:.4g} s"
+    quick = [run for run in reaching if run.start_time <= best.end_time * (1.0 + 1e-9) and run is not direct]
+    if quick:
+        gentlest = min(quick, key=lambda run: run.k_dyn)
+        text += f"; the gentlest shipped controller as quick, {name_of(gentlest)}, has {gentlest.k_dyn:.3f}"
+    elif reaching:
+        gentlest = min(reaching, key=lambda run: run.k_dyn)
+        text += (
+            "; no other shipped controller is as quick, the gentlest of all, "
+            f"{name_of(gentlest)}, has {gentlest.k_dyn:.3f} in {gentlest.start_time:.4g} s"
+        )
+    return text + "."
+
+
+def bound_sentence(best: Optimum) -> str:
+    """What the lower bound covers."""
+    if best.bound.kind == "none":
+        return (
+            f"No lower bound is known here: {best.bound.covers}" if best.bound.covers else "No lower bound."
+        )
+    return f"The lower bound ({best.bound.kind}) covers {best.bound.covers}".rstrip(".") + "."
+
+
+def optimum_figure(best: Optimum) -> Any:
+    """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
+    run = best.run
+    with drawing():
+        figure, panels = new_figure(4, 1, (8.0, 9.0), sharex=True)
+        for axes in panels:
+            shade_open_gap(axes, run)
+            axes.axvline(best.end_time, color=GREY, lw=0.8, ls=":")
+        motor, shaft, speed, twist = panels
+        _motor_torque(motor, best)
+        _shaft_torque(shaft, best)
+        _speeds(speed, best)
+        _twist(twist, best)
+        twist.set_xlabel("time, s     (grey: gap open; dotted: end of the start)")
+        twist.set_xlim(0.0, run.end_time)
+        aim = {"k_dyn": "K_dyn", "start_time": "start time"}.get(best.problem.minimise, best.problem.minimise)
+        asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
+        figure.suptitle(f"{run.drive.name}: {asked}", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _legend(axes: Axes, columns: int) -> None:
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        columnspacing=1.2,
+        handlelength=1.8,
+    )
+
+
+def _headed(axes: Axes, title: str, unit: str) -> None:
+    axes.set_title(title, loc="left", fontsize=SMALL)
+    axes.set_ylabel(unit)
+
+
+def _motor_torque(axes: Axes, best: Optimum) -> None:
+    run, problem = best.run, best.problem
+    t = run.t
+    for limit in (problem.lowest_torque, problem.highest_torque):
+        axes.axhline(limit, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="limits" if limit else None)
+    if problem.torque_speed:
+        speeds, torques = np.array(problem.torque_speed).T
+        axes.plot(
+            t, np.interp(run.w1, speeds, torques), color=COLOURS[3], lw=1.0, ls=":", label="limit at w1"
+        )
+    axes.plot(t, run.u, color=COLOURS[1], label="realised u")
+    knots_t, knots_u = _steps_until(best, run.end_time)
+    axes.plot(knots_t, knots_u, color=COLOURS[6], lw=0.9, ls=DASHES[3], label="demand")
+    low, high = float(np.min(run.u)), float(np.max(run.u))
+    least, most = problem.lowest_torque, problem.highest_torque
+    _headed(axes, f"motor torque {low:.4g} to {high:.4g} of {least:.4g} to {most:.4g} N m", "N m")
+    axes.margins(y=0.08)
+    _legend(axes, 4)
+
+
+def _steps_until(best: Optimum, end: float) -> tuple[Any, Any]:
+    """The knots of the demand up to the end of the run, where its last torque is held."""
+    profile = best.profile
+    inside = profile.time <= end
+    return (
+        np.append(profile.time[inside], end),
+        np.append(profile.torque[inside], profile.at(end)),
+    )
+
+
+def _shaft_torque(axes: Axes, best: Optimum) -> None:
+    run, base = best.run, best.problem.base_torque
+    axes.plot(run.t, run.T, color=COLOURS[0], label="shaft torque")
+    peak = run.peak_torque
+    axes.axhline(peak, color=COLOURS[0], lw=0.9, ls=DASHES[1], label="peak")
+    if best.bound.kind != "none":
+        least = best.bound.k_dyn * base
+        axes.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
+    axes.axhline(base, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
+    axes.plot([run.peak_time], [peak], "o", ms=4, color=COLOURS[0])
+    if not math.isnan(run.first_contact):
+        axes.plot([run.first_contact], [0.0], "^", ms=6, color=COLOURS[1], clip_on=False, label="contact")
+    title = f"K_dyn {best.k_dyn:.4f}"
+    if best.bound.kind != "none":
+        title += f", at least {best.bound.k_dyn:.4f}"
+    _headed(axes, title, "N m")
+    _legend(axes, 5)
+
+
+def _speeds(axes: Axes, best: Optimum) -> None:
+    run, problem = best.run, best.problem
+    axes.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
+    axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
+    axes.axhline(problem.target, color=GREY, lw=0.8, ls=":", label="target")
+    title = f"start time {best.end_time:.4f} s"
+    if problem.start_time is not None:
+        title += f", {problem.start_time:.4f} s allowed"
+        axes.axvline(problem.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="allowed")
+    _headed(axes, title, "rad/s")
+    _legend(axes, 4)
+
+
+def _twist(axes: Axes, best: Optimum) -> None:
+    run = best.run
+    half = 0.5 * float(run.drive.gap)
+    axes.plot(run.t, run.theta, color=COLOURS[2], label="twist phi1 - phi2")
+    for flank in (half, -half):
+        axes.axhline(flank, color="#444444", lw=0.8, ls=DASHES[1], label="flanks" if flank == half else None)
+    contacts = "1 contact" if run.contacts == 1 else f"{run.contacts} contacts"
+    at = "" if math.isnan(run.first_contact) else f", first at {run.first_contact:.4f} s"
+    _headed(axes, contacts + at, "rad")
+    _legend(axes, 2)
+
+
+def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: str) -> None:
+    """Everything about an optimal start."""
+    drive = best.problem.drive
+    save_figure(optimum_figure(best), folder, "optimum")
+    best.profile.to_csv(folder / "profile.csv")
+    best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
+    best.profile.to_c(folder / "profile.c")
+    best.run.to_csv(folder / "trace-optimum.csv")
+    write_text(folder / "drive.toml", drive.to_toml())
+    summary = {key: value for key, value in best.summary().items() if key not in ("profile", "seconds")}
+    write_table(folder / "figures.csv", list(summary), [list(summary.values())])
+    rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
+    beside = [
+        [name_of(run), number(run.k_dyn, 4), number(run.start_time, 5)]
+        for run in sorted(others, key=lambda run: run.k_dyn)
+    ]
+    parts = [
+        f"# {markdown(drive.name)}: optimal start",
+        f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
+        markdown(comparison(best, others)),
+        markdown_table(["figure", "value"], rows, numbers_from=1),
+        markdown(bound_sentence(best)),
+        "![optimum](optimum.svg)",
+        "## The profile",
+        "[profile.csv](profile.csv), [profile.toml](profile.toml) and, as an interpolating function in C, "
+        f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{REPLAY}\n```\n\n"
+        "Traces of the start: [trace-optimum.csv](trace-optimum.csv).",
+        "## The controllers on this drive",
+        markdown_table(["strategy", "K_dyn", "start time s"], beside, numbers_from=1),
+        "## The drive",
+        drive_table(drive),
+        provenance(drive, command),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+# a front ----------------------------------------------------------------------------------------------------
+
+
+def front_tables(front: Front) -> list[Table]:
+    """The curve, and the controllers, the one nearest to the limit first."""
+    points = front.points
+    order = sorted(front.controllers, key=lambda one: one.ratio or math.inf)
+    curve = {
+        "start time\nallowed s": column_of([p.start_time_bound for p in points], 5),
+        "K_dyn": [number(p.k_dyn, 4) for p in points],
+        "lower\nbound": [number(p.k_dyn_lower_bound, 4) for p in points],
+        "gap\n%": [number(p.gap_percent, 3) for p in points],
+        "bound": [p.bound_kind if p.found else "-" for p in points],
+        "heat\ns": column_of([p.heat for p in points]),
+        "contacts": ["-" if p.contacts is None else str(p.contacts) for p in points],
+        "method": [p.method if p.found else p.status.lower().replace("_", " ") for p in points],
+    }
+    controllers = {
+        "strategy": [one.name for one in order],
+        "K_dyn": [number(one.k_dyn, 4) for one in order],
+        "start\ntime s": column_of([one.start_time for one in order], 5),
+        "least K_dyn\nat that time": [number(one.optimum.k_dyn if one.optimum else None, 4) for one in order],
+        "times\nthe least": [number(one.ratio, 3) for one in order],
+    }
+    return [
+        Table.of(f"Least K_dyn, terminal {front.terminal}", curve, ("bound", "method")),
+        Table.of("Controllers against the optimum at their own start time", controllers, ("strategy",)),
+    ]
+
+
+def front_conclusion(front: Front) -> str:
+    """What the curve spans, and which controller comes nearest to it."""
+    found = [point for point in front.points if point.found]
+    if not found:
+        return "None of these start times is feasible."
+    first, last = found[0], found[-1]
+    text = f"Least K_dyn {first.k_dyn:.3f} in {first.start_time_bound:.4g} s"
+    if last is not first:
+        text += f" to {last.k_dyn:.3f} in {last.start_time_bound:.4g} s"
+    judged = [one for one in front.controllers if one.ratio is not None]
+    if not judged:
+        return text + "."
+    best = min(judged, key=lambda one: one.ratio or math.inf)
+    least = best.optimum.k_dyn if best.optimum is not None else math.nan
+    return (
+        f"{text}. Nearest to the limit: {best.name}, K_dyn {best.k_dyn:.3f} where {least:.3f} is the least "
+        f"in its start time of {best.start_time:.4g} s."
+    )
+
+
+def footnotes(front: Front) -> list[str]:
+    """What the bound covers, and why some points are missing."""
+    covers = dict.fromkeys(
+        f"Lower bound ({point.bound_kind}): {point.bound_covers}".rstrip(".") + "."
+        for point in front.points
+        if point.found and point.bound_covers
+    )
+    missing = dict.fromkeys(point.status_text for point in front.points if not point.found)
+    apart = [f"{one.name}: {_why_apart(one)}" for one in front.controllers if one.ratio is None]
+    below = [
+        f"{one.name} lies below the lower bound of its start time: its start is not of the class covered."
+        for one in front.controllers
+        if one.optimum is not None and one.k_dyn < (one.optimum.k_dyn_lower_bound or 0.0)
+    ]
+    return [*covers, *below, *missing, *apart]
+
+
+def _why_apart(one: ControllerPoint) -> str:
+    """Why a controller has no optimum to be compared with."""
+    best = one.optimum
+    if best is None:
+        return one.status_text
+    if best.status == "INFEASIBLE" and best.shortest_start_time is not None:
+        return (
+            "quicker than any start whose gap closes only once, which takes "
+            f"{best.shortest_start_time:.6g} s or more; there is no optimum to compare it with."
+        )
+    return best.status_text
+
+
+def front_figure(front: Front) -> Any:
+    """Least K_dyn over start time with its lower bound, and the controllers as labelled points."""
+    found = [(p.start_time_bound, p.k_dyn, p.k_dyn_lower_bound) for p in front.points if p.k_dyn is not None]
+    placed = [one for one in front.controllers if not math.isnan(one.start_time)]
+    with drawing():
+        figure, axes = new_figure(1, 1, (8.0, 5.4))
+        _curve(axes, found)
+        for index, one in enumerate(placed):
+            axes.plot([one.start_time], [one.k_dyn], MARKERS[index % 8], ms=7, mfc="none", mew=1.8,
+                      color=COLOURS[(index + 1) % 8], clip_on=False, zorder=4)  # fmt: skip
+        _scale(axes, [k for _, k, _ in found] + [one.k_dyn for one in placed])
+        _where_nothing_starts(axes, front)
+        axes.set_xlabel("start time, s     (x: K_dyn over the least K_dyn at the same start time)")
+        axes.set_ylabel("K_dyn")
+        axes.set_title(f"{front.drive.name}: least K_dyn, terminal {front.terminal}", loc="left")
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(loc="upper right")
+        name_points(figure, axes, [(_with_ratio(one), one.start_time, one.k_dyn) for one in placed])
+    return figure
+
+
+def _with_ratio(one: ControllerPoint) -> str:
+    """Its name, and how many times the least K_dyn at its start time it has."""
+    return one.name if one.ratio is None else f"{one.name}, x{one.ratio:.2f}"
+
+
+def _curve(axes: Axes, found: Sequence[tuple[float, float, float | None]]) -> None:
+    if not found:
+        return
+    times, k = [one[0] for one in found], [one[1] for one in found]
+    bounded = [(t, k, low) for t, k, low in found if low is not None]
+    axes.plot(times, k, "o-", ms=3.5, color=COLOURS[0], label="optimum", zorder=3)
+    if bounded:
+        t, above, below = (list(column) for column in zip(*bounded, strict=True))
+        axes.fill_between(t, below, above, color=COLOURS[5], alpha=0.45, lw=0)
+        axes.plot(t, below, ls=DASHES[1], lw=1.2, color=COLOURS[4], label="lower bound", zorder=3)
+
+
+def _where_nothing_starts(axes: Axes, front: Front) -> None:
+    """Hatched, where a start with one contact is impossible; crosses at the start times that were refused."""
+    refused = [p.start_time_bound for p in front.points if not p.found]
+    if refused:
+        axes.plot(refused, [0.03] * len(refused), "x", ms=6, mew=1.5, color=GREY, clip_on=False,
+                  transform=axes.get_xaxis_transform(), label="no optimum")  # fmt: skip
+    shortest = front.shortest_start_time
+    if not math.isnan(shortest):
+        left, right = axes.get_xlim()
+        if left < shortest:
+            axes.axvspan(left, shortest, fc="#F6F6F6", ec="#DDDDDD", hatch="///", lw=0, zorder=0)
+            axes.set_xlim(left, right)
+        label = f"shortest with one contact, {shortest:.4f} s"
+        axes.axvline(shortest, color=GREY, lw=1.0, ls=DASHES[1], label=label)
+
+
+def _scale(axes: Axes, values: Sequence[float]) -> None:
+    """From 0 on, or logarithmic where the largest would press the smallest flat."""
+    shown = [k for k in values if k > 0.0]
+    if not shown:
+        return
+    low, high = min(shown), max(shown)
+    if high < TALL * low:
+        axes.set_ylim(0.0, 1.08 * high)
+    else:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(ticker.FixedLocator(list(TICKS)))
+        axes.yaxis.set_major_formatter(ticker.FuncFormatter(lambda k, _: f"{k:g}"))
+        axes.yaxis.set_minor_locator(ticker.NullLocator())
+        axes.set_ylim(0.85 * low, 1.15 * high)
+    axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
+    axes.margins(x=0.04)
+
+
+def write_front(front: Front, folder: Path, command: str) -> None:
+    """Everything about a curve over start times, but its saved state."""
+    save_figure(front.plot(), folder, "pareto")
+    front.to_csv(folder / "pareto.csv")
+    write_text(folder / "drive.toml", front.drive.to_toml())
+    parts = [
+        f"# {markdown(front.drive.name)}: least K\\_dyn against start time",
+        f"Terminal {front.terminal}.",
+        markdown(front_conclusion(front)),
+        "![pareto](pareto.svg)",
+    ]
+    for title, table in zip(("The curve", "The controllers"), front_tables(front), strict=True):
+        if table.rows:
+            parts += [f"## {title}", _markdown(table, numbers_from=1)]
+    parts += [
+        *map(markdown, footnotes(front)),
+        "All numbers with their digits: [pareto.csv](pareto.csv). Points with their torque profiles, from "
+        "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
+        "## The drive",
+        drive_table(front.drive),
+        provenance(front.drive, command),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+# one profile for several drives -----------------------------------------------------------------------------
+
+
+def robust_question(blind: RobustOptimum) -> str:
+    """What was asked for."""
+    return (
+        f"one profile for {len(blind.scenarios)} drives, least largest K_dyn, start time at most "
+        f"{blind.start_time:.6g} s, terminal reached"
+    )
+
+
+def scenario_table(worth: SensorWorth) -> Table:
+    """What is different in each drive, and its start without and with a sensor."""
+    blind, reacting = worth.blind, worth.reacting
+    drives = blind.scenarios
+    columns = {
+        "gap\nrad": column_of([float(d.gap) for d in drives]),
+        "J2\nkg m2": column_of([float(d.J2) for d in drives]),
+        "Mc\nN m": column_of([float(d.Mc) for d in drives]),
+        "K_dyn\nblind": [number(k, 4) for k in blind.k_dyn_each],
+        "start\ntime s": column_of(list(blind.start_times), 5),
+        "K_dyn\nwith sensor": [number(k, 4) for k in reacting.k_dyn_each],
+        "start \ntime s": column_of(list(reacting.start_times), 5),
+    }
+    return Table.of("", columns)
+
+
+def worth_conclusion(worth: SensorWorth) -> str:
+    """What the sensor is worth."""
+    blind, reacting = worth.blind, worth.reacting
+    text = f"Largest K_dyn {blind.k_dyn:.3f} without a contact sensor, {reacting.k_dyn:.3f} with one"
+    if worth.percent > 0.0:
+        return f"{text}: the sensor lowers it by {worth.percent:.1f} %."
+    return f"{text}: the sensor is worth nothing here."
+
+
+def robust_bound_sentence(optimum: RobustOptimum) -> str:
+    """How much better any profile could be."""
+    bound = optimum.lower_bound
+    if bound.kind == "none":
+        return "No lower bound is known here."
+    return (
+        f"No profile, reacting or not, brings all of them below K_dyn {bound.k_dyn:.4f} ({bound.kind} bound)."
+    )
+
+
+def worth_figure(worth: SensorWorth) -> Any:
+    """Demand and shaft torques of all drives under one profile: without a contact sensor, and with one."""
+    sides = (("without a contact sensor", worth.blind), ("with a contact sensor", worth.reacting))
+    with drawing():
+        figure, axes = new_figure(2, 2, (9.5, 6.0), sharex=True, sharey="row")
+        for column, (title, best) in enumerate(sides):
+            motor, shaft = axes[:, column]
+            base = best.runs[0].peak_torque / best.k_dyn_each[0]
+            for index, (drive, run) in enumerate(zip(best.scenarios, best.runs, strict=True)):
+                look = {"color": COLOURS[index % 8], "ls": DASHES[index % 8], "lw": 1.2}
+                motor.plot(run.t, run.u, **look)
+                shaft.plot(run.t, run.T, **look, label=_differing(drive, best.scenarios))
+            shaft.axhline(best.k_dyn * base, color=GREY, lw=1.0, ls=DASHES[1], label="largest peak")
+            if best.lower_bound.kind != "none":
+                least = best.lower_bound.k_dyn * base
+                shaft.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
+            for panel in (motor, shaft):
+                panel.axvline(best.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1])
+            motor.set_title(title, loc="left", fontsize=SMALL)
+            shaft.set_title(f"largest K_dyn {best.k_dyn:.4f}", loc="left", fontsize=SMALL)
+            shaft.set_xlabel("time, s     (dashed: start time allowed)")
+        axes[0, 0].set_ylabel("motor torque u, N m")
+        axes[1, 0].set_ylabel("shaft torque T, N m")
+        handles, labels = axes[1, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(labels)))
+        figure.suptitle(f"{worth.blind.base.name}: one profile for all", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _differing(drive: Drive, drives: Sequence[Drive]) -> str:
+    """What sets a drive apart from the others."""
+    figures = {
+        "gap": (one.gap for one in drives),
+        "J2": (one.J2 for one in drives),
+        "Mc": (one.Mc for one in drives),
+    }
+    varied = [name for name, values in figures.items() if len(set(values)) > 1]
+    return ", ".join(f"{name} {getattr(drive, name):.4g}" for name in varied) or "the drive"
+
+
+def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
+    """Everything about one profile for several drives, without and with a contact sensor."""
+    base = worth.blind.base
+    save_figure(worth_figure(worth), folder, "contact-sensor")
+    write_text(folder / "drive.toml", base.to_toml())
+    for stem, best in (("blind", worth.blind), ("reacting", worth.reacting)):
+        best.profile.to_toml(folder / f"profile-{stem}.toml", about={"drive": base.name, "k_dyn": best.k_dyn})
+        for index, run in enumerate(best.runs, start=1):
+            run.to_csv(folder / f"trace-{stem}-{index}.csv")
+    worth.blind.profile.to_csv(folder / "profile-blind.csv")
+    worth.blind.profile.to_c(folder / "profile-blind.c")
+    parts = [
+        f"# {markdown(base.name)}: one profile for {len(worth.blind.scenarios)} drives",
+        f"Start time at most {worth.blind.start_time:.6g} s, terminal reached. "
+        f"{markdown(worth_conclusion(worth))}",
+        _markdown(scenario_table(worth), numbers_from=0),
+        markdown(robust_bound_sentence(worth.blind)),
+        "![contact-sensor](contact-sensor.svg)",
+        "Without a sensor: [profile-blind.toml](profile-blind.toml), [profile-blind.csv](profile-blind.csv), "
+        "[profile-blind.c](profile-blind.c). With one, its second part from the contact on: "
+        "[profile-reacting.toml](profile-reacting.toml). Traces of each drive, in the order of the table: "
+        "trace-blind-1.csv and so on.",
+        "## The drive",
+        drive_table(base),
+        provenance(base, command),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+def _markdown(table: Table, numbers_from: int) -> str:
+    headings = [" ".join(column.heading.split()) for column in table.columns]
+    return markdown_table(headings, table.rows, numbers_from)
