@@ -333,10 +333,10 @@ def _names(frame: _Frame, marks: Sequence[StrategyPoint], found: Sequence[FrontP
     for mark, (x, y) in sorted(zip(marks, places, strict=True), key=lambda one: one[1][1]):
         name = mark.name if len(mark.name) <= 26 else mark.name[:25] + "\N{HORIZONTAL ELLIPSIS}"
         colour = html.escape(mark.colour)
-        told = f"{html.escape(mark.name)}: K_dyn {mark.k_dyn:.4g} in {mark.start_time:.4g} s"
+        tooltip = f"{html.escape(mark.name)}: K_dyn {mark.k_dyn:.4g} in {mark.start_time:.4g} s"
         dots.append(
             f'<rect class="curve-mark" x="{x - 3.5:.1f}" y="{y - 3.5:.1f}" width="7" height="7" rx="1" '
-            f'style="fill:{colour}"><title>{told}</title></rect>'
+            f'style="fill:{colour}"><title>{tooltip}</title></rect>'
         )
         place = _free(x, y, LETTER * len(name), taken)
         if place is None:
@@ -385,13 +385,13 @@ def _path(corners: Sequence[tuple[float, float]]) -> str:
 
 def _description(found: Sequence[FrontPoint], marks: Sequence[StrategyPoint]) -> str:
     """The picture for those who do not see it."""
-    said = []
+    sentences = []
     if found:
         first = min(found, key=lambda point: point.start_time_bound)
         last = max(found, key=lambda point: point.start_time_bound)
-        said.append(
+        sentences.append(
             f"Least K_dyn {first.k_dyn:.3g} in {first.start_time_bound:.3g} s to {last.k_dyn:.3g} in "
             f"{last.start_time_bound:.3g} s."
         )
-    said += [f"{mark.name}: {mark.k_dyn:.3g} in {mark.start_time:.3g} s." for mark in marks]
-    return " ".join(said)
+    sentences += [f"{mark.name}: {mark.k_dyn:.3g} in {mark.start_time:.3g} s." for mark in marks]
+    return " ".join(sentences)

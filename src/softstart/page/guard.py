@@ -81,8 +81,8 @@ class Guard:
         elif scope["type"] == "http" and scope.get("method") == "GET" and self._shows_token(scope):
             await self._admit(scope, send)
         else:
-            said = "This page needs its token: open the address that softstart serve has printed."
-            await _refuse(scope, receive, send, 401, said)
+            refusal = "This page needs its token: open the address that softstart serve has printed."
+            await _refuse(scope, receive, send, 401, refusal)
 
     def _refusal(self, headers: _Headers) -> str:
         """Why a request is refused before any token is looked at; empty if it is not."""

@@ -115,13 +115,13 @@ class OptimumPanel:
 
     def _beside(self, best: Optimum) -> str:
         """What it is worth, against the constant torque."""
-        said = f"It is among the strategies: {label_of(best)}."
+        text = f"It is among the strategies: {label_of(best)}."
         if self._stale.stale or REFERENCE not in self._session.controllers:
-            return said
+            return text
         direct = self._session.result(REFERENCE)
         if direct.run is None:
-            return said
-        return f"{said} Direct has {direct.k_dyn:.4g} in {direct.start_time:.4g} s."
+            return text
+        return f"{text} Direct has {direct.k_dyn:.4g} in {direct.start_time:.4g} s."
 
     def _save(self, suffix: str) -> None:
         assert self._found is not None

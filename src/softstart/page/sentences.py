@@ -30,10 +30,10 @@ def sentence_of(error: BaseException) -> str:
         return " ".join(str(error).split())
     if isinstance(error, MemoryError):
         return "There is not enough memory for this."
-    said = " ".join(str(error).split())
-    if len(said) > LONGEST:
-        said = said[:LONGEST] + " ..."
-    what = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    text = " ".join(str(error).split())
+    if len(text) > LONGEST:
+        text = text[:LONGEST] + " ..."
+    what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     log.debug("told the user: %s", what, exc_info=error)
     return f"This did not work, and that is a mistake in softstart, not in your input ({what})."
 

@@ -202,14 +202,14 @@ def _next_one(best: Candidate, nearest: Candidate) -> str:
 
 def _found(choice: Choice) -> list[Html | str]:
     best, plain = choice.recommended, choice.ordinary
-    said: list[Html | str] = []
+    text: list[Html | str] = []
     if best is None:
-        said.append("No strategy fulfils the rule below, so none is recommended. ")
+        text.append("No strategy fulfils the rule below, so none is recommended. ")
     else:
         second = [one for one in choice.candidates if not one.out and one is not best]
         nearest = min(second, key=lambda one: one.worst, default=None)
         gap, inertia = best.map.worst_at
-        said += [
+        text += [
             tag("strong", f"Recommended: {best.name}. "),
             f"Its K_dyn is {fixed(best.row.run.k_dyn, 3)} on the drive as it is and nowhere on the map above "
             f"{fixed(best.worst, 3)} (gap {digits(gap, 3)} rad, J2 {digits(inertia, 3)} kg m²)",
@@ -218,9 +218,9 @@ def _found(choice: Choice) -> list[Html | str]:
             f"Can an ordinary inverter do it? {best.means.inverter.capitalize()}. ",
         ]
     if plain is None:
-        said.append("No ramp was examined, so nothing is said for an ordinary inverter.")
+        text.append("No ramp was examined, so nothing is said for an ordinary inverter.")
         if any(one.means.ordinary for one in choice.candidates):
-            said[-1] = (
+            text[-1] = (
                 "No torque ramp reaches the target speed everywhere, so none is offered for an ordinary "
                 "inverter."
             )
@@ -230,10 +230,10 @@ def _found(choice: Choice) -> list[Html | str]:
             if choice.too_slow
             else ""
         )
-        said += [
+        text += [
             tag("strong", f"On an ordinary inverter: {plain.name}"),
             f"{slow}. K_dyn {fixed(plain.row.run.k_dyn, 3)}, worst {fixed(plain.worst, 3)}.",
         ]
     else:
-        said.append("It is also the best that an ordinary inverter offers.")
-    return said
+        text.append("It is also the best that an ordinary inverter offers.")
+    return text

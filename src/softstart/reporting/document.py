@@ -149,11 +149,11 @@ def provenance_section(about: Provenance) -> Html:
 def answer(report: Report) -> str:
     """The paragraph at the head of the report."""
     best, direct = report.choice.recommended, report.row(REFERENCE)
-    said = _nothing(report)
+    text = _nothing(report)
     if best:
-        said = _recommended(report, best, direct) + _after_rounding(report, best)
-        said += _with_more_time(report, best)
-    return said + _on_an_ordinary_inverter(report) + (_compared(report, best) if best else "")
+        text = _recommended(report, best, direct) + _after_rounding(report, best)
+        text += _with_more_time(report, best)
+    return text + _on_an_ordinary_inverter(report) + (_compared(report, best) if best else "")
 
 
 def _on_an_ordinary_inverter(report: Report) -> str:
@@ -191,13 +191,13 @@ def _compared(report: Report, best: Candidate) -> str:
     limits = (
         f"{short(float(drive.minimum_torque))} to {short(float(min(drive.Ms, drive.maximum_torque)))} N m"
     )
-    said = (
+    text = (
         f" For comparison: no motor torque from {limits}, however it is controlled, brings this load to "
         f"speed in that time with a K_dyn below {fixed(math.floor(bound * 1000.0) / 1000.0, 3)}"
     )
     if known is not None and known < best.row.run.k_dyn * (1.0 - SAME):
-        said += f"; the gentlest start known has {fixed(math.ceil(known * 1000.0) / 1000.0, 3)}"
-    return said + "."
+        text += f"; the gentlest start known has {fixed(math.ceil(known * 1000.0) / 1000.0, 3)}"
+    return text + "."
 
 
 def _after_rounding(report: Report, one: Candidate) -> str:
@@ -269,13 +269,13 @@ def _recommended(report: Report, best: Candidate, direct: Row | None) -> str:
             f"K_dyn {fixed(run.k_dyn, 3)}, peak shaft torque {digits(run.peak_torque)} N m, {speed} after "
             f"{digits(run.start_time)} s",
         )
-    said = (
+    text = (
         f"We recommend {best.name}. With it the shaft carries at most {digits(run.peak_torque)} N m (dynamic "
         f"coefficient K_dyn {fixed(run.k_dyn, 3)}), and the load has its {speed} after "
         f"{digits(run.start_time)} s."
     )
     if direct is None:
-        return said
+        return text
     hard, saved = direct.run, 1.0 - run.peak_torque / direct.run.peak_torque
     torque = float(getattr(hard.controller, "torque", None) or report.drive.Ms)
     full = "the full torque" if torque == float(report.drive.Ms) else f"{short(torque)} N m"
@@ -289,22 +289,22 @@ def _recommended(report: Report, best: Candidate, direct: Row | None) -> str:
         beside += ": on this drive as it is the peak is no lower, but over the range of gaps and loads it is"
     late = run.start_time - hard.start_time
     if math.isnan(late):
-        return f"{said} {beside}; direct start does not reach the target speed at all."
+        return f"{text} {beside}; direct start does not reach the target speed at all."
     share = percent(abs(late) / hard.start_time)
     if abs(late) < 1e-4 * hard.start_time:
-        return f"{said} {beside}, at no cost in time."
+        return f"{text} {beside}, at no cost in time."
     more = "costs" if late > 0.0 else "saves"
-    return f"{said} {beside}. The strategy {more} {digits(abs(late), 3)} s of start time, {share}."
+    return f"{text} {beside}. The strategy {more} {digits(abs(late), 3)} s of start time, {share}."
 
 
 def _nothing(report: Report) -> str:
     """Honestly, where the rule finds nothing."""
     choice = report.choice
     reasons = [f"{one.name} ({one.out})" for one in choice.candidates if one.out]
-    said = "None of the strategies examined can be recommended for this drive: " + "; ".join(reasons) + "."
+    text = "None of the strategies examined can be recommended for this drive: " + "; ".join(reasons) + "."
     if not any(not math.isnan(one.row.run.start_time) for one in choice.candidates):
-        return said + " No strategy brings the load to its target speed."
-    return said + " Allow a slower start, give tuned gains, or examine more strategies."
+        return text + " No strategy brings the load to its target speed."
+    return text + " Allow a slower start, give tuned gains, or examine more strategies."
 
 
 def share_saved(report: Report, row: Row) -> str:

@@ -74,7 +74,7 @@ def _data(drive: Drive) -> Html:
 
 
 def _derived(drive: Drive) -> Html:
-    rated, meant = rated_torque(drive)
+    rated, basis = rated_torque(drive)
     rows = [
         [
             "mean shaft torque under the starting torque: K_dyn = 1",
@@ -84,7 +84,7 @@ def _derived(drive: Drive) -> Html:
         ["elastic frequency with the gap closed", digits(float(drive.Omega) / (2.0 * math.pi)), "Hz"],
         ["elastic period", digits(1e3 * float(drive.elastic_period)), "ms"],
         ["twist of the shaft under the starting torque", digits(float(drive.Ms / drive.c)), "rad"],
-        [f"100 % of torque in the parameter sheets: the {meant}", digits(rated), "N m"],
+        [f"100 % of torque in the parameter sheets: the {basis}", digits(rated), "N m"],
     ]
     return table(["figure", "value", "unit"], rows, caption="Derived figures", text_columns=(0, 2))
 
@@ -240,9 +240,9 @@ def _polyline(points: list[tuple[float, float]], broken: tuple[float, float] | N
 
 
 def _text(
-    x: float, y: float, said: str, size: int = 14, colour: str = _INK, *, anchor: str = "middle"
+    x: float, y: float, label_text: str, size: int = 14, colour: str = _INK, *, anchor: str = "middle"
 ) -> str:
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}" fill="{colour}">'
-        f"{escape(said)}</text>"
+        f"{escape(label_text)}</text>"
     )

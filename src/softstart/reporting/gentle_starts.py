@@ -89,9 +89,9 @@ class _Search:
         self.until = until
         self.low, self.high = float(drive.minimum_torque), float(min(drive.Ms, drive.maximum_torque))
         self.period = float(drive.elastic_period)
-        way = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
+        travel = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
         late = float(drive.torque_lag) + self.high / float(drive.torque_rate)
-        self.crossing = math.sqrt(2.0 * way * float(drive.J1) / self.high) + late  # of the gap, s
+        self.crossing = math.sqrt(2.0 * travel * float(drive.J1) / self.high) + late  # of the gap, s
         self.evaluator = Evaluator([drive], longest)
         # a stand-in whose levels and edges can be told from each other
         self.parameters = ProfileParameters(self.staircase(np.full(N_NUMBERS, 0.55)), drive)

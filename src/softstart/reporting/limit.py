@@ -359,17 +359,17 @@ def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]
     optimum = limit.optimum_at(time)
     if optimum is not None and 100.0 * (known / bound - 1.0) <= TIGHT:
         return []
-    said = (
+    text = (
         f"In the {digits(time)} s of {best.name} the least possible K_dyn thus lies "
         f"between {fixed(bound, 3)} (proved) and {fixed(known, 3)} "
     )
     most = percent(1.0 - bound / own)
     if known < own:
         return [
-            f"{said}(found): {best.name} with {fixed(own, 3)} could be undercut by "
+            f"{text}(found): {best.name} with {fixed(own, 3)} could be undercut by "
             f"{percent(1.0 - known / own)} for certain, by {most} at most."
         ]
-    return [f"{said}(that of {best.name} itself, the gentlest start known): {most} less at most."]
+    return [f"{text}(that of {best.name} itself, the gentlest start known): {most} less at most."]
 
 
 def _times(times: Sequence[float]) -> str:

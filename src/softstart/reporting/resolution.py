@@ -64,8 +64,8 @@ class Resolution:
             _pairs(text, option) if isinstance(text, str) else [(k, v, f"{k}={v}") for k, v in text.items()]
         )
         made, wrong, seen = cls(), list[str](), set[str]()
-        for key, value, said in pairs:
-            start = f'{option} "{said}"'
+        for key, value, given in pairs:
+            start = f'{option} "{given}"'
             if key not in _KEYS:
                 near = nearest(str(key), _KEYS)
                 hint = f"did you mean {near}?" if near else f"there are {', '.join(_KEYS)}."
@@ -97,13 +97,13 @@ class Resolution:
 
     def described(self, drive: Drive) -> list[tuple[str, str]]:
         """What is rounded to what, in words."""
-        rated, meant = rated_torque(drive)
+        rated, basis = rated_torque(drive)
         if self.torque is not None:
             torque = f"{short(self.torque)} N m"
         else:
             share = f"{short(100.0 * self.torque_share)} %"
             step = short(float(f"{self.torque_share * rated:.4g}"))
-            torque = f"{share} of the {meant} of {digits(rated)} N m, that is {step} N m"
+            torque = f"{share} of the {basis} of {digits(rated)} N m, that is {step} N m"
         return [
             ("torques", torque),
             ("times", f"{short(1e3 * self.time)} ms"),

@@ -58,10 +58,36 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """A drive, its strategies compared, the limit, maps, the recommendation and its parameter sheets.
+    """All data behind a report: strategies compared, limit, maps, recommendation and parameter sheets.
 
-    `failed` are strategies whose start could not be finished, with the reason. `sheets` begins with that of
-    the recommended strategy, then the best of an ordinary inverter, if these are two.
+    Attributes
+    ----------
+    drive : Drive
+        The drive that is started.
+    comparison : Comparison
+        The strategies that could be started, one row each.
+    failed : tuple of (str, str)
+        Name of each strategy whose start could not be finished, and the reason.
+    limit : Limit
+        A bound that no start can go below, and the optima found.
+    choice : Choice
+        The recommended strategy, the best one of an ordinary inverter, and the verdict on each.
+    sheets : tuple of Sheet
+        Parameter sheets: of the recommended strategy, then of the best one of an ordinary inverter, if
+        these are two.
+    resolution : Resolution
+        The steps in which the inverter can be set.
+    provenance : Provenance
+        Versions, date, drive file and command.
+
+    Examples
+    --------
+    >>> from softstart import report
+    >>> made = report("crane-4amtkf", controllers=["ramp"], budget=0.0)
+    >>> made.to_html()[:15]
+    '<!DOCTYPE html>'
+    >>> round(made.summary()["k_dyn"], 3)
+    2.106
     """
 
     drive: Drive
@@ -76,8 +102,8 @@ class Report:
     def __repr__(self) -> str:
         """One line that says what is recommended."""
         best = self.choice.recommended
-        said = f"{best.name}, K_dyn {best.row.run.k_dyn:.3f}" if best else "nothing"
-        return f"<Report: {said} recommended for {self.drive.name}>"
+        best_text = f"{best.name}, K_dyn {best.row.run.k_dyn:.3f}" if best else "nothing"
+        return f"<Report: {best_text} recommended for {self.drive.name}>"
 
     def row(self, name: str) -> Row | None:
         """The row of a strategy."""
@@ -140,22 +166,42 @@ def report(
     progress: Progress | None = None,
     command: str = "",
 ) -> Report:
-    """Everything that a customer asks about the start of a drive, computed.
+    """Compute everything that a customer asks about the start of a drive.
 
     Parameters
     ----------
-    drive : a Drive, or the name or file of one.
-    controllers : names, files of tuned gains or Controller objects; by default all installed ones that run as
-        they are. `direct` is added, if it is not among them, to compare with.
-    parameters : a controller's name -> its parameters.
-    resolution : the steps in which the inverter can be set, as "torque=0.5%,time=10ms" or a Resolution.
-    slower : by what share the start of the recommended strategy may be longer than that of direct.
-    budget : s, at most, to look for optima where there is no formula; 0 looks for none.
-    progress : told the share that is done and what is being done.
-    command : the command that repeats it, for the provenance.
+    drive : Drive or str
+        One drive, or the name or file of one.
+    controllers : sequence of str or Controller, optional
+        Names, files of tuned gains, or Controller objects. By default all installed controllers that need
+        no parameter. `direct` is added as the reference if it is not among them.
+    parameters : mapping, optional
+        A controller's name -> its parameters.
+    resolution : Resolution, mapping or str, optional
+        The steps in which the inverter can be set, as "torque=0.5%,time=10ms".
+    slower : float, optional
+        By what share the start of the recommended strategy may be longer than that of `direct`.
+    budget : float, optional
+        Time to search for optima where there is no formula, s; 0 for no search.
+    progress : callable, optional
+        Called with the share that is done (0 to 1) and what is being computed.
+    command : str, optional
+        The command that makes the same report, for the provenance.
 
-    Raises InputError for bad input and SimulationError where not even direct can be started.
+    Returns
+    -------
+    Report
+        The data; `write` makes one HTML file of it.
 
+    Raises
+    ------
+    InputError
+        Bad input; all its mistakes at once.
+    SimulationError
+        Not even the start under `direct` can be finished.
+
+    Examples
+    --------
     >>> found = report("crane-4amtkf", controllers=["ramp", "shaped"], budget=0.0)
     >>> found
     <Report: shaped, K_dyn 1.004 recommended for Crane travel drive 4AMTKF(H)112L6>
@@ -237,13 +283,13 @@ def _made(
 ) -> list[Controller]:
     made = make_controllers(controllers, parameters)
     labels = [label_of(one) for one in made]
-    mistakes = [
+    wrong = [
         f"controllers: two of them are called {label}; give one of the two another name (that of its file)."
         for label in dict.fromkeys(labels)
         if labels.count(label) > 1
     ]
-    if mistakes:
-        raise InputError(mistakes)
+    if wrong:
+        raise InputError(wrong)
     if not any(label_of(one) == REFERENCE for one in made):
         made.append(make_controller(REFERENCE))
     return made

@@ -338,9 +338,9 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
         factor = 0.5 / math.pi if "frequency" in one.name else RPM
         value, exact, step = factor * value, factor * exact, step and factor * step
     elif one.unit == "N*m":
-        rated, meant = rated_torque(drive)
+        rated, basis = rated_torque(drive)
         share = step and 100.0 * step / rated
-        other = f"{_multiple(100.0 * value / rated, share)} % of the {meant}"
+        other = f"{_multiple(100.0 * value / rated, share)} % of the {basis}"
     text = _multiple(value, step)
     kept = "" if one.step is not None else " (not rounded)" if one.name != "period" else "at most"
     if one.name == "period":
@@ -391,18 +391,18 @@ def _outcome(sheet: Sheet) -> Html:
 def _limits(sheet: Sheet, drive: Drive) -> str:
     """The torque limits that leave this start as it is, in steps of the inverter."""
     run = sheet.rounded or sheet.exact
-    rated, meant = rated_torque(drive)
+    rated, basis = rated_torque(drive)
     low, high = min(float(np.min(run.u)), 0.0), float(np.max(run.u))
     step = sheet.torque_step
-    said = []
+    text = []
     for torque in (high, low):
         if torque:
             limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
             share = _multiple(100.0 * limit / rated, 100.0 * step / rated)
-            said.append(f"{_multiple(limit, step)} N m ({share} % of the {meant})")
-    current = " A limit of the torque-producing current: the same percentages." if meant[0] == "r" else ""
+            text.append(f"{_multiple(limit, step)} N m ({share} % of the {basis})")
+    current = " A limit of the torque-producing current: the same percentages." if basis[0] == "r" else ""
     return (
-        f"Torque limits of the inverter, not tighter than what this start takes: {' and '.join(said)}."
+        f"Torque limits of the inverter, not tighter than what this start takes: {' and '.join(text)}."
         f"{current}"
     )
 
@@ -429,10 +429,10 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
     """The same rise as inverters ask for it."""
     notes = []
     if rise := sheet.full_rise:
-        rated, meant = rated_torque(drive)
+        rated, basis = rated_torque(drive)
         notes.append(
             f"Some inverters ask for the time of a ramp from 0 to 100 % of torque "
-            f"({short(float(f'{rated:.4g}'))} N m, the {meant}): that is {digits(1e3 * rise.exact)} ms, a "
+            f"({short(float(f'{rated:.4g}'))} N m, the {basis}): that is {digits(1e3 * rise.exact)} ms, a "
             f"mean rise of {digits(rated / rise.exact)} N m/s. Set to {short(1e3 * rise.rounded)} ms the "
             f"rise takes {digits(1e3 * rise.rise)} ms, K_dyn is {fixed(rise.run.k_dyn, 4)} and the start "
             f"time {digits(rise.run.start_time, 5)} s."
@@ -449,10 +449,10 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
 
 def _on_code(sheet: Sheet, drive: Drive) -> str:
     """What an inverter must run and know for a strategy that is a program."""
-    said = "The strategy is code of its own"
+    text = "The strategy is code of its own"
     if sheet.kind in DOCUMENTED:
-        said += " (equations: docs/controllers.md of softstart)"
+        text += " (equations: docs/controllers.md of softstart)"
     if sheet.computes_with:
         whose = "the drive" if sheet.own == drive else "the drive that its gains were tuned for"
-        said += f"; beside the sheet it computes with {listed(list(sheet.computes_with))} of {whose}"
-    return said + "."
+        text += f"; beside the sheet it computes with {listed(list(sheet.computes_with))} of {whose}"
+    return text + "."

@@ -73,7 +73,7 @@ def means_of(controller: Controller) -> Means:
     [True, False]
     """
     kind = kind_of(controller)
-    extra = [said for sensor, said in _SENSORS.items() if controller.sensors & sensor]
+    extra = [name for sensor, name in _SENSORS.items() if controller.sensors & sensor]
     if extra:
         return Means(" and ".join(extra), "no: drives have no such sensor", False, False)
     if kind in _OPEN_LOOP:
@@ -209,8 +209,8 @@ def traces_figure(runs: Sequence[Run], longest: float, lowest: float, highest: f
             reached = not math.isnan(run.start_time)
             if reached:
                 speed.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
-            said = f"start time {run.start_time:.4g} s" if reached else "target speed not reached"
-            speed.set_title(said, loc="left", fontsize=SMALL + 0.5, pad=3)
+            title = f"start time {run.start_time:.4g} s" if reached else "target speed not reached"
+            speed.set_title(title, loc="left", fontsize=SMALL + 0.5, pad=3)
             speed.set_ylabel("rad/s", fontsize=SMALL)
             _number_stages(torque, run, longest)
         for panel in axes.flat:

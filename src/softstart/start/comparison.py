@@ -46,10 +46,20 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Strategies side by side on one drive, in the order asked for.
+    """Strategies side by side on one drive.
 
-    `fitted_to` is the drive for which they are set up, None where that is `drive` itself.
+    Attributes
+    ----------
+    drive : Drive
+        The drive that is started.
+    rows : tuple of Row
+        One for each strategy, in the order given: its `run`, `time_lost` (s), `k_dyn_worn_gap` and
+        `k_dyn_light_load`.
+    fitted_to : Drive or None
+        The drive for which the strategies are set up, None where that is `drive` itself.
 
+    Examples
+    --------
     >>> from softstart import Drive, compare
     >>> table = compare(Drive.load("crane-4amtkf"), ["direct", "reduced-first-stage"])
     >>> [row.run.controller.name for row in table.rows]
