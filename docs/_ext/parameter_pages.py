@@ -10,7 +10,7 @@ from typing import Any
 from command_pages import cell, prose
 
 from softstart.balancing.tables import TABLES as ENGINE
-from softstart.chain.tables import TABLES as CHAIN
+from softstart.chain.elements import TABLES as CHAIN
 from softstart.clutch.model import TABLES as CLUTCH
 from softstart.controller import controller_class, controller_names
 from softstart.controller.base import Sensor

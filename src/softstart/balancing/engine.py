@@ -310,7 +310,8 @@ class Engine:
             blocks.insert(1, (INDICATOR, about))
         else:
             blocks.insert(4, (CYCLE, vars(self.gas)))
-        return document_text((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
+        kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
+        return document_text(kept, units=False)
 
     # ---- figures -----------------------------------------------------------------------------------------
 

@@ -1,25 +1,39 @@
-"""What a chain is made of: masses, shafts with gaps and gears, the motor."""
+"""What a chain is made of: masses, shafts with gaps and gears, the motor; and the tables of its file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator
+from typing import ClassVar, Literal, get_args
 
-from softstart.chain.tables import MASS, MOTOR, SHAFT
-from softstart.drive import ContactLaw, LoadKind
-from softstart.errors import InputError
-from softstart.input.documents import read_table
+from softstart.drive import ContactLaw, Drive, LoadKind
+from softstart.input.documents import Table
+from softstart.input.files import Library
+from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, like, parameter
+from softstart.input.parameters import Parameter
 
-__all__ = ["Mass", "Motor", "Quantity", "Shaft", "Side", "gap_of", "mass_mistakes", "shaft_mistakes"]
+__all__ = [
+    "LIBRARY",
+    "MASS",
+    "MOTOR",
+    "SHAFT",
+    "START",
+    "TABLES",
+    "TOP",
+    "Mass",
+    "Motor",
+    "Quantity",
+    "Shaft",
+    "Side",
+]
 
 Quantity = float | str  # a number in SI, or a string with a unit
 Side = Literal["before", "after"]
 
+LIBRARY = Library("softstart.chain", "a chain", "chains")
 
-@dataclass(frozen=True, init=False)
-class Mass:
+
+class Mass(ParameterSet):
     """A rigid mass: everything in SI, on its own shaft.
 
     `torque` is the load torque, positive where it brakes a forward motion; `kind` "active" acts always,
@@ -29,34 +43,34 @@ class Mass:
     0.035
     """
 
-    name: str
-    inertia: float
-    damping: float
-    torque: float
-    kind: LoadKind
-    initial_speed: float
+    WHAT: ClassVar[str] = "a mass"
 
-    def __init__(
-        self,
-        inertia: Quantity,
-        *,
-        name: str = "",
-        damping: Quantity = 0.0,
-        torque: Quantity = 0.0,
-        kind: LoadKind = "active",
-        initial_speed: Quantity = 0.0,
-    ) -> None:
-        given = {"inertia": inertia, "damping": damping, "torque": torque, "kind": kind}
-        given |= {"initial_speed": initial_speed} | ({"name": name} if name else {})
-        values = read_table(given, MASS)
-        wrong = mass_mistakes(values)
-        if wrong:
-            raise InputError(wrong)
-        _fill(self, values)
+    name: str = parameter("mass.name", "", "name of the mass", '"drum"', default="")
+    inertia: Number = parameter(
+        "mass.inertia", "kg*m^2", "inertia on its own shaft", '"0.035 kg*m^2"', "above 0", kw_only=False
+    )
+    damping: Number = parameter(
+        "mass.damping", "N*m*s/rad", "damping to the ground", '"0.01 N*m*s/rad"', "0 or more", default=0.0
+    )
+    torque: Number = parameter(
+        "mass.torque", "N*m", "load torque on its own shaft", '"7.16 N*m"', default=0.0
+    )
+    kind: LoadKind = parameter(
+        "mass.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
+    )
+    initial_speed: Number = parameter(
+        "mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"', default=0.0
+    )
+
+    def _mistakes(self) -> Iterable[str]:
+        if self.kind == "reactive" and self.torque < 0.0:
+            yield (
+                f"torque = {self.torque!r}: a reactive load torque is friction and must be 0 or more; write "
+                'its size, or kind "active".'
+            )
 
 
-@dataclass(frozen=True, init=False)
-class Shaft:
+class Shaft(ParameterSet):
     """What joins two neighbouring masses: a spring with a damper, a gap, then a gear.
 
     `ratio` is the speed of the mass before over that of the mass after (3 for a reduction of three to one).
@@ -74,50 +88,89 @@ class Shaft:
     True
     """
 
-    stiffness: float
-    damping: float
-    gap: float
-    ratio: float
-    side: Side
-    efficiency: float
-    restitution: float | None
-    contact_law: ContactLaw
-    start_position: float
+    WHAT: ClassVar[str] = "a shaft"
 
-    def __init__(
-        self,
-        stiffness: Quantity | None = None,
-        *,
-        damping: Quantity = 0.0,
-        gap: Quantity | None = None,
-        backlash: Quantity | None = None,
-        diameter: Quantity | None = None,
-        ratio: Quantity = 1.0,
-        side: Side = "before",
-        efficiency: Quantity = 1.0,
-        restitution: Quantity | None = None,
-        contact_law: ContactLaw = "no-pull",
-        start_position: Quantity = 0.0,
-    ) -> None:
-        given: dict[str, object] = {
-            "stiffness": stiffness,
-            "damping": damping,
-            "gap": gap,
-            "backlash": backlash,
-            "diameter": diameter,
-            "ratio": ratio,
-            "side": side,
-            "efficiency": efficiency,
-            "restitution": restitution,
-            "contact_law": contact_law,
-            "start_position": start_position,
-        }
-        values = read_table({key: value for key, value in given.items() if value is not None}, SHAFT)
-        wrong = shaft_mistakes(values)
+    stiffness: Number = parameter(
+        "shaft.stiffness", "N*m/rad", "stiffness", '"368 N*m/rad"', "above 0",
+        default=None, infinite=True, kw_only=False,
+    )  # fmt: skip
+    damping: Number = parameter(
+        "shaft.damping", "N*m*s/rad", "damping", '"1.5 N*m*s/rad"', "0 or more", default=0.0
+    )
+    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None)
+    backlash: MaybeNumber = parameter(
+        "shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"', "0 or more", default=None
+    )
+    diameter: MaybeNumber = parameter(
+        "shaft.diameter", "m", "pitch diameter", '"185 mm"', "above 0", default=None
+    )
+    ratio: Number = parameter(
+        "shaft.ratio", "1", "gear ratio, speed before over speed after", "3", "above 0", default=1.0
+    )
+    side: Side = parameter(
+        "shaft.side", "", "side of the gear on which shaft and gap lie", '"before"',
+        default="before", choices=get_args(Side),
+    )  # fmt: skip
+    efficiency: Number = parameter(
+        "shaft.efficiency", "1", "efficiency of the gear", "0.97", "from 0 to 1", default=1.0
+    )
+    restitution: MaybeNumber = parameter(
+        "shaft.restitution", "1", "restitution of a rigid gap", "0.8", "from 0 to 1", default=None
+    )
+    contact_law: ContactLaw = parameter(
+        "shaft.contact_law", "", "law of the torque in contact", '"no-pull"',
+        default="no-pull", choices=get_args(ContactLaw),
+    )  # fmt: skip
+    start_position: Number = parameter(
+        "shaft.start_position", "rad", "twist at the start (0 is mid-gap)", '"0 rad"', default=0.0
+    )
+
+    def _mistakes(self) -> Iterable[str]:
+        gap, backlash, diameter = (vars(self)[key] for key in ("gap", "backlash", "diameter"))
+        wrong = []
+        if backlash is not None and gap is not None:
+            wrong.append(f"gap = {gap!r} and backlash = {backlash!r}: both give the gap; leave one out.")
+        if (backlash is None) != (diameter is None):
+            missing = "diameter" if diameter is None else "backlash"
+            wrong.append(
+                f"{missing} is missing: a backlash is on a pitch diameter; give both, or the gap as an angle."
+            )
+        if self.efficiency == 0.0:
+            wrong.append("efficiency = 0: the efficiency of the gear must be above 0.")
         if wrong:
-            raise InputError(wrong)
-        stiff = math.inf if values["stiffness"] is None else values["stiffness"]
-        _fill(self, values | {"stiffness": stiff, "gap": gap_of(values)})
+            return wrong
+        if backlash is not None:
+            self._derive(gap=2.0 * backlash / diameter, backlash=None, diameter=None)
+        elif gap is None:
+            self._derive(gap=0.0)
+        return list(self._joint_mistakes())
+
+    def _joint_mistakes(self) -> Iterator[str]:
+        """What a spring and a rigid joint have."""
+        stiffness, restitution, gap = vars(self)["stiffness"], self.restitution, self.gap
+        if stiffness is None:
+            self._derive(stiffness=math.inf)
+        if stiffness is None and restitution is None:
+            yield (
+                'stiffness is missing: write for example stiffness = "368 N*m/rad"; a gap without a spring '
+                'has a restitution, a rigid joint stiffness = "inf".'
+            )
+        elif not self.rigid:
+            if restitution is not None:
+                yield (
+                    f"restitution = {restitution!r}: a gap that closes on a spring has no impact; leave out "
+                    "the restitution or the stiffness."
+                )
+        else:
+            if gap > 0.0 and restitution is None:
+                yield "restitution is missing: a rigid gap needs one, from 0 (no rebound) to 1 (elastic)."
+            if self.damping > 0.0:
+                yield f"damping = {self.damping!r}: a rigid joint has no damping; leave it out."
+            if abs(self.start_position) > 0.5 * gap:
+                yield (
+                    f"start_position = {self.start_position!r}: a rigid gap of {gap!r} rad lets the twist "
+                    f"lie between {-0.5 * gap!r} and {0.5 * gap!r}."
+                )
 
     @property
     def rigid(self) -> bool:
@@ -125,140 +178,63 @@ class Shaft:
         return math.isinf(self.stiffness)
 
 
-@dataclass(frozen=True, init=False)
-class Motor:
+class Motor(ParameterSet):
     """The motor's torque as a `Drive` has it, at the shaft of the mass on which it acts ("": the first).
 
     >>> Motor(62, torque_lag="2 ms").maximum_torque
     62.0
     """
 
-    mass: str
-    starting_torque: float
-    maximum_torque: float
-    minimum_torque: float
-    rated_power: float | None
-    rated_speed: float | None
-    torque_lag: float
-    torque_rate: float
-    encoder_lines: float
-    encoder_phase: float
-    torque_noise: float
-    noise_seed: float
-    computing_delay: float
+    WHAT: ClassVar[str] = "a motor"
 
-    def __init__(
-        self,
-        starting_torque: Quantity,
-        *,
-        mass: str = "",
-        maximum_torque: Quantity | None = None,
-        minimum_torque: Quantity = 0.0,
-        rated_power: Quantity | None = None,
-        rated_speed: Quantity | None = None,
-        torque_lag: Quantity = 0.0,
-        torque_rate: Quantity = math.inf,
-        encoder_lines: Quantity = 4096.0,
-        encoder_phase: Quantity = 0.0,
-        torque_noise: Quantity = 0.0,
-        noise_seed: Quantity = 0.0,
-        computing_delay: Quantity = 0.0,
-    ) -> None:
-        given: dict[str, object] = {
-            "starting_torque": starting_torque,
-            "maximum_torque": maximum_torque,
-            "minimum_torque": minimum_torque,
-            "rated_power": rated_power,
-            "rated_speed": rated_speed,
-            "torque_lag": torque_lag,
-            "torque_rate": torque_rate,
-            "encoder_lines": encoder_lines,
-            "encoder_phase": encoder_phase,
-            "torque_noise": torque_noise,
-            "noise_seed": noise_seed,
-            "computing_delay": computing_delay,
-        }
-        given |= {"mass": mass} if mass else {}
-        values = read_table({key: value for key, value in given.items() if value is not None}, MOTOR)
-        wrong = motor_mistakes(values)
-        if wrong:
-            raise InputError(wrong)
-        _fill(self, values | {"maximum_torque": values["maximum_torque"] or values["starting_torque"]})
+    mass: str = parameter("motor.mass", "", "name of the mass on which the motor acts", '"rotor"', default="")
+    starting_torque: Number = parameter(
+        "motor.starting_torque", "N*m", "starting torque of the motor", '"62 N*m"', "above 0", kw_only=False
+    )
+    maximum_torque: Number = like(Drive, "maximum_torque")
+    minimum_torque: Number = like(Drive, "minimum_torque")
+    rated_power: MaybeNumber = like(Drive, "rated_power")
+    rated_speed: MaybeNumber = like(Drive, "rated_speed")
+    torque_lag: Number = like(Drive, "torque_lag")
+    torque_rate: Number = like(Drive, "torque_rate")
+    encoder_lines: Number = like(Drive, "encoder_lines")
+    encoder_phase: Number = like(Drive, "encoder_phase")
+    torque_noise: Number = like(Drive, "torque_noise")
+    noise_seed: Number = like(Drive, "noise_seed")
+    computing_delay: Number = like(Drive, "computing_delay")
+
+    def _mistakes(self) -> Iterable[str]:
+        if self.maximum_torque < self.starting_torque:
+            yield (
+                f"maximum_torque = {self.maximum_torque!r}: it must be at least the starting torque, "
+                f"{self.starting_torque!r} N*m."
+            )
 
     def keywords(self) -> dict[str, float]:
         """The motor as keywords of `Drive`."""
-        kept = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "mass"}
-        return {key: value for key, value in kept.items() if value is not None}
+        return {key: v for key, v in self.values().items() if key != "mass" and v is not None}
 
 
-def gap_of(values: Mapping[str, Any]) -> float:
-    """The total angular gap in rad that the values of a shaft mean: given, or `2 backlash/diameter`."""
-    if values["backlash"] is not None:
-        return float(2.0 * values["backlash"] / values["diameter"])
-    return float(values["gap"] or 0.0)
-
-
-def shaft_mistakes(values: Mapping[str, Any]) -> list[str]:
-    """What the values of a shaft, each right in itself, say against one another."""
-    wrong = []
-    backlash, diameter = values["backlash"], values["diameter"]
-    if backlash is not None and values["gap"] is not None:
-        wrong.append(
-            f"gap = {values['gap']!r} and backlash = {backlash!r}: both give the gap; leave one out."
-        )
-    if (backlash is None) != (diameter is None):
-        missing = "diameter" if diameter is None else "backlash"
-        wrong.append(
-            f"{missing} is missing: a backlash is on a pitch diameter; give both, or the gap as an angle."
-        )
-    if values["efficiency"] == 0.0:
-        wrong.append("efficiency = 0: the efficiency of the gear must be above 0.")
-    if wrong:
-        return wrong
-    stiffness, restitution, gap = values["stiffness"], values["restitution"], gap_of(values)
-    if stiffness is None and restitution is None:
-        return [
-            'stiffness is missing: write for example stiffness = "368 N*m/rad"; a gap without a spring has '
-            'a restitution, a rigid joint stiffness = "inf".'
-        ]
-    if stiffness is not None and not math.isinf(stiffness):
-        if restitution is not None:
-            wrong.append(
-                f"restitution = {restitution!r}: a gap that closes on a spring has no impact; leave out the "
-                "restitution or the stiffness."
-            )
-        return wrong
-    if gap > 0.0 and restitution is None:
-        wrong.append("restitution is missing: a rigid gap needs one, from 0 (no rebound) to 1 (elastic).")
-    if values["damping"] > 0.0:
-        wrong.append(f"damping = {values['damping']!r}: a rigid joint has no damping; leave it out.")
-    if abs(values["start_position"]) > 0.5 * gap:
-        wrong.append(
-            f"start_position = {values['start_position']!r}: a rigid gap of {gap!r} rad lets the twist lie "
-            f"between {-0.5 * gap!r} and {0.5 * gap!r}."
-        )
-    return wrong
-
-
-def mass_mistakes(values: Mapping[str, Any]) -> list[str]:
-    """What the values of a mass, each right in itself, say against one another."""
-    if values["kind"] == "reactive" and values["torque"] < 0.0:
-        return [
-            f"torque = {values['torque']!r}: a reactive load torque is friction and must be 0 or more; write "
-            'its size, or kind "active".'
-        ]
-    return []
-
-
-def motor_mistakes(values: Mapping[str, Any]) -> list[str]:
-    """What the values of a motor, each right in itself, say against one another."""
-    largest, start = values["maximum_torque"], values["starting_torque"]
-    if largest is not None and largest < start:
-        return [f"maximum_torque = {largest!r}: it must be at least the starting torque, {start!r} N*m."]
-    return []
-
-
-def _fill(one: Mass | Shaft | Motor, values: Mapping[str, object]) -> None:
-    """Put values into a frozen object; keys without a field are left out."""
-    for field in fields(one):
-        object.__setattr__(one, field.name, values[field.name])
+TOP = Table(
+    "",
+    (
+        Parameter("name", "", "name of the chain", '"my chain"', default="unnamed chain"),
+        Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
+        Parameter("assumed", "", "list of the values that are assumed", '"all stiffnesses"', default=""),
+    ),
+)
+START = Table(
+    "start",
+    (
+        Parameter("load", "", "name of the mass that is to reach the target speed", '"drum"', default=""),
+        Parameter(
+            "target_speed", "rad/s", "speed, at the motor shaft, that the load is to reach", '"880 rpm"',
+            "above 0", default=None,
+        ),
+    ),
+    required=False,
+)  # fmt: skip
+MASS = Table("mass", tuple(Mass.PARAMETERS.values()), many=True, least=2)
+SHAFT = Table("shaft", tuple(Shaft.PARAMETERS.values()), many=True, least=1)
+MOTOR = Table("motor", tuple(Motor.PARAMETERS.values()), required=False)
+TABLES = (TOP, MASS, SHAFT, MOTOR, START)

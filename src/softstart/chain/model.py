@@ -15,18 +15,21 @@ from typing import Any, Self, cast
 
 from softstart.chain.arrays import ChainArrays, arrays_at
 from softstart.chain.elements import (
+    LIBRARY,
+    MASS,
+    MOTOR,
+    SHAFT,
+    START,
+    TABLES,
+    TOP,
     Mass,
     Motor,
     Quantity,
     Shaft,
-    mass_mistakes,
-    motor_mistakes,
-    shaft_mistakes,
 )
-from softstart.chain.tables import LIBRARY, MASS, MOTOR, SHAFT, START, TABLES, TOP
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, read_document, read_table
+from softstart.input.documents import Table, document_text, made, read_document, read_table
 from softstart.quantities import nearest, show
 
 __all__ = ["Chain", "Mass", "Motor", "Shaft"]
@@ -68,7 +71,7 @@ class Chain:
         assumed: str = "",
     ) -> None:
         numbered = enumerate(masses, start=1)
-        masses = tuple(mass if mass.name else replace(mass, name=f"mass {i}") for i, mass in numbered)
+        masses = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in numbered)
         shafts = tuple(shafts)
         if target_speed is not None:
             target_speed = read_table({"target_speed": target_speed}, START)["target_speed"]
@@ -77,7 +80,7 @@ class Chain:
         if masses:
             load_mass = load_mass or masses[-1].name
             if motor is not None and not motor.mass:
-                motor = replace(motor, mass=masses[0].name)
+                motor = motor.replace(mass=masses[0].name)
         wrong = _mistakes(masses, shafts, motor, load_mass)
         if wrong:
             raise InputError(wrong)
@@ -112,27 +115,24 @@ class Chain:
         True
         """
         found = read_document(text, TABLES, "a chain", where=where, also=also)
-        rows = [("[mass] " + str(i), mass_mistakes(row)) for i, row in enumerate(found["mass"], start=1)]
-        rows += [("[shaft] " + str(i), shaft_mistakes(row)) for i, row in enumerate(found["shaft"], start=1)]
-        if found["motor"] is not None:
-            rows.append(("[motor]", motor_mistakes(found["motor"])))
         before = f"{where}: " if where else ""
-        wrong = [f"{before}{place}, {sentence}" for place, sentences in rows for sentence in sentences]
-        if wrong:
-            raise InputError(wrong)
-        motor = None if found["motor"] is None else Motor(**found["motor"])
+        wrong: list[str] = []
         start: dict[str, Any] = found["start"] or {}
-        try:
-            return cls(
-                [Mass(**row) for row in found["mass"]],
-                [Shaft(**row) for row in found["shaft"]],
-                motor,
-                load_mass=start.get("load", ""),
-                target_speed=start.get("target_speed"),
-                **found[""],
-            )
-        except InputError as error:
-            raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
+        parts = {
+            "masses": [
+                made(Mass, row, f"{before}[mass] {i}, ", wrong) for i, row in enumerate(found["mass"], 1)
+            ],
+            "shafts": [
+                made(Shaft, row, f"{before}[shaft] {i}, ", wrong) for i, row in enumerate(found["shaft"], 1)
+            ],
+            "motor": found["motor"] and made(Motor, found["motor"], f"{before}[motor], ", wrong),
+            "load_mass": start.get("load", ""),
+            "target_speed": start.get("target_speed"),
+        }
+        chain = None if wrong else made(cls, parts | found[""], before, wrong)
+        if chain is None:
+            raise InputError(wrong)
+        return chain
 
     @classmethod
     def from_drive(cls, drive: Drive) -> Self:
@@ -144,7 +144,7 @@ class Chain:
         """
         if drive.shape != ():
             raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
-        of_motor = {key: getattr(drive, key) for key in Motor.__dataclass_fields__ if key != "mass"}
+        of_motor = {key: getattr(drive, key) for key in Motor.PARAMETERS if key != "mass"}
         rotor = Mass(
             cast("float", drive.J1), name="motor", initial_speed=cast("float", drive.initial_motor_speed)
         )
@@ -176,8 +176,8 @@ class Chain:
         start = {"load": self.load_mass, "target_speed": self.target_speed}
         rows: list[tuple[Table, Any]] = [(TOP, vars(self))]
         for i, mass in enumerate(self.masses):
-            rows += [(MASS, vars(mass)), *((SHAFT, vars(shaft)) for shaft in self.shafts[i : i + 1])]
-        rows += [] if self.motor is None else [(MOTOR, vars(self.motor))]
+            rows += [(MASS, mass.values()), *((SHAFT, shaft.values()) for shaft in self.shafts[i : i + 1])]
+        rows += [] if self.motor is None else [(MOTOR, self.motor.values())]
         rows.append((START, start))
         return document_text((table, _without_defaults(table, values)) for table, values in rows)
 
@@ -241,13 +241,12 @@ class Chain:
         at = arrays_at(self, self.index(reference))
         columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, strict=True)
         masses = [
-            replace(m, inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
+            m.replace(inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
             for m, J, d, Mc, w0 in columns
         ]
         rows = zip(self.shafts, at.c, at.d, at.gap, at.theta0, strict=True)
         shafts = [
-            replace(
-                s,
+            s.replace(
                 stiffness=float(c),
                 damping=float(d),
                 gap=float(gap),

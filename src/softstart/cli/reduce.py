@@ -34,13 +34,13 @@ METHODS = ("lever", "modal")
 
 
 def _chains() -> Iterable[str]:
-    from softstart.chain.tables import LIBRARY
+    from softstart.chain.elements import LIBRARY
 
     return LIBRARY.names()
 
 
 def _keys() -> Keys:
-    from softstart.chain.tables import TABLES
+    from softstart.chain.elements import TABLES
 
     return table_keys(TABLES)
 

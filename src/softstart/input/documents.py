@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,10 +19,13 @@ from softstart.errors import InputError
 from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of
 from softstart.quantities import nearest
 
+T = TypeVar("T")
+
 __all__ = [
     "Table",
     "document_text",
     "literal",
+    "made",
     "parsed",
     "placed",
     "read_document",
@@ -124,6 +127,15 @@ def _rows(
         found.append(values)
         wrong += sentences_of([*strays, *mistakes])
     return found, wrong
+
+
+def made(make: Callable[..., T], values: Mapping[str, Any], place: str, wrong: list[str]) -> T | None:
+    """What `make` returns for the values; where it refuses them, its sentences go to `wrong`."""
+    try:
+        return make(**values)
+    except InputError as error:
+        wrong.extend(place + sentence for sentence in error.sentences)
+        return None
 
 
 def read_table(given: Mapping[str, object], table: Table, *, style: str = "python") -> dict[str, Any]:
@@ -351,8 +363,8 @@ def _misspelt(
 # ---- writing --------------------------------------------------------------------------------------------
 
 
-def table_text(table: Table, values: Mapping[str, object]) -> str:
-    """The lines of a table in SI, each with its unit and meaning behind it; None is left out.
+def table_text(table: Table, values: Mapping[str, object], *, units: bool = True) -> str:
+    """The lines of a table in SI, each with unit and meaning in a comment (`units`); None is left out.
 
     >>> print(table_text(Table("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),)), {"gap": 0.5}))
     [shaft]
@@ -363,13 +375,15 @@ def table_text(table: Table, values: Mapping[str, object]) -> str:
         value = values.get(p.name)
         if value is not None:
             unit = "" if p.unit == "1" else f"{p.unit}: "
-            lines.append(f"{p.key} = {literal(value)}" + (f"  # {unit}{p.meaning}" if p.unit else ""))
+            lines.append(
+                f"{p.key} = {literal(value)}" + (f"  # {unit}{p.meaning}" if p.unit and units else "")
+            )
     return "\n".join(lines)
 
 
-def document_text(blocks: Iterable[tuple[Table, Mapping[str, object]]]) -> str:
+def document_text(blocks: Iterable[tuple[Table, Mapping[str, object]]], *, units: bool = True) -> str:
     """The text of a document: one table after the other, without those that have no keys."""
-    texts = ((table.name, table_text(table, values)) for table, values in blocks)
+    texts = ((table.name, table_text(table, values, units=units)) for table, values in blocks)
     return "\n\n".join(text for name, text in texts if text and (name == "" or "\n" in text)) + "\n"
 
 

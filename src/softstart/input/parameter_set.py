@@ -35,6 +35,7 @@ __all__ = [
     "Number",
     "Numbers",
     "ParameterSet",
+    "like",
     "meant_by",
     "parameter",
 ]
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
         """A float; given as a number or as text with a unit."""
 
         def __get__(self, one: object, owner: Any) -> float: ...
-        def __set__(self, one: object, given: float | str) -> None: ...
+        def __set__(self, one: object, given: float | str | None) -> None: ...
 
     class MaybeNumber:
         """A float, or None where it is not given."""
@@ -94,6 +95,14 @@ def parameter(
     if default is REQUIRED:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def like(cls: type[ParameterSet], name: str) -> Any:
+    """A field that is the parameter of another class, which need not be given."""
+    described = cls.PARAMETERS[name]
+    return dataclasses.field(
+        default=described.default, metadata={"parameter": described, "positional": False}
+    )
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
@@ -186,6 +195,13 @@ class ParameterSet:
         one = cls.__new__(cls)
         one._fill(given, wording, mistakes, known)
         return one
+
+    def _derive(self, **values: Any) -> None:
+        """Set values that follow from others, as if they had been given; None takes one back."""
+        own = vars(self)
+        own.update(values)
+        given = own["_given"] | values.keys()
+        own["_given"] = frozenset(name for name in given if values.get(name, name) is not None)
 
     def given(self) -> dict[str, Any]:
         """The parameters that were given, in the order of the fields; the others have their defaults."""

@@ -38,13 +38,13 @@ def tractor() -> Chain:
 
 def scale_gaps(chain: Chain, factor: float) -> Chain:
     """The chain with all gaps so many times as wide."""
-    return replace(chain, shafts=tuple(replace(s, gap=factor * s.gap) for s in chain.shafts))
+    return replace(chain, shafts=tuple(s.replace(gap=factor * s.gap) for s in chain.shafts))
 
 
 def single_gap(chain: Chain, k: int, gap: float) -> Chain:
     """The chain at the motor shaft with one gap only, in shaft k."""
     there = chain.brought_to(chain.motor_index)
-    shafts = [replace(s, gap=gap if i == k else 0.0) for i, s in enumerate(there.shafts)]
+    shafts = [s.replace(gap=gap if i == k else 0.0) for i, s in enumerate(there.shafts)]
     return replace(there, shafts=tuple(shafts))
 
 

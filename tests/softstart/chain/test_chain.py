@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
-from softstart.chain.tables import LIBRARY
+from softstart.chain.elements import LIBRARY
 
 BASE = """
 [[mass]]
@@ -241,7 +241,7 @@ def test_names_and_places() -> None:
 def test_replacing_keeps_the_checks() -> None:
     chain = Chain.load("crane-4-mass")
     with pytest.raises(InputError, match="above 0"):
-        replace(chain.masses[0], inertia=-1.0)
+        chain.masses[0].replace(inertia=-1.0)
     assert replace(chain, name="other").masses == chain.masses
 
 

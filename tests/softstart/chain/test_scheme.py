@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from softstart.chain import Chain, Mass, Shaft, reduce_chain
+from softstart.chain.elements import LIBRARY
 from softstart.chain.scheme import scheme_svg
-from softstart.chain.tables import LIBRARY
 
 SVG = "{http://www.w3.org/2000/svg}"
 

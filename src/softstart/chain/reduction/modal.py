@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -66,7 +65,7 @@ def modal(chain: Chain) -> tuple[Chain, list[Step]]:
         efficiency=math.prod(shaft.efficiency for shaft in chain.shafts),
         start_position=way * float(arrays.theta0.sum()),
     )
-    motor = None if chain.motor is None else replace(chain.motor, mass=first.name)
+    motor = None if chain.motor is None else chain.motor.replace(mass=first.name)
     reduced = Chain(
         [rotor, load],
         [shaft],
