@@ -36,6 +36,7 @@ QUICK = (
     "tests/validation/test_gerasymiak_subbotin.py",
 )
 BESIDES_TESTS = ("docs", "README.md", "CHANGELOG.md", "CITATION.cff", "pyproject.toml")  # what tests may read
+CHECKOUT_ONLY = ("softstart_studies/benchmarks/",)  # not in the wheel
 CACHES = ("__pycache__", ".pyc", ".nbi", ".nbc", ".mypy_cache", ".hypothesis", ".venv/")
 
 
@@ -74,17 +75,17 @@ def one_version(wheel: Path) -> None:
 
 
 def look_into_wheel(wheel: Path) -> None:
-    """Every file of the three packages is in the wheel and nothing else; types and assets are among them."""
+    """The wheel holds every file of the three packages but the benchmarks, and nothing else."""
     with zipfile.ZipFile(wheel) as opened:
         inside = {name for name in opened.namelist() if ".dist-info/" not in name}
         information = {name.rpartition("/")[2] for name in opened.namelist() if ".dist-info/" in name}
-    wanted = {
+    sources = {
         f"{package}/{path.relative_to(folder).as_posix()}"
         for package, folder in PACKAGES.items()
         for path in folder.rglob("*")
         if path.is_file() and not cache(path.as_posix())
     }
-    same(inside, wanted, wheel.name)
+    same(inside, {name for name in sources if not name.startswith(CHECKOUT_ONLY)}, wheel.name)
     kinds = {name.rpartition(".")[2] for name in inside}
     needed = {f"{package}/py.typed" for package in PACKAGES} | {"softstart/drive/library/crane-4amtkf.toml"}
     check(needed <= inside, f"{wheel.name} lacks {sorted(needed - inside)}.")
@@ -140,6 +141,9 @@ def works_alone(python: Path, folder: Path) -> None:
     for one_start in found["strategies"]:
         print(f"  {one_start['controller']:24} K_dyn {one_start['k_dyn']:.3f}")
     check(len(found["strategies"]) > 5, "softstart compare does not find its controllers.")
+    listed = run([python.parent / "softstart", "study", "--list"], where=empty, kept=True)
+    check("paper-g" in listed, "softstart study does not find its studies.")
+    check("benchmark" not in listed, f"softstart study lists what is not installed: {listed}")
     check(not list(empty.iterdir()), "softstart compare --json leaves files behind.")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,15 @@ def pytest_configure() -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Without `--page` the tests in a browser are not even imported; the pages' commands likewise."""
+    """Without `--page` the tests in a browser are not even imported; the pages' commands likewise.
+
+    Neither are the tests of the benchmarks where the benchmarks are not installed: they are not in the wheel.
+    """
+    if (
+        collection_path.name.startswith("test_benchmark")
+        and find_spec("softstart_studies.benchmarks") is None
+    ):
+        return True
     if collection_path == DOCS and not config.getoption("--docs-commands"):
         return True
     return True if collection_path == PAGE and not config.getoption("--page") else None
