@@ -32,7 +32,7 @@ PACKAGES = {
 }
 QUICK = (
     "tests/softstart/drive",
-    "tests/softstart/test_units.py",
+    "tests/softstart/test_quantities.py",
     "tests/validation/test_gerasymiak_subbotin.py",
 )
 BESIDES_TESTS = ("docs", "README.md", "CHANGELOG.md", "CITATION.cff", "pyproject.toml")  # what tests may read
@@ -141,9 +141,10 @@ def works_alone(python: Path, folder: Path) -> None:
     for one_start in found["strategies"]:
         print(f"  {one_start['controller']:24} K_dyn {one_start['k_dyn']:.3f}")
     check(len(found["strategies"]) > 5, "softstart compare does not find its controllers.")
-    listed = run([python.parent / "softstart", "study", "--list"], where=empty, kept=True)
-    check("paper-g" in listed, "softstart study does not find its studies.")
-    check("benchmark" not in listed, f"softstart study lists what is not installed: {listed}")
+    names = "from softstart.study import study_names; print(*study_names())"
+    studies = run([python, "-c", names], where=empty, kept=True)
+    check("paper-g" in studies, "softstart study does not find its studies.")
+    check("benchmark" not in studies, f"softstart study lists what is not installed: {studies}")
     check(not list(empty.iterdir()), "softstart compare --json leaves files behind.")
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.late import late
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 else:
     profile_files = late("softstart.profile_files")
 
-Vector = NDArray[np.float64]
 
 MOST_SAMPLES = 1_000_000
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.input.documents import literal, parsed
 from softstart.input.files import read_text, write_whole
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 else:
     casadi = late("casadi")
 
-Vector = NDArray[np.float64]
 
 HEADER = "time [s],torque [N*m]"
 TIME_NAMES = ("time", "t")

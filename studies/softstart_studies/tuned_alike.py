@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from softstart import Drive
+from softstart.arrays import Vector
 from softstart.controller import make_controller, ready_controller_names
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, OptimumError
@@ -20,8 +20,6 @@ from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
 from softstart.tuning.solving import tune
-
-Vector = NDArray[np.float64]
 
 TARGET = 60.0  # rad/s
 LAG = 0.002  # s, of the torque of an inverter

@@ -9,8 +9,8 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.arrays import ChainArrays
 from softstart.chain.model import Chain, Mass, Shaft
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ForcedResponse", "forced_response"]
 
-Vector = NDArray[np.float64]
 
 PERIODS = 20  # over which an amplitude is measured
 SAMPLES = 64  # a period

@@ -15,12 +15,11 @@ from enum import IntFlag
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.plant.start import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
-Vector = NDArray[np.float64]
 Kind = Literal["quantity", "text", "object"]
 
 

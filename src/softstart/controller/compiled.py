@@ -6,9 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from softstart.arrays import Vector
 from softstart.controller.base import NEVER
 from softstart.plant import start
 from softstart.plant.jit import compiled_as, inlined
@@ -28,7 +26,6 @@ from softstart.plant.start import (  # isort: skip
 # indices of `command`; the new state follows from STATE on
 from softstart.plant.start import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
 
-Vector = NDArray[np.float64]
 
 __all__ = [
     "ASK_AGAIN",

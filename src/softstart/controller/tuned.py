@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller.base import Controller, PlainController, Sensor
 from softstart.controller.finding import make_controller
 from softstart.controller.gain_files import RobustFile, Scale, ScheduleFile, read_gain_file
 from softstart.drive import Drive
 from softstart.errors import InputError
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.late import late
 
@@ -37,7 +37,6 @@ else:
 
 __all__ = ["in_contact", "initial_state", "shaft_torque", "whole_drive"]
 
-Vector = NDArray[np.float64]
 
 # The smoothing of what sticks or slews, in elastic periods, and the speed below which a load is stuck, in
 # target speeds.

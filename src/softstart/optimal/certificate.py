@@ -28,15 +28,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.optimal.lp.ideal import ContactProgram, Multipliers
 from softstart.optimal.lp.motion import Contact, Entry, ThroughStandstill, entry_of, no_ideal
 from softstart.optimal.lp.rows import HALVES
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
-
-Vector = NDArray[np.float64]
 
 ENTRY_CELLS = 3000
 FIRST_CELLS = 24  # of tau

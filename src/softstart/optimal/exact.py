@@ -16,9 +16,10 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
+from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
@@ -28,8 +29,6 @@ from softstart.profile import TorqueProfile
 from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-
-Vector = NDArray[np.float64]
 
 LEVELS = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)  # shares of the holding torque that are tried where it lags
 TURN_SAMPLES = 512  # instants at which the sign of w1 - w2 is looked at

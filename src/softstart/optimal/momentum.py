@@ -39,15 +39,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from softstart.optimal.lp.motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
 from softstart.optimal.result import LowerBound
-
-Vector = NDArray[np.float64]
 
 ROUNDING = 1e-10  # by so much, relatively, time is stretched and a bound lowered: not to lie above an optimum
 INSTANTS = 64  # at which the coasting shaft torque is looked at

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.page.live import Frame
@@ -36,8 +37,6 @@ PER_PERIOD = 16  # points an elastic period before thinning: its crests are then
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
 MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
-
-Vector = NDArray[np.float64]
 
 
 class Screen:

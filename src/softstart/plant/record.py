@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from softstart.arrays import Matrix, Vector
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.plant.advance import move
 from softstart.plant.jit import compiled
-from softstart.plant.layout import MOTION, PLANT, SEGMENT, STATE, Matrix, Vector
+from softstart.plant.layout import MOTION, PLANT, SEGMENT, STATE
 from softstart.plant.modes import shaft_torque
 from softstart.plant.span import begin_span
 

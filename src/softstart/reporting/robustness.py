@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Matrix
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.late import late
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 else:
     colors, patches, ticker = (late(f"matplotlib.{name}") for name in ("colors", "patches", "ticker"))
 
-Matrix = NDArray[np.float64]
 GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
 INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
 

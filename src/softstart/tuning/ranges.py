@@ -9,13 +9,11 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller import Controller
 from softstart.errors import InputError
 from softstart.quantities import nearest, to_si
-
-Vector = NDArray[np.float64]
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from softstart.arrays import Vector
 
 TOO_SLOW = 1e30  # where the costs of candidates begin that start, but not in time
 UNFINISHED = 1e60  # where those begin that do not start at all

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.store import Records
 from softstart.tuning.log import Log
 from softstart.tuning.ranges import inside
@@ -16,8 +16,6 @@ from softstart.tuning.search import Found, search
 from softstart.tuning.trials import Judged, Trials
 from softstart.tuning.work import set_costs, set_values
 from softstart.tuning.workers import Workers
-
-Vector = NDArray[np.float64]
 
 WIDER = 2  # times the population of a cell: a worst case over many starts is rougher than one start
 STARTS_A_CALL = 600  # handed to a worker at a time, whatever their number: the answer does not depend on it

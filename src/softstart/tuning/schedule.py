@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.store import Records
 from softstart.tuning.log import Log
 from softstart.tuning.ranges import inside
@@ -16,8 +16,6 @@ from softstart.tuning.search import Found
 from softstart.tuning.trials import Judged
 from softstart.tuning.work import Advice, CellSearch, ask_neighbours, cell_costs, own_values, search_cells
 from softstart.tuning.workers import Workers
-
-Vector = NDArray[np.float64]
 
 STARTS_A_CALL, LARGEST_BLOCK = 600, 12
 TURNS = 3  # times that each cell asks its neighbours

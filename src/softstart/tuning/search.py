@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from softstart.arrays import Vector
+
 Cost = Callable[[Vector], Vector]  # places, one a row, to their costs
 
 CONVERGED = 1e-4  # standard deviation of the population's costs, over their mean

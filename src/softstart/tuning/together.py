@@ -8,9 +8,9 @@ from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from softstart.arrays import Vector
+
 Cost = Callable[[Vector], Vector]
 Search = Callable[[Cost], Any]
 Batch = Callable[[Vector, Vector], Vector]  # whose place each row is, and the rows, to their costs

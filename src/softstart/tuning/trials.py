@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller import Controller, PlainController, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -20,7 +21,6 @@ from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.tuning.question import Question
 
-Vector = NDArray[np.float64]
 Cells = NDArray[np.int64]  # axes: candidate, cell
 Values = Mapping[str, Any]  # name -> one value a candidate
 

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.tuning.ranking import cost
 from softstart.tuning.search import Found, polish, search
 from softstart.tuning.together import Cost, Search, together
 from softstart.tuning.trials import Trials
-
-Vector = NDArray[np.float64]
 
 NEIGHBOURLY_STEP = 0.04
 

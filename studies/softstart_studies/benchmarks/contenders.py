@@ -7,7 +7,8 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
-from softstart_studies.benchmarks.problem import Problem, Vector
+from softstart.arrays import Vector
+from softstart_studies.benchmarks.problem import Problem
 
 
 class Contender(Protocol):

@@ -8,8 +8,9 @@ import control
 import numpy as np
 
 from softstart import simulate
+from softstart.arrays import Vector
 from softstart.drive.control_systems import initial_state
-from softstart_studies.benchmarks.problem import Problem, Vector, crane
+from softstart_studies.benchmarks.problem import Problem, crane
 
 Work = list[tuple[Any, Vector, Vector, float]]
 

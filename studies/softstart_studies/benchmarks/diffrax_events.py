@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from softstart_studies.benchmarks.problem import Problem, Vector
+from softstart.arrays import Vector
+from softstart_studies.benchmarks.problem import Problem
 
 TOLERANCE = 1e-8
 T_MAX = 10.0  # s, never reached

@@ -7,13 +7,14 @@ from typing import Any, cast
 import numpy as np
 
 from softstart import simulate
+from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor
 from softstart.drive import Drive
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.start.run import Run
-from softstart_studies.benchmarks.problem import Problem, Vector, controller_of, crane
+from softstart_studies.benchmarks.problem import Problem, controller_of, crane
 
 
 class Kernel:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from softstart.arrays import Vector
 from softstart_studies.benchmarks.contenders import Contender, make
-from softstart_studies.benchmarks.problem import Problem, Vector, gaps
+from softstart_studies.benchmarks.problem import Problem, gaps
 
 ACCOUNT = Path("/proc/self/status")  # of Linux
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from softstart.arrays import Vector
 from softstart_studies.benchmarks.lsoda import T_MAX, TOLERANCE
-from softstart_studies.benchmarks.problem import Problem, Vector
+from softstart_studies.benchmarks.problem import Problem
 
 
 def peak_torque(problem: Problem, gap: float) -> float:

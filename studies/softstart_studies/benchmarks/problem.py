@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from softstart.arrays import Vector
 
 if TYPE_CHECKING:
     from softstart.controller import Controller
     from softstart.drive import Drive
 
-Vector = NDArray[np.float64]
 
 DRIVE = "crane-4amtkf"
 GAPS = (0.5, 2.0)  # rad, the two gaps of [G]; the batches lie between them

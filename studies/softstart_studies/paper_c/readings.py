@@ -15,13 +15,11 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson, simpson, solve_ivp
 
+from softstart.arrays import Vector
 from softstart.study import Table
 from softstart_studies.paper_c.printed import PRINTED, Row
-
-Vector = NDArray[np.float64]
 
 w0, MM, Mc, tM, cp = 230.0, 60.0, 20.0, 1.0, 5.0  # kgf m, s
 LOADS = ("acts from t = 0", "stands until the shaft carries it", "carried by the shaft before t = 0")

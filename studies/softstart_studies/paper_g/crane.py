@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from softstart import Drive, Run, simulate, stages
+from softstart.arrays import Vector
 from softstart.controller import Controller
 from softstart.start.metrics import base_torque
 
-Vector = NDArray[np.float64]
 Method = Literal[1, 2]
 
 CRANE = Drive.load("crane-4amtkf")  # J2'' = 5 J1, delta1 = 0.5 rad

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.study import Table
 from softstart_studies.paper_g.crane import (
     CRANE,
@@ -18,7 +19,6 @@ from softstart_studies.paper_g.crane import (
     POINTS,
     RATIOS,
     Method,
-    Vector,
     base,
     closed_form,
     crane,

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
-from softstart_studies.paper_g.crane import CRANE, SHARE, Vector, base, closed_form, many
+from softstart_studies.paper_g.crane import CRANE, SHARE, base, closed_form, many
 
 DEVIATIONS: Vector = np.linspace(-0.3, 0.4, 71)  # of the elastic frequency
 BAND = 0.20  # the wider bound of [G]

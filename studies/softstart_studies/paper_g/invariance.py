@@ -6,18 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
-from softstart_studies.paper_g.crane import (
-    CRANE,
-    GAP_1,
-    GAP_2,
-    HEAVY,
-    LIGHT,
-    SHARE,
-    Vector,
-    closed_form,
-    many,
-)
+from softstart_studies.paper_g.crane import CRANE, GAP_1, GAP_2, HEAVY, LIGHT, SHARE, closed_form, many
 
 TORQUE = SHARE * float(CRANE.Ms)
 PEAK_DELAY = 0.5 * float(closed_form(CRANE, SHARE, 2).contact_duration)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart import Drive, stages
+from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, STAGE, STATE, TIME, TORQUE, Vector
+from softstart.controller.compiled import ASK_AGAIN, STAGE, STATE, TIME, TORQUE
 
 SHARE = 0.25  # reduced torque over Ms, as in the check table
 

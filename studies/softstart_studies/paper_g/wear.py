@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
-from softstart_studies.paper_g.crane import CRANE, GAP_1, GAP_2, SHARE, Vector, closed_form, many
+from softstart_studies.paper_g.crane import CRANE, GAP_1, GAP_2, SHARE, closed_form, many
 from softstart_studies.paper_g.switching import SwitchAtInstant
 
 GAPS: Vector = np.linspace(GAP_1, GAP_2, 61)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softstart import Run, simulate
+from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
 from softstart_studies.paper_g.crane import (
     CRANE,
@@ -16,7 +17,6 @@ from softstart_studies.paper_g.crane import (
     METHODS,
     RATIOS,
     SHARE,
-    Vector,
     closed_form,
     crane,
     ratio_where,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.study import Claim, Table
 from softstart_studies.paper_r.free import NOSE, Free, free, placed, scale_gaps, tractor
 from softstart_studies.paper_r.locked import FREQUENCIES, TORQUES, forced, locked
 
 __all__ = ["claims", "masses_table", "sections_table", "twist_claim", "widths_table"]
 
-Vector = NDArray[np.float64]
 
 SHIFTS = (0.0, 1e-9, -1e-9)
 WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)

@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain import Chain, natural_vibration
 from softstart.study import Table
 from softstart_studies.paper_r.free import SAMPLES, analysed, scale_gaps, tractor
@@ -15,7 +15,6 @@ from softstart_studies.paper_r.motion import moved, released
 
 __all__ = ["Locked", "forced", "forced_table", "locked", "locked_table"]
 
-Vector = NDArray[np.float64]
 
 NOSE = 1.0  # deg at the crank nose, gap-free
 TORQUES = (0.0, 50.0, 100.0, 150.0, 200.0, 225.0, 250.0, 300.0, 540.0)  # N m at the crank

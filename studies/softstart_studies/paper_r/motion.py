@@ -14,13 +14,12 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain import Chain, natural_vibration
 
 __all__ = ["Motion", "moved", "released"]
 
-Vector = NDArray[np.float64]
 
 _compiled: Any = numba.njit(cache=True, error_model="numpy")
 ORDER, LOOKS = 20, 6

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softstart import Controller, Drive, simulate
+from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart_studies.tuned_alike import CRANE, Front, front, tuned, tuned_controllers
 
-Vector = NDArray[np.float64]
 NEW = 0.5  # rad, [G]; the widest gap of [G], 2 rad, is half way through this life
 
 

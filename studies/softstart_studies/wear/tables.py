@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.study import Claim, Table, Verdict
-from softstart_studies.wear.life import WAYS, Course, Life, Vector
+from softstart_studies.wear.life import WAYS, Course, Life
 
 HELD = 1.05  # K_dyn at the end of life over that of the new drive, up to which gains count as holding
 

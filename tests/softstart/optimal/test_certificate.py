@@ -8,19 +8,17 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile
+from softstart.arrays import Vector
 from softstart.optimal import certificate
 from softstart.optimal.certificate import _Dual, _Envelope, _Search, certified_bound, not_certified
 from softstart.optimal.exact import replay
 from softstart.optimal.lp.ideal import Multipliers
 from softstart.optimal.lp.motion import Contact, entry_of
 from softstart.optimal.problem import Problem, Terminal
-
-Vector = NDArray[np.float64]
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 UNBOUNDED = 1e9  # rad/s: a target that is set later to what is reached

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile
+from softstart.arrays import Vector
 from softstart.optimal.exact import replay
 from softstart.optimal.lp.motion import (
     Contact,
@@ -22,8 +22,6 @@ from softstart.optimal.lp.motion import (
     no_ideal,
 )
 from softstart.optimal.problem import Problem
-
-Vector = NDArray[np.float64]
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 DAMPED = (0.0, 0.1, 3.0, 6.5564, 20.0, 500.0)  # N m s/rad; 6.5564 is nearly critical

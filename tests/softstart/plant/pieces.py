@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart import Command, CompiledController, Drive, Measured, PlainController
+from softstart.arrays import Vector
 from softstart.controller import compiled_step, stack
-from softstart.controller.compiled import ASK_AGAIN, TIME, TORQUE, Vector
+from softstart.controller.compiled import ASK_AGAIN, TIME, TORQUE
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,9 @@ from softstart import (
     TorqueProfile,
     simulate,
 )
+from softstart.arrays import Vector
 from softstart.controller import compiled_step, make_controller
-from softstart.controller.compiled import ASK_AGAIN, SLOPE, TIME, TORQUE, Vector
+from softstart.controller.compiled import ASK_AGAIN, SLOPE, TIME, TORQUE
 
 CRANE = Drive.load("crane-4amtkf")
 BLOCKS = 10

@@ -12,14 +12,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain.model import Chain, Mass, Shaft
 from softstart.drive import ContactLaw, LoadKind
 
 __all__ = ["Section", "Station", "Working"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.optimal.collocation.program import Numbers, Phase, Program
 from softstart.optimal.collocation.transcription import POINTS, Mesh, Slot
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
-
-Vector = NDArray[np.float64]
 
 Reading = tuple[Vector, float, float, Vector, Vector]  # durations, peak, heat, states, demands
 

@@ -12,12 +12,10 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.optimal.problem import Problem
-
-Vector = NDArray[np.float64]
 
 DemandShape = Literal["steps", "ramps", "continuous"]
 End = Literal["free", "contact", "load stops", "breakaway", "softer", "terminal", "lowest demand"]

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.optimal.collocation.guess import (
     Trajectory,
     first_mesh,
@@ -36,8 +37,6 @@ from softstart.optimal.exact import replay
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate, NotConverged, heat_of
 from softstart.profile import TorqueProfile
-
-Vector = NDArray[np.float64]
 
 QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "error_on_fail": False}
 ACCURACY = {

@@ -17,15 +17,13 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from softstart.arrays import Matrix, Vector
 from softstart.optimal.collocation import statement
 from softstart.optimal.collocation.program import Numbers, Phase, Program
 from softstart.optimal.collocation.statement import INFINITY, Condition, State
 
 SX = Any  # casadi has no types
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 TAIL_POINTS = 128
 

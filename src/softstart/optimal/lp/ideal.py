@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.optimal.lp.motion import Contact, Entry, entry_of, no_ideal
 from softstart.optimal.lp.rows import (
@@ -41,7 +42,6 @@ from softstart.optimal.lp.rows import (
     RowList,
     Rows,
     Steps,
-    Vector,
     below,
     checked_instants,
     contact_grid,

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
-
-Vector = NDArray[np.float64]
 
 Pieces = list[tuple[float, float]]  # (duration in s, torque in N m)
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
+from softstart.arrays import Matrix, Vector
 from softstart.optimal.lp.motion import Contact
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Steps = NDArray[np.int64]
 Marks = NDArray[np.bool_]
 Rows = tuple[Any, Vector]  # sparse matrix over the variables, constants

@@ -31,6 +31,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import expm
 
+from softstart.arrays import Matrix, Vector
 from softstart.optimal.lp.rows import (
     AIM,
     MARGIN,
@@ -38,11 +39,9 @@ from softstart.optimal.lp.rows import (
     SIXTEENTHS,
     Limits,
     Marks,
-    Matrix,
     RowList,
     Rows,
     Steps,
-    Vector,
     below,
     checked_instants,
     single_row,

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.optimal.exact import replay
 from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import Refinement, Vector, contact_grid, refined
+from softstart.optimal.lp.rows import Refinement, contact_grid, refined
 from softstart.optimal.lp.whole import Grid, Instants, Kind, WholeAnswer, WholeProgram
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate

@@ -10,15 +10,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
-from softstart.optimal.robust.evaluation import (
-    Evaluator,
-    Indices,
-    Matrix,
-    ProfileParameters,
-    Staircase,
-    Trajectory,
-)
-from softstart.profile import Vector
+from softstart.arrays import Matrix, Vector
+from softstart.optimal.robust.evaluation import Evaluator, Indices, ProfileParameters, Staircase, Trajectory
 
 Aim = Literal["gentle", "quick"]
 

@@ -16,6 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.controller.base import CompiledController, Sensor
 from softstart.drive import Drive
@@ -25,7 +26,7 @@ from softstart.plant import start as kernel
 from softstart.plant.jit import compiled_as
 from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run_native
 from softstart.plant.vector import plant_vector
-from softstart.profile import TorqueProfile, Vector
+from softstart.profile import TorqueProfile
 from softstart.start.engine import Book
 
 Matrix = NDArray[np.float64]

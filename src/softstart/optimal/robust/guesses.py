@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
-from softstart.optimal.robust.evaluation import Evaluator, Figures, Matrix, ProfileParameters, Staircase
-from softstart.profile import Vector
+from softstart.optimal.robust.evaluation import Evaluator, Figures, ProfileParameters, Staircase
 
 PULSES, COASTS = 6, 5  # cells of the lengths of the pulse and of the coast
 COASTS_REACTING = 3  # fewer: on the contact's own clock the gaps differ less

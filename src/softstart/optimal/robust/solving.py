@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -21,7 +22,7 @@ from softstart.optimal.result import InfeasibleError, LowerBound, OptimumError, 
 from softstart.optimal.robust.descent import Point, Rules, descend, evaluate
 from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
 from softstart.optimal.robust.guesses import Evolution, Family, gentleness, quickness
-from softstart.profile import TorqueProfile, Vector
+from softstart.profile import TorqueProfile
 from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from softstart.arrays import Vector
 from softstart.chain import Chain
 
 __all__ = ["Outcome", "Problem", "lsoda_start"]
 
-Vector = NDArray[np.float64]
 
 TOLERANCE = 1e-8
 T_MAX = 100.0  # s, never reached
