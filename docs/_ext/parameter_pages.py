@@ -9,9 +9,9 @@ from typing import Any
 
 from command_pages import cell, prose
 
-from softstart.balancing.tables import TABLES as ENGINE
+from softstart.balancing.engine import TABLES as ENGINE
 from softstart.chain.elements import TABLES as CHAIN
-from softstart.clutch.model import TABLES as CLUTCH
+from softstart.clutch.model import Clutch
 from softstart.controller import controller_class, controller_names
 from softstart.controller.base import Sensor
 from softstart.drive import PARAMETERS
@@ -46,7 +46,7 @@ def chain_file() -> str:
 
 def clutch_file() -> str:
     """Every key of a clutch file."""
-    return _tables(CLUTCH)
+    return _tables(Clutch.TABLES)
 
 
 def engine_file() -> str:

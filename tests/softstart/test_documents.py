@@ -49,7 +49,7 @@ def test_a_file_is_read_in_si_with_its_defaults():
         "mass": [{"inertia": 0.035, "kind": "free"}, {"inertia": 0.2, "kind": "stuck"}],
         "law": None,
     }
-    assert read(GOOD + "[law]\ntimes = ['0 ms', '500 ms']")["law"]["times"].tolist() == [0.0, 0.5]
+    assert read(GOOD + "[law]\ntimes = ['0 ms', '500 ms']")["law"]["times"] == (0.0, 0.5)
 
 
 def test_everything_that_is_wrong_is_told_at_once():
@@ -94,7 +94,7 @@ def test_changes_go_before_what_the_file_says():
     changed = read(GOOD, also={"mass[2].inertia": "3 kg*m^2", "name": "three", "law.times": [1.0]})
     assert changed["mass"][1]["inertia"] == 3.0
     assert changed[""]["name"] == "three"
-    assert changed["law"]["times"].tolist() == [1.0]
+    assert changed["law"]["times"] == (1.0,)
     (only,) = sentences(GOOD, also={"mass[3].inertia": 1.0})
     assert only == "mass[3].inertia: write mass[N].inertia with N from 1 to 2."
     (only,) = sentences(GOOD, also={"mass.inertai": 1.0})

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -34,26 +34,82 @@ from softstart.balancing.parts import (
 )
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
-from softstart.balancing.tables import (
-    BALANCER,
-    COUNTERWEIGHTS,
-    CYCLE,
-    CYLINDERS,
-    INDICATOR,
-    LIBRARY,
-    MASSES,
-    OPERATION,
-    SHAFT,
-    TABLES,
-    TOP,
-    assumed_keys,
-)
 from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, read_document
+from softstart.input.documents import Table, document_text, made, read_document
+from softstart.input.files import Library
+from softstart.input.parameters import Parameter
+from softstart.quantities import nearest, show
 
 HIGHEST = 24  # order of the crank speed
 ROUNDING = 1e-13  # of the sum of the sizes
 INDICATOR_FILE = "indicator.csv"
+LIBRARY = Library("softstart.balancing", "an engine", "engines")
+
+TOP = Table(
+    "",
+    (
+        Parameter("name", "", "name of the engine", '"my engine"', default="unnamed engine"),
+        Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
+        Parameter(
+            "assumed", "", "keys whose values are assumed, with commas between",
+            '"cylinders.rod_length, masses.*"', default="",
+        ),
+    ),
+)  # fmt: skip
+
+INDICATOR = Table(
+    "indicator",
+    (
+        Parameter("file", "", "CSV file of crank angle and pressure", '"indicator.csv"'),
+        Parameter(
+            "crankcase_pressure", "Pa", "pressure below the pistons", '"1 bar"', "above 0", default=1e5,
+        ),
+    ),
+    required=False,
+)  # fmt: skip
+
+CYLINDERS, MASSES, COUNTERWEIGHTS, OPERATION, BALANCER, CYCLE = (
+    replace(part.TABLES[0], required=required)
+    for part, required in (
+        (Cylinders, True), (Masses, True), (Counterweights, True), (Operation, True), (Layout, False),
+        (SimpleCycle, False),
+    )
+)  # fmt: skip
+SHAFT = replace(BalancerShaft.TABLES[0], many=True)
+TABLES = (TOP, CYLINDERS, MASSES, COUNTERWEIGHTS, CYCLE, INDICATOR, OPERATION, BALANCER, SHAFT)
+
+
+def assumed_keys(text: str, changed: Mapping[str, object], found: Mapping[str, Any]) -> tuple[str, ...]:
+    """The keys named in a text as "masses.*, cycle.speeds", but those `changed` by the user.
+
+    A star stands for all keys of a table that are there in `found`.
+
+    >>> assumed_keys("masses.*", {"masses.rotating": 1}, {"masses": {"reciprocating": 1, "rotating": 2}})
+    ('masses.reciprocating',)
+    >>> assumed_keys("mases.*", {}, {})
+    Traceback (most recent call last):
+    softstart.errors.InputError: assumed = "mases.*": an engine file has no such key; did you mean masses.*?
+    """
+    known = [p.path for table in TABLES for p in table.parameters if table.name]
+    stars = [f"{table.name}.*" for table in TABLES if table.name]
+    named: dict[str, None] = {}
+    wrong = []
+    for name in (one.strip() for one in text.split(",")):
+        if not name:
+            continue
+        if name in stars:
+            values = found.get(name[:-2])
+            here = values if isinstance(values, Mapping) else {}
+            named |= {f"{name[:-1]}{key}": None for key, value in here.items() if value is not None}
+        elif name in known:
+            named[name] = None
+        else:
+            meant = nearest(name, [*stars, *known])
+            hint = f"did you mean {meant}?" if meant else "write masses.rotating, or masses.* for all."
+            wrong.append(f"assumed = {show(name)}: an engine file has no such key; {hint}")
+    if wrong:
+        raise InputError(wrong)
+    return tuple(name for name in named if name not in changed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,15 +308,11 @@ class Engine:
         wrong: list[str] = []
 
         def part(place: str, make: Any, values: dict[str, Any]) -> Any:
-            try:
-                return make(**values)
-            except InputError as error:
-                wrong.extend(f"{before}{place}{' ' if place else ''}{s}" for s in error.sentences)
-                return None
+            return made(make, values, f"{before}{place}{' ' if place else ''}", wrong)
 
         named: dict[str, Any] = found.pop("")
         cylinders = part("[cylinders]", Cylinders, found["cylinders"])
-        made: dict[str, Any] = {
+        parts: dict[str, Any] = {
             "masses": part("[masses]", Masses, found["masses"]),
             "operation": part("[operation]", Operation, found["operation"]),
             "counterweights": part("[counterweights]", Counterweights, found["counterweights"] or {}),
@@ -287,7 +339,7 @@ class Engine:
         if wrong:
             raise InputError(wrong)
         try:
-            return cls(cylinders, gas=gas, **made, **named)
+            return cls(cylinders, gas=gas, **parts, **named)
         except InputError as error:
             raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
 
@@ -298,18 +350,18 @@ class Engine:
         """
         blocks: list[tuple[Table, Any]] = [
             (TOP, {"name": self.name, "source": self.source, "assumed": ", ".join(self.assumed)}),
-            (CYLINDERS, vars(self.cylinders)),
-            (MASSES, vars(self.masses)),
-            (COUNTERWEIGHTS, vars(self.counterweights)),
-            (OPERATION, vars(self.operation)),
-            *((BALANCER, vars(layout)) for layout in [self.layout] if layout is not None),
-            *((SHAFT, vars(shaft)) for shaft in self.shafts),
+            (CYLINDERS, self.cylinders.values()),
+            (MASSES, self.masses.values()),
+            (COUNTERWEIGHTS, self.counterweights.values()),
+            (OPERATION, self.operation.values()),
+            *((BALANCER, layout.values()) for layout in [self.layout] if layout is not None),
+            *((SHAFT, shaft.values()) for shaft in self.shafts),
         ]
         if isinstance(self.gas, MeasuredCycle):
             about = {"file": INDICATOR_FILE, "crankcase_pressure": self.gas.crankcase_pressure}
             blocks.insert(1, (INDICATOR, about))
         else:
-            blocks.insert(4, (CYCLE, vars(self.gas)))
+            blocks.insert(4, (CYCLE, self.gas.values()))
         kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
         return document_text(kept, units=False)
 

@@ -23,10 +23,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from softstart.arrays import Complex, Vector
-from softstart.balancing.parts import CYCLE_ANGLE, Cylinders, Part
-from softstart.balancing.tables import CYCLE
+from softstart.balancing.parts import CYCLE_ANGLE, Cylinders
 from softstart.errors import InputError
-from softstart.input.documents import Table
+from softstart.input.parameter_set import MaybeSeries, Number, ParameterSet, Series, parameter
 from softstart.quantities import RefusedError, parse, show, to_si
 
 LONGEST = math.pi / 12.0  # rad, of a panel
@@ -118,8 +117,7 @@ def torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Com
     return _torque_harmonics(cycle, cylinders, highest)
 
 
-@dataclass(frozen=True)
-class SimpleCycle(Part):
+class SimpleCycle(ParameterSet, kw_only=False):
     """Polytropic compression and expansion, heat by Vibe's law, constant pressures at intake and exhaust.
 
     - From 3 pi to the start of the combustion p V^n_c is constant.
@@ -140,22 +138,91 @@ class SimpleCycle(Part):
     10.0
     """
 
-    compression_ratio: float
-    mean_indicated_pressure: tuple[float, ...]
-    speeds: tuple[float, ...] | None = None
-    intake_pressure: float = 0.9e5
-    idle_pressure: float = 0.3e5
-    exhaust_pressure: float = 1.1e5
-    crankcase_pressure: float = 1e5
-    compression_exponent: float = 1.32
-    expansion_exponent: float = 1.27
-    combustion_start: float = math.radians(15.0)
-    combustion_duration: float = math.radians(55.0)
-    vibe_exponent: float = 2.0
-    exhaust_opening: float = math.radians(130.0)
-    blowdown: float = math.radians(70.0)
+    WHAT: ClassVar[str] = "a cycle"
 
-    TABLE: ClassVar[Table] = CYCLE
+    compression_ratio: Number = parameter(
+        "cycle.compression_ratio", "1", "compression ratio", "9.9", "above 0"
+    )
+    mean_indicated_pressure: Series = parameter(
+        "cycle.mean_indicated_pressure",
+        "Pa",
+        "mean indicated pressure at full load, one or one a speed",
+        '"10 bar"',
+        "above 0",
+        many=True,
+    )
+    speeds: MaybeSeries = parameter(
+        "cycle.speeds",
+        "rad/s",
+        "speeds of these pressures",
+        '["1000 rpm", "5600 rpm"]',
+        "above 0",
+        default=None,
+        many=True,
+    )
+    intake_pressure: Number = parameter(
+        "cycle.intake_pressure",
+        "Pa",
+        "pressure during intake at full load",
+        '"0.9 bar"',
+        "above 0",
+        default=90000.0,
+    )
+    idle_pressure: Number = parameter(
+        "cycle.idle_pressure",
+        "Pa",
+        "pressure during intake at load 0",
+        '"0.3 bar"',
+        "above 0",
+        default=30000.0,
+    )
+    exhaust_pressure: Number = parameter(
+        "cycle.exhaust_pressure", "Pa", "pressure during exhaust", '"1.1 bar"', "above 0", default=110000.0
+    )
+    crankcase_pressure: Number = parameter(
+        "cycle.crankcase_pressure", "Pa", "pressure below the pistons", '"1 bar"', "above 0", default=100000.0
+    )
+    compression_exponent: Number = parameter(
+        "cycle.compression_exponent", "1", "polytropic exponent of the compression", "1.32", default=1.32
+    )
+    expansion_exponent: Number = parameter(
+        "cycle.expansion_exponent", "1", "polytropic exponent of the expansion", "1.27", default=1.27
+    )
+    combustion_start: Number = parameter(
+        "cycle.combustion_start",
+        "rad",
+        "crank angle before dead centre at which combustion begins",
+        '"15 deg"',
+        "0 or more",
+        default=math.radians(15.0),
+    )
+    combustion_duration: Number = parameter(
+        "cycle.combustion_duration",
+        "rad",
+        "duration of the combustion",
+        '"55 deg"',
+        "above 0",
+        default=math.radians(55.0),
+    )
+    vibe_exponent: Number = parameter(
+        "cycle.vibe_exponent", "1", "shape exponent m of Vibe's law", "2", "above 0", default=2.0
+    )
+    exhaust_opening: Number = parameter(
+        "cycle.exhaust_opening",
+        "rad",
+        "crank angle after dead centre at which the exhaust opens",
+        '"130 deg"',
+        "above 0",
+        default=math.radians(130.0),
+    )
+    blowdown: Number = parameter(
+        "cycle.blowdown",
+        "rad",
+        "duration of the fall to the exhaust pressure",
+        '"70 deg"',
+        "0 or more",
+        default=math.radians(70.0),
+    )
 
     def contradictions(self) -> Sequence[str]:
         """Sentences on values that contradict one another."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from softstart.arrays import Vector
 from softstart.balancing.slider_crank import SliderCrank
-from softstart.balancing.tables import BALANCER, COUNTERWEIGHTS, CYLINDERS, MASSES, OPERATION, SHAFT
-from softstart.errors import InputError
-from softstart.input.documents import Table, read_table
+from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, Series, parameter
 from softstart.quantities import show
 
 __all__ = [
@@ -24,7 +21,6 @@ __all__ = [
     "Layout",
     "Masses",
     "Operation",
-    "Part",
     "Quantity",
 ]
 
@@ -34,27 +30,7 @@ CYCLE_ANGLE = 2.0 * TURN  # a four-stroke cycle
 SAME = 1e-6  # rad: angles nearer than this are one
 
 
-class Part:
-    """A part whose fields are those of a table: checked and brought to SI when it is made."""
-
-    TABLE: ClassVar[Table]
-
-    def __post_init__(self) -> None:
-        known: Any = self
-        given = {one.name: getattr(self, one.name) for one in fields(known)}
-        for key, value in read_table(given, self.TABLE).items():
-            object.__setattr__(self, key, tuple(value.tolist()) if isinstance(value, np.ndarray) else value)
-        wrong = list(self.contradictions())
-        if wrong:
-            raise InputError(wrong)
-
-    def contradictions(self) -> Sequence[str]:
-        """Sentences on values that contradict one another."""
-        return ()
-
-
-@dataclass(frozen=True)
-class Cylinders(Part):
+class Cylinders(ParameterSet, kw_only=False):
     """Equal cylinders in one row. Lengths in m, angles in rad; strings with units are read.
 
     `firing_angles` are the crank angles at which each cylinder, counted along the row, is at its firing dead
@@ -68,14 +44,37 @@ class Cylinders(Part):
     [0, 180, 180, 0]
     """
 
-    bore: float
-    stroke: float
-    rod_length: float
-    spacing: float = 0.0
-    firing_angles: tuple[float, ...] = None  # type: ignore[assignment]
-    firing_order: tuple[float, ...] | None = None
+    WHAT: ClassVar[str] = "a row of cylinders"
 
-    TABLE: ClassVar[Table] = CYLINDERS
+    bore: Number = parameter("cylinders.bore", "m", "bore", '"82 mm"', "above 0")
+    stroke: Number = parameter("cylinders.stroke", "m", "stroke", '"71 mm"', "above 0")
+    rod_length: Number = parameter(
+        "cylinders.rod_length", "m", "length of the connecting rod", '"121 mm"', "above 0"
+    )
+    spacing: Number = parameter(
+        "cylinders.spacing",
+        "m",
+        "distance between neighbouring cylinders",
+        '"89 mm"',
+        "0 or more",
+        default=0.0,
+    )
+    firing_angles: Series = parameter(
+        "cylinders.firing_angles",
+        "rad",
+        "crank angles of the firing dead centres, cylinder by cylinder",
+        '["0 deg", "360 deg"]',
+        default=None,
+        many=True,
+    )
+    firing_order: MaybeSeries = parameter(
+        "cylinders.firing_order",
+        "1",
+        "order in which the cylinders fire, evenly over two turns",
+        "[1, 3, 4, 2]",
+        default=None,
+        many=True,
+    )
 
     def contradictions(self) -> Sequence[str]:
         """The rod, and when the cylinders fire."""
@@ -101,8 +100,7 @@ class Cylinders(Part):
                 )
             else:
                 angles = tuple(order.index(n) * CYCLE_ANGLE / count for n in range(1, count + 1))
-                object.__setattr__(self, "firing_angles", angles)
-                object.__setattr__(self, "firing_order", None)
+                self._derive(firing_angles=angles, firing_order=None)
         else:
             for i, angle in enumerate(self.firing_angles):
                 if not 0.0 <= angle < CYCLE_ANGLE:
@@ -149,39 +147,65 @@ class Cylinders(Part):
         return self.area * (crank.r + crank.rod - crank.height(phi))
 
 
-@dataclass(frozen=True)
-class Masses(Part):
+class Masses(ParameterSet, kw_only=False):
     """Masses in kg of one cylinder; the rod is split between piston pin and crank pin.
 
     `inertia` in kg m^2 of crank and flywheel is only needed for the speed fluctuation.
     """
 
-    reciprocating: float
-    rotating: float = 0.0
-    inertia: float | None = None
+    WHAT: ClassVar[str] = "a set of masses"
 
-    TABLE: ClassVar[Table] = MASSES
+    reciprocating: Number = parameter(
+        "masses.reciprocating", "kg", "reciprocating mass of one cylinder", '"0.68 kg"', "above 0"
+    )
+    rotating: Number = parameter(
+        "masses.rotating",
+        "kg",
+        "rotating mass of one throw, at the crank pin",
+        '"0.5 kg"',
+        "0 or more",
+        default=0.0,
+    )
+    inertia: MaybeNumber = parameter(
+        "masses.inertia", "kg*m^2", "inertia of crank and flywheel", '"0.12 kg*m^2"', "above 0", default=None
+    )
 
 
-@dataclass(frozen=True)
-class Counterweights(Part):
+class Counterweights(ParameterSet, kw_only=False):
     """Counterweights opposite to each throw, as shares of the masses they balance."""
 
-    reciprocating_share: float = 0.0
-    rotating_share: float = 1.0
+    WHAT: ClassVar[str] = "a set of counterweights"
 
-    TABLE: ClassVar[Table] = COUNTERWEIGHTS
+    reciprocating_share: Number = parameter(
+        "counterweights.reciprocating_share",
+        "1",
+        "share of the reciprocating masses balanced on the crank",
+        "0.5",
+        "from 0 to 1",
+        default=0.0,
+    )
+    rotating_share: Number = parameter(
+        "counterweights.rotating_share",
+        "1",
+        "share of the rotating masses balanced on the crank",
+        "1",
+        "from 0 to 1",
+        default=1.0,
+    )
 
 
-@dataclass(frozen=True)
-class Operation(Part):
+class Operation(ParameterSet, kw_only=False):
     """Speed range in rad/s, and load: 1 is full, 0 is idling."""
 
-    lowest_speed: float
-    highest_speed: float
-    load: float = 1.0
+    WHAT: ClassVar[str] = "an operation"
 
-    TABLE: ClassVar[Table] = OPERATION
+    lowest_speed: Number = parameter(
+        "operation.lowest_speed", "rad/s", "lowest speed", '"850 rpm"', "above 0"
+    )
+    highest_speed: Number = parameter(
+        "operation.highest_speed", "rad/s", "highest speed", '"5600 rpm"', "above 0"
+    )
+    load: Number = parameter("operation.load", "1", "load", "1", "from 0 to 1", default=1.0)
 
     def contradictions(self) -> Sequence[str]:
         """The range."""
@@ -193,18 +217,20 @@ class Operation(Part):
         )
 
 
-@dataclass(frozen=True)
-class Layout(Part):
+class Layout(ParameterSet, kw_only=False):
     """Given values of a two-shaft balancer to be designed: tuning speed in rad/s, shaft distance in m."""
 
-    tuning_speed: float
-    spacing: float = 0.0
+    WHAT: ClassVar[str] = "a layout"
 
-    TABLE: ClassVar[Table] = BALANCER
+    tuning_speed: Number = parameter(
+        "balancer.tuning_speed", "rad/s", "tuning speed", '"4500 rpm"', "above 0"
+    )
+    spacing: Number = parameter(
+        "balancer.spacing", "m", "distance between the two shafts", '"160 mm"', "0 or more", default=0.0
+    )
 
 
-@dataclass(frozen=True)
-class BalancerShaft(Part):
+class BalancerShaft(ParameterSet, kw_only=False):
     """One balancer shaft. At crank angle phi its mass points at the angle `ratio phi + phase` from the top.
 
     `imbalance` in kg m; `ratio` a whole number, negative if it turns against the crank; `height` in m above
@@ -214,14 +240,24 @@ class BalancerShaft(Part):
     0.0227
     """
 
-    imbalance: float
-    ratio: float
-    phase: float = 0.0
-    height: float = 0.0
-    offset: float = 0.0
-    along: float = 0.0
+    WHAT: ClassVar[str] = "a balancer shaft"
 
-    TABLE: ClassVar[Table] = SHAFT
+    imbalance: Number = parameter(
+        "shaft.imbalance", "kg*m", "imbalance, mass times radius", '"0.02 kg*m"', "above 0"
+    )
+    ratio: Number = parameter("shaft.ratio", "1", "speed over that of the crank, negative if opposite", "-1")
+    phase: Number = parameter(
+        "shaft.phase", "rad", "angle of its mass at crank angle 0", '"180 deg"', default=0.0
+    )
+    height: Number = parameter(
+        "shaft.height", "m", "height of the shaft above the crank", '"30 mm"', default=0.0
+    )
+    offset: Number = parameter(
+        "shaft.offset", "m", "sideways offset of the shaft from the crank", '"80 mm"', default=0.0
+    )
+    along: Number = parameter(
+        "shaft.along", "m", "place of its mass along the crank, from the middle", '"0 mm"', default=0.0
+    )
 
     def contradictions(self) -> Sequence[str]:
         """The ratio."""

@@ -62,7 +62,8 @@ class Mass(ParameterSet):
         "mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"', default=0.0
     )
 
-    def _mistakes(self) -> Iterable[str]:
+    def contradictions(self) -> Iterable[str]:
+        """Sentences on values that contradict one another."""
         if self.kind == "reactive" and self.torque < 0.0:
             yield (
                 f"torque = {self.torque!r}: a reactive load torque is friction and must be 0 or more; write "
@@ -125,7 +126,8 @@ class Shaft(ParameterSet):
         "shaft.start_position", "rad", "twist at the start (0 is mid-gap)", '"0 rad"', default=0.0
     )
 
-    def _mistakes(self) -> Iterable[str]:
+    def contradictions(self) -> Iterable[str]:
+        """Sentences on values that contradict one another."""
         gap, backlash, diameter = (vars(self)[key] for key in ("gap", "backlash", "diameter"))
         wrong = []
         if backlash is not None and gap is not None:
@@ -203,7 +205,8 @@ class Motor(ParameterSet):
     noise_seed: Number = like(Drive, "noise_seed")
     computing_delay: Number = like(Drive, "computing_delay")
 
-    def _mistakes(self) -> Iterable[str]:
+    def contradictions(self) -> Iterable[str]:
+        """Sentences on values that contradict one another."""
         if self.maximum_torque < self.starting_torque:
             yield (
                 f"maximum_torque = {self.maximum_torque!r}: it must be at least the starting torque, "

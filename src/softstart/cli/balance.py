@@ -10,8 +10,7 @@ import click
 
 from softstart.balancing import Balance, Engine, MeasuredCycle
 from softstart.balancing import balance as compute
-from softstart.balancing.engine import INDICATOR_FILE
-from softstart.balancing.tables import LIBRARY, TABLES
+from softstart.balancing.engine import INDICATOR_FILE, LIBRARY, TABLES
 from softstart.cli.commands import Command
 from softstart.cli.completion import names_or_files, table_keys
 from softstart.cli.completion import settings as settings_of

@@ -22,7 +22,7 @@ from softstart.clutch import (
     optimize_engagement,
 )
 from softstart.clutch.laws import read_law
-from softstart.clutch.model import LIBRARY, TABLES
+from softstart.clutch.model import LIBRARY
 from softstart.errors import InputError
 from softstart.quantities import to_si
 from softstart.views import clutches as views
@@ -71,7 +71,7 @@ PHASES = ("phase", "start [s]", "end [s]", "peak torque [N*m]", "at [s]", "frict
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
-    shell_complete=settings_of(lambda: table_keys(TABLES)),
+    shell_complete=settings_of(lambda: table_keys(Clutch.TABLES)),
     help="Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'. May be "
     "repeated.",
 )

@@ -2,132 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self, cast
-
-import numpy as np
+from typing import Any, ClassVar, Self, cast, get_args
 
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
-from softstart.errors import InputError
-from softstart.input.documents import Table, document_text, read_document, read_table
+from softstart.drive import LoadKind
+from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
-from softstart.input.parameters import Parameter
-from softstart.quantities import nearest, show
+from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, parameter
+from softstart.input.parameters import Wording
 
-WHAT = "a clutch"
 LIBRARY = Library("softstart.clutch", "a clutch", "clutches")
-
-PARAMETERS = (
-    Parameter("name", "", "name of the clutch", '"my clutch"', default="unnamed clutch"),
-    Parameter("source", "", "source of the numbers", '"data sheet"', default="not given"),
-    Parameter(
-        "inertia", "kg*m^2", "inertia IM of the clutch side", '"0.98 kg*m^2"', "above 0", table="clutch",
-        name="clutch_inertia",
-    ),
-    Parameter(
-        "torque", "N*m", "friction torque MM of the engaged clutch", '"588 N*m"', "above 0", table="clutch",
-        name="clutch_torque",
-    ),
-    Parameter(
-        "speed", "rad/s", "constant speed w0 of the driving side", '"230 rad/s"', "above 0", table="clutch",
-        name="drive_speed",
-    ),
-    Parameter(
-        "engagement_time", "s", "time tM in which the friction torque rises", '"1 s"', "above 0",
-        table="clutch",
-    ),
-    Parameter(
-        "lining_area", "m^2", "area of all friction faces", '"0.05 m^2"', "above 0", default=None,
-        table="clutch",
-    ),
-    Parameter("stiffness", "N*m/rad", "stiffness cp of the shaft", '"49 N*m/rad"', "above 0", table="shaft"),
-    Parameter(
-        "damping", "N*m*s/rad", "damping of the shaft", '"0.5 N*m*s/rad"', "0 or more", default=0.0,
-        table="shaft",
-    ),
-    Parameter("gap", "rad", "total angular gap", '"0.02 rad"', "0 or more", default=0.0, table="shaft"),
-    Parameter(
-        "inertia", "kg*m^2", "inertia Ic of the load", '"4.9 kg*m^2"', "above 0", table="load",
-        name="load_inertia",
-    ),
-    Parameter(
-        "torque", "N*m", "torque Mc of the load", '"196 N*m"', "0 or more", table="load", name="load_torque",
-    ),
-    Parameter(
-        "kind", "", "kind of the load torque", '"active"', default="active", choices=("active", "reactive"),
-        table="load", name="load_kind",
-    ),
-    Parameter(
-        "kind", "", "engagement law", '"linear"', default="linear", choices=(*LAWS, "table"), table="law",
-        name="law",
-    ),
-    Parameter(
-        "time_constant", "s", "time constant of the exponential law", '"1 s"', default=1.0, table="law",
-    ),
-    Parameter(
-        "times", "s", "instants of the table", "[0, 0.5, 1]", "0 or more", default=None, many=True,
-        table="law", name="law_times",
-    ),
-    Parameter(
-        "torques", "N*m", "friction torques of the table", "[0, 200, 588]", "0 or more", default=None,
-        many=True, table="law", name="law_torques",
-    ),
-)  # fmt: skip
-
-TABLES = tuple(
-    Table(table, tuple(p for p in PARAMETERS if p.table == table), required=table != "law")
-    for table in ("", "clutch", "shaft", "load", "law")
-)
-KEYWORDS = Table("", PARAMETERS)
 
 ABOVE = 1.0 + 1e-9  # a table may exceed MM by rounding
 SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate overflows
 
 
-@dataclass(frozen=True)
-class Clutch:
+class Clutch(ParameterSet, kw_only=False):
     """A slipping clutch with constant driving speed, a shaft and a load: [C] (1).
 
     All values are numbers in SI, or text with a unit.
 
     Parameters
     ----------
-    clutch_inertia : float
-        IM, inertia of the clutch side, kg m^2.
-    clutch_torque : float
-        MM, friction torque of the engaged clutch, N m.
-    drive_speed : float
-        w0, constant speed of the driving side, rad/s.
-    engagement_time : float
-        tM, time in which the friction torque rises, s.
-    stiffness : float
-        cp, stiffness of the shaft, N m/rad.
-    load_inertia : float
-        Ic, inertia of the load, kg m^2.
-    load_torque : float
-        Mc, torque of the load, N m.
-    lining_area : float, optional
-        Area of all friction faces, m^2.
-    damping : float, optional
-        Damping of the shaft, N m s/rad.
-    gap : float, optional
-        Total angular gap (backlash) of the shaft, rad.
-    load_kind : str, optional
-        "active" (acts always, may turn the load back) or "reactive" (friction: holds the load at rest).
-    law : str, optional
-        Engagement law: "linear", "quadratic-concave", "quadratic-convex", "exponential" or "table".
-    time_constant : float, optional
-        Time constant of the exponential law, s.
-    law_times, law_torques : tuple of float, optional
-        Points of the table: s, N m.
-    name, source : str, optional
-        Name of the clutch, and source of its numbers.
+    {parameters}
 
     Raises
     ------
@@ -149,31 +51,57 @@ class Clutch:
     law = "linaer": the engagement law is "linear", ... or "table"; did you mean "linear"?
     """
 
-    clutch_inertia: float
-    clutch_torque: float
-    drive_speed: float
-    engagement_time: float
-    stiffness: float
-    load_inertia: float
-    load_torque: float
-    lining_area: float | None = None
-    damping: float = 0.0
-    gap: float = 0.0
-    load_kind: str = "active"
-    law: str = "linear"
-    time_constant: float = 1.0
-    law_times: tuple[float, ...] | None = None
-    law_torques: tuple[float, ...] | None = None
-    name: str = "unnamed clutch"
-    source: str = "not given"
+    WHAT: ClassVar[str] = "a clutch"
 
-    def __post_init__(self) -> None:
-        given = {p.name: getattr(self, p.name) for p in PARAMETERS}
-        for name, value in read_table(given, KEYWORDS).items():
-            object.__setattr__(self, name, tuple(value.tolist()) if isinstance(value, np.ndarray) else value)
-        wrong = self._mistakes()
-        if wrong:
-            raise InputError(wrong)
+    clutch_inertia: Number = parameter(
+        "clutch.inertia", "kg*m^2", "inertia IM of the clutch side", '"0.98 kg*m^2"', "above 0"
+    )
+    clutch_torque: Number = parameter(
+        "clutch.torque", "N*m", "friction torque MM of the engaged clutch", '"588 N*m"', "above 0"
+    )
+    drive_speed: Number = parameter(
+        "clutch.speed", "rad/s", "constant speed w0 of the driving side", '"230 rad/s"', "above 0"
+    )
+    engagement_time: Number = parameter(
+        "clutch.engagement_time", "s", "time tM in which the friction torque rises", '"1 s"', "above 0"
+    )
+    stiffness: Number = parameter(
+        "shaft.stiffness", "N*m/rad", "stiffness cp of the shaft", '"49 N*m/rad"', "above 0"
+    )
+    load_inertia: Number = parameter(
+        "load.inertia", "kg*m^2", "inertia Ic of the load", '"4.9 kg*m^2"', "above 0"
+    )
+    load_torque: Number = parameter("load.torque", "N*m", "torque Mc of the load", '"196 N*m"', "0 or more")
+    lining_area: MaybeNumber = parameter(
+        "clutch.lining_area", "m^2", "area of all friction faces", '"0.05 m^2"', "above 0", default=None
+    )
+    damping: Number = parameter(
+        "shaft.damping", "N*m*s/rad", "damping of the shaft", '"0.5 N*m*s/rad"', "0 or more", default=0.0
+    )
+    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.02 rad"', "0 or more", default=0.0)
+    load_kind: LoadKind = parameter(
+        "load.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
+    )
+    law: str = parameter(
+        "law.kind", "", "engagement law", '"linear"', default="linear", choices=(*LAWS, "table")
+    )
+    time_constant: Number = parameter(
+        "law.time_constant", "s", "time constant of the exponential law", '"1 s"', default=1.0
+    )
+    law_times: MaybeSeries = parameter(
+        "law.times", "s", "instants of the table", "[0, 0.5, 1]", "0 or more", default=None, many=True
+    )
+    law_torques: MaybeSeries = parameter(
+        "law.torques",
+        "N*m",
+        "friction torques of the table",
+        "[0, 200, 588]",
+        "0 or more",
+        default=None,
+        many=True,
+    )
+    name: str = parameter("name", "", "name of the clutch", '"my clutch"', default="unnamed clutch")
+    source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="not given")
 
     # making one -------------------------------------------------------------------------------------------
 
@@ -195,30 +123,13 @@ class Clutch:
 
         `where` is put before each sentence; `also` holds changes by path, as {"load.torque": "100 N*m"}.
         """
-        found = read_document(text, TABLES, WHAT, where=where, also=also)
-        values = {
-            p.name: found[p.table][p.key]
-            for p in PARAMETERS
-            if found[p.table] is not None and p.key in found[p.table]
-        }
-        try:
-            return cls(**values)
-        except InputError as error:
-            before = f"{where}: " if where else ""
-            raise InputError([f"{before}{sentence}" for sentence in error.sentences]) from None
+        return cls._from_document(
+            parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where, also
+        )
 
     def replace(self, **changes: Any) -> Self:
         """A clutch with some parameters changed, checked like a new one."""
-        known = [p.name for p in PARAMETERS]
-        strays = [
-            f"{name} = {show(value)}: a clutch has no such parameter; "
-            + (f"did you mean {near}?" if (near := nearest(name, known)) else f"it has {', '.join(known)}.")
-            for name, value in changes.items()
-            if name not in known
-        ]
-        if strays:
-            raise InputError(strays)
-        return dataclasses.replace(self, **changes)
+        return super().replace(**changes)
 
     def with_table(self, times: Sequence[float], torques: Sequence[float]) -> Self:
         """The clutch with a law of its own: friction torques (N m) at instants (s), joined by lines."""
@@ -268,7 +179,7 @@ class Clutch:
 
     def summary(self) -> dict[str, Any]:
         """The parameters as plain data, for JSON."""
-        return {p.name: getattr(self, p.name) for p in PARAMETERS}
+        return {p.name: getattr(self, p.name) for table in self.TABLES for p in table.parameters}
 
     def to_toml(self) -> str:
         """The clutch as a file that `load` reads, in SI.
@@ -277,12 +188,12 @@ class Clutch:
         >>> Clutch.from_toml(clutch.to_toml()) == clutch
         True
         """
-        return document_text((table, self.summary()) for table in TABLES)
+        return document_text((table, self.values()) for table in self.TABLES)
 
     # checks -----------------------------------------------------------------------------------------------
 
-    def _mistakes(self) -> list[str]:
-        """What single values do not show."""
+    def contradictions(self) -> list[str]:
+        """Sentences on values that contradict one another."""
         wrong = []
         held = self.clutch_torque
         if self.law == "table":

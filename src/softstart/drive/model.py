@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args, overlo
 import numpy as np
 
 from softstart.drive.checks import contradictions, elastic_frequency
-from softstart.input.documents import Table, document_text, parsed, placed
+from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
 from softstart.input.parameter_set import MaybeNumbers, Numbers, ParameterSet, parameter, read_settings
 from softstart.input.parameters import Parameter, Wording
@@ -157,7 +157,7 @@ class Drive(ParameterSet):
         "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"', default=0.0
     )
 
-    def _contradictions(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
+    def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         return contradictions(values, self.PARAMETERS, wording)
 
     # ---- where drives come from --------------------------------------------------------------------------
@@ -192,16 +192,12 @@ class Drive(ParameterSet):
         >>> Drive.from_toml(drive.to_toml()) == drive
         True
         """
-        document = parsed(text, Wording(where, style="toml"), cls.WHAT, _TABLES)
-        return cls.from_tables(document, where=where)
+        return cls.from_tables(parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where=where)
 
     @classmethod
     def from_tables(cls, document: Mapping[str, Any], *, where: str = "") -> Self:
         """A drive from the tables of a document, {"shaft": {"gap": 0.5}, ...}; `where` as in `from_toml`."""
-        wording = Wording(where, style="toml")
-        content, mistakes = placed(document, _TABLES, cls.WHAT, wording)
-        given = {_NAMES[table, key]: v for table, keys in content.items() for key, v in keys.items()}
-        return cls._made(given, wording, mistakes)
+        return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------
 
@@ -228,7 +224,7 @@ class Drive(ParameterSet):
         inertia = 0.035  # kg*m^2: inertia of the motor
         """
         given = self.given()
-        return document_text((table, given) for table in _TABLES)
+        return document_text((table, given) for table in self.TABLES)
 
     # ---- batches -----------------------------------------------------------------------------------------
 
@@ -328,8 +324,4 @@ class Drive(ParameterSet):
 
 
 PARAMETERS: Mapping[str, Parameter] = Drive.PARAMETERS
-TABLES: tuple[str, ...] = tuple(dict.fromkeys(p.table for p in PARAMETERS.values() if p.table))
-_TABLES = tuple(
-    Table(table, tuple(p for p in PARAMETERS.values() if p.table == table)) for table in ("", *TABLES)
-)
-_NAMES = {(p.table, p.key): p.name for p in PARAMETERS.values()}
+TABLES: tuple[str, ...] = tuple(table.name for table in Drive.TABLES if table.name)

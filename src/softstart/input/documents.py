@@ -23,6 +23,7 @@ T = TypeVar("T")
 
 __all__ = [
     "Table",
+    "changed",
     "document_text",
     "literal",
     "made",
@@ -89,9 +90,7 @@ def read_document(
     """
     wording = Wording(where, style="toml")
     document = parsed(text, wording, what, tables)
-    wrong: list[str] = []
-    for path, value in (also or {}).items():
-        wrong += _changed(document, path, value, tables, what)
+    wrong = list(changed(document, also or {}, tables, what))
     given, mistakes = placed(document, tables, what, wording)
     found: dict[str, Any] = {}
     in_rows: list[str] = []
@@ -197,10 +196,17 @@ def _invalid(message: str, text: str, wording: Wording) -> str:
     return wording.sentence(subject, f"this is not valid TOML ({what}){remedy}")
 
 
+def changed(
+    document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[Table], what: str
+) -> Iterator[str]:
+    """Put changes by path into the document; a sentence for each that cannot be."""
+    for path, value in changes.items():
+        yield from _changed(document, path, value, tables, what)
+
+
 def _changed(
     document: dict[str, Any], path: str, value: object, tables: Sequence[Table], what: str
 ) -> Iterator[str]:
-    """Put a change into the document, or say why it cannot be."""
     name, dot, key = path.rpartition(".")
     name, _, number = name.partition("[")
     table = next((one for one in tables if one.name == name), None)

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, dataclass_transform
 
 import numpy as np
 import numpy.typing as npt
 
 from softstart.errors import InputError
+from softstart.input.documents import Table, changed, placed
 from softstart.input.parameters import (
     REQUIRED,
     Limit,
@@ -32,9 +33,11 @@ from softstart.quantities import Value, nearest, show
 __all__ = [
     "MaybeNumber",
     "MaybeNumbers",
+    "MaybeSeries",
     "Number",
     "Numbers",
     "ParameterSet",
+    "Series",
     "like",
     "meant_by",
     "parameter",
@@ -67,8 +70,21 @@ if TYPE_CHECKING:
         def __get__(self, one: object, owner: Any) -> Value | None: ...
         def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
 
+    class Series:
+        """Several numbers."""
+
+        def __get__(self, one: object, owner: Any) -> tuple[float, ...]: ...
+        def __set__(self, one: object, given: Sequence[float | str] | npt.ArrayLike | None) -> None: ...
+
+    class MaybeSeries:
+        """Several numbers, or None where they are not given."""
+
+        def __get__(self, one: object, owner: Any) -> tuple[float, ...] | None: ...
+        def __set__(self, one: object, given: Sequence[float | str] | npt.ArrayLike | None) -> None: ...
+
 else:
     Number, MaybeNumber, Numbers, MaybeNumbers = float, float | None, Value, Value | None
+    Series, MaybeSeries = tuple[float, ...], tuple[float, ...] | None
 
 
 def parameter(
@@ -84,14 +100,14 @@ def parameter(
     infinite: bool = False,
     symbol: str = "",
     follows: str = "",
-    kw_only: bool = True,
+    kw_only: bool | None = None,
 ) -> Any:
     """A field of a `ParameterSet`; `path` is `table.key` of the file, the rest as in `Parameter`."""
     table, _, key = path.rpartition(".")
     described = Parameter(
         key, unit, meaning, example, limit, default, choices, many, infinite, symbol, follows, table
     )
-    metadata = {"parameter": described, "positional": not kw_only}
+    metadata = {"parameter": described, "kw_only": kw_only}
     if default is REQUIRED:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -100,9 +116,7 @@ def parameter(
 def like(cls: type[ParameterSet], name: str) -> Any:
     """A field that is the parameter of another class, which need not be given."""
     described = cls.PARAMETERS[name]
-    return dataclasses.field(
-        default=described.default, metadata={"parameter": described, "positional": False}
-    )
+    return dataclasses.field(default=described.default, metadata={"parameter": described, "kw_only": True})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
@@ -116,13 +130,21 @@ class ParameterSet:
     WHAT: ClassVar[str] = "a table"
     BATCH: ClassVar[bool] = False
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
+    TABLES: ClassVar[tuple[Table, ...]] = ()
     _POSITIONAL: ClassVar[tuple[str, ...]] = ()
 
-    def __init_subclass__(cls) -> None:
+    def __init_subclass__(cls, kw_only: bool = True) -> None:
         dataclasses.dataclass(init=False, eq=False, repr=False)(cls)
         fields = [one for one in dataclasses.fields(cls) if "parameter" in one.metadata]  # type: ignore[arg-type]
         cls.PARAMETERS = {f.name: dataclasses.replace(f.metadata["parameter"], name=f.name) for f in fields}
-        cls._POSITIONAL = tuple(one.name for one in fields if one.metadata["positional"])
+        tables = sorted({p.table: None for p in cls.PARAMETERS.values()}, key=bool)  # "" first
+        cls.TABLES = tuple(
+            Table(table, tuple(p for p in cls.PARAMETERS.values() if p.table == table)) for table in tables
+        )
+        keyword = {one.name: one.metadata["kw_only"] for one in fields}
+        cls._POSITIONAL = tuple(
+            name for name, own in keyword.items() if not (kw_only if own is None else own)
+        )
         cls.__replace__ = cls.replace  # type: ignore[attr-defined]  # copy.replace of Python 3.13
         ordered = sorted(fields, key=lambda one: one.name not in cls._POSITIONAL)
         cls.__signature__ = inspect.Signature([_argument(one, cls) for one in ordered])  # type: ignore[attr-defined]
@@ -169,19 +191,19 @@ class ParameterSet:
             if name in parameters and not (given[name] is None and parameters[name].default is None)
         )
         right = {name: values[name] for name in own["_given"] if name in values} if wrong else values
-        sentences = [*sentences_of(wrong), *self._contradictions(right, wording)]
+        sentences = [*sentences_of(wrong), *self._check(right, wording)]
         if not sentences:
             before = f"{wording.where}: " if wording.where else ""
-            sentences = [before + sentence for sentence in self._mistakes()]
+            sentences = [before + sentence for sentence in self.contradictions()]
         if sentences:
             raise InputError(sentences)
 
-    def _contradictions(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
-        """What the parameters that are right in themselves say against one another."""
+    def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
+        """Sentences on values that contradict one another, of those that are right in themselves."""
         return ()
 
-    def _mistakes(self) -> Iterable[str]:
-        """The same once all parameters are right in themselves and set; without the name of the file."""
+    def contradictions(self) -> Iterable[str]:
+        """The same once all are right in themselves and set; without the name of the file."""
         return ()
 
     @classmethod
@@ -195,6 +217,21 @@ class ParameterSet:
         one = cls.__new__(cls)
         one._fill(given, wording, mistakes, known)
         return one
+
+    @classmethod
+    def _from_document(
+        cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None
+    ) -> Self:
+        """From the tables of a TOML document, after the changes of `also` ({path: value})."""
+        wording = Wording(where, style="toml")
+        wrong = [Mistake(one) for one in changed(document, also or {}, cls.TABLES, cls.WHAT)]
+        content, mistakes = placed(document, cls.TABLES, cls.WHAT, wording)
+        given = {
+            p.name: content[p.table][p.key]
+            for p in cls.PARAMETERS.values()
+            if p.key in content.get(p.table, ())
+        }
+        return cls._made(given, wording, [*wrong, *mistakes])
 
     def _derive(self, **values: Any) -> None:
         """Set values that follow from others, as if they had been given; None takes one back."""
@@ -265,7 +302,7 @@ def _rebuilt(cls: type[ParameterSet], given: dict[str, Any]) -> ParameterSet:
 
 def _argument(one: dataclasses.Field[Any], cls: type[ParameterSet]) -> inspect.Parameter:
     """The field as an argument of the constructor, for editors and the documentation."""
-    positional = one.metadata["positional"]
+    positional = one.name in cls._POSITIONAL
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if positional else inspect.Parameter.KEYWORD_ONLY
     default = inspect.Parameter.empty if one.default is dataclasses.MISSING else one.default
     return inspect.Parameter(one.name, kind, default=default, annotation=one.type)

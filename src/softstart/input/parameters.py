@@ -237,6 +237,8 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> A
         reason = f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit"
         _refuse(number, ~beyond, reason)
     if isinstance(number, np.ndarray):
+        if parameter.many:
+            return tuple(number.tolist())
         number.setflags(write=False)
     return number
 

@@ -54,7 +54,7 @@ REFUSED = {
     "negative load": ({"load_torque": -1.0}, "load_torque = -1.0: the torque Mc of the load must be"),
     "unknown law": ({"law": "cubic"}, 'law = "cubic": the engagement law is'),
     "no inertia": ({"load_inertia": 0.0}, "load_inertia = 0.0: the inertia Ic of the load must be above 0"),
-    "stray name": ({"inertia": 1.0}, "inertia = 1.0: a clutch has no such parameter"),
+    "stray name": ({"inertia": 1.0}, 'inertia = 1.0: a clutch has no parameter "inertia"'),
     "table without points": ({"law": "table"}, "law_times is missing; give instants in s"),
     "points without table": ({"law_times": [0, 1]}, 'only the law "table" has law_times'),
     "uneven table": (
