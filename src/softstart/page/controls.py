@@ -12,6 +12,7 @@ from softstart.errors import InputError
 from softstart.page.frames import SERVER, Screen
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
+from softstart.views.printed import unit
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LATEST = 1e15  # ms, beyond any clock of a browser
@@ -77,20 +78,11 @@ def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
         "symbol": SYMBOLS.get(name, ""),
         "label": label,
         "meaning": f"{parameter.meaning}; write for example {parameter.example}",
-        "unit": readable(parameter.unit),
+        "unit": unit(parameter.unit),
         "slider": slider,
         "choices": list(parameter.choices),
         "words": not parameter.unit and not parameter.choices,
     }
-
-
-def readable(unit: str) -> str:
-    """A unit as it is printed.
-
-    >>> readable("kg*m^2"), readable("N*m*s/rad"), readable("1")
-    ('kg m²', 'N m s/rad', '')
-    """
-    return "" if unit == "1" else unit.replace("*", " ").replace("^2", "\N{SUPERSCRIPT TWO}")
 
 
 class Delay:

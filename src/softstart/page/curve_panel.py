@@ -17,15 +17,14 @@ from softstart.drive import Drive
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
-from softstart.page.optimum_panel import TERMINALS
 from softstart.page.panel_parts import (
     POLL,
+    TERMINALS,
     JobView,
     StaleNote,
     action,
     box,
     choice,
-    fixed,
     guarded,
     hint,
     jobs_of,
@@ -33,6 +32,7 @@ from softstart.page.panel_parts import (
     table,
 )
 from softstart.page.session import Session
+from softstart.views.printed import fixed
 
 if TYPE_CHECKING:
     from softstart.optimal.front import FrontPoint

@@ -270,16 +270,11 @@ def otherwise(unit: str, value: Any) -> str:
 
 
 def figure(session: Session, found: Strategy) -> dict[str, Any]:
-    """The large figure and what stands about it."""
+    """The large figure and the numbers around it."""
     run = found.run
-    facts: dict[str, Any] = {
-        "name": found.name,
+    facts = judged(session, found) | {
         "status": found.status,
         "base": number(float(metrics.base_torque(session.drive))),
-        "k_dyn": number(found.k_dyn),
-        "start_time": number(found.start_time),
-        "peak_torque": number(found.peak_torque),
-        "time_lost": number(session.time_lost(found.name)) if run is not None else None,
     }
     if run is not None:
         facts |= {
@@ -294,19 +289,23 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
 
 def row(session: Session, found: Strategy) -> dict[str, Any]:
     """One line of the table; `worn` is left out while it is not computed."""
-    label = found.name
-    line: dict[str, Any] = {
-        "name": label,
-        "k_dyn": number(found.k_dyn),
-        "peak_torque": number(found.peak_torque),
-        "start_time": number(found.start_time),
-        "time_lost": number(session.time_lost(label)) if found.run is not None else None,
-        "trouble": found.trouble or ("" if math.isfinite(found.start_time) else found.status),
-    }
-    worn = session.worn_ready(label)
+    line = judged(session, found)
+    line["trouble"] = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
+    worn = session.worn_ready(found.name)
     if worn is not None:
         line["worn"] = number(worn)
     return line
+
+
+def judged(session: Session, found: Strategy) -> dict[str, Any]:
+    """What a strategy is judged by."""
+    return {
+        "name": found.name,
+        "k_dyn": number(found.k_dyn),
+        "start_time": number(found.start_time),
+        "peak_torque": number(found.peak_torque),
+        "time_lost": number(session.time_lost(found.name)) if found.run is not None else None,
+    }
 
 
 def drawn(found: Strategy, channels: tuple[str, ...] = PACKED) -> dict[str, Any] | None:

@@ -16,6 +16,7 @@ from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import (
     POLL,
+    TERMINALS,
     JobView,
     StaleNote,
     action,
@@ -39,11 +40,6 @@ if TYPE_CHECKING:
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
 
-TERMINALS = {
-    "synchronous": "both masses at target speed",
-    "reached": "load at target speed",
-    "steady": "both, and shaft torque at rest",
-}
 BOUNDS = {"certificate": "certified for", "momentum": "by momentum, for", "none": "none: "}
 
 

@@ -17,6 +17,7 @@ from softstart.errors import InputError
 from softstart.page.jobs import Job, Jobs, State
 from softstart.page.sentences import changed_since, sentence_of
 from softstart.page.session import Session
+from softstart.views.printed import NOTHING
 
 POLL = 0.2  # s between two checks of a job
 CLASS_OF = {
@@ -28,8 +29,12 @@ CLASS_OF = {
 }
 # what tasks import, in a process that waits for one
 IMPORTED = ("softstart.page.tasks", "softstart.optimal.solving", "softstart.tuning.solving", "scipy.optimize")
+TERMINALS = {
+    "synchronous": "both masses at target speed",
+    "reached": "load at target speed",
+    "steady": "both, and shaft torque at rest",
+}
 MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html"}
-NOTHING = "\N{EN DASH}"
 
 
 def box() -> Any:
@@ -75,15 +80,6 @@ def number(value: float | None, digits: int = 4) -> str:
     ('0.9092', '\N{EN DASH}', '\N{EN DASH}', '48.1')
     """
     return NOTHING if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
-
-
-def fixed(value: float | None, places: int) -> str:
-    """A number with so many decimal places, for columns.
-
-    >>> fixed(0.981, 4), fixed(None, 4)
-    ('0.9810', '\N{EN DASH}')
-    """
-    return NOTHING if value is None or not math.isfinite(value) else f"{value:.{places}f}"
 
 
 def percent(value: float | None) -> str:

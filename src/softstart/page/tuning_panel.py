@@ -15,7 +15,6 @@ from softstart.controller.tuned import RobustGains, Tuned, scheduled
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.page import tasks
-from softstart.page.controls import readable
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import (
@@ -28,7 +27,6 @@ from softstart.page.panel_parts import (
     duration,
     facts,
     field,
-    fixed,
     guarded,
     hint,
     jobs_of,
@@ -39,6 +37,7 @@ from softstart.page.panel_parts import (
 )
 from softstart.page.session import Session
 from softstart.tuning.grid import gaps_of, inertias_of
+from softstart.views.printed import fixed, unit
 
 FIRST = "shaped"  # the controller offered first, if it is there
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
@@ -211,7 +210,7 @@ def gain_table(found: tasks.Tuned) -> str:
 
 def units_of(name: str) -> dict[str, str]:
     """Units of a controller's parameters, readable."""
-    return {one.name: readable(str(one.metadata.get("unit", ""))) for one in fields(controller_class(name))}
+    return {one.name: unit(str(one.metadata.get("unit", ""))) for one in fields(controller_class(name))}
 
 
 def cell_table(found: tasks.Tuned) -> str:

@@ -10,8 +10,8 @@ from typing import Any
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import Means, label_of, means_of
-from softstart.reporting.values import digits, fixed, percent, short
 from softstart.start.comparison import REFERENCE, Row
+from softstart.views.printed import digits, fixed, percent, short
 
 SLOWER = 0.15  # of the start time of direct
 ALIKE = 0.01  # worst K_dyn within this share of the least count as equal: then K_dyn on the drive as it is

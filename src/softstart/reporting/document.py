@@ -14,8 +14,8 @@ from softstart.reporting.result import Provenance, Report
 from softstart.reporting.robustness import robustness_section
 from softstart.reporting.sheet import sheet_section
 from softstart.reporting.strategies import kind_of, strategies_section, traces_section
-from softstart.reporting.values import RPM, digits, fixed, percent, short
 from softstart.start.comparison import REFERENCE, Row
+from softstart.views.printed import RPM, digits, fixed, percent, short
 
 SAME = 0.005  # a peak within this share of that of direct is no saving
 MENTIONED = 3  # strategies that are gentler than direct start and out

@@ -13,8 +13,8 @@ from html import escape
 from softstart.drive import PARAMETERS, Drive
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.resolution import rated_torque
-from softstart.reporting.values import MINUS, RPM, digits, short, unit
 from softstart.start import metrics
+from softstart.views.printed import MINUS, RPM, digits, short, unit
 
 HIDDEN = ("name", "source", "noise_seed", "encoder_phase")
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px

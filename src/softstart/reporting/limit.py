@@ -26,9 +26,9 @@ from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.reporting.strategies import GREY, SMALL, WIDE, label_of, name_in_figure, ordered
-from softstart.reporting.values import digits, fixed, listed, percent, short
 from softstart.start.comparison import REFERENCE, Row
 from softstart.views.drawing import COLOURS, DASHES, drawing, name_points, new_figure
+from softstart.views.printed import digits, fixed, listed, percent, short
 
 if TYPE_CHECKING:
     from matplotlib import ticker

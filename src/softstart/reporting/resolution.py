@@ -10,7 +10,7 @@ from typing import Self
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.quantities import nearest, to_si
-from softstart.reporting.values import RPM, decimals_of, digits, short
+from softstart.views.printed import RPM, decimals_of, digits, short
 
 EXAMPLE = "torque=0.5%,time=10ms,speed=1rpm"
 _KEYS = {

@@ -15,10 +15,10 @@ from softstart.drive import Drive
 from softstart.late import late
 from softstart.reporting.markup import Figures, Html, html, tag
 from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
-from softstart.reporting.values import digits, fixed, short
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.views.drawing import drawing, new_figure
+from softstart.views.printed import digits, fixed, short
 
 if TYPE_CHECKING:
     from matplotlib import colors, patches, ticker

@@ -12,11 +12,11 @@ import numpy as np
 from softstart.controller import Controller, Sensor
 from softstart.drive import Drive
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
-from softstart.reporting.values import digits, fixed, listed, short
 from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, REFERENCE, WORN_GAP, Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
+from softstart.views.printed import digits, fixed, listed, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""Numbers and quantities as a report prints them."""
+"""Numbers and quantities as report and page print them: a true minus sign, a dash for a missing value."""
 
 from __future__ import annotations
 

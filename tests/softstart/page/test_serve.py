@@ -13,8 +13,7 @@ import urllib.request
 import pytest
 
 from softstart import InputError
-from softstart.page.guard import MOST_BODY, Guard
-from softstart.page.serve import Address, guarded, listening
+from softstart.page.serve import MOST_BODY, Address, Guard, guarded, listening
 
 TOKEN = "a-token-of-some-length"
 
