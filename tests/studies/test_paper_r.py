@@ -10,8 +10,8 @@ from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, forced_response, natural_vibration, reduce_chain
-from softstart.chain.backbone import backbone
 from softstart.chain.simulation import simulate_chain
+from softstart.chain.vibration_with_gaps import backbone
 from softstart.study import Verdict, study_names
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables
 from softstart_studies.paper_r.motion import moved, released

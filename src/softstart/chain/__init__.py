@@ -10,17 +10,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from softstart.chain.arrays import ChainArrays
-from softstart.chain.model import Chain, Mass, Motor, Shaft
+from softstart.chain.elements import Mass, Motor, Shaft
+from softstart.chain.model import Chain, ChainArrays
 
 if TYPE_CHECKING:
-    from softstart.chain.backbone import Backbone, chain_backbone
-    from softstart.chain.forced import ForcedResponse, forced_response
     from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
-    from softstart.chain.simulation import simulate_chain
-    from softstart.chain.verification import Verification, verify_on_chain
+    from softstart.chain.simulation import Verification, simulate_chain, verify_on_chain
     from softstart.chain.vibration import Vibration, natural_vibration
+    from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse, chain_backbone, forced_response
 
 __all__ = [
     "Backbone",
@@ -44,18 +42,18 @@ __all__ = [
 
 # loaded when first used: they need compiled code
 _HOME = {
-    "Backbone": "softstart.chain.backbone",
+    "Backbone": "softstart.chain.vibration_with_gaps",
     "ChainRun": "softstart.chain.run",
-    "ForcedResponse": "softstart.chain.forced",
+    "ForcedResponse": "softstart.chain.vibration_with_gaps",
     "Reduction": "softstart.chain.reduction",
-    "Verification": "softstart.chain.verification",
+    "Verification": "softstart.chain.simulation",
     "Vibration": "softstart.chain.vibration",
-    "chain_backbone": "softstart.chain.backbone",
-    "forced_response": "softstart.chain.forced",
+    "chain_backbone": "softstart.chain.vibration_with_gaps",
+    "forced_response": "softstart.chain.vibration_with_gaps",
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",
-    "verify_on_chain": "softstart.chain.verification",
+    "verify_on_chain": "softstart.chain.simulation",
 }
 
 

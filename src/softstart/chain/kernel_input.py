@@ -10,8 +10,7 @@ import numpy as np
 
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import kernel_layout as at
-from softstart.chain.arrays import ChainArrays
-from softstart.chain.model import Chain
+from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import natural_vibration
 from softstart.errors import InputError
 from softstart.plant import layout as plant

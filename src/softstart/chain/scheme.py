@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
 
-from softstart.chain.arrays import ChainArrays
-from softstart.chain.model import Chain
+from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import Vibration, natural_vibration
 
 __all__ = ["scheme_svg"]

@@ -27,7 +27,7 @@ from softstart.views.markdown import output_folder
 
 if TYPE_CHECKING:
     from softstart.chain import Chain, Reduction
-    from softstart.chain.verification import Verification
+    from softstart.chain.simulation import Verification
 
 DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")

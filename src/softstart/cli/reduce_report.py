@@ -12,7 +12,7 @@ from softstart.views.markdown import markdown, markdown_table, write_table, writ
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
-    from softstart.chain.verification import Verification
+    from softstart.chain.simulation import Verification
 
 
 def write_reduction(

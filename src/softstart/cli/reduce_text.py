@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.chain import Chain, Reduction
-    from softstart.chain.verification import Verification
+    from softstart.chain.simulation import Verification
     from softstart.chain.vibration import Vibration
 
 MOST_MODES = 12

@@ -11,7 +11,7 @@ from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from softstart.chain import Reduction
-    from softstart.chain.verification import Verification
+    from softstart.chain.simulation import Verification
 
 FAR = 1.5  # times the K_dyn of the drive: from there on the two masses do not tell the load of the chain
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
@@ -21,7 +21,7 @@ def verified(
     found: Reduction, names: Sequence[str], params: Mapping[str, Mapping[str, Any]]
 ) -> list[Verification]:
     """The controllers of these names, set up for the drive, started on the drive and on the chain."""
-    from softstart.chain.verification import verify_on_chain
+    from softstart.chain.simulation import verify_on_chain
     from softstart.cli.running import Attributed, make_controllers
 
     drive = found.to_drive()

@@ -9,7 +9,7 @@ import pytest
 
 from softstart import Command, Drive, InputError, Measured, PlainController, simulate
 from softstart.chain import Chain, Mass, Shaft, chain_backbone, natural_vibration
-from softstart.chain.backbone import backbone
+from softstart.chain.vibration_with_gaps import backbone
 
 
 class Off(PlainController):

@@ -13,8 +13,7 @@ from scipy.linalg import eigh
 
 from softstart import Drive, InputError, compare
 from softstart.chain import Chain, Mass, Motor, Reduction, Shaft, natural_vibration, reduce_chain
-from softstart.chain.reduction import FACTOR
-from softstart.chain.reduction.condition import pieces
+from softstart.chain.reduction import FACTOR, pieces
 
 Vector = NDArray[np.float64]
 

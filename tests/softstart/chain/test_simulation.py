@@ -14,9 +14,9 @@ from softstart import Command, Drive, InputError, PlainController, Run, Simulati
 from softstart.balancing import Engine
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.chain.backbone import backbone
 from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
+from softstart.chain.vibration_with_gaps import backbone
 
 CRANE = Drive.load("crane-4amtkf")
 # what can differ between a drive and another, each with the two-mass plant's own closed forms

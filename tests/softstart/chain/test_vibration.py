@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from softstart.chain import Chain, Mass, Shaft, natural_vibration
-from softstart.chain.frequencies import elastic_frequencies, shapes
-from softstart.chain.partial import partial_systems, squared_frequencies
+from softstart.chain.vibration import elastic_frequencies, partial_systems, shapes, squared_frequencies
 from softstart.errors import InputError
 
 Vector = NDArray[np.float64]

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.model import Chain, Mass, Shaft
+from softstart.chain.elements import Mass, Shaft
+from softstart.chain.model import Chain
 from softstart.drive import ContactLaw, LoadKind
 
 __all__ = ["Section", "Station", "Working"]
