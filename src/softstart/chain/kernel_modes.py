@@ -6,349 +6,330 @@ import math
 
 import numpy as np
 
-from softstart.chain import kernel_layout as at
-from softstart.chain.kernel_layout import (
+from softstart.chain.kernel_events import GRAZE, REJOINED
+from softstart.chain.kernel_records import (
+    BACK,
     BEYOND,
+    BREAK_BACK,
+    BREAK_FORWARD,
+    CLOSED,
     CONTACT,
-    DIRECTION,
     DOUBLED,
-    FIRST,
-    HALF,
+    EXIT,
+    GEAR_HOLDS,
+    GEAR_LETS_GO,
+    IMPACT,
     JOINED,
-    LAW,
-    LOAD_MASS,
-    MASK,
-    MODE,
+    LOAD_STARTS,
+    LOAD_STOPS,
+    LOWER,
     OPEN,
-    PATH,
-    PATH_END,
+    OPENED,
     PRESSED,
-    RESTITUTION,
-    RIGID,
-    RUBS,
-    SIDE,
-    SIGN,
-    THETA,
+    REACHED,
+    REJOIN,
+    RELEASE,
+    SETTLE,
+    SETTLED,
+    STOP,
+    SWITCH,
+    TARGET_REACHED,
+    TURNED,
+    UPPER,
     WELDED,
-    C,
-    D,
-    J,
-    Matrix,
-    Vector,
-    W,
-)
+    Record,
+    Start,
+)  # fmt: skip
 from softstart.plant.jit import compiled
-from softstart.plant.layout import (
-    DEAD_ZONE,
-    EVENTS,
-    GAP_EVENTS,
-    MODELICA,
-    N_EVENTS,
-    PERIOD,
-    STAGE,
-    START_TIME,
-    T_END,
-    TIME,
-)
+from softstart.plant.layout import DEAD_ZONE, MODELICA, PLANT, STATE
 
-# MASK of a contact whose torque has just come back: it begins at zero
-REJOINED = 3.0
-# a flank that is touched with an overlap below this share of the gap is grazed, not hit, as in the plant
-GRAZE = 1e-12
 # a rigid flank that is reached more slowly than this, against what presses it on within the span, is settled
 SLOW = 1e-10
 # so many impacts of one shaft at one instant are the collapse of masses that bounce between one another:
 # infinitely many in a finite time without any torque that presses, which end with all of them at one speed
 # (S. McNamara, W. R. Young, Phys. Fluids A 4 (1992) 496-504, doi:10.1063/1.858323)
-COLLAPSE = 100.0
+COLLAPSE = 100
 
 
 @compiled
-def note(
-    x: Vector, events: Matrix, time: float, kind: float, place: float, value: float, impulse: float
-) -> None:
+def note(start: Start, time: float, kind: int, place: int, value: float, impulse: float) -> None:
     """One event; `events` may have no rows, then it is only counted."""
-    x[EVENTS] += 1.0
-    if events.shape[0] > 0:
-        row = int(x[N_EVENTS])
-        events[row, at.E_TIME] = time
-        events[row, at.E_KIND] = kind
-        events[row, at.E_PLACE] = place
-        events[row, at.E_VALUE] = value
-        events[row, at.E_IMPULSE] = impulse
-        x[N_EVENTS] += 1.0
+    x = start.x.view(STATE)[0]
+    x.events += 1.0
+    if start.events.size > 0:
+        event = start.events[int(x.n_events)]
+        event.time = time
+        event.kind = kind
+        event.place = place
+        event.value = value
+        event.impulse = impulse
+        x.n_events += 1.0
 
 
 @compiled
-def path_closed(place: Vector, shaft: Matrix, but: int) -> bool:
+def note_friction(start: Start, i: int, direction: float) -> None:
+    """Friction holds mass i from now on (0), or lets it go in a direction."""
+    x = start.x.view(STATE)[0]
+    mass = start.masses[i]
+    of_load = mass.Mc > 0.0
+    if direction == 0.0:
+        note(start, x.time, LOAD_STOPS if of_load else GEAR_HOLDS, i, mass.direction, 0.0)
+    else:
+        note(start, x.time, LOAD_STARTS if of_load else GEAR_LETS_GO, i, direction, 0.0)
+
+
+@compiled
+def path_closed(start: Start, but: int) -> bool:
     """Whether no gap between motor and load is open, but for that of one shaft."""
-    for k in range(int(place[PATH]), int(place[PATH_END])):
-        if k != but and (shaft[k, MODE] == OPEN or shaft[k, MODE] == BEYOND):
+    for k in range(start.place.path, start.place.path_end):
+        mode = start.shafts[k].mode
+        if k != but and (mode in (OPEN, BEYOND)):
             return False
     return True
 
 
 @compiled
-def engage(shafts: Matrix, mass: Matrix, shaft: Matrix, k: int, side: float) -> None:
+def engage(masses: Record, shafts: Record, k: int, side: float) -> None:
     """The spring begins to act, in its damping regime."""
-    shaft[k, SIDE] = side
-    shaft[k, MODE] = CONTACT
-    z = side * shaft[k, THETA] - shafts[k, HALF]
-    v = side * (mass[k, W] - mass[k + 1, W])
-    if shafts[k, LAW] == MODELICA and shafts[k, D] * v > shafts[k, C] * z:
-        shaft[k, MODE] = DOUBLED
-    pulls = shafts[k, LAW] == DEAD_ZONE and shafts[k, C] * z + shafts[k, D] * v < 0.0
-    shaft[k, SIGN] = -side if pulls else side
+    shaft = shafts[k]
+    shaft.side = side
+    shaft.mode = CONTACT
+    z = side * shaft.theta - shaft.half
+    v = side * (masses[k].w - masses[k + 1].w)
+    if shaft.law == MODELICA and shaft.d * v > shaft.c * z:
+        shaft.mode = DOUBLED
+    pulls = shaft.law == DEAD_ZONE and shaft.c * z + shaft.d * v < 0.0
+    shaft.sign = -side if pulls else side
 
 
 @compiled
-def begin_modes(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix) -> None:
+def begin_modes(masses: Record, shafts: Record) -> None:
     """The modes at t = 0."""
-    for i in range(masses.shape[0]):
-        mass[i, W] = masses[i, at.W_0]
-        mass[i, DIRECTION] = np.sign(mass[i, W]) if masses[i, RUBS] != 0.0 else 1.0
-    for k in range(shafts.shape[0]):
-        theta = shafts[k, at.THETA_0]
-        shaft[k, THETA] = theta
-        shaft[k, MASK] = 0.0
-        shaft[k, SIDE] = 0.0
-        shaft[k, SIGN] = 1.0
-        shaft[k, at.PEAK] = 0.0
-        shaft[k, at.PEAK_TIME] = 0.0
-        shaft[k, at.IMPULSE] = 0.0
-        shaft[k, at.STRUCK] = -1.0
-        shaft[k, at.BLOWS] = 0.0
-        shaft[k, MODE] = OPEN
-        if shafts[k, RIGID] != 0.0:
-            if shafts[k, HALF] == 0.0:
-                shaft[k, MODE] = WELDED
-        elif shafts[k, HALF] == 0.0:
-            shaft[k, MODE] = JOINED
-            torque = shafts[k, C] * theta + shafts[k, D] * (mass[k, W] - mass[k + 1, W])
-            shaft[k, SIGN] = 1.0 if torque >= 0.0 else -1.0
-        elif abs(theta) > shafts[k, HALF]:
-            side = math.copysign(1.0, theta)
-            torque = shafts[k, C] * (abs(theta) - shafts[k, HALF])
-            torque += shafts[k, D] * side * (mass[k, W] - mass[k + 1, W])
-            if shafts[k, LAW] != DEAD_ZONE and torque < 0.0:
-                shaft[k, MODE] = BEYOND
-                shaft[k, SIDE] = side
+    for mass in masses:
+        mass.w = mass.w0
+        mass.direction = np.sign(mass.w) if mass.rubs != 0 else 1.0
+    for k in range(shafts.size):
+        shaft = shafts[k]
+        shaft.theta = shaft.theta0
+        shaft.zeros = 0
+        shaft.side = 0.0
+        shaft.sign = 1.0
+        shaft.peak = 0.0
+        shaft.peak_time = 0.0
+        shaft.impulse = 0.0
+        shaft.struck = -1.0
+        shaft.blows = 0
+        shaft.mode = OPEN
+        if shaft.rigid != 0:
+            if shaft.half == 0.0:
+                shaft.mode = WELDED
+        elif shaft.half == 0.0:
+            shaft.mode = JOINED
+            torque = shaft.c * shaft.theta + shaft.d * (masses[k].w - masses[k + 1].w)
+            shaft.sign = 1.0 if torque >= 0.0 else -1.0
+        elif abs(shaft.theta) > shaft.half:
+            side = math.copysign(1.0, shaft.theta)
+            torque = shaft.c * (abs(shaft.theta) - shaft.half)
+            torque += shaft.d * side * (masses[k].w - masses[k + 1].w)
+            if shaft.law != DEAD_ZONE and torque < 0.0:
+                shaft.mode = BEYOND
+                shaft.side = side
             else:
-                engage(shafts, mass, shaft, k, side)
+                engage(masses, shafts, k, side)
 
 
 @compiled
-def goes_with(shaft: Matrix, k: int, side: float, kind: float) -> bool:
-    """Whether the joint k takes the mass behind it along when a flank `side` beside it is struck.
+def goes_with(shaft: Record, side: float, kind: int) -> bool:
+    """Whether a joint takes the mass behind it along when a flank `side` beside it is struck.
 
-    Where impacts have piled up there is no blow left that could part flanks: their torque decides.
+    Where impacts have piled up no impulse is left that could part flanks: their torque decides.
     """
-    if shaft[k, MODE] == PRESSED:
-        return kind == at.SETTLED or shaft[k, SIDE] == side
-    return shaft[k, MODE] == WELDED
+    if shaft.mode == PRESSED:
+        return kind == SETTLED or shaft.side == side
+    return shaft.mode == WELDED
 
 
 @compiled
-def strike(x: Vector, masses: Matrix, mass: Matrix, shaft: Matrix, k: int, restitution: float, kind: float,
-           time: float, events: Matrix) -> None:  # fmt: skip
+def strike(start: Start, k: int, restitution: float, kind: int, time: float) -> None:
     """The rigid flanks of shaft k meet: new speeds by momentum and restitution, noted as an event `kind`.
 
-    What is rigidly joined on either side goes with it, pressed flanks too where the blow presses them on;
-    where it would have to pull they part. Friction is too weak to matter in a blow.
+    What is rigidly joined on either side goes with it, pressed flanks too where the impact presses them on;
+    where it would have to pull they part. Friction is too weak to matter in an impact.
     """
-    side = shaft[k, SIDE]
-    count = masses.shape[0]
+    x = start.x.view(STATE)[0]
+    masses, shafts = start.masses, start.shafts
+    side = shafts[k].side
+    count = masses.size
     a = k
     b = k + 1
-    J_a = masses[a, J]
-    J_b = masses[b, J]
-    while a > 0 and goes_with(shaft, a - 1, side, kind):
+    J_a = masses[a].J
+    J_b = masses[b].J
+    while a > 0 and goes_with(shafts[a - 1], side, kind):
         a -= 1
-        J_a += masses[a, J]
-    while b + 1 < count and goes_with(shaft, b, side, kind):
+        J_a += masses[a].J
+    while b + 1 < count and goes_with(shafts[b], side, kind):
         b += 1
-        J_b += masses[b, J]
-    w_a = mass[k, W]
-    w_b = mass[k + 1, W]
+        J_b += masses[b].J
+    w_a = masses[k].w
+    w_b = masses[k + 1].w
     v = w_a - w_b
     reduced = J_a * J_b / (J_a + J_b)
     impulse = (1.0 + restitution) * reduced * v
     loss = 0.5 * (1.0 - restitution * restitution) * reduced * v * v
-    note(x, events, time, kind, k, loss, impulse)
-    shaft[k, at.IMPULSE] = max(shaft[k, at.IMPULSE], abs(impulse))
+    note(start, time, kind, k, loss, impulse)
+    shafts[k].impulse = max(shafts[k].impulse, abs(impulse))
     if restitution == 0.0:
         w_a = w_b = (J_a * w_a + J_b * w_b) / (J_a + J_b)
     else:
         w_a -= impulse / J_a
         w_b += impulse / J_b
     for i in range(a, b + 1):
-        mass[i, W] = w_a if i <= k else w_b
-        if masses[i, RUBS] != 0.0:
-            direction = np.sign(mass[i, W])
-            if direction != mass[i, DIRECTION]:
-                if mass[i, DIRECTION] != 0.0:
-                    note(
-                        x,
-                        events,
-                        x[TIME],
-                        at.LOAD_STOPS if masses[i, at.MC] > 0.0 else at.GEAR_HOLDS,
-                        i,
-                        mass[i, DIRECTION],
-                        0.0,
-                    )
+        mass = masses[i]
+        mass.w = w_a if i <= k else w_b
+        if mass.rubs != 0:
+            direction = np.sign(mass.w)
+            if direction != mass.direction:
+                if mass.direction != 0.0:
+                    note_friction(start, i, 0.0)
                 if direction != 0.0:
-                    note(
-                        x,
-                        events,
-                        x[TIME],
-                        at.LOAD_STARTS if masses[i, at.MC] > 0.0 else at.GEAR_LETS_GO,
-                        i,
-                        direction,
-                        0.0,
-                    )
-            mass[i, DIRECTION] = direction
+                    note_friction(start, i, direction)
+            mass.direction = direction
     for j in range(max(a - 1, 0), min(b + 1, count - 1)):
-        shaft[j, MASK] = 0.0  # speeds have jumped: nothing is zero by its nature any more
+        shafts[j].zeros = 0  # speeds have jumped: nothing is zero by its nature any more
     for edge in range(2):
         j = a - 1 if edge == 0 else b
-        if 0 <= j < count - 1 and shaft[j, MODE] == PRESSED:
-            shaft[j, MODE] = OPEN
-            note(x, events, x[TIME], at.OPENED, j, shaft[j, SIDE], 0.0)
+        if 0 <= j < count - 1 and shafts[j].mode == PRESSED:
+            shafts[j].mode = OPEN
+            note(start, x.time, OPENED, j, shafts[j].side, 0.0)
 
 
 @compiled
-def settle(
-    x: Vector, masses: Matrix, mass: Matrix, shaft: Matrix, k: int, rest: float, events: Matrix
-) -> None:
+def settle(start: Start, k: int, rest: float) -> None:
     """Rigid flanks lie on each other from now on; `rest` is how much longer the last impacts take."""
-    strike(x, masses, mass, shaft, k, 0.0, at.SETTLED, x[TIME] + rest, events)
-    shaft[k, MODE] = PRESSED
+    x = start.x.view(STATE)[0]
+    strike(start, k, 0.0, SETTLED, x.time + rest)
+    start.shafts[k].mode = PRESSED
 
 
 @compiled
-def meet(x: Vector, masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix, k: int, side: float,
-         press: float, h: float, events: Matrix) -> None:  # fmt: skip
+def meet(start: Start, k: int, side: float, press: float, h: float) -> None:
     """A flank is reached; `press` is the relative acceleration towards it."""
-    v = side * (mass[k, W] - mass[k + 1, W])
-    shaft[k, THETA] = side * shafts[k, HALF]
-    shaft[k, SIDE] = side
-    if shafts[k, RIGID] != 0.0:
-        e = shafts[k, RESTITUTION]
-        at_once = x[TIME] - shaft[k, at.STRUCK] <= 1e-15 * x[TIME]
-        shaft[k, at.BLOWS] = shaft[k, at.BLOWS] + 1.0 if at_once else 0.0
-        shaft[k, at.STRUCK] = x[TIME]
-        if v <= SLOW * abs(press) * h or (shaft[k, at.BLOWS] > COLLAPSE and e < 1.0):
+    x = start.x.view(STATE)[0]
+    shaft = start.shafts[k]
+    v = side * (start.masses[k].w - start.masses[k + 1].w)
+    shaft.theta = side * shaft.half
+    shaft.side = side
+    if shaft.rigid != 0:
+        e = shaft.restitution
+        at_once = x.time - shaft.struck <= 1e-15 * x.time
+        shaft.blows = shaft.blows + 1 if at_once else 0
+        shaft.struck = x.time
+        if v <= SLOW * abs(press) * h or (shaft.blows > COLLAPSE and e < 1.0):
             rest = 0.0
             if press > 0.0 and e < 1.0:
                 rest = 2.0 * max(e * v, -v) / (press * (1.0 - e))
-            settle(x, masses, mass, shaft, k, rest, events)
+            settle(start, k, rest)
         else:
-            strike(x, masses, mass, shaft, k, e, at.IMPACT, x[TIME], events)
-    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * shafts[k, HALF]:
-        x[EVENTS] += 1.0
-        shaft[k, MASK] = 2.0
+            strike(start, k, e, IMPACT, x.time)
+    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * shaft.half:
+        x.events += 1.0
+        shaft.zeros = 2
     else:
-        note(x, events, x[TIME], at.CLOSED, k, side, 0.0)
-        engage(shafts, mass, shaft, k, side)
+        note(start, x.time, CLOSED, k, side, 0.0)
+        engage(start.masses, start.shafts, k, side)
 
 
 @compiled
-def part(x: Vector, shafts: Matrix, shaft: Matrix, k: int, events: Matrix) -> None:
+def part(start: Start, k: int) -> None:
     """The flanks of shaft k cease to act."""
-    side = shaft[k, SIDE]
-    note(x, events, x[TIME], at.OPENED, k, side, 0.0)
-    if shafts[k, LAW] != DEAD_ZONE and shafts[k, D] > 0.0 and side * shaft[k, THETA] > shafts[k, HALF]:
-        shaft[k, MODE] = BEYOND
-        shaft[k, MASK] = 1.0
+    x = start.x.view(STATE)[0]
+    shaft = start.shafts[k]
+    note(start, x.time, OPENED, k, shaft.side, 0.0)
+    if shaft.law != DEAD_ZONE and shaft.d > 0.0 and shaft.side * shaft.theta > shaft.half:
+        shaft.mode = BEYOND
+        shaft.zeros = 1
     else:
-        shaft[k, MODE] = OPEN
-        shaft[k, THETA] = side * shafts[k, HALF]
+        shaft.mode = OPEN
+        shaft.theta = shaft.side * shaft.half
 
 
 @compiled
-def turn(x: Vector, masses: Matrix, mass: Matrix, i: int, direction: float, events: Matrix) -> None:
+def turn(start: Start, i: int, direction: float) -> None:
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
-    j = i
-    while j < masses.shape[0] and int(mass[j, FIRST]) == i:
-        if masses[j, RUBS] != 0.0:
-            if direction == 0.0:
-                note(
-                    x,
-                    events,
-                    x[TIME],
-                    at.LOAD_STOPS if masses[j, at.MC] > 0.0 else at.GEAR_HOLDS,
-                    j,
-                    mass[j, DIRECTION],
-                    0.0,
-                )
-            else:
-                note(
-                    x,
-                    events,
-                    x[TIME],
-                    at.LOAD_STARTS if masses[j, at.MC] > 0.0 else at.GEAR_LETS_GO,
-                    j,
-                    direction,
-                    0.0,
-                )
-            mass[j, DIRECTION] = direction
+    for j in range(i, start.masses.size):
+        mass = start.masses[j]
+        if mass.first != i:
+            break
+        if mass.rubs != 0:
+            note_friction(start, j, direction)
+            mass.direction = direction
         if direction == 0.0:
-            mass[j, W] = 0.0
-        j += 1
+            mass.w = 0.0
 
 
 @compiled
-def handle(p: Vector, x: Vector, place: Vector, masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix,
-           event: int, k: int, press: float, rest: float, h: float, events: Matrix) -> bool:  # fmt: skip
+def handle(start: Start, event: int, k: int, press: float, rest: float, h: float) -> bool:
     """Change of mode at an event on shaft or mass k; True if the path from motor to load closed or opened."""
-    was = path_closed(place, shaft, -1)
-    blow = False
-    if event in (at.UPPER, at.LOWER):
-        blow = shafts[k, RIGID] != 0.0 and place[PATH] <= k < place[PATH_END]
-        meet(x, masses, shafts, mass, shaft, k, 1.0 if event == at.UPPER else -1.0, press, h, events)
-        blow = blow and shaft[k, MODE] == OPEN and shaft[k, MASK] == 0.0
-    elif event == at.SETTLE:
-        shaft[k, SIDE] = math.copysign(1.0, shaft[k, THETA])
-        settle(x, masses, mass, shaft, k, rest, events)
-    elif event == at.REJOIN:
-        note(x, events, x[TIME], at.CLOSED, k, shaft[k, SIDE], 0.0)
-        engage(shafts, mass, shaft, k, shaft[k, SIDE])
-        shaft[k, MASK] = REJOINED
-    elif event == at.EXIT:
-        part(x, shafts, shaft, k, events)
-    elif event == at.RELEASE:
-        note(x, events, x[TIME], at.OPENED, k, shaft[k, SIDE], 0.0)
-        shaft[k, MODE] = OPEN
-        shaft[k, MASK] = 2.0
-    elif event == at.BACK:
-        x[EVENTS] += 1.0
-        shaft[k, THETA] = shaft[k, SIDE] * shafts[k, HALF]
-        shaft[k, MODE] = OPEN
-        shaft[k, MASK] = 0.0
-    elif event == at.SWITCH:
-        x[EVENTS] += 1.0
-        shaft[k, MODE] = CONTACT if shaft[k, MODE] == DOUBLED else DOUBLED
-        shaft[k, MASK] = 1.0
-    elif event == at.TURNED:
-        x[EVENTS] += 1.0
-        shaft[k, SIGN] = -shaft[k, SIGN]
-        shaft[k, MASK] = 1.0
-    elif event == at.STOP:
-        turn(x, masses, mass, k, 0.0, events)
-    elif event in (at.BREAK_FORWARD, at.BREAK_BACK):
-        turn(x, masses, mass, k, 1.0 if event == at.BREAK_FORWARD else -1.0, events)
-    elif event == at.REACHED:
-        x[START_TIME] = x[TIME]
-        note(x, events, x[TIME], at.TARGET_REACHED, place[LOAD_MASS], mass[k, W], 0.0)
-        if x[T_END] == math.inf:
-            x[T_END] = x[TIME] + p[PERIOD]
-    now = path_closed(place, shaft, -1)
-    if blow and not was and path_closed(place, shaft, k):  # closed, and opened at once
-        x[STAGE] += 2.0
-        x[GAP_EVENTS] += 2.0
+    p = start.p.view(PLANT)[0]
+    x = start.x.view(STATE)[0]
+    was = path_closed(start, -1)
+    bounced = False
+    if event in (UPPER, LOWER):
+        shaft = start.shafts[k]
+        bounced = shaft.rigid != 0 and start.place.path <= k < start.place.path_end
+        meet(start, k, 1.0 if event == UPPER else -1.0, press, h)
+        bounced = bounced and shaft.mode == OPEN and shaft.zeros == 0
+    elif event == STOP:
+        turn(start, k, 0.0)
+    elif event in (BREAK_FORWARD, BREAK_BACK):
+        turn(start, k, 1.0 if event == BREAK_FORWARD else -1.0)
+    elif event == REACHED:
+        x.start_time = x.time
+        note(start, x.time, TARGET_REACHED, start.place.load, start.masses[k].w, 0.0)
+        if x.t_end == math.inf:
+            x.t_end = x.time + p.period
+    else:
+        change(start, event, k, rest)
+    now = path_closed(start, -1)
+    if bounced and not was and path_closed(start, k):  # closed, and opened at once
+        x.stage += 2.0
+        x.gap_events += 2.0
         return True
     if now != was:
-        x[STAGE] += 1.0
-        x[GAP_EVENTS] += 1.0
+        x.stage += 1.0
+        x.gap_events += 1.0
         return True
     return False
+
+
+@compiled
+def change(start: Start, event: int, k: int, rest: float) -> None:
+    """Change of mode of shaft k, whose flanks are in contact or overlap."""
+    x = start.x.view(STATE)[0]
+    shaft = start.shafts[k]
+    if event == SETTLE:
+        shaft.side = math.copysign(1.0, shaft.theta)
+        settle(start, k, rest)
+    elif event == REJOIN:
+        note(start, x.time, CLOSED, k, shaft.side, 0.0)
+        engage(start.masses, start.shafts, k, shaft.side)
+        shaft.zeros = REJOINED
+    elif event == EXIT:
+        part(start, k)
+    elif event == RELEASE:
+        note(start, x.time, OPENED, k, shaft.side, 0.0)
+        shaft.mode = OPEN
+        shaft.zeros = 2
+    elif event == BACK:
+        x.events += 1.0
+        shaft.theta = shaft.side * shaft.half
+        shaft.mode = OPEN
+        shaft.zeros = 0
+    elif event == SWITCH:
+        x.events += 1.0
+        shaft.mode = CONTACT if shaft.mode == DOUBLED else DOUBLED
+        shaft.zeros = 1
+    elif event == TURNED:
+        x.events += 1.0
+        shaft.sign = -shaft.sign
+        shaft.zeros = 1

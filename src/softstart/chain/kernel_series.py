@@ -1,4 +1,4 @@
-"""The Taylor series of one span.
+"""The Taylor series of one span, with gears that have losses.
 
 Between two events the chain is linear, and the torques on it are sums of a line, an exponential and
 harmonics; so all coefficients follow from one another. A span reaches three over the fastest rate of the
@@ -6,97 +6,130 @@ chain in its present mode, where some thirty coefficients leave nothing but roun
 
 Masses joined by rigid shafts, or by rigid flanks that press, are one body; what their joints carry follows
 from the balance of each mass.
+
+A gear of efficiency eta sits between its shaft and the mass on the other side of it, and has the speed w of
+that mass. Of the shaft torque T it passes `eta T` on to the mass when power flows that way, and takes `T/eta`
+from it when power flows back. The difference is friction on the mass, against its motion:
+
+    (1 - eta) |T|      where the shaft drives the mass
+    (1/eta - 1) |T|    where the mass drives the shaft
+
+It passes continuously through T = 0, and jumps where the speed changes its sign with a torque on: there the
+mass sticks while the torque that moves it lies between the two (A. F. Filippov, Differential Equations with
+Discontinuous Righthand Sides, 1988), as one with a reactive load does, with limits that go with T.
 """
 
 from __future__ import annotations
 
 import math
 
-from softstart.chain.kernel_gears import body_grip, held_by, set_gears
-from softstart.chain.kernel_layout import (
-    ACTIVE,
-    AFTER,
-    BEFORE,
-    BODY_J,
-    CONTACT,
-    COSINE,
-    DIRECTION,
-    DOUBLED,
-    FIRST,
-    GEARS,
-    GROUND,
-    HALF,
-    HELD,
-    HOLD,
-    INFLUENCE,
-    JOINED,
-    MC,
-    MEAN,
-    MODE,
-    MOTOR,
-    OMEGA,
-    ON,
-    ORDERS,
-    OUTSIDE,
-    PHI_LINE,
-    PRESSED,
-    RUBBING,
-    RUBS,
-    SIDE,
-    SINE,
-    SIZE,
-    SPEED,
-    STUCK,
-    THETA,
-    TORQUE,
-    TWIST,
-    U_LINE,
-    USED,
-    WELDED,
-    C,
-    Cube,
-    D,
-    J,
-    Matrix,
-    Vector,
-    W,
-)
-from softstart.plant.jit import compiled
-from softstart.plant.layout import LAG, PHI2, TIME, UA, UB, UE
+from softstart.chain.kernel_records import CONTACT, DOUBLED, JOINED, ORDERS, PRESSED, WELDED, Record, Start
+from softstart.plant.jit import compiled, inlined
+from softstart.plant.layout import MOTION, PLANT, STATE
 
 REACH = 3.0
 TRUNCATION = 1e-18
 
 
+# bodies and gears -----------------------------------------------------------------------------------
+
+
 @compiled
-def join_bodies(masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix) -> None:
+def join_bodies(masses: Record, shafts: Record) -> None:
     """Which masses move as one, their inertia, the friction that can hold them, what their gears pass on."""
     first = 0
-    for i in range(masses.shape[0]):
-        if i == 0 or (shaft[i - 1, MODE] != WELDED and shaft[i - 1, MODE] != PRESSED):
+    for i in range(masses.size):
+        mass = masses[i]
+        if i == 0 or (shafts[i - 1].mode != WELDED and shafts[i - 1].mode != PRESSED):
             first = i
-            mass[i, BODY_J] = 0.0
-            mass[i, HOLD] = 0.0
-            mass[i, STUCK] = 0.0
-            mass[i, RUBBING] = 0.0
-            mass[i, GEARS] = 0.0
-        mass[i, FIRST] = first
-        mass[first, BODY_J] += masses[i, J]
-        if masses[i, RUBS] != 0.0:
-            mass[first, RUBBING] += 1.0
-            mass[first, HOLD] += masses[i, MC]
-            if mass[i, DIRECTION] == 0.0:
-                mass[first, STUCK] = 1.0
-    set_gears(shafts, mass, shaft)
+            mass.body_J = 0.0
+            mass.hold = 0.0
+            mass.stuck = 0
+            mass.rubbing = 0
+            mass.gears = 0
+        mass.first = first
+        body = masses[first]
+        body.body_J += mass.J
+        if mass.rubs != 0:
+            body.rubbing += 1
+            body.hold += mass.Mc
+            if mass.direction == 0.0:
+                body.stuck = 1
+    for k in range(shafts.size):
+        set_gear(masses, shafts, k)
 
 
 @compiled
-def fastest_rate(masses: Matrix, shafts: Matrix, tones: Matrix, mass: Matrix, shaft: Matrix) -> float:
+def set_gear(masses: Record, shafts: Record, k: int) -> None:
+    """The share of the torque of shaft k that acts on the masses beside it, in the present directions."""
+    shaft = shafts[k]
+    shaft.before = 1.0
+    shaft.after = 1.0
+    if shaft.eta == 1.0:
+        return
+    i = k + shaft.gear
+    masses[masses[i].first].gears += 1
+    forward = shaft.sign * masses[i].direction  # power flows towards the last mass
+    if forward == 0.0:
+        return
+    if i == k:
+        shaft.before = 1.0 / shaft.eta if forward > 0.0 else shaft.eta
+    else:
+        shaft.after = shaft.eta if forward > 0.0 else 1.0 / shaft.eta
+
+
+@compiled
+def grip(shafts: Record, j: int, direction: float, o: int) -> float:
+    """The coefficient of order o of the friction of the gears at mass j, were it to move so."""
+    total = 0.0
+    for k in range(max(j - 1, 0), min(j + 1, shafts.size)):
+        shaft = shafts[k]
+        if shaft.eta == 1.0 or k + shaft.gear != j:
+            continue
+        driven = shaft.sign * direction if j > k else -shaft.sign * direction
+        share = (1.0 - shaft.eta if driven > 0.0 else 1.0 / shaft.eta - 1.0) * shaft.sign
+        total += share * shaft.torque[o]
+    return total
+
+
+@compiled
+def body_grip(masses: Record, shafts: Record, i: int, direction: float, o: int) -> float:
+    """The same of all gears of the body that begins with mass i."""
+    total = 0.0
+    for j in range(i, masses.size):
+        if masses[j].first != i:
+            break
+        total += grip(shafts, j, direction, o)
+    return total
+
+
+@compiled
+def held_by(masses: Record, shafts: Record, i: int, j: int, held: float, o: int) -> float:
+    """What of `held`, the coefficient of order o of what holds the body i, falls to its mass j.
+
+    What each of several holds is not determined. None holds more than it can if each is used to the same
+    share at the beginning of the span, `used`; from there on a gear goes with its torque, and reactive loads
+    take what is left.
+    """
+    body = masses[i]
+    direction = 1.0 if body.used >= 0.0 else -1.0
+    of_gear = abs(body.used) * direction * grip(shafts, j, direction, o)
+    of_gears = abs(body.used) * direction * body_grip(masses, shafts, i, direction, o)
+    part = masses[j].Mc / body.hold if body.hold > 0.0 else 1.0 / body.rubbing
+    return of_gear + (held - of_gears) * part
+
+
+# the length of a span -------------------------------------------------------------------------------
+
+
+@inlined
+def fastest_rate(start: Start) -> float:
     """An upper bound of the rates of the chain in its present mode, 1/s.
 
     Gershgorin's theorem on the matrix of the shafts, c_k (1/J_a + 1/J_b) with sqrt(c_k c_l)/J beside it, and
     the same of the dampings.
     """
+    masses, shafts = start.masses, start.shafts
     springs = 0.0
     dampers = 0.0
     ground = 0.0
@@ -105,30 +138,30 @@ def fastest_rate(masses: Matrix, shafts: Matrix, tones: Matrix, mass: Matrix, sh
     before_row = 0.0
     before_damping = 0.0
     shared = 0.0
-    for i in range(masses.shape[0]):
-        first = int(mass[i, FIRST])
-        if first == i:
-            shared = 0.0 if mass[i, STUCK] != 0.0 else 1.0 / mass[i, BODY_J]
-            held = 0.0
+    for i in range(masses.size):
+        mass = masses[i]
+        if mass.first == i:
+            shared = 0.0 if mass.stuck != 0 else 1.0 / mass.body_J
+            to_ground = 0.0
             j = i
-            while j < masses.shape[0] and int(mass[j, FIRST]) == i:
-                held += masses[j, GROUND]
+            while j < masses.size and masses[j].first == i:
+                to_ground += masses[j].ground
                 j += 1
-            ground = max(ground, held * shared)
-        if i + 1 == masses.shape[0] or int(mass[i + 1, FIRST]) != i + 1:
+            ground = max(ground, to_ground * shared)
+        if i + 1 == masses.size or masses[i + 1].first != i + 1:
             continue
-        mode = shaft[i, MODE]
+        shaft = shafts[i]
         c = 0.0
         d = 0.0
-        if mode in (CONTACT, JOINED):
-            c = shafts[i, C]
-            d = shafts[i, D]
-        elif mode == DOUBLED:
-            c = 2.0 * shafts[i, C]
-        share = max(shaft[i, BEFORE], shaft[i, AFTER])
+        if shaft.mode in (CONTACT, JOINED):
+            c = shaft.c
+            d = shaft.d
+        elif shaft.mode == DOUBLED:
+            c = 2.0 * shaft.c
+        share = max(shaft.before, shaft.after)
         c *= share
         d *= share
-        after = 0.0 if mass[i + 1, STUCK] != 0.0 else 1.0 / mass[i + 1, BODY_J]
+        after = 0.0 if masses[i + 1].stuck != 0 else 1.0 / masses[i + 1].body_J
         coupling = math.sqrt(c * before_c) * shared
         friction = math.sqrt(d * before_d) * shared
         springs = max(springs, before_row + coupling)
@@ -140,42 +173,9 @@ def fastest_rate(masses: Matrix, shafts: Matrix, tones: Matrix, mass: Matrix, sh
     springs = max(springs, before_row)
     dampers = max(dampers, before_damping) + ground
     rate = 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
-    for j in range(tones.shape[0]):
-        rate = max(rate, tones[j, OMEGA])
+    for tone in start.tones:
+        rate = max(rate, tone.omega)
     return rate
-
-
-@compiled
-def outside(x: Vector, m: Vector, lag: float, masses: Matrix, tones: Matrix, h: float, n: int,
-            series: Cube, lines: Matrix) -> None:  # fmt: skip
-    """The coefficients of the motor torque and of the exciting torques."""
-    for o in range(n + 1):
-        lines[U_LINE, o] = 0.0
-    lines[U_LINE, 0] = m[UA]
-    lines[U_LINE, 1] = m[UB] * h
-    if m[UE] != 0.0:
-        term = m[UE]
-        for o in range(n + 1):
-            lines[U_LINE, o] += term
-            term *= -h / (lag * (o + 1.0))
-    for i in range(masses.shape[0]):
-        series[OUTSIDE, i, 0] = masses[i, MEAN]
-        for o in range(1, n + 1):
-            series[OUTSIDE, i, o] = 0.0
-    for j in range(tones.shape[0]):
-        i = int(tones[j, ON])
-        phase = tones[j, OMEGA] * x[TIME]
-        cos = math.cos(phase)
-        sin = math.sin(phase)
-        turn = tones[j, OMEGA] * h
-        even = tones[j, COSINE] * cos + tones[j, SINE] * sin
-        odd = (tones[j, SINE] * cos - tones[j, COSINE] * sin) * turn
-        for o in range(0, n + 1, 2):
-            series[OUTSIDE, i, o] += even
-            even *= -turn * turn / ((o + 1.0) * (o + 2.0))
-            if o < n:
-                series[OUTSIDE, i, o + 1] += odd
-                odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
 
 
 @compiled
@@ -189,82 +189,126 @@ def orders(reach: float) -> int:
     return max(n + 2, 4)
 
 
+# the series -----------------------------------------------------------------------------------------
+
+
+@inlined
+def expand_torques(start: Start, h: float, n: int) -> None:
+    """The coefficients of the motor torque and of the exciting torques."""
+    p = start.p.view(PLANT)[0]
+    x = start.x.view(STATE)[0]
+    m, u = start.m.view(MOTION)[0], start.u
+    for o in range(n + 1):
+        u[o] = 0.0
+    u[0] = m.ua
+    u[1] = m.ub * h
+    if m.ue != 0.0:
+        lag = p.lag
+        term = m.ue
+        for o in range(n + 1):
+            u[o] += term
+            term *= -h / (lag * (o + 1.0))
+    for mass in start.masses:
+        mass.outside[0] = mass.mean
+        for o in range(1, n + 1):
+            mass.outside[o] = 0.0
+    for tone in start.tones:
+        outside = start.masses[tone.mass].outside
+        phase = tone.omega * x.time
+        cos = math.cos(phase)
+        sin = math.sin(phase)
+        turn = tone.omega * h
+        even = tone.cosine * cos + tone.sine * sin
+        odd = (tone.sine * cos - tone.cosine * sin) * turn
+        for o in range(0, n + 1, 2):
+            outside[o] += even
+            even *= -turn * turn / ((o + 1.0) * (o + 2.0))
+            if o < n:
+                outside[o + 1] += odd
+                odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
+
+
 @compiled
-def expand(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, tones: Matrix,
-           mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, h: float, n: int) -> None:  # fmt: skip
+def expand(start: Start, h: float, n: int) -> None:
     """All coefficients of the span of length h that begins with the present state and modes."""
-    count = masses.shape[0]
-    motor = int(place[MOTOR])
-    outside(x, m, p[LAG], masses, tones, h, n, series, lines)
-    lines[PHI_LINE, 0] = x[PHI2]
-    for i in range(count):
-        series[SPEED, i, 0] = mass[i, W]
-        if i + 1 < count:
-            series[TWIST, i, 0] = shaft[i, THETA]
+    x = start.x.view(STATE)[0]
+    masses, shafts = start.masses, start.shafts
+    count = masses.size
+    motor = start.place.motor
+    expand_torques(start, h, n)
+    start.phi[0] = x.phi2
+    for mass in masses:
+        mass.speed[0] = mass.w
+    for shaft in shafts:
+        shaft.twist[0] = shaft.theta
     for o in range(n + 1):
         share = h / (o + 1.0)
         for k in range(count - 1):
-            mode = shaft[k, MODE]
-            if mode in (CONTACT, JOINED, DOUBLED):
-                z = series[TWIST, k, o]
+            shaft = shafts[k]
+            if shaft.mode in (CONTACT, JOINED, DOUBLED):
+                z = shaft.twist[o]
                 if o == 0:
-                    z -= shaft[k, SIDE] * shafts[k, HALF]
-                if mode == DOUBLED:
-                    series[TORQUE, k, o] = 2.0 * shafts[k, C] * z
+                    z -= shaft.side * shaft.half
+                if shaft.mode == DOUBLED:
+                    shaft.torque[o] = 2.0 * shaft.c * z
                 else:
-                    series[TORQUE, k, o] = shafts[k, C] * z
-                    if shafts[k, D] != 0.0:
-                        series[TORQUE, k, o] += shafts[k, D] * (series[SPEED, k, o] - series[SPEED, k + 1, o])
+                    torque = shaft.c * z
+                    if shaft.d != 0.0:
+                        torque += shaft.d * (masses[k].speed[o] - masses[k + 1].speed[o])
+                    shaft.torque[o] = torque
             else:
-                series[TORQUE, k, o] = 0.0
+                shaft.torque[o] = 0.0
         i = 0
         while i < count:
+            body = masses[i]
             last = i
             total = 0.0
             size = 0.0
             while True:
-                q = series[OUTSIDE, last, o]
+                mass = masses[last]
+                q = mass.outside[o]
                 if last == motor:
-                    q += lines[U_LINE, o]
-                if masses[last, GROUND] != 0.0:
-                    q -= masses[last, GROUND] * series[SPEED, last, o]
+                    q += start.u[o]
+                if mass.ground != 0.0:
+                    q -= mass.ground * mass.speed[o]
                 if o == 0:
-                    q -= mass[last, DIRECTION] * masses[last, MC] + masses[last, ACTIVE]
+                    q -= mass.direction * mass.Mc + mass.active
                     size += abs(q)
-                series[OUTSIDE, last, o] = q
+                mass.outside[o] = q
                 total += q
-                if last + 1 == count or int(mass[last + 1, FIRST]) != i:
+                if last + 1 == count or masses[last + 1].first != i:
                     break
                 last += 1
             if i > 0:
-                total += shaft[i - 1, AFTER] * series[TORQUE, i - 1, o]
+                total += shafts[i - 1].after * shafts[i - 1].torque[o]
             if last + 1 < count:
-                total -= shaft[last, BEFORE] * series[TORQUE, last, o]
-            stuck = mass[i, STUCK] != 0.0
+                total -= shafts[last].before * shafts[last].torque[o]
+            stuck = body.stuck != 0
             held = total if stuck else 0.0
-            rise = 0.0 if stuck else total / mass[i, BODY_J]
-            series[HELD, i, o] = held
+            rise = 0.0 if stuck else total / body.body_J
+            body.held[o] = held
             if o == 0:
                 if i > 0:
-                    size += shaft[i - 1, AFTER] * abs(series[TORQUE, i - 1, 0])
+                    size += shafts[i - 1].after * abs(shafts[i - 1].torque[0])
                 if last + 1 < count:
-                    size += shaft[last, BEFORE] * abs(series[TORQUE, last, 0])
+                    size += shafts[last].before * abs(shafts[last].torque[0])
                 if stuck:
                     direction = 1.0 if held >= 0.0 else -1.0
-                    most = mass[i, HOLD] + body_grip(shafts, mass, shaft, series, i, direction, 0)
-                    mass[i, USED] = held / most if most > 0.0 else 0.0
-                mass[i, SIZE] = size
-                mass[i, INFLUENCE] = size / mass[i, BODY_J]
+                    most = body.hold + body_grip(masses, shafts, i, direction, 0)
+                    body.used = held / most if most > 0.0 else 0.0
+                body.size = size
+                body.influence = size / body.body_J
             for j in range(i, last + 1):
-                series[SPEED, j, o + 1] = rise * share
+                mass = masses[j]
+                mass.speed[o + 1] = rise * share
                 if j < last:  # the joint carries what the masses before it leave
-                    carried = series[OUTSIDE, j, o] - masses[j, J] * rise
-                    if stuck and masses[j, RUBS] != 0.0:
-                        carried -= held_by(masses, shafts, mass, shaft, series, i, j, held, o)
+                    carried = mass.outside[o] - mass.J * rise
+                    if stuck and mass.rubs != 0:
+                        carried -= held_by(masses, shafts, i, j, held, o)
                     if j > 0:
-                        carried += shaft[j - 1, AFTER] * series[TORQUE, j - 1, o]
-                    series[TORQUE, j, o] = carried
+                        carried += shafts[j - 1].after * shafts[j - 1].torque[o]
+                    shafts[j].torque[o] = carried
             i = last + 1
         for k in range(count - 1):
-            series[TWIST, k, o + 1] = share * (series[SPEED, k, o] - series[SPEED, k + 1, o])
-        lines[PHI_LINE, o + 1] = share * series[SPEED, motor, o]
+            shafts[k].twist[o + 1] = share * (masses[k].speed[o] - masses[k + 1].speed[o])
+        start.phi[o + 1] = share * masses[motor].speed[o]

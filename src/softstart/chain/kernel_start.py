@@ -1,311 +1,379 @@
-"""A start of a chain: span after span under a controller."""
+"""A start of a chain, span after span under a controller; and its record, read back at any instant."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
-from softstart.chain import kernel_layout as at
-from softstart.chain.kernel_events import next_event
-from softstart.chain.kernel_layout import (
+from softstart.chain.kernel_events import next_event, peak_within, value
+from softstart.chain.kernel_modes import begin_modes, handle, path_closed
+from softstart.chain.kernel_records import (
     CONTACT,
-    DIRECTION,
     DOUBLED,
     JOINED,
-    LOAD_MASS,
-    MASK,
-    MODE,
-    MOTOR,
-    MOTOR_SHAFT,
-    PHI_LINE,
+    LOWER,
+    NO_EVENT,
+    ORDERS,
     PRESSED,
-    SIDE,
-    SPEED,
-    THETA,
-    TORQUE,
-    TWIST,
+    SETTLE,
+    START_TYPE,
+    UNSOLVED,
+    UPPER,
     WELDED,
-    Cube,
-    Matrix,
+    Record,
+    Start,
     Vector,
-    W,
-)
-from softstart.chain.kernel_modes import begin_modes, handle, path_closed
-from softstart.chain.kernel_peaks import peak_within
-from softstart.chain.kernel_roots import value
+)  # fmt: skip
 from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
 from softstart.plant.advance import next_in_queue
-from softstart.plant.jit import compiled, compiled_as
+from softstart.plant.jit import compiled, compiled_as, inlined
 from softstart.plant.layout import (
+    ANSWER,
     ASK,
-    ASK_AT,
-    ASK_ON_GAP,
-    ASKED,
     BUFFER_FULL,
-    DEMAND,
-    DEMAND_SLOPE,
     ENDED,
-    EVENT_CAP,
     EVENT_LIMIT,
-    EVENTS,
-    LAG,
+    MEASURED,
     MOTION,
-    N_EVENTS,
-    N_SEGMENTS,
     NOT_FINITE,
     NOT_LOCATED,
-    PENDING,
-    PHI2,
     PLANT,
-    Q_TIME,
-    QUEUE,
-    REF,
-    SLEW_END,
-    STAGE,
-    START_TIME,
     STATE,
-    STATUS,
-    T_END,
-    TIME,
-    TIME_LIMIT,
-    UA,
-    UB,
-    UE,
-    W2,
-    U,
-    V,
+    Motion,
+    Plant,
+    State,
 )
-from softstart.plant.layout import THETA as NO_THETA
 from softstart.plant.span import torque_course
-from softstart.plant.start import (
-    ASK_AGAIN,
-    M_SHAFT_TORQUE,
-    NEW_STATE,
-    SEES_SHAFT_TORQUE,
-    SLOPE,
-    STEP_SIGNATURE,
-    measure,
-    obey,
-)
-from softstart.plant.start import (
-    TORQUE as DEMANDED,
-)
+from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, sample, take_answer
 
 _A = types.Array(types.float64, 1, "C")
-_M = types.Array(types.float64, 2, "C")
-_C = types.Array(types.float64, 3, "C")
 _STEP = types.FunctionType(STEP_SIGNATURE)
 
 
 @compiled
-def begin(x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, mass: Matrix, shaft: Matrix,
-          until: float) -> None:  # fmt: skip
+def begin(start: Start, until: float) -> None:
     """The state at t = 0."""
-    for i in range(x.shape[0]):
-        x[i] = 0.0
-    m[PENDING] = 0.0
-    x[T_END] = until
-    x[START_TIME] = math.nan
-    begin_modes(masses, shafts, mass, shaft)
-    join_bodies(masses, shafts, mass, shaft)
-    motor = int(place[MOTOR])
-    load = int(place[LOAD_MASS])
+    m = start.m.view(MOTION)[0]
+    for i in range(start.x.shape[0]):
+        start.x[i] = 0.0
+    x = start.x.view(STATE)[0]
+    m.pending = 0.0
+    x.t_end = until
+    x.start_time = math.nan
+    begin_modes(start.masses, start.shafts)
+    join_bodies(start.masses, start.shafts)
+    motor = start.place.motor
+    load = start.place.load
     for k in range(min(motor, load), max(motor, load)):  # the load mass begins at the angle 0
-        x[PHI2] += shaft[k, THETA] if motor < load else -shaft[k, THETA]
-    x[STAGE] = 2.0 if path_closed(place, shaft, -1) else 1.0
+        theta = start.shafts[k].theta
+        x.phi2 += theta if motor < load else -theta
+    x.stage = 2.0 if path_closed(start, -1) else 1.0
 
 
-@compiled
-def record(x: Vector, m: Vector, mass: Matrix, shaft: Matrix, h: float, segments: Matrix) -> None:
+@inlined
+def record(start: Start, h: float) -> None:
     """What is needed to evaluate any instant of this span again."""
-    row = segments[int(x[N_SEGMENTS])]
-    row[at.S_START] = x[TIME]
-    row[at.S_END] = x[TIME] + h
-    row[at.S_UA] = m[UA]
-    row[at.S_UB] = m[UB]
-    row[at.S_UE] = m[UE]
-    row[at.S_PHI] = x[PHI2]
-    j = at.S_MASS
-    for i in range(mass.shape[0]):
-        row[j] = mass[i, W]
-        row[j + 1] = mass[i, DIRECTION]
-        j += 2
-    for k in range(shaft.shape[0]):
-        row[j] = shaft[k, THETA]
-        row[j + 1] = shaft[k, MODE]
-        row[j + 2] = shaft[k, SIDE]
-        row[j + 3] = shaft[k, at.SIGN]
-        j += at.OF_SHAFT
-    x[N_SEGMENTS] += 1.0
+    x, m = start.x.view(STATE)[0], start.m.view(MOTION)[0]
+    row = int(x.n_segments)
+    span = start.spans[row]
+    span.start = x.time
+    span.end = x.time + h
+    span.ua = m.ua
+    span.ub = m.ub
+    span.ue = m.ue
+    span.phi = x.phi2
+    for i in range(start.masses.size):
+        mass, kept = start.masses[i], start.span_masses[row, i]
+        kept.w = mass.w
+        kept.direction = mass.direction
+    for k in range(start.shafts.size):
+        shaft, noted = start.shafts[k], start.span_shafts[row, k]
+        noted.theta = shaft.theta
+        noted.mode = shaft.mode
+        noted.side = shaft.side
+        noted.sign = shaft.sign
+    x.n_segments += 1.0
 
 
-@compiled
-def move_masses(
-    x: Vector, mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, n: int, s: float
-) -> None:
+@inlined
+def move_masses(start: Start, n: int, s: float) -> None:
     """Speeds, twists and the motor's angle at s on [0, 1]."""
-    for i in range(mass.shape[0]):
-        mass[i, W] = value(series[SPEED, i], n, s)
-    for k in range(shaft.shape[0]):
-        if shaft[k, MODE] != PRESSED and shaft[k, MODE] != WELDED:
-            shaft[k, THETA] = value(series[TWIST, k], n, s)
-    x[PHI2] = value(lines[PHI_LINE], n, s)
+    x = start.x.view(STATE)[0]
+    for mass in start.masses:
+        mass.w = value(mass.speed, n, s)
+    for shaft in start.shafts:
+        if shaft.mode not in (PRESSED, WELDED):
+            shaft.theta = value(shaft.twist, n, s)
+    x.phi2 = value(start.phi, n, s)
 
 
-@compiled
-def move_motor(p: Vector, x: Vector, m: Vector, s: float) -> None:
+@inlined
+def move_motor(p: Plant, x: State, m: Motion, s: float) -> None:
     """Torque, slew limiter and demand after s seconds, as in the two-mass plant."""
-    left = math.exp(-s / p[LAG]) if m[UE] != 0.0 else 0.0
-    x[U] = m[UA] + m[UB] * s + m[UE] * left
-    if x[DEMAND_SLOPE] != 0.0:
-        x[DEMAND] += x[DEMAND_SLOPE] * s
-    x[REF] = x[DEMAND] if s >= m[SLEW_END] else x[REF] + m[UB] * s
+    left = math.exp(-s / p.lag) if m.ue != 0.0 else 0.0
+    x.u = m.ua + m.ub * s + m.ue * left
+    if x.demand_slope != 0.0:
+        x.demand += x.demand_slope * s
+    x.ref = x.demand if s >= m.slew_end else x.ref + m.ub * s
 
 
-@compiled
-def pressing(series: Cube, k: int, n: int, s: float, h: float, side: float) -> float:
-    """The relative acceleration towards the flank `side` of shaft k, rad/s^2."""
+@inlined
+def pressing(twist: Vector, n: int, s: float, h: float, side: float) -> float:
+    """The relative acceleration towards the flank `side`, rad/s^2."""
     total = 0.0
     for o in range(n, 1, -1):
-        total = total * s + o * (o - 1.0) * series[TWIST, k, o]
+        total = total * s + o * (o - 1.0) * twist[o]
     return side * total / (h * h)
 
 
+@inlined
+def rate_of(start: Start) -> float:
+    """An upper bound of all rates of the span, 1/s; the bodies are joined here."""
+    p = start.p.view(PLANT)[0]
+    m = start.m.view(MOTION)[0]
+    join_bodies(start.masses, start.shafts)
+    rate = fastest_rate(start)
+    if m.ue != 0.0:
+        rate = max(rate, 1.0 / p.lag)
+    return rate
+
+
 @compiled
-def advance(p: Vector, x: Vector, m: Vector, place: Vector, masses: Matrix, shafts: Matrix, tones: Matrix,
-            mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix, segments: Matrix,
-            events: Matrix) -> int:  # fmt: skip
+def advance(start: Start) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way."""
-    recording = segments.shape[0] > 0
+    p, x, m = start.p.view(PLANT)[0], start.x.view(STATE)[0], start.m.view(MOTION)[0]
+    masses, shafts = start.masses, start.shafts
+    recording = start.spans.size > 0
     while True:
         if recording and (
-            x[N_SEGMENTS] >= segments.shape[0] or x[N_EVENTS] + 2 * masses.shape[0] + 8 >= events.shape[0]
+            x.n_segments >= start.spans.size or x.n_events + 2 * masses.size + 8 >= start.events.size
         ):
             return BUFFER_FULL
-        t = x[TIME]
-        stop = x[T_END]
-        if math.isnan(x[START_TIME]) and stop == math.inf:
-            stop = p[TIME_LIMIT]
+        t = x.time
+        stop = x.t_end
+        if math.isnan(x.start_time) and stop == math.inf:
+            stop = p.time_limit
         if t >= stop:
             return ENDED
-        if m[PENDING] > 0.0 and t >= m[QUEUE + Q_TIME]:
-            next_in_queue(x.view(STATE)[0], m.view(MOTION)[0])
+        if m.pending > 0.0 and t >= m.due_time[0]:
+            next_in_queue(x, m)
             continue
-        if t >= x[ASK_AT]:
-            return ASK if x[ASKED] < p[EVENT_CAP] else EVENT_LIMIT
-        torque_course(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0])
-        until = min(x[ASK_AT], stop)
-        if m[PENDING] > 0.0:
-            until = min(until, m[QUEUE + Q_TIME])
+        if t >= x.ask_at:
+            return ASK if x.asked < p.event_cap else EVENT_LIMIT
+        torque_course(p, x, m)
+        until = min(x.ask_at, stop)
+        if m.pending > 0.0:
+            until = min(until, m.due_time[0])
         h = until - t
-        cut = m[SLEW_END] < h
+        cut = m.slew_end < h
         if cut:
-            h = m[SLEW_END]
-        join_bodies(masses, shafts, mass, shaft)
-        rate = fastest_rate(masses, shafts, tones, mass, shaft)
-        if m[UE] != 0.0:
-            rate = max(rate, 1.0 / p[LAG])
+            h = m.slew_end
+        rate = rate_of(start)
         if rate * h > REACH:
             cut = True
             h = REACH / rate
         n = orders(rate * h)
-        expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, h, n)
-        event, where, s = next_event(p, x, place, masses, shafts, mass, shaft, series, lines, h, n)
-        if event == at.UNSOLVED:
+        expand(start, h, n)
+        event, where, s = next_event(start, h, n)
+        if event == UNSOLVED:
             return NOT_LOCATED
-        for k in range(shaft.shape[0]):
-            carries = shaft[k, MODE] in (CONTACT, DOUBLED, JOINED, PRESSED, WELDED)
-            if carries and not peak_within(shaft, series, lines, k, n, s, t, h):
+        for k in range(shafts.size):
+            carries = shafts[k].mode in (CONTACT, DOUBLED, JOINED, PRESSED, WELDED)
+            if carries and not peak_within(start, k, n, s, t, h):
                 return NOT_LOCATED
         if s > 0.0:
             if recording:
-                record(x, m, mass, shaft, s * h, segments)
-            move_masses(x, mass, shaft, series, lines, n, s)
+                record(start, s * h)
+            move_masses(start, n, s)
             move_motor(p, x, m, s * h)
-            x[TIME] = t + s * h
-            for k in range(shaft.shape[0]):
-                shaft[k, MASK] = 0.0
-        total = x[U]
-        for i in range(mass.shape[0]):
-            total += mass[i, W]
+            x.time = t + s * h
+            for shaft in shafts:
+                shaft.zeros = 0
+        total = x.u
+        for mass in masses:
+            total += mass.w
         if not math.isfinite(total):
             return NOT_FINITE
-        if event == at.NO_EVENT:
+        if event == NO_EVENT:
             if not cut:
-                x[TIME] = until
+                x.time = until
             continue
         press = 0.0
         rest = 0.0
-        if event in (at.UPPER, at.LOWER):
-            press = pressing(series, where, n, s, h, 1.0 if event == at.UPPER else -1.0)
-        elif event == at.SETTLE:
-            ratio = -series[TWIST, where, 1] / series[TWIST, where, 2]
-            if shafts[where, at.RESTITUTION] < 1.0:
-                rest = h * ratio / (1.0 - shafts[where, at.RESTITUTION])
-        of_gap = handle(p, x, place, masses, shafts, mass, shaft, event, where, press, rest, h, events)
-        if of_gap and x[ASK_ON_GAP] != 0.0:
-            x[ASK_AT] = x[TIME]
-        if x[EVENTS] > p[EVENT_CAP]:
+        if event in (UPPER, LOWER):
+            press = pressing(shafts[where].twist, n, s, h, 1.0 if event == UPPER else -1.0)
+        elif event == SETTLE:
+            struck = shafts[where]
+            ratio = -struck.twist[1] / struck.twist[2]
+            if struck.restitution < 1.0:
+                rest = h * ratio / (1.0 - struck.restitution)
+        of_gap = handle(start, event, where, press, rest, h)
+        if of_gap and x.ask_on_gap != 0.0:
+            x.ask_at = x.time
+        if x.events > p.event_cap:
             return EVENT_LIMIT
 
 
-@compiled
-def torque_now(shafts: Matrix, mass: Matrix, shaft: Matrix, series: Cube, k: int) -> float:
+@inlined
+def torque_now(start: Start, k: int) -> float:
     """The torque of shaft k in the present state; of rigid joints as the last series has it."""
-    mode = shaft[k, MODE]
-    if mode in (PRESSED, WELDED):
-        return series[TORQUE, k, 0]
-    if mode not in (CONTACT, DOUBLED, JOINED):
+    shaft = start.shafts[k]
+    if shaft.mode in (PRESSED, WELDED):
+        return shaft.torque[0]
+    if shaft.mode not in (CONTACT, DOUBLED, JOINED):
         return 0.0
-    z = shaft[k, THETA] - shaft[k, SIDE] * shafts[k, at.HALF]
-    if mode == DOUBLED:
-        return 2.0 * shafts[k, at.C] * z
-    return shafts[k, at.C] * z + shafts[k, at.D] * (mass[k, W] - mass[k + 1, W])
+    z = shaft.theta - shaft.side * shaft.half
+    if shaft.mode == DOUBLED:
+        return 2.0 * shaft.c * z
+    return shaft.c * z + shaft.d * (start.masses[k].w - start.masses[k + 1].w)
 
 
 @compiled
-def look(p: Vector, x: Vector, m: Vector, sees: int, place: Vector, masses: Matrix, shafts: Matrix,
-         tones: Matrix, mass: Matrix, shaft: Matrix, series: Cube, lines: Matrix,
-         measured: Vector) -> None:  # fmt: skip
+def measure_chain(start: Start, sees: int, measured: Vector) -> None:
     """What the controller sees now, by the sensors of the two-mass plant."""
-    motor = int(place[MOTOR])
-    load = int(place[LOAD_MASS])
-    x[NO_THETA] = 0.0
-    x[W2] = mass[load, W]
-    x[V] = mass[motor, W] - mass[load, W]
-    measure(p, x, sees, measured)
+    x = start.x.view(STATE)[0]
+    motor = start.place.motor
+    w_load = start.masses[start.place.load].w
+    x.theta = 0.0
+    x.w2 = w_load
+    x.v = start.masses[motor].w - w_load
+    seen = measured.view(MEASURED)[0]
+    sample(start.p.view(PLANT)[0], x, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
-        k = int(place[MOTOR_SHAFT])
-        if (
-            shaft[k, MODE] == PRESSED or shaft[k, MODE] == WELDED
-        ):  # what the joint carries: of a span of no length
-            torque_course(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0])
-            join_bodies(masses, shafts, mass, shaft)
-            expand(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, 0.0, 0)
+        k = start.place.motor_shaft
+        if start.shafts[k].mode in (PRESSED, WELDED):  # what the joint carries: of a span of no length
+            torque_course(start.p.view(PLANT)[0], x, start.m.view(MOTION)[0])
+            join_bodies(start.masses, start.shafts)
+            expand(start, 0.0, 0)
         sign = 1.0 if motor <= k else -1.0
-        measured[M_SHAFT_TORQUE] = sign * torque_now(shafts, mass, shaft, series, k)
+        seen.shaft_torque = sign * torque_now(start, k)
 
 
-@compiled_as(
-    types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _A, _M, _M, _M, _M, _M, _C, _M, _M, _M)
-)
-def run(  # type: ignore[no-untyped-def]
-    step, p, parameters, sees, x, m, measured, state, command, place, masses, shafts, tones, mass, shaft,
-    series, lines, segments, events,
-):  # fmt: skip
+@compiled_as(types.int64(_STEP, _A, types.int64, START_TYPE, _A, _A, _A))
+def run(step, parameters, sees, start, measured, state, command):  # type: ignore[no-untyped-def]
     """One start to its end, or until a buffer is full: call again with larger ones."""
+    p, x, m = start.p.view(PLANT)[0], start.x.view(STATE)[0], start.m.view(MOTION)[0]
+    answer = command[:NEW_STATE].view(ANSWER)[0]
+    new_state = command[NEW_STATE:]
     while True:
-        reason = advance(p, x, m, place, masses, shafts, tones, mass, shaft, series, lines, segments, events)
+        reason = advance(start)
         if reason != ASK:
-            x[STATUS] = reason
+            x.status = reason
             return reason
-        look(p, x, m, sees, place, masses, shafts, tones, mass, shaft, series, lines, measured)
-        command[SLOPE] = 0.0
+        measure_chain(start, sees, measured)
+        answer.slope = 0.0
         step(parameters, measured, state, command)
-        taken = obey(p, x, m, command[DEMANDED], command[ASK_AGAIN], command[SLOPE])
+        taken = take_answer(p, x, m, answer.torque, answer.ask_again, answer.slope)
         if taken != ASK:
-            x[STATUS] = taken
+            x.status = taken
             return taken
         for i in range(state.shape[0]):
-            state[i] = command[NEW_STATE + i]
+            state[i] = new_state[i]
+
+
+# the record -----------------------------------------------------------------------------------------
+
+
+@compiled
+def restore(start: Start, row: int) -> int:
+    """The state at the start of a recorded span, and its series; returns how many coefficients."""
+    x, m = start.x.view(STATE)[0], start.m.view(MOTION)[0]
+    span = start.spans[row]
+    x.time = span.start
+    m.ua = span.ua
+    m.ub = span.ub
+    m.ue = span.ue
+    x.phi2 = span.phi
+    for i in range(start.masses.size):
+        mass, kept = start.masses[i], start.span_masses[row, i]
+        mass.w = kept.w
+        mass.direction = kept.direction
+    for k in range(start.shafts.size):
+        shaft, noted = start.shafts[k], start.span_shafts[row, k]
+        shaft.theta = noted.theta
+        shaft.mode = noted.mode
+        shaft.side = noted.side
+        shaft.sign = noted.sign
+    h = span.end - span.start
+    n = min(orders(rate_of(start) * h), ORDERS - 2)
+    expand(start, h, n)
+    return n
+
+
+@compiled
+def states_at(
+    start: Start, index: NDArray[np.int64], times: Vector, motor: Record, w: Record, twist: Record, T: Record
+) -> None:
+    """The states at times[j] within span index[j]: angle and torque of the motor, speeds, twists, torques."""
+    last = -1
+    n = 0
+    for j in range(times.shape[0]):
+        if index[j] != last:
+            last = index[j]
+            n = restore(start, last)
+        span = start.spans[last]
+        s = min(max((times[j] - span.start) / (span.end - span.start), 0.0), 1.0)
+        motor[j].phi = value(start.phi, n, s)
+        motor[j].u = value(start.u, n, s)
+        for i in range(start.masses.size):
+            w[j, i] = value(start.masses[i].speed, n, s)
+        for k in range(start.shafts.size):
+            twist[j, k] = value(start.shafts[k].twist, n, s)
+            T[j, k] = value(start.shafts[k].torque, n, s)
+
+
+@compiled
+def product(f: Vector, g: Vector, n: int) -> float:
+    """The integral of f g over [0, 1]."""
+    total = 0.0
+    for i in range(n + 1):
+        inner = 0.0
+        for j in range(n + 1):
+            inner += g[j] / (i + j + 1.0)
+        total += f[i] * inner
+    return total
+
+
+@compiled
+def work_of(start: Start, works: Record) -> None:
+    """Work over all recorded spans, by exact quadrature of their series, into `works`, an array of one."""
+    work = works[0]
+    f, g = start.f, start.g
+    for row in range(start.spans.size):
+        n = restore(start, row)
+        span = start.spans[row]
+        h = span.end - span.start
+        of_motor = h * product(start.u, start.masses[start.place.motor].speed, n)
+        work.motor += of_motor
+        exciting = -of_motor
+        for mass in start.masses:
+            speed = mass.speed
+            ground = 0.0
+            if mass.ground != 0.0:
+                ground = h * mass.ground * product(speed, speed, n)
+            turned = speed[0]
+            for o in range(1, n + 1):
+                turned += speed[o] / (o + 1.0)
+            load = h * mass.direction * mass.Mc * turned + h * mass.active * turned
+            work.ground += ground
+            work.load += load
+            exciting += h * product(mass.outside, speed, n) + ground + load
+        work.exciting += exciting
+        for k in range(start.shafts.size):
+            shaft = start.shafts[k]
+            if shaft.mode not in (CONTACT, DOUBLED, JOINED):
+                continue
+            before, after = start.masses[k].speed, start.masses[k + 1].speed
+            for o in range(n + 1):
+                f[o] = shaft.torque[o] - shaft.c * shaft.twist[o]
+                g[o] = before[o] - after[o]
+            f[0] += shaft.c * shaft.side * shaft.half
+            work.shafts += h * product(f, g, n)
+            if shaft.eta != 1.0:
+                if shaft.before != 1.0:
+                    work.gears += h * (shaft.before - 1.0) * product(shaft.torque, before, n)
+                if shaft.after != 1.0:
+                    work.gears += h * (1.0 - shaft.after) * product(shaft.torque, after, n)

@@ -17,6 +17,7 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain.elements import (
     LIBRARY,
     MASS,
@@ -313,7 +314,6 @@ def _mistakes(
     return wrong
 
 
-Vector = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 

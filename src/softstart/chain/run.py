@@ -4,42 +4,54 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from softstart.chain import kernel_layout as at
-from softstart.chain import kernel_record as record
-from softstart.chain.kernel_input import Numbers
+from softstart.chain import kernel_start as kernel
+from softstart.chain.kernel_records import (
+    CLOSED,
+    CONTACT,
+    DOUBLED,
+    GEAR_HOLDS,
+    GEAR_LETS_GO,
+    IMPACT,
+    JOINED,
+    LOAD_STARTS,
+    LOAD_STOPS,
+    MOTOR,
+    OPENED,
+    SETTLED,
+    TARGET_REACHED,
+    WORK,
+    Numbers,
+    Record,
+    Start,
+    Vector,
+)  # fmt: skip
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.errors import InputError
-from softstart.plant import layout as plant
-from softstart.start import metrics
+from softstart.plant import layout
+from softstart.start.run import BaseRun
 from softstart.start.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["ChainEnergy", "ChainEvent", "ChainRun"]
-
-Vector = NDArray[np.float64]
-
 EVENT_NAMES = {
-    at.CLOSED: "gap closed",
-    at.OPENED: "gap opened",
-    at.LOAD_STARTS: "load starts",
-    at.LOAD_STOPS: "load stops",
-    at.TARGET_REACHED: "target speed reached",
-    at.IMPACT: "impact",
-    at.SETTLED: "impacts over, flanks press",
-    at.GEAR_LETS_GO: "gear lets go",
-    at.GEAR_HOLDS: "gear holds",
+    CLOSED: "gap closed",
+    OPENED: "gap opened",
+    LOAD_STARTS: "load starts",
+    LOAD_STOPS: "load stops",
+    TARGET_REACHED: "target speed reached",
+    IMPACT: "impact",
+    SETTLED: "impacts over, flanks press",
+    GEAR_LETS_GO: "gear lets go",
+    GEAR_HOLDS: "gear holds",
 }
-OF_A_SHAFT = frozenset({at.CLOSED, at.OPENED, at.IMPACT, at.SETTLED})
-PLOT_POINTS = 1500
 
 
 class ChainEvent(NamedTuple):
@@ -79,7 +91,7 @@ class ChainEnergy:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ChainRun:
+class ChainRun(BaseRun):
     """One start of a chain. Angles, speeds and torques in SI at the motor shaft.
 
     `.t, .phi, .w, .twist, .T, .u` are traces for plotting, a row an instant; `at(times)` evaluates any
@@ -90,48 +102,42 @@ class ChainRun:
     controller: Controller | None
     base: Drive | None
     status: Status
-    numbers: Numbers
-    final: Vector
-    mass: at.Matrix
-    shaft: at.Matrix
-    segments: at.Matrix
-    event_rows: at.Matrix
+    numbers: Numbers  # the chain as the kernel has it
+    recorded: Start  # the kernel's records at the end
 
     def __repr__(self) -> str:
         """One line that says what came out."""
-        end = (
-            f"start time {self.start_time:.4f} s" if self.start_time == self.start_time else self.status.value
-        )
         peaks = f"peaks {self.peak_torques.round(3)} N m"
-        return f"<ChainRun: {self._controller_name} on {self.chain.name}, {peaks}, {end}>"
-
-    @property
-    def _controller_name(self) -> str:
-        if self.controller is None:
-            return "no motor torque"
-        return self.controller.name or type(self.controller).__name__
+        return f"<ChainRun: {self.controller_name} on {self.chain.name}, {peaks}, {self._outcome}>"
 
     # figures -------------------------------------------------------------------------------------------
 
     @property
+    def _final(self) -> Vector:
+        return self.recorded.x
+
+    @property
     def peak_torques(self) -> Vector:
         """Largest |T| of each shaft, N m, located; impacts of rigid flanks have `peak_impulses` instead."""
-        return np.abs(self.shaft[:, at.PEAK])
+        peaks: Vector = np.abs(self.recorded.shafts["peak"])
+        return peaks
 
     @property
     def peak_times(self) -> Vector:
         """When |T| of each shaft is largest, s."""
-        return self.shaft[:, at.PEAK_TIME].copy()
+        times: Vector = self.recorded.shafts["peak_time"].copy()
+        return times
 
     @property
     def peak_impulses(self) -> Vector:
         """Largest impulse of each shaft's impacts, N m s; 0 where none was."""
-        return self.shaft[:, at.IMPULSE].copy()
+        impulses: Vector = self.recorded.shafts["impulse"].copy()
+        return impulses
 
     @property
     def motor_shaft(self) -> int:
         """The index of the shaft beside the motor, on the way to the load."""
-        return int(self.numbers.place[at.MOTOR_SHAFT])
+        return self.numbers.place.motor_shaft
 
     @property
     def peak_torque(self) -> float:
@@ -144,34 +150,17 @@ class ChainRun:
         return float(self.peak_times[self.motor_shaft])
 
     @property
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the shaft beside the motor, [G](16), over the mean torque of the base."""
-        if self.base is None:
-            raise InputError("base: K_dyn refers to the mean torque of a drive; give base to simulate_chain.")
-        return float(metrics.k_dyn(self.peak_torque, self.base))
-
-    @property
-    def start_time(self) -> float:
-        """First instant at which the load mass has its target speed, s; NaN if it never has."""
-        return float(self.final[plant.START_TIME])
-
-    @property
-    def end_time(self) -> float:
-        """End of the run, s."""
-        return float(self.final[plant.TIME])
-
-    @property
     def stages(self) -> int:
         """The number of the last stage: odd while a gap from motor to load is open, even while none is."""
-        return int(self.final[plant.STAGE])
+        return int(self._final[layout.STAGE])
 
     @cached_property
     def events(self) -> tuple[ChainEvent, ...]:
         """All events, in order."""
-        rows = self.event_rows[np.argsort(self.event_rows[:, at.E_TIME], kind="stable")]
+        rows = self.recorded.events[np.argsort(self._edges(), kind="stable")]
         return tuple(
-            ChainEvent(float(t), EVENT_NAMES[float(kind)], int(place), float(value), float(impulse))
-            for t, kind, place, value, impulse in rows
+            ChainEvent(time, EVENT_NAMES[kind], place, value, impulse)
+            for time, kind, place, value, impulse in rows.tolist()
         )
 
     # states --------------------------------------------------------------------------------------------
@@ -183,37 +172,41 @@ class ChainRun:
         instant where something jumps the value is the one after the jump.
         """
         when = np.asarray(times, dtype=np.float64)
-        flat = np.ascontiguousarray(when.ravel())
-        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
-            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
-        index = (np.searchsorted(self.segments[:, at.S_START], flat, side="right") - 1).clip(0)
+        flat = self._instants(when)
+        index = (np.searchsorted(self.recorded.spans["start"], flat, side="right") - 1).clip(0)
         count = self.numbers.count
-        out = np.empty((flat.size, 3 * count))
-        x, m, mass, shaft, series, lines = self.numbers.scratch()
-        given = self.numbers
-        record.states_at(
-            given.p, x, m, given.place, given.masses, given.shafts, given.tones, mass, shaft, series, lines,
-            self.segments, index, flat, out,
-        )  # fmt: skip
-        w, twist, T = np.split(out[:, 2:], [count, 2 * count - 1], axis=1)
-        motor = int(given.place[at.MOTOR])
+        motor = np.empty(flat.size, MOTOR)
+        w, twist, T = (np.empty((flat.size, columns)) for columns in (count, count - 1, count - 1))
+        kernel.states_at(self._replayed(), index, flat, motor, w, twist, T)
         relative = np.concatenate([np.zeros((flat.size, 1)), -np.cumsum(twist, axis=1)], axis=1)
-        phi = out[:, :1] + relative - relative[:, motor : motor + 1]
+        place = self.numbers.place.motor
+        phi = motor["phi"][:, None] + relative - relative[:, place : place + 1]
         shaped = {"phi": phi, "w": w, "twist": twist, "T": T}
         found = {name: values.reshape(*when.shape, -1) for name, values in shaped.items()}
-        return {**found, "u": out[:, 1].reshape(when.shape)}
+        return {**found, "u": motor["u"].reshape(when.shape)}
 
-    @cached_property
-    def t(self) -> Vector:
-        """Instants of the traces, s: an even grid and every event and peak."""
-        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
-        edges = self.event_rows[:, at.E_TIME]
-        when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), self.peak_times])
-        return np.unique(when.clip(0.0, self.end_time))
+    def _replayed(self) -> Start:
+        """A start with the records of this one, whose state may be overwritten."""
+        run = self.recorded
+        records = {name: getattr(run, name) for name in ("spans", "span_masses", "span_shafts", "events")}
+        return self.numbers.start()._replace(**records)
 
-    @cached_property
-    def _traces(self) -> dict[str, Vector]:
-        return self.at(self.t)
+    def _edges(self) -> Vector:
+        edges: Vector = self.recorded.events["time"]
+        return edges
+
+    def _peak_times(self) -> Vector:
+        return self.peak_times
+
+    def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
+        masses = [mass.name for mass in self.chain.masses]
+        shafts = [f"{a} - {b}" for a, b in pairwise(masses)]
+        columns = {"u [N*m]": states["u"]}
+        for name, unit, parts in (
+            ("phi", "rad", masses), ("w", "rad/s", masses), ("twist", "rad", shafts), ("T", "N*m", shafts),
+        ):  # fmt: skip
+            columns |= {f"{name} {part} [{unit}]": states[name][:, i] for i, part in enumerate(parts)}
+        return columns
 
     @property
     def phi(self) -> Vector:
@@ -230,50 +223,30 @@ class ChainRun:
         """Twists of the shafts, rad."""
         return self._traces["twist"]
 
-    @property
-    def T(self) -> Vector:
-        """Torques of the shafts, N m."""
-        return self._traces["T"]
-
-    @property
-    def u(self) -> Vector:
-        """Motor torque, N m."""
-        return self._traces["u"]
-
     # what follows from them ----------------------------------------------------------------------------
 
     @cached_property
     def energy(self) -> ChainEnergy:
         """Energy balance of the run."""
-        given = self.numbers
-        x, m, mass, shaft, series, lines = given.scratch()
-        work = np.zeros(record.N_WORK)
-        record.work_of(
-            given.p, x, m, given.place, given.masses, given.shafts, given.tones, mass, shaft, series, lines,
-            self.segments, work,
-        )  # fmt: skip
-        motor, exciting, load, ground, shafts, gears = work.tolist()
-        kinetic = 0.5 * float(
-            given.masses[:, at.J] @ (self.mass[:, at.W] ** 2 - given.masses[:, at.W_0] ** 2)
-        )
-        rows = self._shaft_rows
-        final = self.shaft[None, :, [at.THETA, at.MODE, at.SIDE]]
+        given, run = self.numbers, self.recorded
+        works = np.zeros(1, WORK)
+        kernel.work_of(self._replayed(), works)
+        motor, exciting, load, ground, shafts, gears = works[0].tolist()
+        kinetic = 0.5 * float(given.masses["J"] @ (run.masses["w"] ** 2 - given.masses["w0"] ** 2))
+        rows = run.span_shafts
+        final = np.empty((1, rows.shape[1]), rows.dtype)
+        for name in rows.dtype.names:
+            final[name] = run.shafts[name]
         elastic = _stored(given, final) - _stored(given, rows[:1])
         # flanks may part while the spring is still loaded, and meet again: that energy goes, or comes
         after = np.concatenate([rows[1:], final])
-        before = np.concatenate([after[:, :, :1], rows[:, :, 1:]], axis=2)
+        before = rows.copy()
+        before["theta"] = after["theta"]
         shafts += _stored(given, before) - _stored(given, after)
-        struck = np.isin(self.event_rows[:, at.E_KIND], [at.IMPACT, at.SETTLED])
-        impacts = float(self.event_rows[struck, at.E_VALUE].sum())
+        struck = np.isin(run.events["kind"], [IMPACT, SETTLED])
+        impacts = float(run.events["value"][struck].sum())
         residual = motor + exciting - kinetic - elastic - load - ground - shafts - gears - impacts
         return ChainEnergy(motor, exciting, kinetic, elastic, load, ground, shafts, gears, impacts, residual)
-
-    @property
-    def _shaft_rows(self) -> Vector:
-        """THETA, MODE and SIDE of each shaft at the start of each span."""
-        width = at.S_MASS + 2 * self.numbers.count
-        rows = self.segments[:, width:].reshape(self.segments.shape[0], -1, at.OF_SHAFT)
-        return rows[:, :, :3]
 
     def plot(self) -> Figure:
         """Torques, speeds and twists over time."""
@@ -287,10 +260,7 @@ class ChainRun:
         return {
             "chain": self.chain.name,
             "assumed": self.chain.assumed,
-            "controller": self._controller_name,
-            "parameters": {} if self.controller is None else self.controller.parameters,
-            "status": self.status.name,
-            "status_text": self.status.value,
+            **self._controller_and_status(),
             "base": None if self.base is None else self.base.name,
             "k_dyn": None if self.base is None else self.k_dyn,
             "peak_torque": self.peak_torque,
@@ -306,9 +276,8 @@ class ChainRun:
         }
 
 
-def _stored(given: Numbers, rows: at.Matrix) -> float:
-    """The sum of the elastic energies of all shafts, in J, over rows of (THETA, MODE, SIDE)."""
-    theta, mode, side = rows[..., 0], rows[..., 1], rows[..., 2]
-    acting = np.isin(mode, [at.CONTACT, at.DOUBLED, at.JOINED])
-    z = np.where(acting, theta - side * given.shafts[:, at.HALF], 0.0)
-    return float(np.sum(0.5 * given.shafts[:, at.C] * z * z))
+def _stored(given: Numbers, rows: Record) -> float:
+    """The sum of the elastic energies of all shafts, in J, over recorded rows of shafts."""
+    acting = np.isin(rows["mode"], [CONTACT, DOUBLED, JOINED])
+    z = np.where(acting, rows["theta"] - rows["side"] * given.shafts["half"], 0.0)
+    return float(np.sum(0.5 * given.shafts["c"] * z * z))

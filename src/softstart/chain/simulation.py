@@ -5,32 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
 from softstart.balancing.periodic_torque import PeriodicTorque
-from softstart.chain import kernel_layout as at
 from softstart.chain import kernel_start as kernel
-from softstart.chain.kernel_input import Numbers, numbers
+from softstart.chain.kernel_records import Numbers, Record, Start, Vector, numbers
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.run import ChainRun
-from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
+from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
-from softstart.errors import InputError, SimulationError
-from softstart.plant import layout as plant
-from softstart.plant import start as sensing
+from softstart.errors import InputError
+from softstart.plant import layout
 from softstart.start import metrics
-from softstart.start.engine import answer_of
+from softstart.start.engine import FIRST_ROWS, MAX_EVENTS, Recorder, check_limits, ended, run_one
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.start.status import Status, status_of
-
-MAX_EVENTS = 1_000_000
-FIRST_ROWS = 256
 
 
 def simulate_chain(
@@ -50,7 +43,7 @@ def simulate_chain(
     Between two events the chain is linear: its Taylor series are summed to the last digit, and events are
     certified first roots of them. A shaft without a gap is a spring that pulls too. A gear with losses passes
     on its share of the torque in the direction of the power, and holds its mass at rest in between
-    (`softstart.chain.kernel_gears`). Rigid gaps close by impacts, angular momentum kept; those that pile up
+    (`softstart.chain.kernel_series`). Rigid gaps close by impacts, angular momentum kept; those that pile up
     are followed to their known end, when the flanks press.
 
     Parameters
@@ -75,41 +68,27 @@ def simulate_chain(
     """
     if isinstance(chain, str):
         chain = Chain.load(chain)
-    until = _time("until", until, "leave it out to run to the start time")
-    time_limit = _time("time_limit", time_limit, "leave it out for a hundred times a stiff chain's start")
-    if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
-        raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
+    until, time_limit, max_events = check_limits(until, time_limit, max_events, "chain")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         if other is not None and not (isinstance(other, Drive) and other.shape == ()):
             raise InputError(f"{name} = {other!r}: give a single Drive.")
-    given = numbers(chain, excitation, time_limit, int(max_events))
+    given = numbers(chain, excitation, time_limit, max_events)
     _check_end(chain, controller, until, given)
     fitted = None
-    book = _Book(given)
-    end = math.inf if until is None else until
     if controller is None:
-        kernel.begin(book.x, book.m, given.place, given.masses, given.shafts, book.mass, book.shaft, end)
-        book.x[plant.ASK_AT] = math.inf
-        reason = _go_on(given, book)
+        recorder = _ChainRecorder(given, 0)
+        recorder.begin(math.inf if until is None else until)
+        recorder.x[layout.ASK_AT] = math.inf
+        while (reason := recorder.advance()) == layout.BUFFER_FULL:
+            recorder.grow()
     else:
         made = make_controller(controller, parameters)
         fitted_to = fitted_to or drive_of(chain)
         fitted, own = made.set_up(fitted_to)
-        reason = _run(fitted, own, given, book, end)
-    status = status_of(reason, not math.isnan(book.x[plant.START_TIME]), until is not None)
-    if not status.finished:
-        remedy = ""
-        if status is Status.TOO_MANY_EVENTS:
-            remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
-        raise SimulationError(
-            f"{status.value}{remedy} Chain {chain.name}, t = {book.x[plant.TIME]:.6g} s, "
-            f"{int(book.x[plant.EVENTS])} events."
-        )
-    return ChainRun(
-        chain, fitted, base or fitted_to, status, given, book.x.copy(), book.mass.copy(), book.shaft.copy(),
-        book.segments[: int(book.x[plant.N_SEGMENTS])].copy(),
-        book.events[: int(book.x[plant.N_EVENTS])].copy(),
-    )  # fmt: skip
+        recorder = _ChainRecorder(given, int(fitted.sensors))
+        reason = run_one(fitted, own, recorder, until)
+    status = ended(recorder.x, reason, until, max_events, f"Chain {chain.name}")
+    return ChainRun(chain, fitted, base or fitted_to, status, given, recorder.finished())
 
 
 def drive_of(chain: Chain) -> Drive:
@@ -121,71 +100,53 @@ def drive_of(chain: Chain) -> Drive:
         raise InputError(sentences) from None
 
 
-class _Book:
-    """State, scratch and growing records of one start."""
+class _ChainRecorder(Recorder):
+    """One start of a chain in the kernel."""
 
-    def __init__(self, given: Numbers) -> None:
-        self.x, self.m, self.mass, self.shaft, self.series, self.lines = given.scratch()
-        self.segments = np.zeros((FIRST_ROWS, at.row_width(given.count)))
-        self.events = np.zeros((FIRST_ROWS + 4 * given.count, at.N_EVENT))
+    def __init__(self, given: Numbers, sees: int) -> None:
+        super().__init__(given.p, sees, recording=False)
+        self.start = given.start(FIRST_ROWS)
+        self.x, self.m = self.start.x, self.start.m
+
+    def begin(self, until: float) -> None:
+        kernel.begin(self.start, until)
+
+    def advance(self) -> int:
+        reason: int = kernel.advance(self.start)
+        return reason
+
+    def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
+        reason: int = kernel.run(step, numbers, self.sees, self.start, self.measured, state, command)
+        return reason
+
+    def measure(self) -> None:
+        kernel.measure_chain(self.start, self.sees, self.measured)
 
     def grow(self) -> None:
-        """Twice the room for whatever is nearly full."""
-        if self.x[plant.N_SEGMENTS] >= self.segments.shape[0]:
-            self.segments = np.concatenate([self.segments, np.zeros_like(self.segments)])
-        else:
-            self.events = np.concatenate([self.events, np.zeros_like(self.events)])
-
-
-def _go_on(given: Numbers, book: _Book) -> int:
-    """To the next control instant or to the end."""
-    while True:
-        reason: int = kernel.advance(
-            given.p, book.x, book.m, given.place, given.masses, given.shafts, given.tones, book.mass,
-            book.shaft, book.series, book.lines, book.segments, book.events,
-        )  # fmt: skip
-        if reason != plant.BUFFER_FULL:
-            return reason
-        book.grow()
-
-
-def _run(controller: Controller, drive: Drive, given: Numbers, book: _Book, until: float) -> int:
-    x, m = book.x, book.m
-    kernel.begin(x, m, given.place, given.masses, given.shafts, book.mass, book.shaft, until)
-    x[plant.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
-    sees = int(controller.sensors)
-    measured = np.zeros(sensing.N_MEASURED)
-    if isinstance(controller, CompiledController):
-        own = np.array(controller.vector(drive), dtype=np.float64).ravel()
-        size = controller.state_size
-        command = np.zeros(sensing.NEW_STATE + size)
-        of_controller = np.zeros(size)
-        while True:
-            reason: int = kernel.run(
-                type(controller).kernel, given.p, own, sees, x, m, measured, of_controller, command,
-                given.place, given.masses, given.shafts, given.tones, book.mass, book.shaft, book.series,
-                book.lines, book.segments, book.events,
-            )  # fmt: skip
-            if reason != plant.BUFFER_FULL:
-                return reason
-            book.grow()
-    if not isinstance(controller, PlainController):
-        raise InputError(
-            f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
+        start = self.start
+        if start.x[layout.N_SEGMENTS] < start.spans.size:
+            self.start = start._replace(events=_doubled(start.events))
+            return
+        self.start = start._replace(
+            spans=_doubled(start.spans),
+            span_masses=_doubled(start.span_masses),
+            span_shafts=_doubled(start.span_shafts),
         )
-    state = tuple(controller.initial_state)
-    while True:
-        reason = _go_on(given, book)
-        if reason != plant.ASK:
-            return reason
-        kernel.look(
-            given.p, x, m, sees, given.place, given.masses, given.shafts, given.tones, book.mass, book.shaft,
-            book.series, book.lines, measured,
-        )  # fmt: skip
-        torque, ask_again, state, slope = answer_of(controller, measured, state, x[plant.TIME])
-        taken: int = sensing.obey(given.p, x, m, torque, ask_again, slope)
-        if taken != plant.ASK:
-            return taken
+
+    def finished(self) -> Start:
+        """The start with the records that are filled."""
+        start = self.start
+        spans, events = int(start.x[layout.N_SEGMENTS]), int(start.x[layout.N_EVENTS])
+        return start._replace(
+            spans=start.spans[:spans].copy(),
+            span_masses=start.span_masses[:spans].copy(),
+            span_shafts=start.span_shafts[:spans].copy(),
+            events=start.events[:events].copy(),
+        )
+
+
+def _doubled(rows: Record) -> Record:
+    return np.concatenate([rows, np.zeros_like(rows)])
 
 
 def _check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
@@ -194,7 +155,7 @@ def _check_end(chain: Chain, controller: object, until: float | None, given: Num
         raise InputError(
             "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
         )
-    if until is not None or given.p[plant.TIME_LIMIT] < math.inf:
+    if until is not None or given.p[layout.TIME_LIMIT] < math.inf:
         return
     if controller is None or chain.target_speed is None:
         raise InputError(
@@ -207,15 +168,6 @@ def _check_end(chain: Chain, controller: object, until: float | None, given: Num
         f"starting_torque: it is not above the load torques, {load:.6g} N*m at the motor "
         f"shaft{lossy}, so the load may never reach its target speed; give until or time_limit."
     )
-
-
-def _time(name: str, value: object, remedy: str) -> float | None:
-    """A time above 0 s, or None."""
-    if value is None:
-        return None
-    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
-        return float(value)
-    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,13 +23,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain.model import Chain, ChainArrays
 from softstart.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Vector = NDArray[np.float64]
 
 
 class Node(NamedTuple):

@@ -44,7 +44,7 @@ def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Va
     >>> round(float(backbone(1.0, 1.0, 2.0, 0.1, 0.1 / math.pi)), 12)
     1.0
     """
-    amplitudes: NDArray[np.float64] = np.asarray(amplitude, np.float64)
+    amplitudes: Vector = np.asarray(amplitude, np.float64)
     if not np.all(amplitudes > 0.0):
         raise InputError("amplitude: the largest twist of the spring must be above 0.")
     Omega = elastic_frequency(J1, J2, c)

@@ -55,7 +55,7 @@ from softstart.linear.sampled_start import Sample, SampledStart
 from softstart.linear.systems import System, at_points, zeros_of
 from softstart.plant import layout, record
 from softstart.plant import start as kernel
-from softstart.start.engine import Book
+from softstart.start.engine import Recorder
 
 optimize = late("scipy.optimize")
 
@@ -313,10 +313,10 @@ def _after(
     first = _on_the_cycle(start, point, base, outside, cycle, factor)
     period = 2.0 * math.pi / cycle.frequency
     end = first.time + (SETTLING + MEASURED) * period
-    book = Book(start.sees)
-    for _ in start.from_sample(first, end, book):
+    recorder = Recorder(start.p, start.sees)
+    for _ in start.from_sample(first, end, recorder):
         pass
-    segments = book.rows()[0]
+    segments = recorder.rows()[0]
     times = np.linspace(end - MEASURED * period, end * (1.0 - 1e-12), MEASURED * POINTS)
     index = (np.searchsorted(segments[:, layout.S_START], times, side="right") - 1).clip(0)
     states = np.empty((times.size, record.N_OUT))

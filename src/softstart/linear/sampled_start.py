@@ -20,7 +20,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.plant import layout
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
-from softstart.start.engine import Book
+from softstart.start.engine import Recorder
 
 FAR = 1e9  # in target speeds: never reached
 
@@ -107,49 +107,49 @@ class SampledStart:
 
     def samples(self, until: float) -> Iterator[Sample]:
         """The start from its beginning."""
-        book = Book(self.sees, recording=False)
-        kernel.begin(self.p, book.x, until, book.events)
-        book.x[layout.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
-        yield from self._continued(book, self.first_state)
+        recorder = Recorder(self.p, self.sees, recording=False)
+        recorder.begin(until)
+        recorder.x[layout.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        yield from self._continued(recorder, self.first_state)
 
-    def from_sample(self, sample: Sample, until: float, book: Book | None = None) -> Iterator[Sample]:
-        """The start from a sample on, whose plant or state may have been changed; `book` may record it."""
-        book = book or Book(self.sees, recording=False)
-        book.x[:] = sample.x
-        book.x[[layout.N_SEGMENTS, layout.N_EVENTS, layout.N_STAGES]] = 0.0
-        book.x[layout.T_END] = until
-        book.m[:] = sample.m
-        yield from self._continued(book, sample.state)
+    def from_sample(self, sample: Sample, until: float, recorder: Recorder | None = None) -> Iterator[Sample]:
+        """The start from a sample on, whose plant or state may have been changed."""
+        recorder = recorder or Recorder(self.p, self.sees, recording=False)
+        recorder.x[:] = sample.x
+        recorder.x[[layout.N_SEGMENTS, layout.N_EVENTS, layout.N_STAGES]] = 0.0
+        recorder.x[layout.T_END] = until
+        recorder.m[:] = sample.m
+        yield from self._continued(recorder, sample.state)
 
-    def _continued(self, book: Book, state: Vector) -> Iterator[Sample]:
+    def _continued(self, recorder: Recorder, state: Vector) -> Iterator[Sample]:
         while True:
-            reason = kernel.advance(self.p, book.x, book.m, book.segments, book.events, book.stages)
+            reason = recorder.advance()
             if reason == layout.BUFFER_FULL:
-                book.grow()
+                recorder.grow()
                 continue
             if reason == layout.ENDED:
                 return
             if reason != layout.ASK:
                 raise SimulationError(
-                    f"{self._name}: the start was given up at t = {book.x[layout.TIME]:.6g} s."
+                    f"{self._name}: the start was given up at t = {recorder.x[layout.TIME]:.6g} s."
                 )
-            x, m = book.x.copy(), book.m.copy()
-            measured = self._measured(book)
+            x, m = recorder.x.copy(), recorder.m.copy()
+            measured = self._measured(recorder)
             demand, ask_again, slope, after = self.step(measured, state)
             yield Sample(x, m, measured, state, demand, ask_again, slope)
-            if kernel.obey(self.p, book.x, book.m, demand, ask_again, slope) != layout.ASK:
+            if kernel.obey(self.p, recorder.x, recorder.m, demand, ask_again, slope) != layout.ASK:
                 raise SimulationError(
-                    f"{self._name}: at t = {book.x[layout.TIME]:.6g} s the controller's answer was no "
+                    f"{self._name}: at t = {recorder.x[layout.TIME]:.6g} s the controller's answer was no "
                     f"command (torque {demand:.6g} N m, ask again at {ask_again:.6g} s)."
                 )
             state = after
 
-    def _measured(self, book: Book) -> Vector:
-        before, when = book.x[layout.SAMPLE_ANGLE], book.x[layout.SAMPLE_TIME]
-        kernel.measure(self.p, book.x, self.sees, book.measured)
-        measured = book.measured.copy()
+    def _measured(self, recorder: Recorder) -> Vector:
+        before, when = recorder.x[layout.SAMPLE_ANGLE], recorder.x[layout.SAMPLE_TIME]
+        kernel.measure(self.p, recorder.x, self.sees, recorder.measured)
+        measured = recorder.measured.copy()
         now = measured[kernel.M_TIME]
-        if self.differencing and book.x[layout.ASKED] != 0.0 and now > when:
+        if self.differencing and recorder.x[layout.ASKED] != 0.0 and now > when:
             measured[kernel.M_MOTOR_SPEED] = (measured[kernel.M_MOTOR_ANGLE] - before) / (now - when)
         return measured
 

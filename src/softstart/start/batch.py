@@ -18,13 +18,12 @@ from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.start import metrics
-from softstart.start.engine import Book, run_plain
+from softstart.start.engine import MAX_EVENTS, Recorder, run_one
 from softstart.start.status import status_of
 
 if TYPE_CHECKING:
     import xarray
 
-MAX_EVENTS = 1_000_000  # events and control instants of one start
 PATIENCE = 0.2  # s
 FIRST_TURN = 32  # starts
 
@@ -123,9 +122,9 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
             )  # fmt: skip
         return results
     for row, one in zip(results, p, strict=True):
-        book = Book(int(controller.sensors), recording=False)
-        book.x[at.STATUS] = run_plain(controller, one, book, end)
-        row[:] = book.x
+        recorder = Recorder(one, int(controller.sensors), recording=False)
+        recorder.x[at.STATUS] = run_one(controller, own, recorder, end)
+        row[:] = recorder.x
     return results
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import traceback
+from numbers import Integral, Real
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +14,20 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
+from softstart.start.status import Status, status_of
 
+MAX_EVENTS = 1_000_000  # events and control instants of one start
 FIRST_ROWS = 256
 
 
-class Book:
-    """Scratch and growing records of one start."""
+class Recorder:
+    """One start of a drive in the kernel: its state, scratch and growing records.
 
-    def __init__(self, sees: int, recording: bool = True) -> None:
-        self.sees = sees
+    `p` is the drive as the kernel has it, `sees` the sensors of the controller.
+    """
+
+    def __init__(self, p: at.Vector, sees: int, recording: bool = True) -> None:
+        self.p, self.sees = p, sees
         rows = FIRST_ROWS if recording else 0
         self.x = np.zeros(at.N_X)
         self.m = np.zeros(at.N_M)
@@ -28,6 +35,27 @@ class Book:
         self.segments = np.zeros((rows, at.N_SEGMENT))
         self.events = np.zeros((rows, at.N_EVENT))
         self.stages = np.zeros((rows, at.N_STAGE))
+
+    def begin(self, until: float) -> None:
+        """The state at t = 0; without an end `until` is infinite."""
+        kernel.begin(self.p, self.x, until, self.events)
+
+    def advance(self) -> int:
+        """To the next control instant, the end, or a full record; returns which."""
+        reason: int = kernel.advance(self.p, self.x, self.m, self.segments, self.events, self.stages)
+        return reason
+
+    def run(self, step: Any, numbers: at.Vector, state: at.Vector, command: at.Vector) -> int:
+        """To the end, or a full record, under a compiled controller."""
+        reason: int = kernel.run(
+            step, self.p, numbers, self.sees, self.x, self.m, self.measured, state, command,
+            self.segments, self.events, self.stages,
+        )  # fmt: skip
+        return reason
+
+    def measure(self) -> None:
+        """Fill `measured` with what the controller sees now."""
+        kernel.measure(self.p, self.x, self.sees, self.measured)
 
     def grow(self) -> None:
         """Twice the room for whatever is nearly full."""
@@ -45,61 +73,46 @@ class Book:
         )
 
 
-def run_one(controller: Controller, drive: Drive, p: at.Vector, book: Book, until: float | None) -> int:
-    """A start from its beginning to `until`; `drive` is the one the (fitted) controller is set up for."""
-    end = math.inf if until is None else float(until)
-    if isinstance(controller, CompiledController):
-        return run_compiled(controller, drive, p, book, end)
-    return run_plain(controller, p, book, end)
+def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: float | None) -> int:
+    """A start from its beginning to `until`; returns why it ended.
 
-
-def run_compiled(controller: CompiledController, drive: Drive, p: at.Vector, book: Book, end: float) -> int:
-    """A compiled controller: the loop itself runs in the kernel."""
-    kernel.begin(p, book.x, end, book.events)
-    book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
-    numbers = np.array(
-        controller.vector(drive), dtype=np.float64
-    ).ravel()  # a copy: the kernel takes no read-only ones
-    size = controller.state_size
-    state, command = np.zeros(size), np.zeros(kernel.NEW_STATE + size)
-    step = type(controller).kernel
-    while True:
-        reason: int = kernel.run(
-            step, p, numbers, book.sees, book.x, book.m, book.measured, state, command,
-            book.segments, book.events, book.stages,
-        )  # fmt: skip
-        if reason != at.BUFFER_FULL:
-            return reason
-        book.grow()
-
-
-def run_plain(controller: Controller, p: at.Vector, book: Book, end: float) -> int:
-    """A plain Python controller through the same kernel, one control instant at a time."""
+    `drive` is the one for which the (fitted) controller is set up.
+    """
+    recorder.begin(math.inf if until is None else float(until))
+    recorder.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
+    if isinstance(controller, CompiledController):  # the loop itself runs in the kernel
+        # a copy: the kernel takes no read-only numbers
+        numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
+        size = controller.state_size
+        memory, command = np.zeros(size), np.zeros(kernel.NEW_STATE + size)
+        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
+            recorder.grow()
+        return reason
     if not isinstance(controller, PlainController):
         raise InputError(
             f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
         )
-    kernel.begin(p, book.x, end, book.events)
-    book.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
     state = tuple(controller.initial_state)
     while True:
-        reason: int = kernel.advance(p, book.x, book.m, book.segments, book.events, book.stages)
+        reason = recorder.advance()
         if reason == at.BUFFER_FULL:
-            book.grow()
+            recorder.grow()
         elif reason == at.ASK:
-            kernel.measure(p, book.x, book.sees, book.measured)
-            torque, ask_again, state, slope = answer_of(controller, book.measured, state, book.x[at.TIME])
-            taken: int = kernel.obey(p, book.x, book.m, torque, ask_again, slope)
+            recorder.measure()
+            torque, ask_again, state, slope = _answer(
+                controller, recorder.measured, state, recorder.x[at.TIME]
+            )
+            taken: int = kernel.obey(recorder.p, recorder.x, recorder.m, torque, ask_again, slope)
             if taken != at.ASK:
                 return taken
         else:
             return reason
 
 
-def answer_of(
+def _answer(
     controller: PlainController, measured: at.Vector, state: tuple[float, ...], time: float
 ) -> tuple[float, float, tuple[float, ...], float]:
-    """What a plain controller answers at `time`: torque, when to ask again, its state, slope."""
+    """What a plain controller answers at `time`: torque, when to be asked again, its state, slope."""
     try:
         answer = controller.step(Measured(*measured.tolist()), state)
     except (Exception, SystemExit) as error:  # the user's own code may fail in any way
@@ -116,3 +129,38 @@ def answer_of(
             f"controller {type(controller).__name__}: its step answered {answer!r}; "
             "answer with Command(torque, ask_again, state, slope)."
         ) from None
+
+
+def check_limits(
+    until: object, time_limit: object, max_events: object, machine: str
+) -> tuple[float | None, float | None, int]:
+    """The end, the time limit and the cap on events of a start of a `machine` (drive or chain)."""
+    until = _time("until", until, "leave it out to run to the start time")
+    time_limit = _time(
+        "time_limit", time_limit, f"leave it out for a hundred times a stiff {machine}'s start"
+    )
+    if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
+        raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
+    return until, time_limit, int(max_events)
+
+
+def _time(name: str, value: object, remedy: str) -> float | None:
+    """A time above 0 s, or None."""
+    if value is None:
+        return None
+    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
+        return float(value)
+    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
+
+
+def ended(x: at.Vector, reason: int, until: float | None, max_events: int, start: str) -> Status:
+    """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
+    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None)
+    if status.finished:
+        return status
+    remedy = ""
+    if status is Status.TOO_MANY_EVENTS:
+        remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
+    raise SimulationError(
+        f"{status.value}{remedy} {start}, t = {x[at.TIME]:.6g} s, {int(x[at.EVENTS])} events."
+    )

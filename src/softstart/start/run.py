@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softstart.controller.base import Controller
 from softstart.drive import Drive
+from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.plant import layout as at
@@ -59,8 +60,122 @@ class Stage:
         return self.end - self.start
 
 
+class BaseRun:
+    """What finished starts of drives and of chains have in common."""
+
+    controller: Controller | None
+    base: Drive | None
+    status: Status
+
+    @property
+    def peak_torque(self) -> float:
+        """Largest |T| of the (motor's) shaft, N m, located."""
+        raise NotImplementedError
+
+    @property
+    def _final(self) -> Vector:
+        """The kernel's state at the end."""
+        raise NotImplementedError
+
+    def at(self, times: ArrayLike) -> dict[str, Vector]:
+        """States at any instants within the run."""
+        raise NotImplementedError
+
+    def _edges(self) -> Vector:
+        """Times of the events, s."""
+        raise NotImplementedError
+
+    def _peak_times(self) -> Vector:
+        """Times of the peaks that are located, s."""
+        raise NotImplementedError
+
+    def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
+        """The columns of `to_csv` after the time, by their headings."""
+        raise NotImplementedError
+
+    @property
+    def controller_name(self) -> str:
+        """Name of the controller."""
+        if self.controller is None:
+            return "no motor torque"
+        return self.controller.name or type(self.controller).__name__
+
+    @property
+    def _outcome(self) -> str:
+        """The start time in words, or why there is none."""
+        if math.isnan(self.start_time):
+            return self.status.value
+        return f"start time {self.start_time:.4f} s"
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16): peak torque over the mean torque of `base`."""
+        if self.base is None:
+            raise InputError("base: K_dyn refers to the mean torque of a drive; give base to simulate_chain.")
+        return float(metrics.k_dyn(self.peak_torque, self.base))
+
+    @property
+    def start_time(self) -> float:
+        """First instant at which the load has its target speed, s; NaN if it never has."""
+        return float(self._final[at.START_TIME])
+
+    @property
+    def end_time(self) -> float:
+        """End of the run, s."""
+        return float(self._final[at.TIME])
+
+    def _instants(self, times: ArrayLike) -> Vector:
+        """The times as one row; raises ValueError for one outside of the run."""
+        flat = np.ascontiguousarray(np.asarray(times, dtype=np.float64).ravel())
+        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
+            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
+        return flat
+
+    @cached_property
+    def t(self) -> Vector:
+        """Instants of the traces, s: an even grid and every event and located peak."""
+        edges = self._edges()
+        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
+        when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), self._peak_times()])
+        return np.unique(when.clip(0.0, self.end_time))
+
+    @cached_property
+    def _traces(self) -> dict[str, Vector]:
+        return self.at(self.t)
+
+    @property
+    def u(self) -> Vector:
+        """Motor torque, N m."""
+        return self._traces["u"]
+
+    @property
+    def T(self) -> Vector:
+        """Shaft torque, N m; of a chain a column for each shaft."""
+        return self._traces["T"]
+
+    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
+        """Write the states under a header with units, at `times` or the plot's instants."""
+        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
+        columns = {"t [s]": when, **self._columns(self.at(when))}
+        header, table = ",".join(columns), np.column_stack(list(columns.values()))
+
+        def write(stream: IO[Any]) -> None:
+            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
+
+        write_whole(Path(path), write)
+
+    def _controller_and_status(self) -> dict[str, Any]:
+        """What every summary says of them."""
+        return {
+            "controller": self.controller_name,
+            "parameters": {} if self.controller is None else self.controller.parameters,
+            "status": self.status.name,
+            "status_text": self.status.value,
+        }
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Run:
+class Run(BaseRun):
     """One start under one controller. All angles in rad at the motor shaft, SI units.
 
     `.t, .phi1, .phi2, .w1, .w2, .u, .T` are traces for plotting; `at(times)` evaluates any instant exactly;
@@ -91,11 +206,8 @@ class Run:
         >>> simulate(Drive.load("crane-4amtkf"), "direct")
         <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
         """
-        name = self.controller.name or type(self.controller).__name__
-        time = (
-            f"start time {self.start_time:.4f} s" if self.start_time == self.start_time else self.status.value
-        )
-        return f"<Run: {name} on {self.drive.name}, K_dyn {self.k_dyn:.3f}, {time}>"
+        name = f"{self.controller_name} on {self.drive.name}"
+        return f"<Run: {name}, K_dyn {self.k_dyn:.3f}, {self._outcome}>"
 
     # figures -------------------------------------------------------------------------------------------
 
@@ -110,11 +222,6 @@ class Run:
         return float(self.final[at.PEAK_TIME])
 
     @property
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the whole run, [G](16)."""
-        return float(metrics.k_dyn(self.peak_torque, self.base))
-
-    @property
     def k_dyn_first_contact(self) -> float:
         """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one.
 
@@ -123,16 +230,6 @@ class Run:
         if math.isnan(self.final[at.STAGE_2_END]):
             return math.nan
         return float(metrics.k_dyn(self.final[at.FIRST_PEAK], self.base))
-
-    @property
-    def start_time(self) -> float:
-        """First instant at which the load has its target speed, s; NaN if it never has."""
-        return float(self.final[at.START_TIME])
-
-    @property
-    def end_time(self) -> float:
-        """End of the run, s."""
-        return float(self.final[at.TIME])
 
     @property
     def first_contact(self) -> float:
@@ -184,9 +281,7 @@ class Run:
         (= w1 - w2). At an instant where a torque jumps the value is the one after the jump.
         """
         when = np.asarray(times, dtype=np.float64)
-        flat = np.ascontiguousarray(when.ravel())
-        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
-            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
+        flat = self._instants(when)
         index = np.searchsorted(self.segments[:, at.S_START], flat, side="right") - 1
         states = self.states_in(index.clip(0), flat)
         return {name: values.reshape(when.shape) for name, values in states.items()}
@@ -200,18 +295,19 @@ class Run:
         names = ("phi1", "phi2", "w1", "w2", "u", "T", "theta", "v")
         return {name: out[:, i].reshape(times.shape) for i, name in enumerate(names)}
 
-    @cached_property
-    def t(self) -> Vector:
-        """Instants of the traces, s: an even grid and every event and stage peak."""
-        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
-        edges = self.event_rows[:, at.E_TIME]
-        just_before = np.nextafter(edges, 0.0)
-        peaks = self.stage_rows[:, at.G_PEAK_TIME]
-        return np.unique(np.concatenate([grid, edges, just_before, peaks]).clip(0.0, self.end_time))
+    @property
+    def _final(self) -> Vector:
+        return self.final
 
-    @cached_property
-    def _traces(self) -> dict[str, Vector]:
-        return self.at(self.t)
+    def _edges(self) -> Vector:
+        return self.event_rows[:, at.E_TIME]
+
+    def _peak_times(self) -> Vector:
+        return self.stage_rows[:, at.G_PEAK_TIME]
+
+    def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
+        units = {"phi1": "rad", "phi2": "rad", "w1": "rad/s", "w2": "rad/s", "u": "N*m", "T": "N*m"}
+        return {f"{name} [{unit}]": states[name] for name, unit in units.items()}
 
     @property
     def phi1(self) -> Vector:
@@ -234,16 +330,6 @@ class Run:
         return self._traces["w2"]
 
     @property
-    def u(self) -> Vector:
-        """Motor torque, N m."""
-        return self._traces["u"]
-
-    @property
-    def T(self) -> Vector:
-        """Shaft torque, N m."""
-        return self._traces["T"]
-
-    @property
     def theta(self) -> Vector:
         """Twist phi1 - phi2, rad; contact is at |theta| = gap/2."""
         return self._traces["theta"]
@@ -263,19 +349,6 @@ class Run:
         """Energy balance of the run."""
         return metrics.energy_balance(self)
 
-    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
-        """Write t, phi1, phi2, w1, w2, u, T under a header with units, at `times` or the plot's instants."""
-        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
-        states = self.at(when)
-        columns = [when, *(states[name] for name in ("phi1", "phi2", "w1", "w2", "u", "T"))]
-        header = "t [s],phi1 [rad],phi2 [rad],w1 [rad/s],w2 [rad/s],u [N*m],T [N*m]"
-
-        def write(stream: IO[Any]) -> None:
-            table = np.column_stack(columns)
-            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
-
-        write_whole(Path(path), write)
-
     def plot(self) -> Any:
         """Torques, speeds and twist over time, stages shaded."""
         return starts.run_figure(self)
@@ -285,10 +358,7 @@ class Run:
         first, second = self.stage_durations
         return {
             "drive": self.drive.name,
-            "controller": self.controller.name or type(self.controller).__name__,
-            "parameters": self.controller.parameters,
-            "status": self.status.name,
-            "status_text": self.status.value,
+            **self._controller_and_status(),
             "contact_law": self.drive.contact_law,
             "load_kind": self.drive.load_kind,
             "k_dyn": self.k_dyn,

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, overload
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
-from softstart.errors import InputError, SimulationError
-from softstart.plant import layout as at
+from softstart.errors import InputError
 from softstart.plant.vector import plant_vector
-from softstart.start.batch import MAX_EVENTS, simulate_many
-from softstart.start.engine import Book, run_one
+from softstart.start.batch import simulate_many
+from softstart.start.engine import MAX_EVENTS, Recorder, check_limits, ended, run_one
 from softstart.start.run import Run
-from softstart.start.status import Status, status_of
 
 if TYPE_CHECKING:
     import xarray
@@ -87,38 +83,18 @@ def simulate(
     if isinstance(drive, str):
         drive = Drive.load(drive)
     made = make_controller(controller, parameters)
-    until = _time("until", until, "leave it out to run to the start time")
-    time_limit = _time("time_limit", time_limit, "leave it out for a hundred times a stiff drive's start")
-    if isinstance(max_events, bool) or not isinstance(max_events, Integral) or max_events < 1:
-        raise InputError(f"max_events = {max_events}: the cap on events is a whole number of 1 or more.")
-    max_events = int(max_events)
+    until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
     if not isinstance(drive, Drive) or drive.shape != ():
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
     fitted, own = made.set_up(fitted_to or drive)
     p = plant_vector(drive, time_limit, max_events)[0]
-    book = Book(int(fitted.sensors))
-    reason = run_one(fitted, own, p, book, until)
-    status = status_of(reason, not math.isnan(book.x[at.START_TIME]), until is not None)
-    if not status.finished:
-        remedy = ""
-        if status is Status.TOO_MANY_EVENTS:
-            remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
-        raise SimulationError(
-            f"{status.value}{remedy} Drive {drive.name}, controller {fitted.name or type(fitted).__name__}, "
-            f"t = {book.x[at.TIME]:.6g} s, {int(book.x[at.EVENTS])} events."
-        )
-    return Run(drive, fitted, base or drive, status, p, book.x.copy(), *book.rows())
-
-
-def _time(name: str, value: object, remedy: str) -> float | None:
-    """A time above 0 s, or None."""
-    if value is None:
-        return None
-    if isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf:
-        return float(value)
-    raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
+    recorder = Recorder(p, int(fitted.sensors))
+    reason = run_one(fitted, own, recorder, until)
+    name = fitted.name or type(fitted).__name__
+    status = ended(recorder.x, reason, until, max_events, f"Drive {drive.name}, controller {name}")
+    return Run(drive, fitted, base or drive, status, p, recorder.x.copy(), *recorder.rows())
 
 
 def _check_other(name: str, other: object, drive: object) -> None:

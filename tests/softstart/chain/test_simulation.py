@@ -87,8 +87,8 @@ def test_plain_and_compiled_controllers_agree_to_the_bit():
     made = make_controller("ramp", None)
     compiled = simulate_chain(chain, made, 0.15, fitted_to=CRANE)
     plain = simulate_chain(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
-    assert np.array_equal(compiled.segments, plain.segments)
-    assert np.array_equal(compiled.event_rows, plain.event_rows)
+    for name in ("spans", "span_masses", "span_shafts", "events"):
+        assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
 
 
 def test_the_motor_may_sit_at_the_other_end():
@@ -219,7 +219,7 @@ def test_work_of_exciting_torques_by_quadrature():
     hum = PeriodicTorque(0.7, [0.5, 2.0], [0.3, -0.1], [0.2, 0.4], speed=30.0)
     run = simulate_chain(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
     nodes, weights = leggauss(8)
-    starts, ends = run.segments[:, 0], run.segments[:, 1]
+    starts, ends = run.recorded.spans["start"], run.recorded.spans["end"]
     half = 0.5 * (ends - starts)
     times = starts[:, None] + half[:, None] * (1.0 + nodes)
     w = run.at(times)["w"]

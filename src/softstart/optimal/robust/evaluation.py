@@ -27,7 +27,7 @@ from softstart.plant.jit import compiled_as
 from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run_native
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
-from softstart.start.engine import Book
+from softstart.start.engine import Recorder
 
 Matrix = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -417,40 +417,37 @@ class _Recorder:
     def __init__(self, parameters: ProfileParameters, p: Matrix) -> None:
         self.controller = parameters.controller
         self.p = p[0].copy()
-        self.book = Book(int(parameters.controller.sensors))
+        self.records = Recorder(self.p, int(parameters.controller.sensors))
         self.state = np.zeros(self.controller.state_size)
         self.command = np.zeros(kernel.NEW_STATE + self.controller.state_size)
         self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
 
     def play(self, numbers: Vector, until: float) -> Vector:
         """The state at the end; the spans stay on the recorder."""
-        book = self.book
-        book.m[:] = 0.0
+        records = self.records
+        records.m[:] = 0.0
         self.state[:] = 0.0
-        kernel.begin(self.p, book.x, until, book.events)
-        book.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
+        records.begin(until)
+        records.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
         while True:
-            reason = kernel.run(
-                type(self.controller).kernel, self.p, numbers, book.sees, book.x, book.m, book.measured,
-                self.state, self.command, book.segments, book.events, book.stages,
-            )  # fmt: skip
+            reason = records.run(type(self.controller).kernel, numbers, self.state, self.command)
             if reason != at.BUFFER_FULL:
-                return book.x
-            book.grow()
+                return records.x
+            records.grow()
 
     def moved(self, rows: Matrix, until: float, times: Vector) -> tuple[Matrix, Matrix]:
         """Shaft torque and load speed at `times` for each row of parameters, run to `until`."""
         begun = np.zeros(at.N_X)
-        kernel.begin(self.p, begun, until, self.book.events)
+        kernel.begin(self.p, begun, until, self.records.events)
         begun[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
         return all_moved(
-            type(self.controller).kernel, self.p, np.ascontiguousarray(rows), begun, self.book.sees,
-            self.state.size, self.command.size, times, self.book.segments.shape[0],
+            type(self.controller).kernel, self.p, np.ascontiguousarray(rows), begun, self.records.sees,
+            self.state.size, self.command.size, times, self.records.segments.shape[0],
         )  # fmt: skip
 
     def at(self, times: Vector) -> Matrix:
         """States at the instants, columns as in plant/record.py."""
-        spans = self.book.segments[: int(self.book.x[at.N_SEGMENTS])]
+        spans = self.records.segments[: int(self.records.x[at.N_SEGMENTS])]
         index = np.searchsorted(spans[:, at.S_START], times, side="right") - 1
         out = np.empty((times.size, record.N_OUT))
         record.states_at(self.p, spans, index.clip(0), times, *self.scratch, out)

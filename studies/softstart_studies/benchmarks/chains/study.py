@@ -14,7 +14,7 @@ import numpy as np
 
 from softstart import __version__
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.chain.kernel_input import elastic_period
+from softstart.chain.kernel_records import elastic_period
 from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
 from softstart.controller.finding import make_controller
