@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from softstart.arrays import Vector
 from softstart.chain.kernel_records import (
     BACK,
     BEYOND,
@@ -34,7 +35,6 @@ from softstart.chain.kernel_records import (
     UPPER,
     Record,
     Start,
-    Vector,
 )  # fmt: skip
 from softstart.chain.kernel_series import body_grip
 from softstart.plant.jit import compiled, inlined

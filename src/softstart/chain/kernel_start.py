@@ -8,6 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from softstart.arrays import Vector
 from softstart.chain.kernel_events import next_event, peak_within, value
 from softstart.chain.kernel_modes import begin_modes, handle, path_closed
 from softstart.chain.kernel_records import (
@@ -25,7 +26,6 @@ from softstart.chain.kernel_records import (
     WELDED,
     Record,
     Start,
-    Vector,
 )  # fmt: skip
 from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
 from softstart.plant.advance import next_in_queue

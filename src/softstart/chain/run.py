@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softstart.arrays import Vector
 from softstart.chain import kernel_start as kernel
 from softstart.chain.kernel_records import (
     CLOSED,
@@ -29,7 +30,6 @@ from softstart.chain.kernel_records import (
     Numbers,
     Record,
     Start,
-    Vector,
 )  # fmt: skip
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller

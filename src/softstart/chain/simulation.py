@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import kernel_start as kernel
-from softstart.chain.kernel_records import Numbers, Record, Start, Vector, numbers
+from softstart.chain.kernel_records import Numbers, Record, Start, numbers
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.run import ChainRun
