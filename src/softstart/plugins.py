@@ -1,4 +1,4 @@
-"""Finding what packages register in an entry-point group: the built-in ones have no privilege.
+"""Controllers and studies that packages register as entry points: the built-in ones have no privilege.
 
 A source checkout registers more: what its pyproject.toml names under [tool.softstart.entry-points], which is
 not part of the wheel (the benchmarks).
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from softstart.errors import InputError
 
+CONTROLLERS, STUDIES = "softstart.controllers", "softstart.studies"  # the groups
 CHECKOUT = Path(__file__).resolve().parents[2] / "pyproject.toml"  # elsewhere in an installed package
 
 
@@ -39,7 +40,7 @@ def _of_checkout(group: str) -> list[EntryPoint]:
 
 
 def load(group: str, kind: str, name: str, lists: str) -> object:
-    """What is registered under a name; `kind` is the key in the sentences, `lists` the command to list all.
+    """What is registered under a name; error sentences name `kind`, and `lists`, the command that lists all.
 
     Raises InputError in one sentence for an unknown name and for one that does not load.
 

@@ -14,12 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from softstart.errors import InputError
-from softstart.plugins import load, registered
+from softstart.plugins import STUDIES, load, registered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-GROUP = "softstart.studies"
 
 Progress = Callable[[str], None]  # told, in a few words, what is being done now
 
@@ -145,7 +143,7 @@ def study_names() -> tuple[str, ...]:
     >>> "paper-g" in study_names()
     True
     """
-    return tuple(registered(GROUP))
+    return tuple(registered(STUDIES))
 
 
 def find_study(name: str) -> Study:
@@ -157,7 +155,7 @@ def find_study(name: str) -> Study:
     Traceback (most recent call last):
     softstart.errors.InputError: study = "papper-g": there is no study of this name; did you mean "paper-g"?
     """
-    found = load(GROUP, "study", name, "softstart study --list")
+    found = load(STUDIES, "study", name, "softstart study --list")
     if not (isinstance(found, type) and issubclass(found, Study)):
         raise InputError(f'study = "{name}": {found!r} is no study; derive it from softstart.study.Study.')
     return found()

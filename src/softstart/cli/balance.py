@@ -13,8 +13,14 @@ from softstart.balancing import balance as compute
 from softstart.balancing.engine import INDICATOR_FILE, LIBRARY, TABLES
 from softstart.cli.commands import Command
 from softstart.cli.completion import names_or_files, table_keys
-from softstart.cli.completion import settings as settings_of
-from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
+from softstart.cli.options import (
+    Mistakes,
+    changes_option,
+    command_line,
+    json_option,
+    out_option,
+    read_changes,
+)
 from softstart.errors import InputError
 from softstart.quantities import to_si
 from softstart.views import balances as views
@@ -49,14 +55,9 @@ DEFAULT_ENGINE = "vaz-11113"
     multiple=True,
     help="A speed to show, as 4500rpm. May be repeated; by default round ones over the range.",
 )
-@click.option(
-    "--set",
-    "settings",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=settings_of(lambda: table_keys(TABLES)),
-    help="Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5. May be "
-    "repeated.",
+@changes_option(
+    lambda: table_keys(TABLES),
+    "Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5.",
 )
 @json_option
 @out_option("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")

@@ -10,8 +10,14 @@ import click
 
 from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.completion import names_or_files, table_keys
-from softstart.cli.completion import settings as settings_of
-from softstart.cli.options import Mistakes, command_line, json_option, out_option, read_changes
+from softstart.cli.options import (
+    Mistakes,
+    changes_option,
+    command_line,
+    json_option,
+    out_option,
+    read_changes,
+)
 from softstart.cli.running import working
 from softstart.clutch import (
     LAWS,
@@ -66,14 +72,9 @@ PHASES = ("phase", "start [s]", "end [s]", "peak torque [N*m]", "at [s]", "frict
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
     "and friction torque. By default that of the clutch file.",
 )
-@click.option(
-    "--set",
-    "settings",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=settings_of(lambda: table_keys(Clutch.TABLES)),
-    help="Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'. May be "
-    "repeated.",
+@changes_option(
+    lambda: table_keys(Clutch.TABLES),
+    "Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
 )
 @click.option(
     "--until", metavar="TIME", help="End of the run, as 5 (s). By default a period after the lock-up."

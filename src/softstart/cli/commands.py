@@ -1,4 +1,4 @@
-"""The commands under `softstart`, loaded by name when called, and what is said of a wrong command line."""
+"""The commands under `softstart`, loaded by name when called, and the messages for a wrong command line."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ COMMANDS = {
         "Design a soft start in the browser: sliders, traces that follow, strategies side by side.",
     ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
-    "controllers": ("lists", "List the controllers, or tell the parameters of one."),
+    "controllers": ("lists", "List the controllers, or show the parameters of one."),
     "study": ("study", "List the studies, or run one."),
     "completion": (
         "completion",
-        "Print what makes the Tab key complete commands, drives, controllers, keys and studies.",
+        "Print the script that completes commands, drives, controllers, keys and studies with the Tab key.",
     ),
 }
 
@@ -70,12 +70,12 @@ softstart --help lists all commands."""
 EPILOG = """\
 Exit codes: 0 done, 2 bad input or usage, 3 no solution, 130 interrupted.
 
-The Tab key completes names after: eval "$(softstart completion bash)", or zsh, or fish.
+For completion with the Tab key: eval "$(softstart completion bash)", or zsh, or fish.
 """
 
 
 class Words(click.types.StringParamType):
-    """Text of which the words in the option's metavar, `a|b|c`, are known; in capitals it is a placeholder.
+    """Text with the choices of the option's metavar, `a|b|c`; a choice in capitals is a placeholder.
 
     >>> option = click.Option(["--terminal"], metavar="synchronous|steady|FILE", type=Words())
     >>> [item.value for item in option.shell_complete(click.Context(click.Command("x")), "s")]
@@ -85,7 +85,7 @@ class Words(click.types.StringParamType):
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """The words that begin so."""
+        """The words that begin with `incomplete`."""
         words = (param.metavar or "").strip("[]").split("|")
         found = [word for word in words if word.islower() and word.startswith(incomplete)]
         return [CompletionItem(word) for word in found] if len(words) > 1 else []
@@ -130,7 +130,7 @@ class Commands(Command, click.Group):
             formatter.write_dl([(name, short_help(name, limit)) for name in COMMANDS])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Commands and options that begin so."""
+        """Commands and options that begin with `incomplete`."""
         found = [CompletionItem(n, help=short_help(n)) for n in COMMANDS if n.startswith(incomplete)]
         return found + click.Command.shell_complete(self, ctx, incomplete)
 
@@ -181,7 +181,7 @@ def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words in a row.
+    """Words as a list in a sentence.
 
     >>> listed(["a", "b", "c"]), listed(["a"])
     ('a, b and c', 'a')
@@ -193,14 +193,14 @@ def usage_sentence(error: click.UsageError) -> str:
     """One sentence for what click refused, with the command it was about and where help is.
 
     >>> usage_sentence(click.UsageError("there is no such thing."))
-    'there is no such thing. "softstart --help" tells more.'
+    'there is no such thing. See "softstart --help".'
     """
     command = error.ctx.command_path if error.ctx else "softstart"
     place = command.removeprefix("softstart").strip()
     reason = _reason(error).strip()
     if reason[-1:] not in (".", "?"):
         reason += "."
-    return f'{place + ": " if place else ""}{reason} "{command} --help" tells more.'
+    return f'{place + ": " if place else ""}{reason} See "{command} --help".'
 
 
 def _reason(error: click.UsageError) -> str:

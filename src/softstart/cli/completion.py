@@ -24,7 +24,7 @@ from softstart.cli.commands import Command, did_you_mean
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.plugins import registered
+from softstart.plugins import CONTROLLERS, STUDIES, registered
 
 if TYPE_CHECKING:
     from softstart import controller as controllers_found
@@ -34,8 +34,6 @@ else:
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 Keys = Mapping[str, tuple[str, Sequence[str]]]  # by key: its meaning, and its values where these are words
-
-CONTROLLERS, STUDIES = "softstart.controllers", "softstart.studies"
 
 
 def names_or_files(names: Callable[[], Iterable[str]], *endings: str) -> Completer:
@@ -308,9 +306,9 @@ def register_shells() -> None:
 @click.command(cls=Command)
 @click.argument("shell", metavar="[bash|zsh|fish]", required=False)
 def completion(shell: str | None) -> None:
-    """Print what makes the Tab key complete commands, drives, controllers, keys and studies.
+    """Print the script that completes commands, drives, controllers, keys and studies with the Tab key.
 
-    Without a name it is for the shell that runs. It begins with the place to put it; to try it at once:
+    By default it is for the shell that runs. Its first line names the file to put it in; to try it at once:
 
     \b
       eval "$(softstart completion bash)"

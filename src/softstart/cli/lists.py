@@ -31,7 +31,7 @@ else:
 def drives(name: str | None, as_json: bool) -> None:
     """List the shipped drives, or print one as TOML.
 
-    An own drive begins with: softstart drives crane-4amtkf > mine.toml
+    For a drive of your own: softstart drives crane-4amtkf > mine.toml
     """
     if name is not None and name not in drive_names():
         raise InputError(
@@ -65,7 +65,7 @@ def _values(drive: Any) -> dict[str, Any]:
 @click.argument("name", required=False, shell_complete=controllers_known)
 @json_option
 def controllers(name: str | None, as_json: bool) -> None:
-    """List the controllers, or tell the parameters of one.
+    """List the controllers, or show the parameters of one.
 
     NAME is that of a controller, or path/to/file.py:ClassName for one of your own.
     """

@@ -1,4 +1,4 @@
-"""The entry point: runs a command and turns whatever goes wrong into sentences and an exit code."""
+"""The entry point: runs a command; every failure becomes sentences on standard error and an exit code."""
 
 from __future__ import annotations
 
@@ -18,56 +18,56 @@ completion = late("softstart.cli.completion")
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
-UNHEARD = 0.5  # s after which a stop that nobody handles is repeated
+REPEAT_AFTER = 0.5  # s until a stop signal that was lost is raised again
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `softstart ARGUMENTS` (those of the process by default); returns the exit code.
 
-    0 done, 2 bad input or usage, 3 no solution, 130 interrupted, 141 the reader of a pipe went away. What
-    goes wrong is said on standard error; standard output is then empty.
+    0 done, 2 bad input or usage, 3 no solution, 130 interrupted, 141 the reader of a pipe closed it. After a
+    failure standard output is empty.
 
     >>> main(["drives", "crane-4amtk"])
     2
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     if arguments is None:
-        sys.excepthook = _own_mistake
+        sys.excepthook = _internal_error
         signal.signal(signal.SIGTERM, _stop)
         if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
             signal.signal(signal.SIGINT, _stop)
-        _never_fail_on_letters()
+        _replace_unprintable()
     try:
         code = _run(given)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return _said_interrupted()
+        return _interrupted()
     except SystemError as error:
-        if _is_stop(error):  # it came while compiled code looked at its arguments
-            return _said_interrupted()
+        if _is_stop(error):  # raised while compiled code unpacked its arguments
+            return _interrupted()
         raise
     except click.UsageError as error:
-        return _say([usage_sentence(error)], BAD_INPUT)
+        return _fail([usage_sentence(error)], BAD_INPUT)
     except InputError as error:
-        return _say(error.sentences, BAD_INPUT)
+        return _fail(error.sentences, BAD_INPUT)
     except SimulationError as error:
-        return _say([str(error)], NO_SOLUTION)
+        return _fail([str(error)], NO_SOLUTION)
     except BrokenPipeError:
         _silence_stdout()
         return PIPE_CLOSED
     except OSError as error:
         _silence_stdout()
-        return _say([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
+        return _fail([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
     except MemoryError:
-        return _say(["there is not enough memory for this."], NO_SOLUTION)
+        return _fail(["there is not enough memory for this."], NO_SOLUTION)
     finally:
-        _stop_is_heard()
+        _end_repetition()
     return code
 
 
-def _said_interrupted() -> int:
-    _stop_is_heard()
-    return _say(["interrupted; nothing half-written was left behind."], INTERRUPTED)
+def _interrupted() -> int:
+    _end_repetition()
+    return _fail(["interrupted; no incomplete file was left behind."], INTERRUPTED)
 
 
 def _run(arguments: list[str]) -> int:
@@ -82,7 +82,7 @@ def _run(arguments: list[str]) -> int:
     return DONE
 
 
-def _say(sentences: Sequence[str], code: int) -> int:
+def _fail(sentences: Sequence[str], code: int) -> int:
     """Sentences on standard error, numbered if there are several."""
     lines = [sentence.strip() for sentence in sentences]
     if len(lines) == 1:
@@ -93,12 +93,12 @@ def _say(sentences: Sequence[str], code: int) -> int:
     try:
         print(text, file=sys.stderr, flush=True)
     except OSError:
-        return code  # nobody listens on standard error; the exit code still says it
+        return code  # standard error is closed; the exit code remains
     return code
 
 
 def _silence_stdout() -> None:
-    """Throw away what is still buffered, so that the interpreter does not complain at its end."""
+    """Discard what is still buffered: the interpreter would report at exit that it cannot be written."""
     try:
         descriptor = sys.stdout.fileno()
     except (OSError, ValueError):
@@ -106,8 +106,8 @@ def _silence_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
 
 
-def _never_fail_on_letters() -> None:
-    """A letter that the terminal's encoding does not have becomes a question mark, not a failure."""
+def _replace_unprintable() -> None:
+    """Print a question mark for a character that the terminal's encoding lacks, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -115,15 +115,15 @@ def _never_fail_on_letters() -> None:
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C or TERM. Where no exception can pass (callbacks of compiled libraries) it is lost: so again."""
+    """Ctrl-C or TERM. Callbacks of compiled libraries lose the exception, so a timer raises it again."""
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, _stop_again)
-        signal.setitimer(signal.ITIMER_REAL, UNHEARD, UNHEARD)
+        signal.setitimer(signal.ITIMER_REAL, REPEAT_AFTER, REPEAT_AFTER)
     raise KeyboardInterrupt
 
 
 def _stop_again(number: int, frame: FrameType | None) -> None:
-    if not _is_stop(sys.exc_info()[1]):  # else it is heard, and cleans up
+    if not _is_stop(sys.exc_info()[1]):  # else it is being handled
         raise KeyboardInterrupt
 
 
@@ -135,19 +135,19 @@ def _is_stop(error: BaseException | None) -> bool:
     return False
 
 
-def _stop_is_heard() -> None:
+def _end_repetition() -> None:
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def _own_mistake(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """The last resort: a mistake of softstart itself. The interpreter then exits with 1."""
+def _internal_error(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
+    """Report a bug of softstart itself. The interpreter then exits with 1."""
     if os.environ.get(DEBUG):
         sys.__excepthook__(kind, error, traceback)
         return
     text = " ".join(str(error).split())
     print(
-        f"softstart: this is a mistake in softstart, not in your input ({kind.__name__}: {text}); please "
+        f"softstart: this is a bug in softstart, not in your input ({kind.__name__}: {text}); please "
         f"report it with the command you ran and what it prints with {DEBUG}=1 set.",
         file=sys.stderr,
     )

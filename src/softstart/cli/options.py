@@ -1,4 +1,4 @@
-"""The options that commands share, and reading them: all mistakes of one command line are told at once."""
+"""The options that commands share, and reading them: all errors of one command line are reported at once."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from typing import Any
 import click
 
 from softstart.cli.commands import did_you_mean
-from softstart.cli.completion import controllers, drive_keys, files_only, names_or_files, parameters
+from softstart.cli.completion import Keys, controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.errors import InputError
-from softstart.plugins import registered
+from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import to_si
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_DRIVE = "crane-4amtkf"
-CONTROLLER_GROUP = "softstart.controllers"  # read here so that names are checked before numba is imported
 
 
 class Mistakes:
@@ -42,12 +41,12 @@ class Mistakes:
         self.sentences: list[str] = []
 
     @contextmanager
-    def noted(self) -> Iterator[None]:
-        """Keep the sentences of an InputError raised inside, and go on."""
+    def noted(self, before: str = "") -> Iterator[None]:
+        """Keep the sentences of an InputError raised inside, each with `before` in front of it."""
         try:
             yield
         except InputError as error:
-            self.sentences.extend(error.sentences)
+            self.sentences.extend(before + sentence for sentence in error.sentences)
 
     def settle(self) -> None:
         """Raise what was noted, if anything was."""
@@ -66,7 +65,7 @@ def drive_names() -> tuple[str, ...]:
 @cache
 def controller_names() -> tuple[str, ...]:
     """Names of the installed controllers, found without importing any."""
-    return tuple(registered(CONTROLLER_GROUP))
+    return tuple(registered(CONTROLLERS))
 
 
 def drive_argument(default: str | None = None) -> Decorator:
@@ -82,13 +81,20 @@ def controller_option(name: str, metavar: str, text: str, required: bool = False
     return click.option(name, metavar=metavar, required=required, help=text, shell_complete=controllers)
 
 
-set_option = click.option(
-    "--set",
-    "settings",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=settings_of(drive_keys),
-    help="Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'. May be repeated.",
+def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
+    """--set, for a file with these keys."""
+    return click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        shell_complete=settings_of(keys),
+        help=f"{text} May be repeated.",
+    )
+
+
+set_option = changes_option(
+    drive_keys, "Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'."
 )
 until_option = click.option(
     "--until",
@@ -164,32 +170,6 @@ def read_until(text: str | None) -> float | None:
     return value
 
 
-def read_changes(settings: Sequence[str]) -> dict[str, Any]:
-    """The texts of --set for a file of tables, `key=value`, as a mapping: a value is read as in TOML if it
-    is such, else it is text.
-
-    >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
-    {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
-    """
-    found: dict[str, Any] = {}
-    mistakes = Mistakes()
-    for text in settings:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        with mistakes.noted():
-            if not (key and equals and value):
-                raise InputError(
-                    f'--set "{text}": write a key, an equals sign and a value, as load.inertia=0.07.'
-                )
-            if key in found:
-                raise InputError(f'--set "{text}": {key} is given twice; keep one of the two.')
-            try:
-                found[key] = tomllib.loads(f"value = {value}")["value"]
-            except tomllib.TOMLDecodeError:
-                found[key] = value
-    mistakes.settle()
-    return found
-
-
 def read_names(text: str | None, option: str = "--controllers") -> list[str] | None:
     """The controllers of a comma-separated list, each known and named once; None if none was given."""
     if text is None:
@@ -238,47 +218,66 @@ def check_name(name: str, option: str, several: str = "") -> str:
 
 
 def read_params(texts: Sequence[str]) -> dict[str, str]:
-    """`key=value` texts as a mapping; the controller reads the values.
+    """The `key=value` texts of --param as a mapping; the controller reads the values.
 
     >>> read_params(["torque=15 N*m"])
     {'torque': '15 N*m'}
     """
-    found: dict[str, str] = {}
-    mistakes = Mistakes()
-    for text in texts:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        with mistakes.noted():
-            if not (key and equals and value):
-                raise InputError(
-                    f'--param "{text}": write a key, an equals sign and a value, as torque="15 N*m".'
-                )
-            if key in found:
-                raise InputError(f'--param "{text}": {key} is given twice; keep one of the two.')
-            found[key] = value
-    mistakes.settle()
-    return found
+    return _pairs(texts, "--param", 'a key, an equals sign and a value, as torque="15 N*m"')
 
 
 def read_params_of(texts: Sequence[str], names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """`controller.key=value` texts, by controller.
+    """The `controller.key=value` texts of --param, by controller.
 
     >>> read_params_of(["ramp.time=0.2"], ["direct", "ramp"])
     {'ramp': {'time': '0.2'}}
     """
+    form = "CONTROLLER.key=value, as ramp.time=0.2"
+
+    def check(whole: str) -> None:
+        name, _, key = whole.rpartition(".")
+        if not (name and key):
+            raise InputError(f"write {form}.")
+        if name not in names:
+            raise InputError(f"{name} is not compared here; {did_you_mean(name, names)}")
+
     found: dict[str, dict[str, str]] = {}
+    for whole, value in _pairs(texts, "--param", form, check).items():
+        name, _, key = whole.rpartition(".")
+        found.setdefault(name, {})[key] = value
+    return found
+
+
+def read_changes(settings: Sequence[str]) -> dict[str, Any]:
+    """The `key=value` texts of --set for a file of tables: a value that is one in TOML is read, else text.
+
+    >>> read_changes(["masses.reciprocating=0.6 kg", "cylinders.firing_order=[1, 2]"])
+    {'masses.reciprocating': '0.6 kg', 'cylinders.firing_order': [1, 2]}
+    """
+    found: dict[str, Any] = {}
+    form = "a key, an equals sign and a value, as load.inertia=0.07"
+    for key, value in _pairs(settings, "--set", form).items():
+        try:
+            found[key] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key] = value
+    return found
+
+
+def _pairs(
+    texts: Sequence[str], option: str, form: str, check: Callable[[str], None] = lambda key: None
+) -> dict[str, str]:
+    """The `key=value` texts of an option as a mapping; all errors at once, those of `check(key)` too."""
     mistakes = Mistakes()
+    found: dict[str, str] = {}
     for text in texts:
-        whole, equals, value = (part.strip() for part in text.partition("="))
-        name, dot, key = whole.rpartition(".")
-        with mistakes.noted():
-            if not (dot and name and key and equals and value):
-                raise InputError(f'--param "{text}": write CONTROLLER.key=value, as ramp.time=0.2.')
-            if name not in names:
-                raise InputError(
-                    f'--param "{text}": {name} is not compared here; {did_you_mean(name, names)}'
-                )
-            if key in found.setdefault(name, {}):
-                raise InputError(f'--param "{text}": {name}.{key} is given twice; keep one of the two.')
-            found[name][key] = value
+        key, equals, value = (part.strip() for part in text.partition("="))
+        with mistakes.noted(f'{option} "{text}": '):
+            if not (key and equals and value):
+                raise InputError(f"write {form}.")
+            check(key)
+            if key in found:
+                raise InputError(f"{key} is given twice; keep one of the two.")
+            found[key] = value
     mistakes.settle()
     return found

@@ -1,4 +1,4 @@
-"""Run controllers from the command line: say when the kernel is compiled, and whose mistake a failure is."""
+"""Running controllers for a command: progress, a notice of compilation, failures of user code."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from contextlib import contextmanager, redirect_stdout
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from softstart.cli.options import CONTROLLER_GROUP, Mistakes
+from softstart.cli.options import Mistakes
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.plugins import registered
+from softstart.plugins import CONTROLLERS, registered
 
 if TYPE_CHECKING:
     import rich.console as rich_console
@@ -79,7 +79,7 @@ class Attributed:
 
     def __init__(self, loading: str = "") -> None:
         self.loading = loading
-        self.modules = {point.module for point in registered(CONTROLLER_GROUP).values()}
+        self.modules = {point.module for point in registered(CONTROLLERS).values()}
 
     def __enter__(self) -> None:
         pass
@@ -135,6 +135,6 @@ def make_controllers(
 
 
 def _one_line(sentence: str) -> str:
-    """Numba tells its mistakes in long reports: the first lines say it."""
+    """The first lines of an error message of numba, which may fill pages."""
     lines = [line.strip() for line in sentence.splitlines() if line.strip()]
     return " ".join(lines[:3]) + (" ..." if len(lines) > 3 else "") if len(lines) > 1 else sentence

@@ -15,10 +15,8 @@ from typing import Any
 from softstart.controller.base import Controller, Sensor
 from softstart.controller.gain_files import SUFFIXES
 from softstart.errors import InputError
-from softstart.plugins import load, registered
+from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
-
-GROUP = "softstart.controllers"
 
 
 def controller_names() -> tuple[str, ...]:
@@ -27,7 +25,7 @@ def controller_names() -> tuple[str, ...]:
     >>> "direct" in controller_names()
     True
     """
-    return tuple(registered(GROUP))
+    return tuple(registered(CONTROLLERS))
 
 
 def ready_controller_names(given: Collection[str] = ()) -> tuple[str, ...]:
@@ -56,7 +54,7 @@ def controller_class(name: str) -> type[Controller]:
     """
     if ".py:" in name or name.endswith(".py"):
         return _from_file(name)
-    found = load(GROUP, "controller", name, "softstart controllers")
+    found = load(CONTROLLERS, "controller", name, "softstart controllers")
     return _checked(found, name)
 
 

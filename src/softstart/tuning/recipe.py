@@ -8,10 +8,9 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from softstart.controller import Controller, make_controller
-from softstart.controller.finding import GROUP
 from softstart.controller.tuned import Tuned
 from softstart.errors import InputError
-from softstart.plugins import registered
+from softstart.plugins import CONTROLLERS, registered
 
 LOOSE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 
@@ -59,7 +58,7 @@ def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | N
 def _name_of(controller: Controller) -> str:
     """The name under which the controller's class is found, or nothing."""
     cls = type(controller)
-    point = registered(GROUP).get(cls.name)
+    point = registered(CONTROLLERS).get(cls.name)
     if point is not None and point.value == f"{cls.__module__}:{cls.__qualname__}":
         return cls.name
     if cls.__module__.startswith(LOOSE):

@@ -138,9 +138,9 @@ def _make_parents_and_rename(stage: Path, target: Path) -> None:
 
 @contextmanager
 def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
-    """The file `name` in DIR itself that keeps `what`, there after an interruption too, which is said.
+    """The file `name` in DIR itself that keeps `what`; after an interruption it stays, and a message says so.
 
-    What is wrong with it is told as of --out.
+    Errors about it name --out.
     """
     state = None if out is None else Path(out) / name
     try:
@@ -156,7 +156,9 @@ def kept_state(out: str | None, name: str, what: str) -> Iterator[Path | None]:
         ) from error
     except KeyboardInterrupt:
         if state is not None and state.exists():
-            print(f"softstart: {what} are kept in {state}; the same command goes on.", file=sys.stderr)
+            print(
+                f"softstart: {what} are kept in {state}; run the same command to continue.", file=sys.stderr
+            )
         raise
 
 

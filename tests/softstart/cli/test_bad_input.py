@@ -170,5 +170,5 @@ def test_a_mistake_of_softstart_itself_shows_no_traceback(place):
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (1, "")
-    assert "this is a mistake in softstart" in ended.stderr
+    assert "this is a bug in softstart" in ended.stderr
     assert "Traceback" not in ended.stderr

@@ -166,7 +166,7 @@ def test_interrupted_write_leaves_nothing(command, place, stop, there_before):
     process.send_signal(stop)
     out, err = process.communicate()
     assert (process.returncode, out) == (130, "")
-    assert err == "softstart: interrupted; nothing half-written was left behind.\n"
+    assert err == "softstart: interrupted; no incomplete file was left behind.\n"
     assert not list(place.rglob("*.part"))
     if there_before:
         assert [path.name for path in (place / "results").iterdir()] == ["report.md"]

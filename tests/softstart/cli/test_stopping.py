@@ -63,7 +63,7 @@ def ended(work: str, name: str) -> subprocess.CompletedProcess[str]:
 def test_a_stop_that_was_lost_is_repeated(work: str, name: str) -> None:
     done = ended(work, name)
     assert (done.returncode, done.stdout) == (130, "")
-    assert done.stderr == "softstart: interrupted; nothing half-written was left behind.\n"
+    assert done.stderr == "softstart: interrupted; no incomplete file was left behind.\n"
 
 
 def test_what_cleans_up_is_not_stopped_again() -> None:
