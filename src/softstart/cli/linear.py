@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+import softstart
 from softstart.cli.commands import Command
 from softstart.cli.options import (
     DEFAULT_DRIVE,
@@ -23,8 +24,7 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
-from softstart.linear.view import LinearView, linear_view
-from softstart.views import linear as views
+from softstart.late import late
 from softstart.views.drawing import save_figure
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import (
@@ -42,6 +42,10 @@ from softstart.views.terminal import console, print_json, print_table, print_tab
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from softstart.views import linear as views
+else:  # no numba for a help, a wrong option or the Tab key
+    views = late("softstart.views.linear")
 
 
 @click.command(cls=Command)
@@ -84,7 +88,7 @@ def linear(
         with working("running and linearising the start ..."):
             (made,) = make_controllers([controller], {controller: given}, prefix=False)
             with Attributed():
-                view = linear_view(one, made)
+                view = softstart.linear_view(one, made)
         if folder is not None:
             with working("drawing the figure ..."):
                 write_linear(view, folder, command_line())
@@ -97,7 +101,7 @@ def linear(
             print(f"\nWritten to {out}: {'report.md, figure and response' if view.margins else 'report.md'}.")
 
 
-def _show(to: Console, view: LinearView) -> None:
+def _show(to: Console, view: softstart.LinearView) -> None:
     for index, line in enumerate(drive_lines(view.drive)):
         sentence(to, line, "bold" if index == 0 else "")
     sentence(to, f"  under  {view.name}")
@@ -112,7 +116,7 @@ def _show(to: Console, view: LinearView) -> None:
         sentence(to, note, "dim")
 
 
-def write_linear(view: LinearView, folder: Path, command: str) -> None:
+def write_linear(view: softstart.LinearView, folder: Path, command: str) -> None:
     """The files of --out."""
     parts = [f"# {markdown(view.drive.name)}: loop of {markdown(view.name)}"]
     if view.margins is None:

@@ -5,16 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from softstart.cli.commands import did_you_mean
 from softstart.cli.options import Decorator, Mistakes
 from softstart.errors import InputError, SimulationError
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.late import late
 from softstart.quantities import to_si
 from softstart.views.terminal import print_json
+
+if TYPE_CHECKING:
+    from softstart.optimal import result
+else:  # no numba for a help, a wrong option or the Tab key
+    result = late("softstart.optimal.result")
 
 METHODS = ("auto", "closed-form", "collocation", "lp")
 OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
@@ -219,8 +224,8 @@ def no_solution_reported(as_json: bool) -> Iterator[None]:
     except RuntimeError as error:
         if isinstance(error, SimulationError | RecursionError | NotImplementedError):
             raise
-        if not isinstance(error, InfeasibleError | OptimumError | NotConverged):
+        if not isinstance(error, result.InfeasibleError | result.OptimumError | result.NotConverged):
             raise
-        if as_json and isinstance(error, InfeasibleError):
+        if as_json and isinstance(error, result.InfeasibleError):
             print_json(error.verdict.summary())
         raise SimulationError(as_option(str(error))) from error

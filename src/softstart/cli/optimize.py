@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import softstart
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
@@ -40,38 +41,27 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.running import Attributed, working
-from softstart.controller import ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.optimal import solving
+from softstart.late import late
 from softstart.optimal.problem import OBJECTIVES, TERMINALS, Problem
-from softstart.optimal.result import Optimum
-from softstart.optimal.robust import SensorWorth, scenarios_of, worth_of_contact_sensor
-from softstart.optimal.shortest import start_time_of_direct
 from softstart.quantities import to_si
-from softstart.start.run import Run
-from softstart.start.simulation import simulate
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
 from softstart.views.numbers import Column
-from softstart.views.optima import (
-    AIMS,
-    bound_sentence,
-    comparison,
-    controller_summary,
-    figure_rows,
-    question,
-    robust_bound_sentence,
-    robust_question,
-    scenario_table,
-    worth_conclusion,
-    write_optimum,
-    write_worth,
-)
 from softstart.views.terminal import console, print_json, print_lines, print_table, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from softstart import controller
+    from softstart.optimal import robust, shortest
+    from softstart.optimal.result import Optimum
+    from softstart.start.run import Run
+    from softstart.views import optima as views
+else:  # no numba for a help, a wrong option or the Tab key
+    controller, robust = late("softstart.controller"), late("softstart.optimal.robust")
+    shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
 
 
 @click.command(cls=Command)
@@ -81,7 +71,7 @@ if TYPE_CHECKING:
 )
 @terminal_option("synchronous")
 @method_option
-@click.option("--minimise", metavar="|".join(AIMS), help="By default k_dyn.")
+@click.option("--minimise", metavar="|".join(OBJECTIVES), help="By default k_dyn.")
 @click.option("--max-k-dyn", metavar="NUMBER", help="Largest K_dyn allowed, if another figure is minimised.")
 @click.option("--max-heat", metavar="TIME", help="Largest I2t heat allowed, in s of starting torque.")
 @torque_speed_option
@@ -188,14 +178,14 @@ def _weight(text: str) -> float:
 
 
 def _missing(bounds: Mapping[str, Any]) -> str:
-    aim = AIMS[bounds.get("minimise", "k_dyn")]
+    aim = views.AIMS[bounds.get("minimise", "k_dyn")]
     return f"--start-time is missing: without it the start with the least {aim} would take for ever; give one"
 
 
 def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
     """What to type instead, from what `direct` needs."""
     with working("starting the drive ..."):
-        direct = start_time_of_direct(drive)
+        direct = shortest.start_time_of_direct(drive)
     return (
         f"{_missing(bounds)}, as --start-time 1.2x, which is {1.2 * direct:.4g} s: 1.2 times the "
         f"{direct:.4g} s that direct needs."
@@ -207,18 +197,20 @@ def _optimize_one(
 ) -> None:
     with no_solution_reported(as_json), output_folder(out) as folder:
         with working("looking for the gentlest start ..."):
-            direct = start_time_of_direct(drive) if asked is not None and asked.multiple else math.nan
+            direct = (
+                shortest.start_time_of_direct(drive) if asked is not None and asked.multiple else math.nan
+            )
             seconds = None if asked is None else asked.seconds(direct)
             with named_as_options():
-                best = solving.optimize(drive, seconds, **bounds)
+                best = softstart.optimize(drive, seconds, **bounds)
         with working("starting the drive under the shipped controllers ..."):
             others = runs_beside(best)
         if folder is not None:
             with working("drawing the figure ..."):
-                write_optimum(best, others, folder, command_line())
+                views.write_optimum(best, others, folder, command_line())
 
     if as_json:
-        print_json({**best.summary(), "controllers": [controller_summary(run) for run in others]})
+        print_json({**best.summary(), "controllers": [views.controller_summary(run) for run in others]})
     else:
         _show(console(), best, others)
         if out is not None:
@@ -229,21 +221,21 @@ def runs_beside(best: Optimum) -> list[Run]:
     """The same drive under every controller that runs without being given a parameter, and does not fail."""
     drive, base = best.problem.drive, best.problem.base
     runs = []
-    for name in ready_controller_names():
+    for name in controller.ready_controller_names():
         with suppress(InputError, SimulationError), Attributed(name):
-            runs.append(simulate(drive, name, base=base))
+            runs.append(softstart.simulate(drive, name, base=base))
     return runs
 
 
 def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
     print_lines(to, drive_lines(best.problem.drive))
-    sentence(to, f"  asked  {question(best)}")
+    sentence(to, f"  asked  {views.question(best)}")
     sentence(to, f"  method {best.method}: {best.why}")
     to.print()
-    print_table(to, [Column("", False), Column("", False)], figure_rows(best), headings=False)
+    print_table(to, [Column("", False), Column("", False)], views.figure_rows(best), headings=False)
     to.print()
-    sentence(to, comparison(best, others), "bold")
-    sentence(to, bound_sentence(best), "dim")
+    sentence(to, views.comparison(best, others), "bold")
+    sentence(to, views.bound_sentence(best), "dim")
 
 
 # one profile for several drives ---------------------------------------------------------------------------
@@ -261,12 +253,12 @@ def _optimize_for_all(
                     status.update(f"{doing} ...")
 
             with named_as_options():
-                scenarios = scenarios_of(drive, **varied)
-                direct = start_time_of_direct(drive) if asked.multiple else math.nan
-                worth = worth_of_contact_sensor(scenarios, asked.seconds(direct), progress=progress)
+                scenarios = robust.scenarios_of(drive, **varied)
+                direct = shortest.start_time_of_direct(drive) if asked.multiple else math.nan
+                worth = robust.worth_of_contact_sensor(scenarios, asked.seconds(direct), progress=progress)
         if folder is not None:
             with working("drawing the figure ..."):
-                write_worth(worth, folder, command_line())
+                views.write_worth(worth, folder, command_line())
 
     if as_json:
         print_json(worth.summary())
@@ -276,14 +268,14 @@ def _optimize_for_all(
             print(f"\nWritten to {out}: report.md, both profiles, the figure and traces.")
 
 
-def _show_worth(to: Console, worth: SensorWorth) -> None:
+def _show_worth(to: Console, worth: robust.SensorWorth) -> None:
     blind = worth.blind
     print_lines(to, drive_lines(blind.base))
-    sentence(to, f"  asked  {robust_question(blind)}")
+    sentence(to, f"  asked  {views.robust_question(blind)}")
     to.print()
-    table = scenario_table(worth)
+    table = views.scenario_table(worth)
     print_table(to, table.columns, table.rows, bold=[blind.worst])
     to.print()
-    sentence(to, worth_conclusion(worth), "bold")
-    sentence(to, robust_bound_sentence(blind), "dim")
+    sentence(to, views.worth_conclusion(worth), "bold")
+    sentence(to, views.robust_bound_sentence(blind), "dim")
     sentence(to, "K_dyn refers to the mean shaft torque of the first drive.", "dim")

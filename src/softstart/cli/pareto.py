@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import softstart
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
@@ -36,20 +37,21 @@ from softstart.cli.options import (
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
-from softstart.controller import ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal import front
-from softstart.optimal.front import Front
+from softstart.late import late
 from softstart.optimal.problem import TERMINALS, Problem
-from softstart.optimal.shortest import start_time_of_direct
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import kept_state, output_folder
-from softstart.views.optima import footnotes, front_conclusion, front_tables, write_front
 from softstart.views.terminal import console, print_json, print_lines, print_tables, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from softstart.optimal import shortest
+    from softstart.views import optima as views
+else:  # no numba for a help, a wrong option or the Tab key
+    shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
 
 STATE = "pareto.jsonl"
 
@@ -125,7 +127,7 @@ def pareto(
         found = _computed(one, asked, names, bounds, state)
         if folder is not None and any(point.found for point in found.points):
             with working("drawing the figure ..."):
-                write_front(found, folder, command_line())
+                views.write_front(found, folder, command_line())
 
     if as_json:
         print_json(found.summary())
@@ -143,9 +145,9 @@ def _computed(
     names: Sequence[str] | None,
     bounds: dict[str, Any],
     state: Path | None,
-) -> Front:
+) -> softstart.Front:
     with working("starting the drive ...") as status:
-        made = make_controllers(names or ready_controller_names(), {}, prefix=True)
+        made = make_controllers(names, {}, prefix=True)
 
         def progress(doing: str) -> None:
             if status is not None:
@@ -154,16 +156,18 @@ def _computed(
         times = None
         if asked is not None:
             multiples = any(one.multiple for one in asked)
-            direct = start_time_of_direct(drive) if multiples else math.nan
+            direct = shortest.start_time_of_direct(drive) if multiples else math.nan
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
-            return front.pareto(drive, times, controllers=made, save_to=state, progress=progress, **bounds)
+            return softstart.pareto(
+                drive, times, controllers=made, save_to=state, progress=progress, **bounds
+            )
 
 
-def _show(to: Console, found: Front) -> None:
+def _show(to: Console, found: softstart.Front) -> None:
     print_lines(to, drive_lines(found.drive))
-    print_tables(to, front_tables(found))
+    print_tables(to, views.front_tables(found))
     to.print()
-    sentence(to, front_conclusion(found), "bold")
-    for note in footnotes(found):
+    sentence(to, views.front_conclusion(found), "bold")
+    for note in views.footnotes(found):
         sentence(to, note, "dim")

@@ -66,6 +66,16 @@ def test_quick_answers_import_nothing_heavy(what, place):
     assert ended.stderr.splitlines()[-1] == f"[] {code}"
 
 
+def test_the_help_of_no_command_imports_anything_heavy():
+    program = (
+        "import sys; from softstart.cli import main; from softstart.cli.commands import COMMANDS; "
+        "codes = {main([name, '--help']) for name in COMMANDS}; "
+        f"print([name for name in {HEAVY} if name in sys.modules], codes, file=sys.stderr)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ended.stderr == "[] {0}\n"
+
+
 @pytest.mark.parametrize(
     "arguments", [["simulate", "good.toml", "--controller", "direct"], ["compare", *DIRECT]]
 )
