@@ -10,16 +10,7 @@ import numpy as np
 
 from softstart import stages
 from softstart.controller import CompiledController, compiled_step, parameter, stack
-from softstart.controller.compiled import (
-    ASK_AGAIN,
-    MOTOR_ANGLE,
-    MOTOR_SPEED,
-    MOTOR_TORQUE,
-    STATE,
-    TIME,
-    TORQUE,
-    Vector,
-)
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.plant.vector import encoder_count
 from softstart_controllers.reduced import reduced_torque
@@ -41,53 +32,75 @@ SMALLEST_DROP = 0.05
 ROUNDING_SHARE = 1.0 / 3.0  # of the drop, that the encoder's rounding may feign at the worst
 BISECTIONS = 40
 
-# indices of the parameter vector
-P_TORQUE, P_FULL, P_PERIOD, P_J1, P_HALF, P_STRIDE, P_DROP, P_WAIT, P_PATIENCE = range(9)
-# indices of the state; the ring of the last differences follows
-S_SAMPLE, S_FREE_ANGLE, S_FREE_SPEED, S_DEMAND, S_TORQUE, S_RAISE_AT, S_RING = range(7)
+
+class Parameters:
+    """Torques, the motor, and the window of the second difference."""
+
+    torque: float
+    full: float
+    period: float
+    J1: float
+    half: float
+    stride: float
+    drop: float
+    wait: float
+    patience: float
+
+
+class State:
+    """The free motor, and the ring of the last differences to it."""
+
+    sample: float
+    free_angle: float
+    free_speed: float
+    demand: float
+    realised: float
+    raise_at: float
+    ring: Vector
+
+
+PARAMETERS = record(Parameters)
+STATE = record(State, ring=RING)
+COMMAND = record(Answer, State, ring=RING)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The angle lost against a free motor, its second difference, and the wait after contact."""
-    period = parameters[P_PERIOD]
-    sample = int(state[S_SAMPLE])
-    t = measured[TIME]
-    u = measured[MOTOR_TORQUE]
-    raise_at = state[S_RAISE_AT]
-    for i in range(RING):
-        command[STATE + S_RING + i] = state[S_RING + i]
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    keep_state(state, command)
+    t, u = m.time, m.motor_torque
+    sample = int(x.sample)
     if sample == 0:
-        angle = measured[MOTOR_ANGLE]
-        speed = measured[MOTOR_SPEED]
-        raise_at = math.inf
+        y.free_angle = m.motor_angle
+        y.free_speed = m.motor_speed
+        y.raise_at = math.inf
     else:
-        a = mean_torque(state[S_TORQUE], u, state[S_DEMAND]) / parameters[P_J1]
-        angle = state[S_FREE_ANGLE] + period * (state[S_FREE_SPEED] + 0.5 * period * a)
-        speed = state[S_FREE_SPEED] + period * a
-        stride = int(parameters[P_STRIDE])
+        a = mean_torque(x.realised, u, x.demand) / p.J1
+        y.free_angle = x.free_angle + p.period * (x.free_speed + 0.5 * p.period * a)
+        y.free_speed = x.free_speed + p.period * a
+        stride = int(p.stride)
         if sample % stride == 0:
-            half = int(parameters[P_HALF])
+            half = int(p.half)
             kept = sample // stride
-            lost = angle - measured[MOTOR_ANGLE]
+            lost = y.free_angle - m.motor_angle
             # the slots not yet written are zero: before the start nothing was lost
-            middle = state[S_RING + (kept + RING - half) % RING]
-            oldest = state[S_RING + (kept + RING - 2 * half) % RING]
-            command[STATE + S_RING + kept % RING] = lost
-            if raise_at == math.inf and lost - 2.0 * middle + oldest > parameters[P_DROP]:
-                raise_at = t + parameters[P_WAIT]
-        if raise_at == math.inf and t >= parameters[P_PATIENCE]:
-            raise_at = t
-    waiting = t + 0.5 * period < raise_at
-    demand = parameters[P_TORQUE] if waiting else parameters[P_FULL]
-    command[TORQUE] = demand
-    command[ASK_AGAIN] = (sample + 1) * period if waiting else math.inf
-    command[STATE + S_SAMPLE] = sample + 1
-    command[STATE + S_FREE_ANGLE] = angle
-    command[STATE + S_FREE_SPEED] = speed
-    command[STATE + S_DEMAND] = demand
-    command[STATE + S_TORQUE] = u
-    command[STATE + S_RAISE_AT] = raise_at
+            middle = x.ring[(kept + RING - half) % RING]
+            oldest = x.ring[(kept + RING - 2 * half) % RING]
+            y.ring[kept % RING] = lost
+            if x.raise_at == math.inf and lost - 2.0 * middle + oldest > p.drop:
+                y.raise_at = t + p.wait
+        if y.raise_at == math.inf and t >= p.patience:
+            y.raise_at = t
+    waiting = t + 0.5 * p.period < y.raise_at
+    y.torque = p.torque if waiting else p.full
+    y.ask_again = (sample + 1) * p.period if waiting else math.inf
+    y.sample = sample + 1
+    y.demand = y.torque
+    y.realised = u
 
 
 @dataclass(frozen=True)
@@ -135,7 +148,7 @@ class AccelerationDelay(CompiledController):
     summary: ClassVar[str] = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
     source: ClassVar[str] = "[G]"
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = S_RING + RING
+    state_size: ClassVar[int] = size(STATE)
 
     torque: float | None = parameter(
         "N*m",

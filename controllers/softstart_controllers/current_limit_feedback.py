@@ -9,16 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, compiled_step, parameter, stack
-from softstart.controller.compiled import (
-    ASK_AGAIN,
-    MOTOR_ANGLE,
-    MOTOR_SPEED,
-    MOTOR_TORQUE,
-    STATE,
-    TIME,
-    TORQUE,
-    Vector,
-)
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
 from softstart_controllers.reduced import reduced_torque
@@ -45,90 +36,111 @@ CERTAINTY = 5.0  # standard deviations of the estimate
 REFINEMENTS = 4
 OPEN_AGAIN = 0.3  # of the threshold
 
-# indices of the parameter vector
-(
-    P_PERIOD, P_J1, P_LOW, P_FULL, P_FEEDBACK, P_CLOSED, P_OPEN, P_RISE, P_APPROACH, P_HORIZON, P_LOAD_SPEED,
-    P_DRIFT, P_PATIENCE, P_C, P_MOTOR_BEND, P_LOAD_BEND, P_DAMPING_BEND, P_MC,
-    P_K_ANGLE, P_K_SPEED, P_K_TORQUE, P_K_RATE,
-) = range(22)  # fmt: skip
-# indices of the state
-(
-    S_SAMPLE, S_ANGLE, S_SPEED, S_TORQUE, S_RATE, S_DEMAND, S_MOTOR_TORQUE, S_PHASE, S_PROGRESS,
-    S_LOAD_SPEED, N_STATE,
-) = range(11)  # fmt: skip
-# values of S_PHASE
-GAP_OPEN, CLOSED, OPEN_AGAIN_PHASE, IMPATIENT = 0.0, 1.0, 2.0, 3.0
+GAP_OPEN, CLOSED, OPEN_AGAIN_PHASE, IMPATIENT = 0.0, 1.0, 2.0, 3.0  # phases
+
+
+class Parameters:
+    """Limits, thresholds, the model of the closed drive and the gains k of the observer."""
+
+    period: float
+    J1: float
+    low: float
+    full: float
+    feedback: float
+    closed: float
+    open: float
+    rise: float
+    approach: float
+    horizon: float
+    load_speed: float
+    drift: float
+    patience: float
+    c: float
+    motor_bend: float
+    load_bend: float
+    damping_bend: float
+    Mc: float
+    k_angle: float
+    k_speed: float
+    k_torque: float
+    k_rate: float
+
+
+class State:
+    """The estimate: motor angle and speed, shaft torque T and its rate; the limit that rises."""
+
+    sample: float
+    angle: float
+    speed: float
+    T: float
+    rate: float
+    demand: float
+    realised: float
+    phase: float
+    progress: float
+    load_speed: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Estimate T and T', tell whether the gap is closed, set the torque."""
-    p = parameters
-    h = p[P_PERIOD]
-    t = measured[TIME]
-    u = measured[MOTOR_TORQUE]
-    sample = state[S_SAMPLE]
-    phase = state[S_PHASE]
-    progress = state[S_PROGRESS]
-    load_speed = state[S_LOAD_SPEED]
-    if sample == 0.0:
-        angle = measured[MOTOR_ANGLE]
-        speed = measured[MOTOR_SPEED]
-        torque = 0.0
-        rate = 0.0
-        load_speed = p[P_LOAD_SPEED]
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    keep_state(state, command)
+    t, u, h = m.time, m.motor_torque, p.period
+    phase = x.phase
+    if x.sample == 0.0:
+        y.angle = m.motor_angle
+        y.speed = m.motor_speed
+        y.T = 0.0
+        y.rate = 0.0
+        y.load_speed = p.load_speed
     else:
-        mean = mean_torque(state[S_MOTOR_TORQUE], u, state[S_DEMAND])
-        torque = state[S_TORQUE]
-        rate = state[S_RATE]
+        mean = mean_torque(x.realised, u, x.demand)
         bend = 0.0
         if phase == CLOSED:
-            middle = torque + 0.5 * h * rate
-            bend = p[P_MOTOR_BEND] * (mean - middle) - p[P_LOAD_BEND] * (middle - p[P_MC])
-            bend -= p[P_DAMPING_BEND] * rate
-        angle, speed, torque, rate = predict(
-            state[S_ANGLE], state[S_SPEED], torque, rate, bend, mean, p[P_J1], h
-        )
-        error = measured[MOTOR_ANGLE] - angle
-        angle += p[P_K_ANGLE] * error
-        speed += p[P_K_SPEED] * error
-        torque += p[P_K_TORQUE] * error
-        rate += p[P_K_RATE] * error
+            middle = x.T + 0.5 * h * x.rate
+            bend = p.motor_bend * (mean - middle) - p.load_bend * (middle - p.Mc)
+            bend -= p.damping_bend * x.rate
+        angle, speed, T, rate = predict(x.angle, x.speed, x.T, x.rate, bend, mean, p.J1, h)
+        error = m.motor_angle - angle
+        y.angle = angle + p.k_angle * error
+        y.speed = speed + p.k_speed * error
+        y.T = T + p.k_torque * error
+        y.rate = rate + p.k_rate * error
 
     if phase == CLOSED:
-        if torque < p[P_OPEN]:
+        if p.open > y.T:
             phase = OPEN_AGAIN_PHASE
-            load_speed = speed - rate / p[P_C]
-    elif torque > p[P_CLOSED] and phase != IMPATIENT:
+            y.load_speed = y.speed - y.rate / p.c
+    elif p.closed < y.T and phase != IMPATIENT:
         phase = CLOSED
-    if t >= p[P_PATIENCE]:
+    if t >= p.patience:
         phase = IMPATIENT
 
-    limit = p[P_LOW] + (p[P_FULL] - p[P_LOW]) * progress
+    limit = p.low + (p.full - p.low) * x.progress
     if phase == CLOSED:
-        demand = min(max(limit - p[P_FEEDBACK] * rate, 0.0), p[P_FULL])
-        progress = min(1.0, progress + p[P_RISE])
+        y.torque = min(max(limit - p.feedback * y.rate, 0.0), p.full)
+        y.progress = min(1.0, x.progress + p.rise)
     elif phase == IMPATIENT:
-        demand = limit
-        progress = min(1.0, progress + p[P_RISE])
+        y.torque = limit
+        y.progress = min(1.0, x.progress + p.rise)
     else:
-        allowed = load_speed + p[P_APPROACH]
+        allowed = y.load_speed + p.approach
         if phase == GAP_OPEN:  # never less than half: a contact not seen must not let the load run back
-            allowed -= min(p[P_DRIFT] * t, 0.5 * p[P_APPROACH])
-        demand = min(max(p[P_J1] * (allowed - speed) / p[P_HORIZON], 0.0), p[P_LOW])
+            allowed -= min(p.drift * t, 0.5 * p.approach)
+        y.torque = min(max(p.J1 * (allowed - y.speed) / p.horizon, 0.0), p.low)
 
-    command[TORQUE] = demand
-    command[ASK_AGAIN] = (sample + 1.0) * h
-    command[STATE + S_SAMPLE] = sample + 1.0
-    command[STATE + S_ANGLE] = angle
-    command[STATE + S_SPEED] = speed
-    command[STATE + S_TORQUE] = torque
-    command[STATE + S_RATE] = rate
-    command[STATE + S_DEMAND] = demand
-    command[STATE + S_MOTOR_TORQUE] = u
-    command[STATE + S_PHASE] = phase
-    command[STATE + S_PROGRESS] = progress
-    command[STATE + S_LOAD_SPEED] = load_speed
+    y.ask_again = (x.sample + 1.0) * h
+    y.sample = x.sample + 1.0
+    y.demand = y.torque
+    y.realised = u
+    y.phase = phase
 
 
 @dataclass(frozen=True)
@@ -188,7 +200,7 @@ class CurrentLimitFeedback(CompiledController):
     )
     source: ClassVar[str] = "[G]"
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = N_STATE
+    state_size: ClassVar[int] = size(STATE)
 
     low_torque: float | None = parameter(
         "N*m",
@@ -259,7 +271,7 @@ class CurrentLimitFeedback(CompiledController):
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """The numbers in the order of the indices P_PERIOD to P_K_RATE."""
+        """The numbers of `Parameters`."""
         eyes = observer(drive, self.period, self.uncertainty)
         period, ratio, rise = (np.asarray(v, float) for v in (self.period, self.damping_ratio, self.rise))
         threshold = np.asarray(self.threshold, float)

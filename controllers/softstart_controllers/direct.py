@@ -7,15 +7,25 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, TORQUE, Vector
+from softstart.controller.compiled import Answer, Vector, record
 from softstart.drive import Drive
+
+
+class Parameters:
+    """What the step is given."""
+
+    torque: float
+
+
+PARAMETERS, COMMAND = record(Parameters), record(Answer)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """One torque, once and for all."""
-    command[TORQUE] = parameters[0]
-    command[ASK_AGAIN] = math.inf
+    y = command.view(COMMAND)[0]
+    y.torque = parameters.view(PARAMETERS)[0].torque
+    y.ask_again = math.inf
 
 
 @dataclass(frozen=True)

@@ -29,20 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from softstart.controller.compiled import (
-    MOTOR_ANGLE,
-    MOTOR_SPEED,
-    MOTOR_TORQUE,
-    STATE,
-    Vector,
-    inlined,
-)
+from softstart.controller.compiled import Vector, inlined, record
 from softstart.drive import Drive
 from softstart.plant.jit import compiled
 from softstart.plant.vector import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
-from softstart_controllers.sampled import mean_torque, pulling_load
+from softstart_controllers.sampled import mean_torque, number, patience, pulling_load, sample_period
 from softstart_controllers.shaping import swing
 
 THRESHOLD = 0.1  # of M12avg_base
@@ -50,130 +43,153 @@ LOW_SHARE = 0.5  # of the shaft torque under the low limit: what the threshold m
 LARGEST_DAMPING = 0.95  # damping ratio that the model of the closed drive may have
 BISECTIONS = 24
 SLOWEST = 0.02  # of the approach speed: with no speed and no torque a contact would never be seen
+LOW_TORQUE_SHARE = 0.5  # of the accelerating torque
 REFITS = 4  # the speed of impact depends a little on the instant of contact
 
-# indices of the parameter vector, before those of the controller itself
-(
-    P_PERIOD, P_J1, P_LOW, P_APPROACH, P_HORIZON, P_LOAD_SPEED, P_DRIFT, P_HALF, P_STRIDE, P_TRIGGER,
-    P_PATIENCE, P_MC, P_PULL, P_STICKS, P_RESTS, P_C, P_D, P_SHARE, P_SIGMA, P_OMEGA, P_STUCK_SIGMA,
-    P_STUCK_OMEGA, N_LANDING,
-) = range(23)  # fmt: skip
-# indices of the state, likewise; the ring of the last lost angles comes first
-S_RING = 0
-(
-    S_SAMPLE, S_COUNT, S_FREE_ANGLE, S_FREE_SPEED, S_DEMAND, S_TORQUE, S_SLOPE, S_OLDER_SLOPE,
-    S_CONTACTS, S_LOAD_SPEED, S_LEFT_AT, N_LANDING_STATE,
-) = range(RING, RING + 12)  # fmt: skip
+
+class Parameters:
+    """What `landing_numbers` gives; sigma + i omega is the pole of the closed drive, load moving or stuck."""
+
+    period: float
+    J1: float
+    low: float
+    approach: float
+    horizon: float
+    load_speed: float
+    drift: float
+    half: float
+    stride: float
+    trigger: float
+    patience: float
+    Mc: float
+    pull: float
+    sticks: float
+    rests: float
+    c: float
+    d: float
+    share: float
+    sigma: float
+    omega: float
+    stuck_sigma: float
+    stuck_omega: float
+
+
+class State:
+    """From the first sample on; the ring holds the last lost angles."""
+
+    ring: Vector
+    sample: float
+    count: float
+    free_angle: float
+    free_speed: float
+    demand: float
+    torque: float
+    slope: float
+    older_slope: float
+    contacts: float
+    load_speed: float
+    left_at: float
+
+
+PARAMETERS, STATE = record(Parameters), record(State, ring=RING)
 
 
 @inlined
-def watch(p: Vector, measured: Vector, state: Vector, command: Vector) -> tuple[float, float]:
+def watch(p: Parameters, m: Any, x: State, y: State) -> tuple[float, float]:
     """Motor speed, and how far the second difference is beyond the trigger (-inf between two looks).
 
     The free motor goes on under the torque realised; its speed is corrected by the slope of the lost angle.
+    x is the state before this sample, y the one after it, so far the same.
     """
-    h = p[P_PERIOD]
-    u = measured[MOTOR_TORQUE]
-    angle = measured[MOTOR_ANGLE]
-    count = int(state[S_COUNT])
-    slope = state[S_SLOPE]
-    older = state[S_OLDER_SLOPE]
+    h = p.period
+    count = int(x.count)
     beyond = -math.inf
     if count == 0:
-        free_angle = angle
-        free_speed = measured[MOTOR_SPEED] if state[S_SAMPLE] == 0.0 else state[S_FREE_SPEED]
-        slope = 0.0
-        older = 0.0
+        y.free_angle = m.motor_angle
+        if x.sample == 0.0:
+            y.free_speed = m.motor_speed
+        y.slope = 0.0
+        y.older_slope = 0.0
         for i in range(RING):
-            command[STATE + S_RING + i] = 0.0
+            y.ring[i] = 0.0
     else:
-        a = mean_torque(state[S_TORQUE], u, state[S_DEMAND]) / p[P_J1]
-        free_angle = state[S_FREE_ANGLE] + h * (state[S_FREE_SPEED] + 0.5 * h * a)
-        free_speed = state[S_FREE_SPEED] + h * a
-        for i in range(RING):
-            command[STATE + S_RING + i] = state[S_RING + i]
-        stride = int(p[P_STRIDE])
+        a = mean_torque(x.torque, m.motor_torque, x.demand) / p.J1
+        y.free_angle = x.free_angle + h * (x.free_speed + 0.5 * h * a)
+        y.free_speed = x.free_speed + h * a
+        stride = int(p.stride)
         if count % stride == 0:
-            half = int(p[P_HALF])
+            half = int(p.half)
             kept = count // stride
-            lost = free_angle - angle
-            middle = state[S_RING + (kept + RING - half) % RING]
-            oldest = state[S_RING + (kept + RING - 2 * half) % RING]
-            command[STATE + S_RING + kept % RING] = lost
+            lost = y.free_angle - m.motor_angle
+            middle = x.ring[(kept + RING - half) % RING]
+            oldest = x.ring[(kept + RING - 2 * half) % RING]
+            y.ring[kept % RING] = lost
             length = half * stride * h
-            slope = 0.5 * (lost - oldest) / length
-            older = (middle - oldest) / length
-            beyond = lost - 2.0 * middle + oldest - p[P_TRIGGER]
-    for i in range(S_SAMPLE, N_LANDING_STATE):
-        command[STATE + i] = state[i]
-    command[STATE + S_SAMPLE] = state[S_SAMPLE] + 1.0
-    command[STATE + S_COUNT] = count + 1
-    command[STATE + S_FREE_ANGLE] = free_angle
-    command[STATE + S_FREE_SPEED] = free_speed
-    command[STATE + S_TORQUE] = u
-    command[STATE + S_SLOPE] = slope
-    command[STATE + S_OLDER_SLOPE] = older
-    return free_speed - slope, beyond
+            y.slope = 0.5 * (lost - oldest) / length
+            y.older_slope = (middle - oldest) / length
+            beyond = lost - 2.0 * middle + oldest - p.trigger
+    y.count = count + 1
+    return y.free_speed - y.slope, beyond
 
 
 @inlined
-def drift(p: Vector, state: Vector) -> float:
+def drift(p: Parameters, x: State) -> float:
     """By how much the load slows down while the gap is open, rad/s^2."""
-    return p[P_DRIFT] if state[S_CONTACTS] == 0.0 else p[P_PULL]
+    return p.drift if x.contacts == 0.0 else p.pull
 
 
 @inlined
-def load_speed(p: Vector, state: Vector, t: float) -> float:
+def load_speed(p: Parameters, x: State, t: float) -> float:
     """Speed of the load while the gap is open; a reactive load comes to rest."""
-    began = p[P_LOAD_SPEED] if state[S_CONTACTS] == 0.0 else state[S_LOAD_SPEED]
-    speed = began - drift(p, state) * (t - state[S_LEFT_AT])
-    if p[P_RESTS] != 0.0 and speed * began <= 0.0:
+    began = p.load_speed if x.contacts == 0.0 else x.load_speed
+    speed = began - drift(p, x) * (t - x.left_at)
+    if p.rests != 0.0 and speed * began <= 0.0:
         return 0.0
     return speed
 
 
 @inlined
-def sticks(p: Vector, state: Vector) -> float:
+def sticks(p: Parameters, x: State) -> float:
     """1 where the load is at rest before contact and does not move until T > Mc."""
-    return p[P_STICKS] if state[S_CONTACTS] == 0.0 else 0.0
+    return p.sticks if x.contacts == 0.0 else 0.0
 
 
 @inlined
-def approach(p: Vector, state: Vector, t: float, speed: float) -> float:
+def approach(p: Parameters, x: State, t: float, speed: float) -> float:
     """The torque that closes the gap, within 0 and the low torque."""
-    if state[S_CONTACTS] == 0.0:
+    if x.contacts == 0.0:
         # never less than half: a contact not seen must not let the load run back
-        allowed = p[P_LOAD_SPEED] + p[P_APPROACH] - min(p[P_DRIFT] * t, 0.5 * p[P_APPROACH])
+        allowed = p.load_speed + p.approach - min(p.drift * t, 0.5 * p.approach)
     else:
-        allowed = state[S_LOAD_SPEED] + p[P_APPROACH]
-    return min(max(p[P_J1] * (allowed - speed) / p[P_HORIZON], 0.0), p[P_LOW])
+        allowed = x.load_speed + p.approach
+    return min(max(p.J1 * (allowed - speed) / p.horizon, 0.0), p.low)
 
 
 @inlined
-def open_again(t: float, motor_speed: float, load_speed_now: float, state: Vector, command: Vector) -> None:
+def open_again(t: float, motor_speed: float, load_speed_now: float, x: State, y: State) -> None:
     """The flanks have parted: watch anew, from the speeds of motor and load."""
-    command[STATE + S_COUNT] = 0.0
-    command[STATE + S_FREE_SPEED] = motor_speed
-    command[STATE + S_CONTACTS] = state[S_CONTACTS] + 1.0
-    command[STATE + S_LOAD_SPEED] = load_speed_now
-    command[STATE + S_LEFT_AT] = t
+    y.count = 0.0
+    y.free_speed = motor_speed
+    y.contacts = x.contacts + 1.0
+    y.load_speed = load_speed_now
+    y.left_at = t
 
 
 @compiled
-def mean_twist(p: Vector, u: float) -> float:
+def mean_twist(p: Parameters, u: float) -> float:
     """Twist about which the closed drive swings under the motor torque u, in rad."""
-    return (u / p[P_J1] + p[P_PULL]) / (p[P_SIGMA] * p[P_SIGMA] + p[P_OMEGA] * p[P_OMEGA])
+    return (u / p.J1 + p.pull) / (p.sigma * p.sigma + p.omega * p.omega)
 
 
 @compiled
-def motor_torque(p: Vector, twist: float) -> float:
+def motor_torque(p: Parameters, twist: float) -> float:
     """The motor torque that keeps a twist: the inverse of `mean_twist`."""
-    return p[P_J1] * (twist * (p[P_SIGMA] * p[P_SIGMA] + p[P_OMEGA] * p[P_OMEGA]) - p[P_PULL])
+    return p.J1 * (twist * (p.sigma * p.sigma + p.omega * p.omega) - p.pull)
 
 
 @compiled
 def move(
-    p: Vector, z: float, v: float, stuck: float, u: float, s: float
+    p: Parameters, z: float, v: float, stuck: float, u: float, s: float
 ) -> tuple[float, float, float, float, float]:
     """The closed drive after the time s under the torque u, by the model.
 
@@ -183,56 +199,63 @@ def move(
     moving = s
     gained = 0.0
     if stuck != 0.0:
-        mean = u / p[P_C]
-        end_z, end_v = swing(z, v, mean, p[P_STUCK_SIGMA], p[P_STUCK_OMEGA], s)
-        if p[P_C] * end_z + p[P_D] * end_v <= p[P_MC]:
+        mean = u / p.c
+        end_z, end_v = swing(z, v, mean, p.stuck_sigma, p.stuck_omega, s)
+        if p.c * end_z + p.d * end_v <= p.Mc:
             return end_z, end_v, 1.0, 0.0, end_v - v
         low, high = 0.0, s
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            end_z, end_v = swing(z, v, mean, p[P_STUCK_SIGMA], p[P_STUCK_OMEGA], middle)
-            if p[P_C] * end_z + p[P_D] * end_v > p[P_MC]:
+            end_z, end_v = swing(z, v, mean, p.stuck_sigma, p.stuck_omega, middle)
+            if p.c * end_z + p.d * end_v > p.Mc:
                 high = middle
             else:
                 low = middle
-        end_z, end_v = swing(z, v, mean, p[P_STUCK_SIGMA], p[P_STUCK_OMEGA], high)
+        end_z, end_v = swing(z, v, mean, p.stuck_sigma, p.stuck_omega, high)
         moving = s - high
         gained = end_v - v
         z, v = end_z, end_v
-    end_z, end_v = swing(z, v, mean_twist(p, u), p[P_SIGMA], p[P_OMEGA], moving)
-    impulse = p[P_SHARE] * (moving * (u / p[P_J1] + p[P_PULL]) - (end_v - v))  # of the shaft, over J1
-    return end_z, end_v, 0.0, moving, gained + moving * u / p[P_J1] - impulse
+    end_z, end_v = swing(z, v, mean_twist(p, u), p.sigma, p.omega, moving)
+    impulse = p.share * (moving * (u / p.J1 + p.pull) - (end_v - v))  # of the shaft, over J1
+    return end_z, end_v, 0.0, moving, gained + moving * u / p.J1 - impulse
 
 
 @compiled
-def lost_angle(p: Vector, s: float, u: float, v: float, stuck: float) -> float:
+def over_dead_time(u: float, demand: float, lag: float, dead: float) -> tuple[float, float]:
+    """Mean motor torque of the dead time, in which the last demand goes on acting, and that at its end."""
+    left = math.exp(-dead / lag) if lag > 0.0 else 0.0
+    return demand + (u - demand) * (1.0 - left) * lag / dead, demand + (u - demand) * left
+
+
+@compiled
+def lost_angle(p: Parameters, s: float, u: float, v: float, stuck: float) -> float:
     """Angle lost to the shaft s after contact, in rad."""
     if s <= 0.0:
         return 0.0
     if stuck != 0.0:
-        z, _ = swing(0.0, v, u / p[P_C], p[P_STUCK_SIGMA], p[P_STUCK_OMEGA], s)
-        return s * (0.5 * s * u / p[P_J1] + v) - z
-    a = u / p[P_J1] + p[P_PULL]
-    z, _ = swing(0.0, v, mean_twist(p, u), p[P_SIGMA], p[P_OMEGA], s)
-    return p[P_SHARE] * (s * (0.5 * s * a + v) - z)
+        z, _ = swing(0.0, v, u / p.c, p.stuck_sigma, p.stuck_omega, s)
+        return s * (0.5 * s * u / p.J1 + v) - z
+    a = u / p.J1 + p.pull
+    z, _ = swing(0.0, v, mean_twist(p, u), p.sigma, p.omega, s)
+    return p.share * (s * (0.5 * s * a + v) - z)
 
 
 @compiled
 def contact_seen(
-    p: Vector, state: Vector, t: float, u: float, beyond: float, free_speed: float, older_slope: float
+    p: Parameters, x: State, t: float, u: float, beyond: float, free_speed: float, older_slope: float
 ) -> tuple[float, float]:
     """How long ago the contact was, and at what speed the flanks met.
 
     From the second difference, `beyond` the trigger, the speed the motor would have now, freed from the
     shaft, and what that speed was wrong by in the older half of the window, the shaft's part taken out.
     """
-    difference = beyond + p[P_TRIGGER]
-    back = p[P_HALF] * p[P_STRIDE] * p[P_PERIOD]
-    longest = 2.0 * back + 0.5 * math.pi / p[P_OMEGA]
-    slowest = SLOWEST * p[P_APPROACH]
-    stuck = sticks(p, state)
-    free = free_speed - older_slope - load_speed(p, state, t)
-    closing = u / p[P_J1] + drift(p, state)
+    difference = beyond + p.trigger
+    back = p.half * p.stride * p.period
+    longest = 2.0 * back + 0.5 * math.pi / p.omega
+    slowest = SLOWEST * p.approach
+    stuck = sticks(p, x)
+    free = free_speed - older_slope - load_speed(p, x, t)
+    closing = u / p.J1 + drift(p, x)
     s = 0.0
     v = slowest
     for _ in range(REFITS):
@@ -290,27 +313,53 @@ def pole(drive: Drive, stiffness: Any, stuck: bool = False) -> tuple[Any, Any]:
     return -ratio * Omega, Omega * np.sqrt(1.0 - ratio**2)
 
 
-def landing_numbers(
-    drive: Drive,
-    *,
-    period: Any,
-    low_torque: Any,
-    approach_speed: Any,
-    threshold: Any,
-    patience: Any,
-    stiffness: Any,
-) -> tuple[Any, ...]:
-    """The parameters P_PERIOD to P_STUCK_OMEGA, each a number or an array."""
+# unit, meaning and default of the parameters that every landing has
+LOW_TORQUE = ("N*m", "torque limit while the gap is open", "load torque plus half the accelerating torque")
+THRESHOLD_TORQUE = (
+    "N*m",
+    "mean shaft torque over the window that means contact",
+    "0.1 M12avg_base, at most half of what low torque and speed control can make the shaft carry",
+)
+
+
+def landing_defaults(controller: Any, drive: Drive, impact: float) -> dict[str, Any]:
+    """The parameters of the landing, whose impact alone swings the shaft to this share of the full torque.
+
+    Those that were given are kept where others follow from them.
+    """
+
+    def given(name: str, default: Any) -> Any:
+        value = getattr(controller, name)
+        return default if value is None else value
+
+    held = np.maximum(drive.Mc, 0.0)
+    low = given("low_torque", held + LOW_TORQUE_SHARE * (drive.Ms - held))
+    period = given("period", sample_period(drive))
+    carried = impact * shaft_torque_under(drive, given("full_torque", drive.Ms))
+    speed = given("approach_speed", drive.Omega * carried / drive.c)
+    return {
+        "low_torque": number(low),
+        "approach_speed": number(speed),
+        "full_torque": drive.Ms,
+        "threshold": number(contact_threshold(drive, low, speed, period)),
+        "patience": patience(drive),
+        "period": period,
+    }
+
+
+def landing_numbers(controller: Any, drive: Drive, stiffness: Any) -> tuple[Any, ...]:
+    """The numbers of `Parameters`, each a number or an array."""
+    period, threshold = controller.period, controller.threshold
     half, stride, trigger = window(drive, threshold, 1.0, period)
     rests = float(drive.load_kind == "reactive") * (np.asarray(drive.Mc) > 0.0)
     rolling = np.where(rests == 0.0, 1.0, np.sign(drive.initial_load_speed))
     sigma, omega = pole(drive, stiffness)
     stuck_sigma, stuck_omega = pole(drive, stiffness, stuck=True)
     return (
-        period, drive.J1, low_torque, approach_speed,
+        period, drive.J1, controller.low_torque, controller.approach_speed,
         horizon(drive, period), drive.initial_load_speed,
-        rolling * drive.Mc / drive.J2, half, stride, trigger, patience, drive.Mc, drive.Mc / drive.J2,
-        rests * (np.asarray(drive.initial_load_speed) == 0.0), rests, stiffness,
+        rolling * drive.Mc / drive.J2, half, stride, trigger, controller.patience, drive.Mc,
+        drive.Mc / drive.J2, rests * (np.asarray(drive.initial_load_speed) == 0.0), rests, stiffness,
         -2.0 * sigma * stiffness / (sigma**2 + omega**2), drive.J2 / (drive.J1 + drive.J2),
         sigma, omega, stuck_sigma, stuck_omega,
     )  # fmt: skip

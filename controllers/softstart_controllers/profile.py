@@ -11,34 +11,39 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import (
-    ASK_AGAIN,
-    NEVER,
-    SLOPE,
-    STAGE,
-    STATE,
-    TIME,
-    TORQUE,
-    Vector,
-    inlined,
-)
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, inlined, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.profile import TorqueProfile
 
-# parameters: these four, then times and torques of the first profile, then those of the second
-P_PERIOD, P_KNOTS, P_KNOTS_AFTER, P_ROOM, P_FIRST = range(5)
-# state: the knot passed last, whether the second profile waits or plays, the instant at which it takes over
-S_KNOT, S_PHASE, S_ORIGIN = range(3)
-FIRST, WAITING, SECOND = 0.0, 1.0, 2.0
+FIRST, WAITING, SECOND = 0.0, 1.0, 2.0  # phases
+
+
+class Parameters:
+    """Times and torques of the first profile follow, each in `room` places; then those of the second."""
+
+    period: float
+    knots: float
+    knots_after: float
+    room: float
+
+
+class State:
+    """The knot passed last, the phase, and the instant at which the second profile takes over."""
+
+    knot: float
+    phase: float
+    origin: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+N_PARAMETERS = size(PARAMETERS)
 
 
 @inlined
-def play(
-    numbers: Vector, begin: int, room: int, count: int, origin: float, knot: int, command: Vector
-) -> int:
-    """The line of the profile that holds at the instant in command[ASK_AGAIN], which becomes its end."""
-    t = command[ASK_AGAIN]
+def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot: int, y: Any) -> int:
+    """The line of the profile that holds at the instant y.ask_again, which becomes its end."""
+    t = y.ask_again
     torques = begin + room
     while knot + 1 < count and origin + numbers[begin + knot + 1] <= t:
         knot += 1
@@ -52,41 +57,45 @@ def play(
         if math.isfinite(steepness):  # else the knots are a rounding apart: a step
             slope = steepness
             torque += slope * (t - (origin + numbers[begin + knot]))
-    command[TORQUE] = torque
-    command[SLOPE] = slope
-    command[ASK_AGAIN] = until
+    y.torque = torque
+    y.slope = slope
+    y.ask_again = until
     return knot
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Parameters: (period, knots, knots after contact, room, times, torques, times, torques)."""
-    t = measured[TIME]
-    period = parameters[P_PERIOD]
-    count_after = int(parameters[P_KNOTS_AFTER])
-    room = int(parameters[P_ROOM])
-    knot = int(state[S_KNOT])
-    phase = state[S_PHASE]
-    origin = state[S_ORIGIN]
-    if phase == FIRST and count_after > 0 and measured[STAGE] >= 2.0:
+    """The line that holds now, of the first profile or of the second."""
+    p = parameters[:N_PARAMETERS].view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    t = m.time
+    count_after = int(p.knots_after)
+    room = int(p.room)
+    first = N_PARAMETERS
+    knot = int(x.knot)
+    phase = x.phase
+    origin = x.origin
+    if phase == FIRST and count_after > 0 and m.stage >= 2.0:
         phase = WAITING
-        origin = math.ceil(t / period) * period if period > 0.0 else t
+        origin = math.ceil(t / p.period) * p.period if p.period > 0.0 else t
     if phase == WAITING and t >= origin:
         phase = SECOND
         knot = 0
-    command[ASK_AGAIN] = t
+    y.ask_again = t
     if phase == SECOND:
-        knot = play(parameters, P_FIRST + 2 * room, (parameters.shape[0] - P_FIRST) // 2 - room, count_after,
-                    origin, knot, command)  # fmt: skip
+        after = (parameters.shape[0] - first) // 2 - room
+        knot = play(parameters, first + 2 * room, after, count_after, origin, knot, y)
     else:
-        knot = play(parameters, P_FIRST, room, int(parameters[P_KNOTS]), 0.0, knot, command)
+        knot = play(parameters, first, room, int(p.knots), 0.0, knot, y)
         if phase == WAITING:
-            command[ASK_AGAIN] = min(command[ASK_AGAIN], origin)
-    if command[ASK_AGAIN] == math.inf and (phase == SECOND or count_after == 0):
-        command[ASK_AGAIN] = NEVER
-    command[STATE + S_KNOT] = knot
-    command[STATE + S_PHASE] = phase
-    command[STATE + S_ORIGIN] = origin
+            y.ask_again = min(y.ask_again, origin)
+    if y.ask_again == math.inf and (phase == SECOND or count_after == 0):
+        y.ask_again = NEVER
+    y.knot = knot
+    y.phase = phase
+    y.origin = origin
 
 
 @dataclass(frozen=True)
@@ -116,7 +125,7 @@ class Profile(CompiledController):
     source: ClassVar[str] = "practice"
     sensors: ClassVar[Sensor] = Sensor.STAGE
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = 3
+    state_size: ClassVar[int] = size(STATE)
     needs: ClassVar[tuple[str, ...]] = ("file", "profile")
 
     file: str | None = parameter(

@@ -7,26 +7,43 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, STATE, TIME, TORQUE, Vector
+from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
 
 
+class Parameters:
+    """What the step is given."""
+
+    initial: float
+    full: float
+    time: float
+    period: float
+
+
+class State:
+    """How many samples were taken."""
+
+    sample: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+
+
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Parameters: (initial, full torque, time, period); state: (number of samples taken)."""
-    initial = parameters[0]
-    full = parameters[1]
-    time = parameters[2]
-    t = measured[TIME]
-    sample = state[0] + 1.0
-    command[STATE] = sample
-    if t < time:
-        command[TORQUE] = initial + (full - initial) * (t / time)
-        command[ASK_AGAIN] = sample * parameters[3]
+    """A straight line over time, sampled."""
+    p = parameters.view(PARAMETERS)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    t = measured.view(MEASURED)[0].time
+    y.sample = x.sample + 1.0
+    if t < p.time:
+        y.torque = p.initial + (p.full - p.initial) * (t / p.time)
+        y.ask_again = y.sample * p.period
     else:
-        command[TORQUE] = full
-        command[ASK_AGAIN] = math.inf
+        y.torque = p.full
+        y.ask_again = math.inf
 
 
 @dataclass(frozen=True)
@@ -77,5 +94,5 @@ class Ramp(CompiledController):
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """(initial, full torque, time, period)."""
+        """The numbers of `Parameters`."""
         return stack(drive, self.initial, self.full_torque, self.time, self.period)

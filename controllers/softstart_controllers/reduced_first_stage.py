@@ -7,17 +7,29 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, NEVER, STAGE, TORQUE, Vector
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
 from softstart.drive import Drive
 from softstart_controllers.reduced import reduced_torque
+
+
+class Parameters:
+    """What the step is given."""
+
+    reduced: float
+    full: float
+
+
+PARAMETERS, COMMAND = record(Parameters), record(Answer)
 
 
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced in stage 1; the stage number changes at the instant of contact."""
-    waiting = measured[STAGE] < 2.0
-    command[TORQUE] = parameters[0] if waiting else parameters[1]
-    command[ASK_AGAIN] = math.inf if waiting else NEVER
+    p = parameters.view(PARAMETERS)[0]
+    y = command.view(COMMAND)[0]
+    waiting = measured.view(MEASURED)[0].stage < 2.0
+    y.torque = p.reduced if waiting else p.full
+    y.ask_again = math.inf if waiting else NEVER
 
 
 @dataclass(frozen=True)

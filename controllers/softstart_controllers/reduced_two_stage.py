@@ -7,25 +7,43 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, NEVER, STAGE, STATE, TIME, TORQUE, Vector
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
 from softstart.drive import Drive
 from softstart_controllers.reduced import reduced_torque
 
 
+class Parameters:
+    """What the step is given."""
+
+    reduced: float
+    full: float
+    patience: float
+
+
+class State:
+    """By when the torque is raised at the latest; 0 before contact."""
+
+    deadline: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+
+
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """State = (instant by which the torque is raised at the latest, 0 before contact)."""
-    t = measured[TIME]
-    deadline = state[0]
-    if measured[STAGE] >= 2.0 and deadline == 0.0:
-        deadline = t + parameters[2]
-    waiting = measured[STAGE] < 2.0 or (measured[STAGE] < 3.0 and t < deadline)
-    command[TORQUE] = parameters[0] if waiting else parameters[1]
+    """Reduced until the gap opens again, or the deadline has passed."""
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    y = command.view(COMMAND)[0]
+    y.deadline = state.view(STATE)[0].deadline
+    if m.stage >= 2.0 and y.deadline == 0.0:
+        y.deadline = m.time + p.patience
+    waiting = m.stage < 2.0 or (m.stage < 3.0 and m.time < y.deadline)
+    y.torque = p.reduced if waiting else p.full
     if waiting:
-        command[ASK_AGAIN] = deadline if deadline > t else math.inf
+        y.ask_again = y.deadline if y.deadline > m.time else math.inf
     else:
-        command[ASK_AGAIN] = NEVER
-    command[STATE] = deadline
+        y.ask_again = NEVER
 
 
 @dataclass(frozen=True)

@@ -9,35 +9,54 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, compiled_step, parameter, stack
-from softstart.controller.compiled import ASK_AGAIN, STATE, TIME, TORQUE, Vector
+from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
 
 
+class Parameters:
+    """What the step is given."""
+
+    initial: float
+    full: float
+    time: float
+    rounding: float
+    period: float
+
+
+class State:
+    """How many samples were taken."""
+
+    sample: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+
+
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
-    """Parameters: (initial, full torque, time, rounding, period); state: (number of samples taken)."""
-    initial = parameters[0]
-    full = parameters[1]
-    time = parameters[2]
-    end = 0.5 * parameters[3]  # each rounded end, as a share of the time
-    t = measured[TIME]
-    sample = state[0] + 1.0
-    command[STATE] = sample
-    if t < time:
-        x = t / time
-        if x < end:
-            share = 0.5 * x * x / (end * (1.0 - end))
-        elif x <= 1.0 - end:
-            share = (x - 0.5 * end) / (1.0 - end)
+    """An S over time, sampled."""
+    p = parameters.view(PARAMETERS)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    t = measured.view(MEASURED)[0].time
+    y.sample = x.sample + 1.0
+    end = 0.5 * p.rounding  # each rounded end, as a share of the time
+    if t < p.time:
+        passed = t / p.time
+        left = 1.0 - passed
+        if passed < end:
+            share = 0.5 * passed * passed / (end * (1.0 - end))
+        elif passed <= 1.0 - end:
+            share = (passed - 0.5 * end) / (1.0 - end)
         else:
-            share = 1.0 - 0.5 * (1.0 - x) * (1.0 - x) / (end * (1.0 - end))
-        command[TORQUE] = initial + (full - initial) * share
-        command[ASK_AGAIN] = sample * parameters[4]
+            share = 1.0 - 0.5 * left * left / (end * (1.0 - end))
+        y.torque = p.initial + (p.full - p.initial) * share
+        y.ask_again = y.sample * p.period
     else:
-        command[TORQUE] = full
-        command[ASK_AGAIN] = math.inf
+        y.torque = p.full
+        y.ask_again = math.inf
 
 
 @dataclass(frozen=True)
@@ -101,5 +120,5 @@ class SCurve(CompiledController):
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """(initial, full torque, time, rounding, period)."""
+        """The numbers of `Parameters`."""
         return stack(drive, self.initial, self.full_torque, self.time, self.rounding, self.period)

@@ -2,29 +2,205 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, parameter, stack
-from softstart.controller.compiled import Vector
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart_controllers import landing, shaping
-from softstart_controllers.sampled import (
-    PATIENCE_DEFAULT,
-    PERIOD_DEFAULT,
-    check,
-    number,
-    patience,
-    sample_period,
-)
-from softstart_controllers.shaped_step import N_STATE, step
+from softstart.plant.jit import compiled
+from softstart_controllers import landing
+from softstart_controllers.landing import (
+    approach,
+    contact_seen,
+    load_speed,
+    mean_twist,
+    motor_torque,
+    move,
+    open_again,
+    over_dead_time,
+    sticks,
+    watch,
+)  # fmt: skip
+from softstart_controllers.sampled import PATIENCE_DEFAULT, PERIOD_DEFAULT, check, mean_torque
+from softstart_controllers.shaping import ZV, ZVD, later, plan, sensitivity, swing, vector
 
-SHAPERS = {"zv": shaping.ZV, "zvd": shaping.ZVD}
-LOW = 0.5  # of the accelerating torque
+SHAPERS = {"zv": ZV, "zvd": ZVD}
 IMPACT = {"zv": 0.7, "zvd": 0.3}  # c dw12/Omega, of the shaft torque under the full torque
+BRAKING = 4.0  # of T'/Omega, that the mean torque stays below T while no steps are found
+GAP_OPEN, SWINGING, STEPPING, DONE = 0.0, 1.0, 2.0, 3.0  # phases
+
+
+class Parameters:
+    """The landing and the steps."""
+
+    landing: landing.Parameters
+    order: float
+    full: float
+    lag: float
+    dead: float
+
+
+class State:
+    """Twist z and its rate v by the model, the sensitivity D of `shaping`, the planned steps."""
+
+    landing: landing.State
+    phase: float
+    z: float
+    v: float
+    stuck: float
+    motor_speed: float
+    D_real: float
+    D_imag: float
+    begin: float
+    samples: float
+    levels: Vector
+
+
+PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
+STATE = record(State, landing=landing.STATE, levels=4)
+COMMAND = record(Answer, State, landing=landing.STATE, levels=4)
+
+
+@compiled
+def mean_level(p: landing.Parameters, u: float) -> float:
+    """M = (u J2 + Mc J1)/(J1 + J2) in N m."""
+    return p.c * mean_twist(p, u)
+
+
+@compiled
+def torque_of(p: landing.Parameters, level: float) -> float:
+    """The motor torque of a mean shaft torque, not below zero."""
+    return max(0.0, motor_torque(p, level / p.c))
+
+
+@compiled
+def follow(
+    p: landing.Parameters, lag: float, z: float, v: float, stuck: float, u: float, demand: float, s: float,
+    contact: bool, y: State,
+) -> None:  # fmt: skip
+    """Twist, its rate, motor speed and the sensitivity D of `shaping` after the time s, by the model.
+
+    D counts from the contact, or from where a stuck load breaks away; later, once no steps could be found,
+    from the present sample.
+    """
+    end_z, end_v, still, moving, gained = move(p, z, v, stuck, u, s)
+    D = 0j
+    if still == 0.0:
+        level = mean_level(p, u)
+        sigma, omega = p.sigma, p.omega
+        inertia = p.share * p.J1
+        begin_z, begin_v = swing(end_z, end_v, level / p.c, sigma, omega, -moving)
+        if contact or stuck != 0.0:
+            D = sensitivity(begin_v, p.c * begin_z, inertia, sigma, omega, lag, level)
+            W = vector(begin_z, begin_v, p.c, sigma, omega, lag, level)
+            D = later(D, W, mean_level(p, demand), sigma, omega, moving)
+        else:
+            D = sensitivity(end_v, p.c * end_z, inertia, sigma, omega, lag, level)
+    y.z = end_z
+    y.v = end_v
+    y.motor_speed += gained
+    y.stuck = still
+    y.D_real = D.real
+    y.D_imag = D.imag
+
+
+@compiled
+def at_rest(p: landing.Parameters, u: float, stuck: float, y: State) -> None:
+    """The shaft at rest under the motor torque u."""
+    y.stuck = 1.0 if stuck != 0.0 and u <= p.Mc else 0.0
+    y.z = u / p.c if y.stuck != 0.0 else mean_twist(p, u)
+    y.v = 0.0
+    y.D_real = 0.0
+    y.D_imag = 0.0
+
+
+@compiled
+def prepare(p: Parameters, u: float, demand: float, y: State) -> int:
+    """Plan the steps from the state that the first of them meets; how many samples each level lasts."""
+    near = p.landing
+    lag, dead, c, sigma, omega = p.lag, p.dead, near.c, near.sigma, near.omega
+    z, v = y.z, y.v
+    D = complex(y.D_real, y.D_imag)
+    if dead > 0.0:  # until then the last demand goes on acting
+        W = vector(z, v, c, sigma, omega, lag, mean_level(near, u))
+        D = later(D, W, mean_level(near, demand), sigma, omega, dead)
+        mean, u = over_dead_time(u, demand, lag, dead)
+        z, v = swing(z, v, mean_twist(near, mean), sigma, omega, dead)
+    W = vector(z, v, c, sigma, omega, lag, mean_level(near, u))
+    lowest = max(0.0, mean_level(near, 0.0))
+    n, M0, M1, M2, M3 = plan(int(p.order), W, D, lowest, mean_level(near, p.full), sigma, omega, near.period)
+    y.samples = n
+    y.levels[0] = torque_of(near, M0)
+    y.levels[1] = torque_of(near, M1)
+    y.levels[2] = torque_of(near, M2)
+    y.levels[3] = torque_of(near, M3)
+    return n
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Close the gap, follow the swing by the model, plan the steps once, play them."""
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    keep_state(state, command)
+    near, before, now = p.landing, x.landing, y.landing
+    t, u = m.time, m.motor_torque
+    phase = x.phase
+    demand = p.full
+    now.sample = before.sample + 1.0
+    now.torque = u
+
+    if phase == GAP_OPEN:
+        speed, beyond = watch(near, m, before, now)
+        demand = approach(near, before, t, speed)
+        if beyond > 0.0:
+            phase = SWINGING
+            s, v = contact_seen(near, before, t, u, beyond, now.free_speed, now.older_slope)
+            y.motor_speed = v + load_speed(near, before, t - s)
+            stuck = sticks(near, before)
+            if s * near.omega < math.pi:
+                follow(near, p.lag, 0.0, v, stuck, u, before.demand, s, True, y)
+            if s * near.omega >= math.pi or y.z <= 0.0:
+                # seen so late that the phase of the swing is not known: take its mean
+                at_rest(near, u, stuck, y)
+    elif phase == SWINGING:
+        mean = mean_torque(before.torque, u, before.demand)
+        follow(near, p.lag, x.z, x.v, x.stuck, mean, before.demand, near.period, False, y)
+        if y.z < 0.0:
+            phase = GAP_OPEN
+            open_again(t, y.motor_speed, y.motor_speed - y.v, before, now)
+            demand = near.low
+
+    if phase == SWINGING:
+        if y.stuck != 0.0:
+            demand = near.low
+        elif prepare(p, u, before.demand, y) > 0:
+            phase = STEPPING
+            y.begin = before.sample
+        else:  # the swing dies out where it is
+            swinging = BRAKING * y.v / math.hypot(near.sigma, near.omega)
+            demand = min(torque_of(near, near.c * (y.z - swinging)), p.full)
+    if phase == STEPPING:
+        level = int((before.sample - y.begin) / y.samples)
+        if level < int(p.order):
+            demand = y.levels[level]
+        else:
+            phase = DONE
+    elif t >= near.patience:
+        phase = DONE
+        demand = p.full
+
+    y.torque = demand
+    y.ask_again = math.inf if phase == DONE else (before.sample + 1.0) * near.period
+    y.phase = phase
+    now.demand = demand
 
 
 @dataclass(frozen=True)
@@ -73,15 +249,10 @@ class Shaped(CompiledController):
     summary: ClassVar[str] = "soft landing, then torque steps that leave no swing in the shaft (ZV, ZVD)"
     source: ClassVar[str] = "Smith 1957, Singer and Seering 1990"
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = N_STATE
+    state_size: ClassVar[int] = size(STATE)
 
     shaper: str | None = parameter("", "zv or zvd", "zv", "text")
-    low_torque: float | None = parameter(
-        "N*m",
-        "torque limit while the gap is open",
-        "load torque plus half the accelerating torque",
-        multiples=(0.3, 2.0),
-    )
+    low_torque: float | None = parameter(*landing.LOW_TORQUE, multiples=(0.3, 2.0))
     approach_speed: float | None = parameter(
         "rad/s",
         "speed at which the gap is closed",
@@ -94,11 +265,7 @@ class Shaped(CompiledController):
     frequency: float | None = parameter(
         "rad/s", "undamped elastic frequency of the model", "Omega", multiples=(0.7, 1.4)
     )
-    threshold: float | None = parameter(
-        "N*m",
-        "mean shaft torque over the window that means contact",
-        "0.1 M12avg_base, at most half of what low torque and speed control can make the shaft carry",
-    )
+    threshold: float | None = parameter(*landing.THRESHOLD_TORQUE)
     patience: float | None = parameter("s", "longest wait for contact and plan", PATIENCE_DEFAULT)
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
 
@@ -115,36 +282,17 @@ class Shaped(CompiledController):
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """From the nominal drive; neither gap nor start position enter."""
-        held = np.maximum(drive.Mc, 0.0)
-        low = held + LOW * (drive.Ms - held) if self.low_torque is None else self.low_torque
-        period = sample_period(drive) if self.period is None else self.period
-        full = drive.Ms if self.full_torque is None else self.full_torque
         shaper = self.shaper or "zv"
-        impact = IMPACT[shaper] * landing.shaft_torque_under(drive, full)
-        speed = drive.Omega * impact / drive.c if self.approach_speed is None else self.approach_speed
         return {
             "shaper": shaper,
-            "low_torque": number(low),
-            "approach_speed": number(speed),
-            "full_torque": drive.Ms,
             "frequency": drive.Omega,
-            "threshold": number(landing.contact_threshold(drive, low, speed, period)),
-            "patience": patience(drive),
-            "period": period,
+            **landing.landing_defaults(self, drive, IMPACT[shaper]),
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """The numbers in the order of the indices from P_PERIOD to P_DEAD."""
+        """The numbers of `Parameters`."""
         inertia = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
-        numbers = landing.landing_numbers(
-            drive,
-            period=self.period,
-            low_torque=self.low_torque,
-            approach_speed=self.approach_speed,
-            threshold=self.threshold,
-            patience=self.patience,
-            stiffness=inertia * np.asarray(self.frequency) ** 2,
-        )
+        numbers = landing.landing_numbers(self, drive, inertia * np.asarray(self.frequency) ** 2)
         return stack(
             drive, *numbers, SHAPERS[self.shaper or "zv"], self.full_torque, drive.torque_lag,
             drive.computing_delay,

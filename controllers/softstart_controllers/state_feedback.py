@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, parameter, stack
-from softstart.controller.compiled import Vector
+from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
+from softstart.plant.jit import compiled
 from softstart.plant.vector import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains
-from softstart_controllers.sampled import (
-    PATIENCE_DEFAULT,
-    PERIOD_DEFAULT,
-    check,
-    number,
-    patience,
-    sample_period,
-)
-from softstart_controllers.state_feedback_step import N_STATE, step
+from softstart_controllers.landing import (
+    approach,
+    contact_seen,
+    load_speed,
+    move,
+    open_again,
+    over_dead_time,
+    sticks,
+    watch,
+)  # fmt: skip
+from softstart_controllers.sampled import PATIENCE_DEFAULT, PERIOD_DEFAULT, check, mean_torque, number
+from softstart_controllers.shaping import swing
 
-LOW = 0.5  # of the accelerating torque
 IMPACT = 0.7  # c dw12/Omega, of the shaft torque under the full torque
 RISE = 0.75  # of the elastic period
 TORQUE_WEIGHT = 3.0
@@ -34,6 +38,157 @@ FASTEST = 6.0  # bandwidth of the filter in elastic frequencies, however fine th
 SLOWEST = 0.05  # likewise, however coarse the encoder
 SLEWED_SHARE = 0.25  # of Ms
 OPENS = 0.5  # of the threshold: a shaft that pulls so much has let go
+GAP_OPEN, CLOSED, IMPATIENT = 0.0, 1.0, 2.0  # phases
+
+
+class Parameters:
+    """The landing, the weights f of the feedback and the gains of the filter."""
+
+    landing: landing.Parameters
+    full: float
+    rise: float
+    lag: float
+    dead: float
+    load_share: float
+    f_twist: float
+    f_rate: float
+    f_torque: float
+    k_angle: float
+    k_speed: float
+    k_twist: float
+    k_rate: float
+    k_load: float
+    opens: float
+
+
+class State:
+    """The estimate: motor angle and speed, twist z and its rate v, load torque."""
+
+    landing: landing.State
+    phase: float
+    angle: float
+    speed: float
+    z: float
+    v: float
+    stuck: float
+    load: float
+    progress: float
+
+
+PARAMETERS = record(Parameters, landing=landing.PARAMETERS)
+STATE = record(State, landing=landing.STATE)
+COMMAND = record(Answer, State, landing=landing.STATE)
+
+
+@compiled
+def twist_under(p: Parameters, u: float, load: float) -> float:
+    """Twist about which the closed drive swings, in rad, under the motor torque u and this load torque."""
+    sigma, omega = p.landing.sigma, p.landing.omega
+    return (u / p.landing.J1 + load * p.load_share) / (sigma * sigma + omega * omega)
+
+
+@compiled
+def predict(p: Parameters, u: float, x: State, y: State) -> None:
+    """The closed drive one sample on, from x to y."""
+    near = p.landing
+    h = near.period
+    a = u / near.J1 + x.load * p.load_share
+    if x.stuck != 0.0:
+        y.z, y.v, y.stuck, _, gained = move(near, x.z, x.v, 1.0, u, h)
+        lost = h * (x.speed + 0.5 * h * u / near.J1) - (y.z - x.z)
+    else:
+        y.z, y.v = swing(x.z, x.v, twist_under(p, u, x.load), near.sigma, near.omega, h)
+        y.stuck = 0.0
+        lost = near.share * (h * (0.5 * h * a + x.v) - (y.z - x.z))
+        gained = h * u / near.J1 - near.share * (h * a - (y.v - x.v))
+    y.angle = x.angle + h * (x.speed + 0.5 * h * u / near.J1) - lost
+    y.speed = x.speed + gained
+
+
+@compiled
+def feedback(p: Parameters, u: float, before: float, y: State) -> float:
+    """The torque that the feedback asks for, within 0 and the full torque; raises the reference."""
+    near = p.landing
+    z, v = y.z, y.v
+    if p.dead > 0.0:  # until then the last demand goes on acting
+        mean, u = over_dead_time(u, before, p.lag, p.dead)
+        z, v = swing(z, v, twist_under(p, mean, y.load), near.sigma, near.omega, p.dead)
+    progress = y.progress
+    low, full = twist_under(p, near.low, near.Mc), twist_under(p, p.full, near.Mc)
+    reference = low + (full - low) * progress
+    rate = (full - low) / p.rise if progress < 1.0 else 0.0
+    y.progress = min(1.0, progress + near.period / p.rise)
+    square = near.sigma * near.sigma + near.omega * near.omega
+    Omega = math.sqrt(square)
+    mean = reference - 2.0 * near.sigma * rate / square - p.f_twist * (z - reference)
+    mean -= p.f_rate * (v - rate) / Omega
+    mean -= p.f_torque * (twist_under(p, u, y.load) - reference)
+    demand = near.J1 * (mean * square - y.load * p.load_share)
+    return min(max(demand, 0.0), p.full)
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Close the gap; from contact on estimate the state and feed it back."""
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    keep_state(state, command)
+    near, before, now = p.landing, x.landing, y.landing
+    t, u = m.time, m.motor_torque
+    phase = x.phase
+    if before.sample == 0.0:
+        y.load = near.Mc
+    demand = p.full
+    now.sample = before.sample + 1.0
+    now.torque = u
+
+    if phase == GAP_OPEN:
+        speed, beyond = watch(near, m, before, now)
+        demand = approach(near, before, t, speed)
+        if beyond > 0.0:
+            phase = CLOSED
+            stuck = sticks(near, before)
+            s, v = contact_seen(near, before, t, u, beyond, now.free_speed, now.older_slope)
+            late = s * near.omega >= math.pi
+            z, rate, still, _, gained = move(near, 0.0, v, stuck, u, s)
+            if late or z <= 0.0:  # seen so late that the phase of the swing is not known
+                z, rate, still = 0.0, 0.0, stuck
+            else:
+                speed = v + load_speed(near, before, t - s) + gained
+            y.z = z
+            y.v = rate
+            y.stuck = still
+            y.speed = speed
+            y.angle = m.motor_angle
+    elif phase == CLOSED:
+        predict(p, mean_torque(before.torque, u, before.demand), x, y)
+        error = m.motor_angle - y.angle
+        y.angle += p.k_angle * error
+        y.speed += p.k_speed * error
+        if y.stuck != 0.0:  # the twist is the motor's own way
+            y.z += p.k_angle * error
+            y.v += p.k_speed * error
+        else:
+            y.z += p.k_twist * error
+            y.v += p.k_rate * error
+            y.load += p.k_load * error
+        if near.c * y.z < p.opens:
+            phase = GAP_OPEN
+            open_again(t, y.speed, y.speed - y.v, before, now)
+            demand = near.low
+
+    if phase == CLOSED:
+        demand = feedback(p, u, before.demand, y)
+    if t >= near.patience:
+        phase = IMPATIENT
+        demand = p.full
+
+    y.torque = demand
+    y.ask_again = math.inf if phase == IMPATIENT else (before.sample + 1.0) * near.period
+    y.phase = phase
+    now.demand = demand
 
 
 @dataclass(frozen=True)
@@ -81,14 +236,9 @@ class StateFeedback(CompiledController):
     summary: ClassVar[str] = "soft landing, then LQR of the shaft torque on a Kalman filter"
     source: ClassVar[str] = "LQG, python-control"
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = N_STATE
+    state_size: ClassVar[int] = size(STATE)
 
-    low_torque: float | None = parameter(
-        "N*m",
-        "torque limit while the gap is open",
-        "load torque plus half the accelerating torque",
-        multiples=(0.3, 2.0),
-    )
+    low_torque: float | None = parameter(*landing.LOW_TORQUE, multiples=(0.3, 2.0))
     approach_speed: float | None = parameter(
         "rad/s",
         "speed at which the gap is closed",
@@ -116,11 +266,7 @@ class StateFeedback(CompiledController):
         "4",
         multiples=(0.03, 30.0),
     )
-    threshold: float | None = parameter(
-        "N*m",
-        "mean shaft torque over the window that means contact",
-        "0.1 M12avg_base, at most half of what low torque and speed control can make the shaft carry",
-    )
+    threshold: float | None = parameter(*landing.THRESHOLD_TORQUE)
     uncertainty: float | None = parameter(
         "1",
         "unknown part of T'' that the filter reckons with, as a share of Omega^2 M12avg_base",
@@ -148,36 +294,17 @@ class StateFeedback(CompiledController):
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """From the nominal drive; neither gap nor start position enter."""
-        held = np.maximum(drive.Mc, 0.0)
-        low = held + LOW * (drive.Ms - held) if self.low_torque is None else self.low_torque
-        period = sample_period(drive) if self.period is None else self.period
-        full = drive.Ms if self.full_torque is None else self.full_torque
-        impact = IMPACT * landing.shaft_torque_under(drive, full)
-        speed = drive.Omega * impact / drive.c if self.approach_speed is None else self.approach_speed
         return {
-            "low_torque": number(low),
-            "approach_speed": number(speed),
-            "full_torque": drive.Ms,
             "rise": number(RISE * drive.elastic_period),
             "torque_weight": TORQUE_WEIGHT,
             "rate_weight": RATE_WEIGHT,
-            "threshold": number(landing.contact_threshold(drive, low, speed, period)),
             "uncertainty": UNCERTAINTY,
-            "patience": patience(drive),
-            "period": period,
+            **landing.landing_defaults(self, drive, IMPACT),
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """The numbers in the order of the indices from P_PERIOD to P_OPENS."""
-        numbers = landing.landing_numbers(
-            drive,
-            period=self.period,
-            low_torque=self.low_torque,
-            approach_speed=self.approach_speed,
-            threshold=self.threshold,
-            patience=self.patience,
-            stiffness=drive.c,
-        )
+        """The numbers of `Parameters`."""
+        numbers = landing.landing_numbers(self, drive, drive.c)
         period = np.asarray(self.period)
         step = drive.Omega * period
         ratio = np.minimum(0.5 * drive.d * drive.Omega / drive.c, landing.LARGEST_DAMPING)

@@ -14,6 +14,7 @@ import pytest
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, simulate
+from softstart.plant.layout import index
 from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
@@ -94,13 +95,13 @@ def test_estimates_stay_close(gap: float, J2: float, lag: float, kind: Any) -> N
     drive = crane(gap, J2, lag, kind)
     run, trace = traced(drive, CurrentLimitFeedback())
     true = run.at(trace[:, 0])
-    error = (trace[:, 1 + clf.S_TORQUE] - true["T"]) / base_torque(drive)
+    error = (trace[:, 1 + index(clf.STATE, "T")] - true["T"]) / base_torque(drive)
     first_gap = trace[:, 0] < run.first_contact
     assert np.abs(error[first_gap]).max() < 0.05
     assert np.sqrt(np.mean(error**2)) < 0.07
     assert np.abs(error).max() < 0.55
-    assert np.abs(trace[:, 1 + clf.S_SPEED] - true["w1"]).max() < 1.3
-    closed = trace[trace[:, 1 + clf.S_PHASE] == clf.CLOSED, 0]
+    assert np.abs(trace[:, 1 + index(clf.STATE, "speed")] - true["w1"]).max() < 1.3
+    closed = trace[trace[:, 1 + index(clf.STATE, "phase")] == clf.CLOSED, 0]
     assert 0.0 < closed[0] - run.first_contact < 0.0065
 
 
@@ -113,7 +114,7 @@ def test_rounding_alone_is_never_a_contact() -> None:
         wide = drive.replace(gap=gap, start_position=rng.uniform(0, 1e-3) * gap)
         run, trace = traced(wide, CurrentLimitFeedback())
         first_gap = trace[:, 0] < run.first_contact
-        assert np.all(trace[first_gap, 1 + clf.S_PHASE] == clf.GAP_OPEN), wide
+        assert np.all(trace[first_gap, 1 + index(clf.STATE, "phase")] == clf.GAP_OPEN), wide
 
 
 # the start -----------------------------------------------------------------------------------------------

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
+from softstart.plant.layout import index
 from softstart.profile import TorqueProfile
 from softstart.start.metrics import base_torque
-from softstart_controllers import landing, shaped_step
+from softstart_controllers import landing, shaped
 from softstart_controllers.profile import Profile
 from softstart_controllers.shaped import Shaped
 from softstart_controllers.shaping import ZV, ZVD, Levels, levels, plan, sensitivity, swing, vector
@@ -205,14 +206,14 @@ def test_the_first_look_at_the_contact_tells_its_state(
     """Twist in shares of M12avg_base/c, rate in the same times Omega. Worst of the 32: 0.017 and 0.033."""
     drive = crane(gap, J2, lag, kind).replace(encoder_lines=lines)
     run, trace = traced(drive, Shaped())
-    first = np.argmax(trace[:, 1 + shaped_step.S_PHASE] > shaped_step.GAP_OPEN)
+    first = np.argmax(trace[:, 1 + index(shaped.STATE, "phase")] > shaped.GAP_OPEN)
     seen = trace[first]
     true = run.at([seen[0]])
     unit = base_torque(drive)
     assert 0.0 < seen[0] - run.first_contact < 0.0065
-    assert abs(drive.c * seen[1 + shaped_step.S_Z] - true["T"][0]) / unit < 0.04
+    assert abs(drive.c * seen[1 + index(shaped.STATE, "z")] - true["T"][0]) / unit < 0.04
     rate = true["w1"][0] - true["w2"][0]
-    assert drive.c * abs(seen[1 + shaped_step.S_V] - rate) / (drive.Omega * unit) < 0.06
+    assert drive.c * abs(seen[1 + index(shaped.STATE, "v")] - rate) / (drive.Omega * unit) < 0.06
 
 
 def test_rounding_alone_is_never_a_contact() -> None:
@@ -223,7 +224,7 @@ def test_rounding_alone_is_never_a_contact() -> None:
         wide = drive.replace(gap=gap, start_position=rng.uniform(0, 1e-3) * gap, encoder_phase=rng.uniform())
         run, trace = traced(wide, Shaped())
         first_gap = trace[:, 0] < run.first_contact
-        assert np.all(trace[first_gap, 1 + shaped_step.S_PHASE] == shaped_step.GAP_OPEN), wide
+        assert np.all(trace[first_gap, 1 + index(shaped.STATE, "phase")] == shaped.GAP_OPEN), wide
 
 
 # the start -----------------------------------------------------------------------------------------------

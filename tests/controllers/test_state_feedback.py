@@ -13,9 +13,10 @@ from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.drive import library
+from softstart.plant.layout import index
 from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
-from softstart_controllers import state_feedback_step as at
+from softstart_controllers import state_feedback as sf
 from softstart_controllers.contact_designs import (
     LOAD_NOISE,
     NO_LAG,
@@ -133,8 +134,8 @@ def test_batch_has_the_numbers_of_its_drives() -> None:
 
 def distance_to_instability(drive: Drive, plant: Drive) -> float:
     """Smallest |1 + L| of the loop, cut at the demand; 1/that is the peak of its sensitivity."""
-    numbers = StateFeedback().fitted(drive).vector(drive)
-    h = float(numbers[at.P_PERIOD])
+    p = StateFeedback().fitted(drive).vector(drive).view(sf.PARAMETERS)[0]
+    h = float(p.landing.period)
 
     def closed(of: Drive, lag: float) -> tuple[Any, Any]:
         """phi1, w1, z, z' and load torque or lagging torque."""
@@ -153,7 +154,7 @@ def distance_to_instability(drive: Drive, plant: Drive) -> float:
     lag = float(plant.torque_lag)
     Ap, Bp = closed(plant, lag)
     Am, Bm = closed(drive, 0.0)
-    K = numbers[[at.P_K_ANGLE, at.P_K_SPEED, at.P_K_TWIST, at.P_K_RATE, at.P_K_LOAD]][:, None]
+    K = np.array([[p.k_angle], [p.k_speed], [p.k_twist], [p.k_rate], [p.k_load]])
     keep = np.eye(5) - K @ np.eye(1, 5)
     square = drive.Omega**2
     smallest = math.inf
@@ -166,8 +167,8 @@ def distance_to_instability(drive: Drive, plant: Drive) -> float:
             mean = back + back * (u - 1.0) * lag / h * (1.0 - math.exp(-h / lag))
         known = np.linalg.solve(np.eye(5) - keep @ Am * back, keep @ Bm[:, 0] * mean + K[:, 0] * x[0])
         twist = (u / drive.J1 + known[4] / drive.J2) / square
-        level = -numbers[at.P_F_TWIST] * known[2] - numbers[at.P_F_RATE] * known[3] / drive.Omega
-        level -= numbers[at.P_F_TORQUE] * twist
+        level = -p.f_twist * known[2] - p.f_rate * known[3] / drive.Omega
+        level -= p.f_torque * twist
         answer = drive.J1 * (level * square - known[4] / drive.J2)
         smallest = min(smallest, abs(1.0 - answer))
     return smallest
@@ -203,12 +204,12 @@ def test_estimates_stay_close_from_the_first_look_on(gap: float, J2: float, lag:
     """In shares of M12avg_base, 4096 lines. Worst of the 16: T 0.06, w1 0.3 rad/s, load torque 0.13."""
     drive = crane(gap, J2, lag, kind)
     run, trace = traced(drive, StateFeedback())
-    closed = trace[trace[:, 1 + at.S_PHASE] == at.CLOSED]
+    closed = trace[trace[:, 1 + index(sf.STATE, "phase")] == sf.CLOSED]
     true = run.at(closed[:, 0])
     base = base_torque(drive)
-    assert np.abs(drive.c * closed[:, 1 + at.S_Z] - true["T"]).max() < 0.1 * base
-    assert np.abs(closed[:, 1 + at.S_SPEED] - true["w1"]).max() < 0.8
-    assert np.abs(closed[:, 1 + at.S_LOAD] - drive.Mc).max() < 0.25 * base
+    assert np.abs(drive.c * closed[:, 1 + index(sf.STATE, "z")] - true["T"]).max() < 0.1 * base
+    assert np.abs(closed[:, 1 + index(sf.STATE, "speed")] - true["w1"]).max() < 0.8
+    assert np.abs(closed[:, 1 + index(sf.STATE, "load")] - drive.Mc).max() < 0.25 * base
 
 
 # the start -----------------------------------------------------------------------------------------------

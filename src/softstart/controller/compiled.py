@@ -8,8 +8,9 @@ from typing import Any
 
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
-from softstart.plant import start
+from softstart.plant import layout, start
 from softstart.plant.jit import compiled_as, inlined
+from softstart.plant.layout import MEASURED, Answer, record, size
 from softstart.plant.start import STEP_SIGNATURE
 
 # indices of `measured`
@@ -30,6 +31,7 @@ from softstart.plant.start import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  
 __all__ = [
     "ASK_AGAIN",
     "LOAD_SPEED",
+    "MEASURED",
     "MOTOR_ANGLE",
     "MOTOR_SPEED",
     "MOTOR_TORQUE",
@@ -40,10 +42,24 @@ __all__ = [
     "STATE",
     "TIME",
     "TORQUE",
+    "Answer",
     "Vector",
     "compiled_step",
     "inlined",
+    "keep_state",
+    "record",
+    "size",
 ]
+
+
+@inlined
+def keep_state(state: Vector, command: Vector) -> None:
+    """The new state is the old one, until the step changes it."""
+    for i in range(state.shape[0]):
+        command[STATE + i] = state[i]
+
+
+INTERFACE = (Path(start.__file__), Path(layout.__file__))
 
 
 def _drop_if_stale(function: Callable[..., None], source: Path) -> None:
@@ -54,7 +70,7 @@ def _drop_if_stale(function: Callable[..., None], source: Path) -> None:
     """
     own = _called(function, set())
     try:
-        changed = max(path.stat().st_mtime for path in {Path(__file__), Path(start.__file__), *own})
+        changed = max(path.stat().st_mtime for path in {Path(__file__), *INTERFACE, *own})
         for file in {source, *own}:
             for path in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]"):
                 if path.stat().st_mtime < changed:

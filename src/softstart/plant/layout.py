@@ -22,8 +22,10 @@ Septuple = tuple[float, float, float, float, float, float, float]
 MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
 
 
-def record(fields: type) -> Any:
-    """The NumPy type of a record: a float64 for each field of the class, in order; MOST_PENDING for a Vector.
+def record(*fields: type, **parts: Any) -> Any:
+    """The NumPy type of a record: a float64 for each field of the classes, in order.
+
+    A field named in `parts` is an array of so many numbers, or a record within the record.
 
     >>> class Point:
     ...     x: float
@@ -32,16 +34,34 @@ def record(fields: type) -> Any:
     >>> float(row.view(record(Point))[0].y)
     4.0
     """
-    types = [
-        (name, np.float64, (MOST_PENDING,)) if kind == "Vector" else (name, np.float64)
-        for name, kind in fields.__annotations__.items()
-    ]
-    return np.dtype((np.record, np.dtype(types)))
+    types: list[Any] = []
+    for name in (name for one in fields for name in one.__annotations__):
+        part = parts.get(name)
+        types.append((name, np.float64, (part,)) if isinstance(part, int) else (name, part or np.float64))
+    # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
+    scalar = type(fields[-1].__name__, (np.void,), {name: _field(name) for name, *_ in types})
+    return np.dtype((scalar, np.dtype(types)))
+
+
+def _field(name: str) -> property:
+    """A field as an attribute, outside of compiled functions."""
+    return property(lambda row: row[name], lambda row, value: row.__setitem__(name, value))
 
 
 def size(dtype: Any) -> int:
     """How many float64 numbers a record takes."""
     return int(dtype.itemsize) // 8
+
+
+def index(dtype: Any, path: str) -> int:
+    """The place of a field in its row of numbers, `landing.count` for one in a record within the record.
+
+    >>> index(STATE, "theta")
+    1
+    """
+    name, _, rest = path.partition(".")
+    inner, offset = dtype.fields[name][:2]
+    return int(offset) // 8 + (index(inner, rest) if rest else 0)
 
 
 class Plant:
@@ -230,7 +250,8 @@ class Answer:
     slope: float
 
 
-PLANT, STATE, MOTION = record(Plant), record(State), record(Motion)
+PLANT, STATE = record(Plant), record(State)
+MOTION = record(Motion, due_time=MOST_PENDING, due_demand=MOST_PENDING, due_slope=MOST_PENDING)
 SEGMENT, EVENT, STAGE_ROW, MEASURED = record(Segment), record(EventRow), record(StageRow), record(Measured)
 ANSWER = record(Answer)
 N_P, N_X, N_M = size(PLANT), size(STATE), size(MOTION)
