@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 
 from softstart.plant.jit import compiled
-
-from softstart_controllers.shaft_filter import (  # isort: skip
-    ANGLE, B, COVARIANCE, N, P00, P01, P11, PHI1, SPEED, W1, W2, Vector, Z, move,
-)  # fmt: skip
+from softstart_controllers.shaft_filter import Free, N, Shaft, move
 
 HALVINGS = 40
 SMALL = 1e-4  # for differences
@@ -99,62 +96,58 @@ def time_since_contact(
 
 @compiled
 def since_contact(
-    m: Vector, i: int, out: int, s: float, speed: float, w2: float, b: float, drift: float, u: float,
-    a: float, c: float, d: float, Mc: float, reactive: float,
-) -> None:  # fmt: skip
-    """phi1, w1, z, w2 and b now, s after contact, to the places from `out` on.
+    angle: float, s: float, speed: float, w2: float, b: float, drift: float, u: float, a: float, c: float,
+    d: float, Mc: float, reactive: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """phi1, w1, z, w2 and b now, s after contact.
 
-    Without the contact the motor would have its angle at i, this speed, and the load w2 - b drift now: the
-    load torque has taken that impulse from it. From the contact on all go under the motor torque u.
+    Without the contact the motor would have this angle and speed, and the load w2 - b drift now: the load
+    torque has taken that impulse from it. From the contact on all go under the motor torque u.
     """
     rolling = Mc * s if drift != 0.0 else 0.0
     way, w1, z, load = move(
         speed - a * u * s, 0.0, w2 - b * (drift - rolling), b, u, s, a, c, d, Mc, reactive
     )
-    m[out + PHI1] = m[i + ANGLE] - s * (speed - 0.5 * a * u * s) + way
-    m[out + W1] = w1
-    m[out + Z] = z
-    m[out + W2] = load
-    m[out + B] = b
+    return angle - s * (speed - 0.5 * a * u * s) + way, w1, z, load, b
 
 
 @compiled
 def take_up(
-    m: Vector, x: int, i: int, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
+    x: Shaft, m: Free, s: float, s_variance: float, u: float, w2: float, w2_variance: float,
     drift: float, b: float, b_variance: float, a: float, c: float, d: float, Mc: float, reactive: float,
 ) -> None:  # fmt: skip
-    """Begin the filter of the shaft at x, a time s after contact, from the free motor now at i.
+    """Begin the filter of the shaft, a time s after contact, from the free motor now.
 
     The first guess owes its errors to s, to the free motion, to w2 and to 1/J2 = b. The covariance is the sum
     of what each of them does to (phi1, w1, z, w2, 1/J2), by central differences.
     """
-    speed = m[i + SPEED]
-    P = x + COVARIANCE
-    up, down = P + N * N, P + N * N + N
-    for k in range(N * N):
-        m[P + k] = 0.0
-    m[P + N * PHI1 + PHI1] = m[i + P00]
+    speed = m.speed
+    for k in range(N):
+        for j in range(N):
+            x.P[k, j] = 0.0
+    x.P[0, 0] = m.p00
     for cause in range(4):
         at_s = SMALL * s if cause == 0 else 0.0
         at_speed = SMALL * (abs(speed) + abs(w2)) if cause == 1 else 0.0
         at_w2 = SMALL * (abs(speed) + abs(w2)) if cause == 2 else 0.0
         at_b = SMALL * b if cause == 3 else 0.0
         step = at_s + at_speed + at_w2 + at_b
-        variance = (s_variance, m[i + P11], w2_variance, b_variance)[cause]
+        variance = (s_variance, m.p11, w2_variance, b_variance)[cause]
         if step <= 0.0:
             continue
-        for sign, out in ((1.0, up), (-1.0, down)):
-            since_contact(
-                m, i, out, s + sign * at_s, speed + sign * at_speed, w2 + sign * at_w2, b + sign * at_b,
-                drift, u, a, c, d, Mc, reactive,
-            )  # fmt: skip
+        up = since_contact(
+            m.angle, s + at_s, speed + at_speed, w2 + at_w2, b + at_b, drift, u, a, c, d, Mc, reactive
+        )
+        down = since_contact(
+            m.angle, s - at_s, speed - at_speed, w2 - at_w2, b - at_b, drift, u, a, c, d, Mc, reactive
+        )
         for k in range(N):
-            m[up + k] = (m[up + k] - m[down + k]) / (2.0 * step)
+            x.F[0, k] = (up[k] - down[k]) / (2.0 * step)
         for k in range(N):
             for j in range(N):
-                m[P + N * k + j] += variance * m[up + k] * m[up + j]
+                x.P[k, j] += variance * x.F[0, k] * x.F[0, j]
         if cause == 1:  # angle and speed of the free motion err together
             for k in range(N):
-                m[P + N * PHI1 + k] += m[i + P01] * m[up + k]
-                m[P + N * k + PHI1] += m[i + P01] * m[up + k]
-    since_contact(m, i, x, s, speed, w2, b, drift, u, a, c, d, Mc, reactive)
+                x.P[0, k] += m.p01 * x.F[0, k]
+                x.P[k, 0] += m.p01 * x.F[0, k]
+    x.phi1, x.w1, x.z, x.w2, x.b = since_contact(m.angle, s, speed, w2, b, drift, u, a, c, d, Mc, reactive)

@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, parameter, stack
-from softstart.controller.compiled import Vector
+from softstart.controller.compiled import Vector, size
 from softstart.drive import Drive
 from softstart.plant.vector import encoder_count
-from softstart_controllers.pulse_coast_hold_step import RING, STATE_SIZE, step
+from softstart_controllers.pulse_coast_hold_step import RING, STATE, step
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
@@ -97,7 +97,7 @@ class PulseCoastHold(CompiledController):
     summary: ClassVar[str] = "pulse to a motor speed, coast until the shaft torque peaks, hold the peak"
     source: ClassVar[str] = "softstart: the optimum of docs/optimal-starts.md as feedback"
     kernel: ClassVar[Any] = step
-    state_size: ClassVar[int] = STATE_SIZE
+    state_size: ClassVar[int] = size(STATE)
 
     coast_speed: float | None = parameter(
         "rad/s",
@@ -150,7 +150,7 @@ class PulseCoastHold(CompiledController):
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """The numbers in the order of the indices P_PERIOD to P_BLIND."""
+        """The numbers of `Parameters`."""
         a = 1.0 / np.asarray(drive.J1)
         h = np.asarray(self.period, float)
         ratio = 1.0 / np.asarray(self.inertia_ratio, float)

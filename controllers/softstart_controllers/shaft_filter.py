@@ -1,7 +1,6 @@
 """Motor, shaft and load from motor angle and motor torque alone: two Kalman filters.
 
-Compiled steps must not allocate, so each filter keeps its numbers in consecutive slots of a vector `m` that
-the caller owns; `i` or `x` is the place of its first slot.
+Compiled steps must not allocate, so each filter keeps its numbers in a record that the caller owns.
 """
 
 from __future__ import annotations
@@ -10,64 +9,89 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.plant.jit import compiled
+from softstart.plant.layout import record
 
-Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+N = 5
 
-# The motor turning free: phi1, w1, 1/J1 and their covariances, from place i on.
-ANGLE, SPEED, INVERSE, P00, P01, P02, P11, P12, P22, FREE_SIZE = range(10)
 
-# The shaft in contact: phi1, w1, z (twist beyond the gap), w2, 1/J2, from place x on; then their 5 x 5
-# covariances, then two 5 x 5 matrices to work in.
-PHI1, W1, Z, W2, B, N = range(6)
-COVARIANCE = N
-_F, _G = N + N * N, N + 2 * N * N
-SHAFT_SIZE = N + 3 * N * N
+class Free:
+    """The motor turning free: phi1, w1, 1/J1 and their covariances."""
+
+    angle: float
+    speed: float
+    inverse: float
+    p00: float
+    p01: float
+    p02: float
+    p11: float
+    p12: float
+    p22: float
+
+
+class Shaft:
+    """The shaft in contact: phi1, w1, z (twist beyond the gap), w2, b = 1/J2; P is their covariance.
+
+    F and G are matrices to work in.
+    """
+
+    phi1: float
+    w1: float
+    z: float
+    w2: float
+    b: float
+    P: Matrix
+    F: Matrix
+    G: Matrix
+
+
+FREE, SHAFT = record(Free), record(Shaft, P=(N, N), F=(N, N), G=(N, N))
 
 
 @compiled
-def free_predict(m: Vector, i: int, u: float, early: float, h: float, noise: float) -> None:
+def free_predict(m: Free, u: float, early: float, h: float, noise: float) -> None:
     """The free motor h later: w1' = u/J1, under the mean torque u, which acts `early` (see `contact.lean`).
 
     1/J1 is an unknown of its own, which the pulse reveals; `noise` (rad^2/s^2) is what the torque measured
     may be wrong by, as variance of w1.
 
-    >>> m = np.zeros(FREE_SIZE)
-    >>> m[INVERSE] = 2.0
-    >>> free_predict(m, 0, 3.0, 0.0, 0.5, 0.0)
-    >>> m[:3].tolist()
+    >>> m = np.zeros(9).view(FREE)[0]
+    >>> m.inverse = 2.0
+    >>> free_predict(m, 3.0, 0.0, 0.5, 0.0)
+    >>> [float(value) for value in (m.angle, m.speed, m.inverse)]
     [0.75, 3.0, 2.0]
     """
     g = u * h
     f = 0.5 * g * h + early * h * h
-    m[i + ANGLE] += h * m[i + SPEED] + f * m[i + INVERSE]
-    m[i + SPEED] += g * m[i + INVERSE]
-    p00, p01, p02 = m[i + P00], m[i + P01], m[i + P02]
-    p11, p12, p22 = m[i + P11], m[i + P12], m[i + P22]
+    m.angle += h * m.speed + f * m.inverse
+    m.speed += g * m.inverse
+    p00, p01, p02 = m.p00, m.p01, m.p02
+    p11, p12, p22 = m.p11, m.p12, m.p22
     row00, row01, row02 = p00 + h * p01 + f * p02, p01 + h * p11 + f * p12, p02 + h * p12 + f * p22
     row11, row12 = p11 + g * p12, p12 + g * p22
-    m[i + P00] = row00 + h * row01 + f * row02 + noise * h * h / 3.0
-    m[i + P01] = row01 + g * row02 + 0.5 * noise * h
-    m[i + P02] = row02
-    m[i + P11] = row11 + g * row12 + noise
-    m[i + P12] = row12
+    m.p00 = row00 + h * row01 + f * row02 + noise * h * h / 3.0
+    m.p01 = row01 + g * row02 + 0.5 * noise * h
+    m.p02 = row02
+    m.p11 = row11 + g * row12 + noise
+    m.p12 = row12
 
 
 @compiled
-def free_update(m: Vector, i: int, angle: float, variance: float) -> None:
+def free_update(m: Free, angle: float, variance: float) -> None:
     """Correct by the encoder's angle, whose error has this variance in rad^2."""
-    p00, p01, p02 = m[i + P00], m[i + P01], m[i + P02]
+    p00, p01, p02 = m.p00, m.p01, m.p02
     total = p00 + variance
     k0, k1, k2 = p00 / total, p01 / total, p02 / total
-    error = angle - m[i + ANGLE]
-    m[i + ANGLE] += k0 * error
-    m[i + SPEED] += k1 * error
-    m[i + INVERSE] += k2 * error
-    m[i + P00] = (1.0 - k0) * p00
-    m[i + P01] = (1.0 - k0) * p01
-    m[i + P02] = (1.0 - k0) * p02
-    m[i + P11] -= k1 * p01
-    m[i + P12] -= k1 * p02
-    m[i + P22] -= k2 * p02
+    error = angle - m.angle
+    m.angle += k0 * error
+    m.speed += k1 * error
+    m.inverse += k2 * error
+    m.p00 = (1.0 - k0) * p00
+    m.p01 = (1.0 - k0) * p01
+    m.p02 = (1.0 - k0) * p02
+    m.p11 -= k1 * p01
+    m.p12 -= k1 * p02
+    m.p22 -= k2 * p02
 
 
 @compiled
@@ -132,7 +156,7 @@ def move(
 
 @compiled
 def shaft_predict(
-    m: Vector, x: int, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
+    x: Shaft, u: float, early: float, h: float, a: float, c: float, d: float, Mc: float,
     reactive: float, speed_noise: float, twist_noise: float, load_noise: float,
 ) -> None:  # fmt: skip
     """The shaft in contact h later, by `move`; the covariance by F = 1 + h A + h^2 A^2/2 + h^3 A^3/6.
@@ -143,9 +167,8 @@ def shaft_predict(
 
     The noises are the variances that the sample adds to w1, z and w2.
     """
-    F, G, P = x + _F, x + _G, x + COVARIANCE
-    b = m[x + B]
-    _, w1, z, w2 = move(m[x + W1], m[x + Z], m[x + W2], b, u, 0.5 * h, a, c, d, Mc, reactive)
+    b = x.b
+    _, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, 0.5 * h, a, c, d, Mc, reactive)
     T = shaft(z, w1 - w2, c, d)
     in_contact = 1.0 if T > 0.0 else 0.0
     moves = 0.0 if reactive != 0.0 and w2 == 0.0 and Mc >= T else 1.0
@@ -154,12 +177,12 @@ def shaft_predict(
     by_b = h * load_acceleration(T, w2, 1.0, Mc, reactive) * moves
     for j in range(N):  # F = 1 + h A (1 + h A/2 (1 + h A/3)), a column at a time
         f0 = f1 = f2 = f3 = 0.0
-        f4 = 1.0 if j == B else 0.0
+        f4 = 1.0 if j == 4 else 0.0
         for share in (3.0, 2.0, 1.0):
-            f0 += 1.0 if j == PHI1 else 0.0
-            f1 += 1.0 if j == W1 else 0.0
-            f2 += 1.0 if j == Z else 0.0
-            f3 += 1.0 if j == W2 else 0.0
+            f0 += 1.0 if j == 0 else 0.0
+            f1 += 1.0 if j == 1 else 0.0
+            f2 += 1.0 if j == 2 else 0.0
+            f3 += 1.0 if j == 3 else 0.0
             dT = c * f2 + d * (f1 - f3)
             f0, f1, f2, f3 = (
                 h * f1 / share,
@@ -167,45 +190,62 @@ def shaft_predict(
                 h * (f1 - f3) / share,
                 (on_w2 * dT + by_b * f4) / share,
             )
-        m[F + PHI1 * N + j] = f0 + (1.0 if j == PHI1 else 0.0)
-        m[F + W1 * N + j] = f1 + (1.0 if j == W1 else 0.0)
-        m[F + Z * N + j] = f2 + (1.0 if j == Z else 0.0)
-        m[F + W2 * N + j] = f3 + (1.0 if j == W2 else 0.0)
-        m[F + B * N + j] = f4
+        x.F[0, j] = f0 + (1.0 if j == 0 else 0.0)
+        x.F[1, j] = f1 + (1.0 if j == 1 else 0.0)
+        x.F[2, j] = f2 + (1.0 if j == 2 else 0.0)
+        x.F[3, j] = f3 + (1.0 if j == 3 else 0.0)
+        x.F[4, j] = f4
     for i in range(N):  # G = F P
         for j in range(N):
             total = 0.0
             for k in range(N):
-                total += m[F + N * i + k] * m[P + N * k + j]
-            m[G + N * i + j] = total
+                total += x.F[i, k] * x.P[k, j]
+            x.G[i, j] = total
     for i in range(N):  # P = G F'
         for j in range(i, N):
             total = 0.0
             for k in range(N):
-                total += m[G + N * i + k] * m[F + N * j + k]
-            m[P + N * i + j] = total
-            m[P + N * j + i] = total
-    m[P + (N + 1) * W1] += speed_noise
-    m[P + (N + 1) * Z] += twist_noise
-    m[P + (N + 1) * W2] += load_noise
-    way, w1, z, w2 = move(m[x + W1], m[x + Z], m[x + W2], b, u, h, a, c, d, Mc, reactive)
-    m[x + PHI1] += way + a * early * h * h
-    m[x + W1] = w1
-    m[x + Z] = z + a * early * h * h
-    m[x + W2] = w2
+                total += x.G[i, k] * x.F[j, k]
+            x.P[i, j] = total
+            x.P[j, i] = total
+    x.P[1, 1] += speed_noise
+    x.P[2, 2] += twist_noise
+    x.P[3, 3] += load_noise
+    way, w1, z, w2 = move(x.w1, x.z, x.w2, b, u, h, a, c, d, Mc, reactive)
+    x.phi1 += way + a * early * h * h
+    x.w1 = w1
+    x.z = z + a * early * h * h
+    x.w2 = w2
 
 
 @compiled
-def shaft_update(m: Vector, x: int, angle: float, variance: float, least: float, most: float) -> None:
+def shaft_update(x: Shaft, angle: float, variance: float, least: float, most: float) -> None:
     """Correct by the encoder's angle; 1/J2 stays between `least` and `most`."""
-    P, K = x + COVARIANCE, x + _F
-    total = m[P] + variance
-    error = angle - m[x + PHI1]
+    total = x.P[0, 0] + variance
+    error = angle - x.phi1
     for i in range(N):
-        m[K + i] = m[P + N * i] / total
-        m[K + N + i] = m[P + i]
+        x.F[0, i] = x.P[i, 0] / total  # the gain
+        x.F[1, i] = x.P[0, i]
+    x.phi1 += x.F[0, 0] * error
+    x.w1 += x.F[0, 1] * error
+    x.z += x.F[0, 2] * error
+    x.w2 += x.F[0, 3] * error
+    x.b += x.F[0, 4] * error
     for i in range(N):
-        m[x + i] += m[K + i] * error
         for j in range(N):
-            m[P + N * i + j] -= m[K + i] * m[K + N + j]
-    m[x + B] = min(max(m[x + B], least), most)
+            x.P[i, j] -= x.F[0, i] * x.F[1, j]
+    x.b = min(max(x.b, least), most)
+
+
+@compiled
+def copy(m: Free, to: Free) -> None:
+    """The filter of the free motor once more."""
+    to.angle = m.angle
+    to.speed = m.speed
+    to.inverse = m.inverse
+    to.p00 = m.p00
+    to.p01 = m.p01
+    to.p02 = m.p02
+    to.p11 = m.p11
+    to.p12 = m.p12
+    to.p22 = m.p22

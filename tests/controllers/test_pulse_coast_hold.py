@@ -18,8 +18,8 @@ from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, 
 from tests.controllers.starts import CRANE, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.controller.compiled import STATE
 from softstart.optimal.solving import optimize
+from softstart.plant.layout import index, size
 from softstart.start.batch import array_starts, figures
 from softstart.start.metrics import base_torque
 from softstart_controllers import pulse_coast_hold_step as stepping
@@ -55,9 +55,9 @@ def started(batch: Drive, nominal: Drive, controller: PulseCoastHold | None = No
     return {name: values.reshape(batch.shape) for name, (values, _, _) in figures(notes, base).items()}
 
 
-def state(trace: np.ndarray[Any, Any], index: int) -> np.ndarray[Any, Any]:
+def state(trace: np.ndarray[Any, Any], name: str) -> np.ndarray[Any, Any]:
     """A column of the state; the first column of a trace is the time."""
-    return trace[:, 1 + index - STATE]
+    return trace[:, 1 + index(stepping.STATE, name)]
 
 
 # the filters ---------------------------------------------------------------------------------------------
@@ -65,20 +65,21 @@ def state(trace: np.ndarray[Any, Any], index: int) -> np.ndarray[Any, Any]:
 
 def test_filter_of_the_free_motor_is_the_kalman_filter() -> None:
     rng = np.random.default_rng(1)
-    m = np.zeros(3 + sf.FREE_SIZE)
-    i, h = 3, 0.001
-    m[i : i + 3] = 0.1, 2.0, 28.0
-    m[i + sf.P00], m[i + sf.P11], m[i + sf.P22] = 1e-8, 1e-4, 1.0
-    other = FreeMotor(m[i : i + 3], np.diag([1e-8, 1e-4, 1.0]))
+    h = 0.001
+    row = np.zeros(size(sf.FREE))
+    row[:3] = 0.1, 2.0, 28.0
+    m = row.view(sf.FREE)[0]
+    m.p00, m.p11, m.p22 = 1e-8, 1e-4, 1.0
+    other = FreeMotor(row[:3], np.diag([1e-8, 1e-4, 1.0]))
     for _ in range(200):
         u, early = rng.uniform(-10, 62), rng.uniform(-3, 3)
         angle = other.x[0] + rng.normal() * 1e-4
-        sf.free_predict(m, i, u, early, h, 1e-5)
-        sf.free_update(m, i, angle, 1.2e-8)
+        sf.free_predict(m, u, early, h, 1e-5)
+        sf.free_update(m, angle, 1.2e-8)
         other.predict(u, early, h, 1e-5)
         other.update(angle, 1.2e-8)
-    assert m[i : i + 3] == pytest.approx(other.x, rel=1e-9)
-    assert m[i + 3 :] == pytest.approx(other.P[np.triu_indices(3)], rel=1e-7, abs=1e-18)
+    assert row[:3] == pytest.approx(other.x, rel=1e-9)
+    assert row[3:] == pytest.approx(other.P[np.triu_indices(3)], rel=1e-7, abs=1e-18)
 
 
 @pytest.mark.parametrize("d", [0.0, 1.0])
@@ -88,38 +89,38 @@ def test_filter_of_the_shaft_is_the_extended_kalman_filter(d: float) -> None:
     a, Mc, h = 1.0 / J1, 7.16, 0.0005
     first = np.array([0.3, 12.0, 0.05, 1.0, 10.0])
     root = rng.normal(size=(5, 5)) * np.array([1e-4, 0.1, 1e-3, 0.1, 3.0])[:, None]
-    m = np.zeros(2 + sf.SHAFT_SIZE)
-    x = 2
-    m[x : x + 5] = first
-    m[x + sf.COVARIANCE : x + sf.COVARIANCE + 25] = (root @ root.T).ravel()
+    row = np.zeros(size(sf.SHAFT))
+    row[:5] = first
+    x = row.view(sf.SHAFT)[0]
+    x.P[:] = root @ root.T
     other = Shaft(first, root @ root.T, a, C, d, Mc)
     noises = (1e-6, 1e-8, 1e-5)
     for _ in range(40):
         u = rng.uniform(30, 62)
-        sf.shaft_predict(m, x, u, 0.0, h, a, C, d, Mc, 0.0, *noises)
+        sf.shaft_predict(x, u, 0.0, h, a, C, d, Mc, 0.0, *noises)
         other.predict(u, h, noises)
         angle = other.x[0] + rng.normal() * 1e-4
-        sf.shaft_update(m, x, angle, 1.2e-8, 0.0, 1e3)
+        sf.shaft_update(x, angle, 1.2e-8, 0.0, 1e3)
         other.update(angle, 1.2e-8)
-    assert m[x : x + 5] == pytest.approx(other.x, rel=2e-5)
-    P = m[x + sf.COVARIANCE : x + sf.COVARIANCE + 25].reshape(5, 5)
+    assert row[:5] == pytest.approx(other.x, rel=2e-5)
+    P = x.P
     deviations = np.sqrt(np.diag(other.P))
     assert np.abs(P - other.P).max() < 1e12  # finite
     assert np.abs((P - other.P) / np.outer(deviations, deviations)).max() < 2e-3
 
 
 def test_reactive_load_stays_until_the_shaft_moves_it() -> None:
-    m = np.zeros(sf.SHAFT_SIZE)
-    m[:5] = 0.0, 10.0, 0.01, 0.0, 5.0
-    m[sf.COVARIANCE + 24] = 1.0
+    x = np.zeros(size(sf.SHAFT)).view(sf.SHAFT)[0]
+    x.w1, x.z, x.b = 10.0, 0.01, 5.0
+    x.P[4, 4] = 1.0
     for _ in range(3):
-        sf.shaft_predict(m, 0, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
-    assert m[sf.W2] == 0.0
-    assert m[sf.COVARIANCE + 5 * sf.W2 + sf.B] == 0.0  # nothing is learnt of J2 before
+        sf.shaft_predict(x, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
+    assert x.w2 == 0.0
+    assert x.P[3, 4] == 0.0  # nothing is learnt of J2 before
     for _ in range(100):
-        sf.shaft_predict(m, 0, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
-    assert m[sf.W2] > 0.1
-    assert m[sf.COVARIANCE + 5 * sf.W2 + sf.B] > 0.0
+        sf.shaft_predict(x, 0.0, 0.0, 1e-4, 1.0 / J1, C, 0.0, 7.16, 1.0, 0.0, 0.0, 0.0)
+    assert x.w2 > 0.1
+    assert x.P[3, 4] > 0.0
 
 
 @given(
@@ -163,13 +164,12 @@ def test_first_guess_in_contact_is_the_plant(d: float, u: float, drift: float, r
     w2 = -b * drift
 
     def guess(s: float, b: float, speed: float, variances: tuple[float, float, float]) -> Any:
-        m = np.zeros(sf.FREE_SIZE + sf.SHAFT_SIZE)
-        m[: sf.P00] = 0.2, speed, a
-        m[sf.P11] = variances[2]
-        take_up(
-            m, sf.FREE_SIZE, 0, s, variances[0], u, 0.0, 0.0, drift, b, variances[1], a, C, d, Mc, reactive
-        )
-        return m[sf.FREE_SIZE : sf.FREE_SIZE + 5], m[sf.FREE_SIZE + 5 : sf.FREE_SIZE + 30].reshape(5, 5)
+        m = np.zeros(size(sf.FREE)).view(sf.FREE)[0]
+        m.angle, m.speed, m.inverse, m.p11 = 0.2, speed, a, variances[2]
+        row = np.zeros(size(sf.SHAFT))
+        x = row.view(sf.SHAFT)[0]
+        take_up(x, m, s, variances[0], u, 0.0, 0.0, drift, b, variances[1], a, C, d, Mc, reactive)
+        return row[:5], x.P
 
     none = (0.0, 0.0, 0.0)
     if reactive == 0.0:
@@ -217,11 +217,9 @@ def test_the_pulse_tells_motor_inertia_and_delay() -> None:
     twin = controller.as_plain(nominal)
     assert twin.numbers == numbers  # type: ignore[attr-defined]
     _, trace = traced_as(drive, nominal)
-    coasting = state(trace, stepping.S_PHASE) == stepping.COAST
-    assert state(trace, stepping.S_FREE + sf.INVERSE)[coasting][-1] * 1.05 * J1 == pytest.approx(
-        1.0, abs=0.006
-    )
-    assert state(trace, stepping.S_DELAY)[coasting][-1] == pytest.approx(0.002, rel=0.01)
+    coasting = state(trace, "phase") == stepping.COAST
+    assert state(trace, "free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)
+    assert state(trace, "delay")[coasting][-1] == pytest.approx(0.002, rel=0.01)
 
 
 def traced_as(drive: Drive, nominal: Drive) -> tuple[Any, np.ndarray[Any, Any]]:
@@ -250,7 +248,7 @@ def test_no_contact_is_seen_before_there_is_one(kind: Any, gap: float) -> None:
             kind, gap, 2.0, encoder_phase=phase, motor_inertia=J * J1, torque_lag=lag, computing_delay=dead
         )
         run, trace = traced_as(drive, told(kind))
-        contact = trace[state(trace, stepping.S_PHASE) >= stepping.CONTACT, 0]
+        contact = trace[state(trace, "phase") >= stepping.CONTACT, 0]
         assert contact[0] > run.first_contact
         assert contact[0] - run.first_contact < 0.0075
         assert run.contacts == 1
@@ -433,7 +431,7 @@ def test_begins_again_when_the_gap_opens() -> None:
     drive = cell("active", 2.0, 0.7)
     run, trace = traced(drive, PulseCoastHold())
     assert run.contacts > 1
-    assert state(trace, stepping.S_OPENINGS)[-1] >= 1.0
+    assert state(trace, "openings")[-1] >= 1.0
     assert run.k_dyn < simulate(drive, "direct").k_dyn
 
 
@@ -444,8 +442,8 @@ def test_raises_the_torque_where_it_cannot_see() -> None:
         CRANE.replace(torque_rate=1000.0),
     ):
         _, trace = traced(blind, PulseCoastHold())
-        assert np.all(state(trace, stepping.S_PHASE) == stepping.RAISE)
-        demand = state(trace, stepping.S_DEMAND)
+        assert np.all(state(trace, "phase") == stepping.RAISE)
+        demand = state(trace, "demand")
         assert np.all(np.diff(demand) >= 0.0)
         assert demand[-1] == 62.0
 

@@ -25,7 +25,7 @@ MOST_PENDING: Final = 16  # answers of a controller that may wait for their comp
 def record(*fields: type, **parts: Any) -> Any:
     """The NumPy type of a record: a float64 for each field of the classes, in order.
 
-    A field named in `parts` is an array of so many numbers, or a record within the record.
+    A field named in `parts` is an array of so many numbers or of this shape, or a record within the record.
 
     >>> class Point:
     ...     x: float
@@ -37,7 +37,9 @@ def record(*fields: type, **parts: Any) -> Any:
     types: list[Any] = []
     for name in (name for one in fields for name in one.__annotations__):
         part = parts.get(name)
-        types.append((name, np.float64, (part,)) if isinstance(part, int) else (name, part or np.float64))
+        types.append(
+            (name, np.float64, part) if isinstance(part, int | tuple) else (name, part or np.float64)
+        )
     # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
     scalar = type(fields[-1].__name__, (np.void,), {name: _field(name) for name, *_ in types})
     return np.dtype((scalar, np.dtype(types)))
