@@ -24,9 +24,14 @@ from softstart.chain.vibration import (
 )
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from softstart.views import chains as views
+else:
+    views = late("softstart.views.chains")
 
 Method = Literal["lever", "modal"]
 
@@ -148,9 +153,7 @@ class Reduction:
 
     def plot(self) -> Figure:
         """What each step does to the kept frequencies, with the bounds."""
-        from softstart.chain.pictures import reduction_figure
-
-        figure: Figure = reduction_figure(self)
+        figure: Figure = views.reduction_figure(self)
         return figure
 
     def summary(self) -> dict[str, Any]:

@@ -34,12 +34,17 @@ from softstart.chain.kernel_records import (
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.drive import Drive
+from softstart.late import late
 from softstart.plant import layout
 from softstart.start.run import BaseRun
 from softstart.start.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from softstart.views import chains as views
+else:
+    views = late("softstart.views.chains")
 
 EVENT_NAMES = {
     CLOSED: "gap closed",
@@ -250,9 +255,7 @@ class ChainRun(BaseRun):
 
     def plot(self) -> Figure:
         """Torques, speeds and twists over time."""
-        from softstart.chain.pictures_of_runs import run_figure
-
-        figure: Figure = run_figure(self)
+        figure: Figure = views.run_figure(self)
         return figure
 
     def summary(self) -> dict[str, Any]:

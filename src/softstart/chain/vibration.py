@@ -26,9 +26,14 @@ from numpy.typing import NDArray
 from softstart.arrays import Vector
 from softstart.chain.model import Chain, ChainArrays
 from softstart.errors import InputError
+from softstart.late import late
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from softstart.views import chains as views
+else:
+    views = late("softstart.views.chains")
 
 
 class Node(NamedTuple):
@@ -112,9 +117,7 @@ class Vibration:
 
     def plot(self, modes: int = 3) -> Figure:
         """The lowest elastic shapes with their nodes."""
-        from softstart.chain.pictures import shapes_figure
-
-        figure: Figure = shapes_figure(self, modes)
+        figure: Figure = views.shapes_figure(self, modes)
         return figure
 
     def summary(self) -> dict[str, Any]:

@@ -23,10 +23,15 @@ from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration import natural_vibration
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.quantities import Value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from softstart.views import chains as views
+else:
+    views = late("softstart.views.chains")
 
 
 def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Value:
@@ -81,20 +86,8 @@ class Backbone:
 
     def plot(self) -> Figure:
         """The frequencies, over that without gaps, against the largest torque."""
-        from softstart.views.drawing import COLOURS, drawing, new_figure
-
-        with drawing():
-            figure, axes = new_figure(size=(6.5, 4.0))
-            axes.semilogx(self.torque, self.frequency / self.Omega, "o-", color=COLOURS[0], label="chain")
-            if np.isfinite(self.two_masses).all():
-                two = self.two_masses / self.Omega
-                axes.semilogx(self.torque, two, "--", color=COLOURS[1], label="two masses, exact")
-            axes.set_xlabel("largest torque at release, N m")
-            axes.set_ylabel("frequency over that without gaps")
-            axes.set_title(f"{self.chain.name}: free vibration with gaps, mode {self.mode}")
-            axes.legend()
-        drawn: Figure = figure
-        return drawn
+        figure: Figure = views.backbone_figure(self)
+        return figure
 
 
 def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60) -> Backbone:
@@ -207,20 +200,8 @@ class ForcedResponse:
 
     def plot(self, mass: str | int = 0) -> Figure:
         """The amplitude of one mass against the frequency, with gaps and without."""
-        from softstart.views.drawing import COLOURS, drawing, new_figure
-
-        index = self.chain.index(mass)
-        with drawing():
-            figure, axes = new_figure(size=(6.5, 4.0))
-            with_gaps = f"with gaps, {self.locking:g} N m constant"
-            axes.plot(self.frequency, self.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
-            axes.plot(self.frequency, self.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
-            axes.set_xlabel("frequency of the exciting torque, rad/s")
-            axes.set_ylabel("amplitude, rad")
-            axes.set_title(f"{self.chain.name}: forced response of {self.chain.masses[index].name}")
-            axes.legend()
-        drawn: Figure = figure
-        return drawn
+        figure: Figure = views.response_figure(self, mass)
+        return figure
 
 
 def forced_response(

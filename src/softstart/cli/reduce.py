@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.chain.elements import LIBRARY, TABLES
+from softstart.chain.model import Chain
+from softstart.chain.reduction import Reduction, reduce_chain
 from softstart.cli.commands import Command
 from softstart.cli.completion import Keys, names_or_files, table_keys
 from softstart.cli.completion import settings as settings_of
@@ -22,26 +26,37 @@ from softstart.cli.options import (
     read_names,
     read_params_of,
 )
+from softstart.cli.running import Attributed, make_controllers, working
 from softstart.errors import InputError
-from softstart.views.markdown import output_folder
+from softstart.late import late
+from softstart.views import chains as views
+from softstart.views.chain_schemes import scheme_svg
+from softstart.views.drawing import save_figure
+from softstart.views.markdown import (
+    command_run,
+    markdown,
+    output_folder,
+    table_sections,
+    write_table,
+    write_text,
+)
+from softstart.views.terminal import console, print_json, print_tables, sentence
 
 if TYPE_CHECKING:
-    from softstart.chain import Chain, Reduction
+    from softstart.chain import simulation
     from softstart.chain.simulation import Verification
+else:
+    simulation = late("softstart.chain.simulation")  # compiles its kernel: only needed with --verify
 
 DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")
 
 
 def _chains() -> Iterable[str]:
-    from softstart.chain.elements import LIBRARY
-
     return LIBRARY.names()
 
 
 def _keys() -> Keys:
-    from softstart.chain.elements import TABLES
-
     return table_keys(TABLES)
 
 
@@ -137,9 +152,6 @@ def reduce(
     mistakes.settle()
     assert one is not None
 
-    from softstart.cli.reduce_verify import check, verdict, verified
-    from softstart.cli.running import working
-
     with output_folder(out) as folder:
         with working("reducing the chain ..."):
             found = reduced(one, asked)
@@ -150,29 +162,112 @@ def reduce(
             with working("starting the drive and the chain ..."):
                 done = verified(found, names, given)
         if folder is not None:
-            from softstart.cli.reduce_report import write_reduction
-
             with working("drawing the figures ..."):
-                write_reduction(found, beside, done, folder, command_line())
-
-    from softstart.cli.reduce_text import show_reduction
-    from softstart.views.terminal import console, print_json
+                _write(found, beside, done, folder, command_line())
 
     if as_json:
-        verification = {"verified": [one.summary() for one in done], "verdict": verdict(done)}
+        verification = {"verified": [one.summary() for one in done], "verdict": views.verdict(done)}
         print_json({**summary(found, beside), **verification})
         return
-    show_reduction(console(), found, beside, done)
+    _show(found, beside, done)
     if out is not None:
         print(
             f"\nWritten to {out}: report.md, the scheme, the figures, the tables and what it was reduced to."
         )
 
 
+def _show(found: Reduction, beside: Reduction | None, done: Sequence[Verification]) -> None:
+    """The chain, its frequencies, the steps and what came out."""
+    to = console()
+    for index, line in enumerate(views.chain_lines(found.chain)):
+        sentence(to, line, "bold" if index == 0 else "")
+    print_tables(to, views.tables(found, beside, done))
+    if said := views.caution(done):
+        sentence(to, said, "bold")
+    to.print()
+    sentence(to, views.conclusion(found), "bold")
+    for note in views.footnotes(found):
+        sentence(to, note, "dim")
+
+
+def _write(
+    found: Reduction, beside: Reduction | None, done: Sequence[Verification], folder: Path, command: str
+) -> None:
+    """Scheme, figures, tables, the chain with all changes, what came out, and the report that ties them."""
+    vibration = found.whole_vibration
+    write_text(folder / "scheme.svg", scheme_svg(found.chain))
+    write_text(folder / "reduced-scheme.svg", scheme_svg(found.reduced))
+    pictures = {"shapes": vibration.plot()}
+    if any(step.ratio != float("inf") for step in found.steps):
+        pictures["reduction"] = found.plot()
+    for stem, figure in pictures.items():
+        save_figure(figure, folder, stem)
+    write_text(folder / "chain.toml", found.chain.to_toml())
+    write_text(folder / "reduced.toml", found.reduced.to_toml())
+    results = "[chain.toml](chain.toml), [reduced.toml](reduced.toml)"
+    if makes_drive(found):
+        write_text(folder / "drive.toml", found.to_drive().to_toml())
+        results += ", [drive.toml](drive.toml) for compare, optimize and tune"
+    for name, (headings, rows) in views.files(found, done).items():
+        write_table(folder / name, headings, rows)
+
+    parts = [
+        f"# {markdown(found.chain.name)}: natural frequencies and reduction",
+        "\n".join(f"- {markdown(line.strip())}" for line in views.chain_lines(found.chain)[1:]),
+        markdown(views.conclusion(found)),
+        "![scheme](scheme.svg)",
+        "![reduced scheme](reduced-scheme.svg)",
+    ]
+    parts += table_sections(views.tables(found, beside, done))
+    if said := views.caution(done):
+        parts.append(markdown(said))
+    parts += [f"![{stem}]({stem}.svg)" for stem in pictures]
+    starts = ", [verified.csv](verified.csv)" if done else ""
+    parts += [
+        *map(markdown, views.footnotes(found)),
+        f"What was reduced, and to what: {results}.",
+        "All numbers: [frequencies.csv](frequencies.csv), [shapes.csv](shapes.csv), "
+        "[holzer.csv](holzer.csv), [partial-systems.csv](partial-systems.csv), [steps.csv](steps.csv)"
+        f"{starts}.",
+        f"{command_run(command)}Source: {markdown(found.chain.source) or 'none given'}.",
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+
+
+def verified(
+    found: Reduction, names: Sequence[str], params: Mapping[str, Mapping[str, Any]]
+) -> list[Verification]:
+    """The controllers of these names, set up for the drive, started on the drive and on the chain."""
+    drive = found.to_drive()
+    done = []
+    for controller in make_controllers(names, params, prefix=True):
+        with Attributed():
+            done.append(simulation.verify_on_chain(found.chain, drive, controller))
+    return done
+
+
+def check(found: Reduction, names: Sequence[str] | None) -> None:
+    """That there is a drive to design on, where controllers are to be verified."""
+    if names is None or makes_drive(found):
+        return
+    mistakes = Mistakes()
+    count = len(found.reduced.masses)
+    if count != 2:
+        with mistakes.noted():
+            raise InputError(
+                f"--verify: a start is designed on two masses, and {count} are left; leave out --to and "
+                "--up-to, or take --method modal."
+            )
+    with mistakes.noted():
+        if found.chain.motor is None or found.chain.target_speed is None:
+            raise InputError(
+                "--verify: a start needs the tables [motor] and [start] with a target_speed; add them."
+            )
+    mistakes.settle()
+
+
 def reduced(chain: Chain, asked: dict[str, Any]) -> Reduction:
     """The reduction asked for; keywords in sentences as options."""
-    from softstart.chain import reduce_chain
-
     try:
         return reduce_chain(chain, **asked)
     except InputError as error:
@@ -192,8 +287,6 @@ def reduced(chain: Chain, asked: dict[str, Any]) -> Reduction:
 
 def beside_it(found: Reduction) -> Reduction | None:
     """The other method's two masses, to be shown beside; None where it has none."""
-    from softstart.chain import reduce_chain
-
     if len(found.reduced.masses) != 2:
         return None
     other = "modal" if found.method == "lever" else "lever"
@@ -225,8 +318,6 @@ def makes_drive(found: Reduction) -> bool:
 
 def read_chain(name: str, settings: Sequence[str]) -> Chain:
     """The chain asked for, with its changes."""
-    from softstart.chain import Chain
-
     mistakes = Mistakes()
     changes: dict[str, Any] = {}
     with mistakes.noted():

@@ -35,8 +35,8 @@ class PaperR(Study):
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """All of it; `out` receives the chain with its assumed values and its scheme."""
         if out is not None:
-            from softstart.chain.scheme import scheme_svg
             from softstart.input.files import write_whole
+            from softstart.views.chain_schemes import scheme_svg
 
             chain = free.tractor()
             write_whole(out / "tractor-like.toml", lambda stream: stream.write(chain.to_toml()))

@@ -10,7 +10,7 @@ import pytest
 
 from softstart.chain import Chain, Mass, Shaft, reduce_chain
 from softstart.chain.elements import LIBRARY
-from softstart.chain.scheme import scheme_svg
+from softstart.views.chain_schemes import scheme_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -1,0 +1,387 @@
+"""Chains in words, tables and figures: vibration, reduction, starts, and starts beside the reduced drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
+from softstart.views.numbers import Table, column_of, number, printable, short
+
+if TYPE_CHECKING:
+    from softstart.chain.model import Chain
+    from softstart.chain.reduction import Reduction
+    from softstart.chain.run import ChainRun
+    from softstart.chain.simulation import Verification
+    from softstart.chain.vibration import Vibration
+    from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse
+
+MOST_MODES = 12
+FAR = 1.5  # times the K_dyn of the drive: from there on the two masses do not predict the load of the chain
+ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
+
+
+# words -----------------------------------------------------------------------------------------------------
+
+
+def chain_lines(chain: Chain) -> list[str]:
+    """The chain in a few lines."""
+    arrays = chain.at_motor_shaft()
+    gaps = int((arrays.gap > 0.0).sum())
+    lines = [
+        printable(chain.name),
+        f"  {len(chain.masses)} masses, {gaps} gap{'' if gaps == 1 else 's'}; at the motor shaft J = "
+        f"{short(float(arrays.J.sum()))} kg m2, gaps {short(float(arrays.gap.sum()))} rad, load torque "
+        f"{short(float(arrays.Mc.sum()))} N m",
+        f"  motor on {chain.masses[arrays.motor].name}, load {chain.load_mass}",
+    ]
+    if chain.assumed:
+        lines.append(f"  assumed: {printable(chain.assumed)}")
+    return lines
+
+
+def conclusion(found: Reduction) -> str:
+    """What came out."""
+    whole, after = len(found.chain.masses), len(found.reduced.masses)
+    if not found.steps:
+        return f"The {whole} masses stay: nothing swings far enough above {found.wanted:.6g} rad/s."
+    worst = max(found.frequencies, key=lambda one: abs(one.error))
+    said = (
+        f"{whole} masses became {after}; of the kept frequencies {worst.whole:.6g} rad/s changed most, by "
+        f"{100 * worst.error:+.3g} %."
+    )
+    if found.forced:
+        said += f" The condition fails: its least ratio is {found.least_ratio:.3g}, below {found.factor:g}."
+    return said
+
+
+def footnotes(found: Reduction) -> list[str]:
+    """What a reader must know."""
+    notes = [note[0].upper() + note[1:] + "." for note in found.notes]
+    if found.chain.assumed:
+        notes.append(f"Assumed: {found.chain.assumed}.")
+    return notes
+
+
+def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification] | None:
+    """The pair that stands the other way round on the chain, the one that is gentler there first.
+
+    Of several the one that differs most on the chain; strategies that are alike are no pair.
+    """
+    pairs = []
+    for one, other in combinations(done, 2):
+        gentler, harder = sorted((one, other), key=lambda v: v.chain.k_dyn)
+        if (
+            gentler.chain.k_dyn < (1.0 - ALIKE) * harder.chain.k_dyn
+            and harder.drive.k_dyn < (1.0 - ALIKE) * gentler.drive.k_dyn
+        ):
+            pairs.append((gentler, harder))
+    return max(pairs, key=lambda pair: pair[1].chain.k_dyn / pair[0].chain.k_dyn, default=None)
+
+
+def caution(done: Sequence[Verification]) -> str:
+    """One sentence where the chain orders or loads strategies otherwise than the two masses; else none."""
+    said = []
+    pair = reordered(done)
+    if pair is not None:
+        gentler, harder = pair
+        said.append(
+            f"{gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain.k_dyn:.3g} and "
+            f"{harder.chain.k_dyn:.3g}), on the drive it is the other way round "
+            f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})"
+        )
+    far = max(done, key=_ratio, default=None)
+    if far is not None and _ratio(far) > FAR:
+        said.append(f"{far.name} has {_ratio(far):.2f} times its K_dyn on the drive")
+    return f"On the chain {', and '.join(said)}: choose by the chain." if said else ""
+
+
+def verdict(done: Sequence[Verification]) -> dict[str, Any] | None:
+    """The same as plain data; None without starts."""
+    if not done:
+        return None
+    return {
+        "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
+        "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain.k_dyn)],
+        "order_differs": reordered(done) is not None,
+        "largest_ratio": max(map(_ratio, done)),
+        "caution": caution(done) or None,
+    }
+
+
+def _ratio(one: Verification) -> float:
+    """K_dyn on the chain over that on the drive."""
+    return one.chain.k_dyn / one.drive.k_dyn
+
+
+# tables ----------------------------------------------------------------------------------------------------
+
+
+def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verification] = ()) -> list[Table]:
+    """Frequencies, steps, the two masses of both methods, and the starts on drive and chain."""
+    shown = [frequencies_table(found.whole_vibration)]
+    if found.steps:
+        shown.append(steps_table(found))
+    shown.append(kept_table(found))
+    if len(found.reduced.masses) == 2:
+        shown.append(two_masses_table(found, beside))
+    if done:
+        shown.append(verified_table(done))
+    return shown
+
+
+def frequencies_table(vibration: Vibration) -> Table:
+    """The lowest natural frequencies with their nodes."""
+    count = min(vibration.Omega.size, MOST_MODES)
+    nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) for m in range(count)]
+    more = vibration.Omega.size - count
+    title = "Natural frequencies, gaps closed" + (f" (and {more} above)" if more else "")
+    of_nodes = "nodes (7.30: behind mass 7, at 0.30 of the twist to mass 8)"
+    cells = {
+        of_nodes: [node or "-" for node in nodes],
+        "mode": [str(m) for m in range(count)],
+        "Omega\nrad/s": column_of([float(w) for w in vibration.Omega[:count]], 6),
+        "Hz": column_of([float(f) for f in vibration.frequency[:count]], 5),
+    }
+    return Table.of(title, cells, texts=[of_nodes])
+
+
+def steps_table(found: Reduction) -> Table:
+    """What was merged, at which frequency, and what it did to the kept frequencies."""
+    what = {"joint": "rigid joint", "mass": "shared", "pair": "joined", "modal": "first mode of"}
+    masses = [", ".join(step.masses) if step.kind != "modal" else "the chain" for step in found.steps]
+    worst = [max((abs(error) for error in step.errors), default=0.0) for step in found.steps]
+    bounds = [max(step.bounds, default=0.0) for step in found.steps]
+    cells = {
+        "step": [f"{what[step.kind]} {names}" for step, names in zip(found.steps, masses, strict=True)],
+        "partial\nrad/s": [number(step.Omega, 1) for step in found.steps],
+        "(partial/\nwanted)^2": [number(step.ratio, 1) for step in found.steps],
+        "masses\nleft": [str(step.masses_left) for step in found.steps],
+        "error\n%": [f"{100 * error:.2g}" for error in worst],
+        "at most\n%": [f"{100 * bound:.2g}" if math.isfinite(bound) else "-" for bound in bounds],
+    }
+    wanted = f"wanted up to {found.wanted:.6g} rad/s, condition {found.factor:g}"
+    return Table.of(f"Steps, method {found.method}: {wanted}", cells, texts=["step"])
+
+
+def kept_table(found: Reduction) -> Table:
+    """The kept frequencies before and after."""
+    kept = found.frequencies
+    cells = {
+        "mode": [f"{i}" for i in range(1, len(kept) + 1)],
+        "chain\nrad/s": [f"{f.whole:.6g}" for f in kept],
+        "reduced\nrad/s": [f"{f.reduced:.6g}" for f in kept],
+        "error\n%": [f"{100 * f.error:+.3g}" for f in kept],
+        "at most\n%": [f"{100 * f.bound:.3g}" for f in kept],
+    }
+    return Table.of("Kept frequencies", cells)
+
+
+def two_masses_table(found: Reduction, beside: Reduction | None) -> Table:
+    """The chain and the two masses of both methods."""
+    rows = {
+        "first elastic frequency, rad/s": "Omega",
+        "node: share of the twist before it": "node",
+        "participation of the motor": "participation",
+        "stiffness motor - load, N m/rad": "stiffness",
+        "J1, kg m2": "",
+        "J2, kg m2": "",
+        "whole gap, rad": "gap",
+    }
+    whole = found.figures[0]
+    cells = {
+        "at the motor shaft": list(rows),
+        "chain": [short(getattr(whole, key)) if key else "-" for key in rows.values()],
+    }
+    for one in (found, beside) if beside is not None else (found,):
+        chain, figures = one.reduced, one.figures[1]
+        inertia = {
+            "J1, kg m2": chain.masses[chain.motor_index].inertia,
+            "J2, kg m2": chain.masses[chain.load_index].inertia,
+        }
+        cells[one.method] = [
+            short(getattr(figures, key) if key else inertia[name]) for name, key in rows.items()
+        ]
+    return Table.of("Two masses", cells, texts=["at the motor shaft"])
+
+
+def verified_table(done: Sequence[Verification]) -> Table:
+    """The starts on the drive and on the chain."""
+    cells = {
+        "strategy": [one.name for one in done],
+        "largest in": [one.worst_place for one in done],
+        "K_dyn\ndrive": [number(one.drive.k_dyn, 4) for one in done],
+        "K_dyn\nchain": [number(one.chain.k_dyn, 4) for one in done],
+        "drive off\n%": [f"{100 * one.error:+.1f}" for one in done],
+        "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
+        "start time\nchain s": column_of([one.chain.start_time for one in done], 4),
+        "largest K\nof a shaft": [number(one.worst_k_dyn, 4) for one in done],
+    }
+    title = "Designed on the two masses, verified on the chain (K_dyn: the shaft beside the motor)"
+    return Table.of(title, cells, texts=["strategy", "largest in"])
+
+
+def files(found: Reduction, done: Sequence[Verification]) -> dict[str, tuple[Sequence[str], list[list[Any]]]]:
+    """The tables of --out with all digits: headings and rows by file name."""
+    vibration = found.whole_vibration
+    names = [mass.name for mass in found.chain.masses]
+    modes = range(vibration.Omega.size)
+    frequencies = [[m, float(vibration.Omega[m]), float(vibration.frequency[m])] for m in modes]
+    holzer = [[m, *row] for m in modes[1:] for row in vibration.holzer(m)]
+    heading = ("mode", "mass", "inertia [kg*m^2]", "shape", "inertia torque [N*m]", "sum [N*m]")
+    systems = [[s.kind, " + ".join(s.masses), s.Omega] for s in vibration.partial_systems]
+    kept = range(1, len(found.frequencies) + 1)
+    columns = [f"{what} {i}" for i in kept for what in ("error", "bound")]
+    steps = []
+    for step in found.steps:
+        errors = [x for pair in zip(step.errors, step.bounds, strict=False) for x in pair]
+        filled = [*errors, *([None] * (len(columns) - len(errors)))]
+        steps.append([step.kind, " + ".join(step.masses), step.Omega, step.ratio, step.masses_left, *filled])
+    first = ("kind", "masses", "partial [rad/s]", "ratio", "masses left")
+    made: dict[str, tuple[Sequence[str], list[list[Any]]]] = {
+        "frequencies.csv": (("mode", "Omega [rad/s]", "frequency [Hz]"), frequencies),
+        "shapes.csv": (("mode", *names), [[m, *vibration.shape[m].tolist()] for m in modes]),
+        "holzer.csv": ((*heading, "stiffness [N*m/rad]", "twist [rad]"), holzer),
+        "partial-systems.csv": (("kind", "masses", "Omega [rad/s]"), systems),
+        "steps.csv": ((*first, *columns), steps),
+    }
+    if done:
+        rows = [{k: v for k, v in one.summary().items() if k != "chain"} for one in done]
+        made["verified.csv"] = (list(rows[0]), [list(row.values()) for row in rows])
+    return made
+
+
+# figures ---------------------------------------------------------------------------------------------------
+
+
+def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
+    """The lowest elastic shapes along the compliance of the chain, with their nodes; grey where gaps are."""
+    arrays = vibration.chain.at_motor_shaft()
+    place = np.concatenate([[0.0], np.cumsum(1.0 / arrays.c)])
+    place = place / place[-1]
+    shown = min(modes, vibration.Omega.size - 1)
+    with drawing():
+        figure, axes = new_figure(size=(8.0, 4.2))
+        for k in np.flatnonzero(arrays.gap > 0.0):
+            axes.axvspan(place[k], place[k + 1], color="#E8ECEF", lw=0, zorder=0)
+        axes.axhline(0.0, color="black", lw=0.8)
+        for m in range(1, shown + 1):
+            colour = COLOURS[(m - 1) % len(COLOURS)]
+            label = f"mode {m}: {vibration.frequency[m]:.4g} Hz"
+            axes.plot(place, vibration.shape[m], "o-", ms=4, color=colour, label=label)
+            nodes = [
+                place[n.shaft] + n.share * (place[n.shaft + 1] - place[n.shaft]) for n in vibration.nodes[m]
+            ]
+            axes.plot(nodes, np.zeros(len(nodes)), "o", ms=8, mfc="white", mec=colour, mew=1.6, zorder=4)
+        _name_masses(axes, place, [mass.name for mass in vibration.chain.masses])
+        axes.set_ylabel("amplitude at the motor shaft")
+        axes.set_title(f"{vibration.chain.name}: shapes with the gaps closed")
+        axes.legend()
+    return figure
+
+
+def _name_masses(axes: Any, place: np.ndarray[Any, Any], names: list[str]) -> None:
+    """Names below the axis; masses at nearly one place share a tick."""
+    ticks: list[float] = []
+    labels: list[list[str]] = []
+    for x, name in zip(place.tolist(), names, strict=True):
+        if ticks and x - ticks[-1] < 0.05:
+            labels[-1].append(name)
+        else:
+            ticks.append(x)
+            labels.append([name])
+    texts = [group[0] if len(group) == 1 else f"{group[0]} ... {group[-1]}" for group in labels]
+    axes.set_xticks(ticks, texts, rotation=30, ha="right")
+    axes.set_xlabel("place along the chain, by compliance (grey: shafts with a gap)")
+
+
+def reduction_figure(reduction: Reduction) -> Any:
+    """The partial frequency of each step over what it had to be above, and the errors with their bounds."""
+    steps = [step for step in reduction.steps if math.isfinite(step.ratio)]
+    with drawing():
+        figure, (above, below) = new_figure(2, size=(8.0, 5.6), sharex=True)
+        left = [step.masses_left for step in steps]
+        above.semilogy(left, [step.ratio for step in steps], "o-", color=COLOURS[0])
+        above.axhline(reduction.factor, color=COLOURS[1], ls="--", label=f"condition: {reduction.factor:g}")
+        above.set_ylabel("(partial / wanted frequency)$^2$")
+        above.legend()
+        for i in range(len(reduction.frequencies)):
+            colour = COLOURS[i % len(COLOURS)]
+            errors = [100 * abs(step.errors[i]) if i < len(step.errors) else math.nan for step in steps]
+            bounds = [100 * step.bounds[i] if i < len(step.bounds) else math.nan for step in steps]
+            below.semilogy(
+                left, np.maximum(errors, 1e-12), "o-", color=colour, label=f"frequency {i + 1}: error"
+            )
+            below.semilogy(left, np.maximum(bounds, 1e-12), ":", color=colour, label="its bound")
+        below.set_ylabel("error, %")
+        below.set_xlabel("masses left")
+        below.xaxis.get_major_locator().set_params(integer=True)
+        below.legend()
+        below.invert_xaxis()
+        above.set_title(f"{reduction.chain.name}: reduction, method {reduction.method}")
+    return figure
+
+
+def run_figure(run: ChainRun) -> Any:
+    """Shaft torques with their located peaks, speeds of the masses, and where each twist is in its gap."""
+    masses = [mass.name for mass in run.chain.masses]
+    shafts = [f"{a} - {b}" for a, b in pairwise(masses)]
+    gap = run.chain.at_motor_shaft().gap
+    with drawing():
+        figure, (torque, speed, twist) = new_figure(3, size=(8.0, 7.5), sharex=True)
+        torque.plot(run.t, run.u, color="black", lw=1.0, label="motor")
+        for k, name in enumerate(shafts):
+            style = {"color": COLOURS[k % len(COLOURS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
+            torque.plot(run.t, run.T[:, k], label=name, **style)
+            at = run.at(run.peak_times[k])["T"][k]
+            torque.plot(run.peak_times[k], at, "o", ms=4, color=style["color"])
+            if gap[k] > 0.0:
+                twist.plot(run.t, 2.0 * run.twist[:, k] / gap[k], label=name, **style)
+        for i, name in enumerate(masses):
+            colour, dash = COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]
+            speed.plot(run.t, run.w[:, i], color=colour, ls=dash, label=name)
+        for flank in (-1.0, 1.0):
+            twist.axhline(flank, color="black", lw=0.8)
+        torque.set_ylabel("torque, N m")
+        speed.set_ylabel("speed, rad/s")
+        twist.set_ylabel("twist over half the gap")
+        twist.set_xlabel("time, s")
+        torque.set_title(f"{run.chain.name}, at the motor shaft")
+        for axes in (torque, speed, twist):
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(fontsize=7.5, ncols=2, loc="best")
+    return figure
+
+
+def backbone_figure(found: Backbone) -> Any:
+    """The frequencies, over that without gaps, against the largest torque."""
+    with drawing():
+        figure, axes = new_figure(size=(6.5, 4.0))
+        axes.semilogx(found.torque, found.frequency / found.Omega, "o-", color=COLOURS[0], label="chain")
+        if np.isfinite(found.two_masses).all():
+            two = found.two_masses / found.Omega
+            axes.semilogx(found.torque, two, "--", color=COLOURS[1], label="two masses, exact")
+        axes.set_xlabel("largest torque at release, N m")
+        axes.set_ylabel("frequency over that without gaps")
+        axes.set_title(f"{found.chain.name}: free vibration with gaps, mode {found.mode}")
+        axes.legend()
+    return figure
+
+
+def response_figure(found: ForcedResponse, mass: str | int) -> Any:
+    """The amplitude of one mass against the frequency, with gaps and without."""
+    index = found.chain.index(mass)
+    with drawing():
+        figure, axes = new_figure(size=(6.5, 4.0))
+        with_gaps = f"with gaps, {found.locking:g} N m constant"
+        axes.plot(found.frequency, found.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
+        axes.plot(found.frequency, found.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
+        axes.set_xlabel("frequency of the exciting torque, rad/s")
+        axes.set_ylabel("amplitude, rad")
+        axes.set_title(f"{found.chain.name}: forced response of {found.chain.masses[index].name}")
+        axes.legend()
+    return figure
