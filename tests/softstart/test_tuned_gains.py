@@ -9,17 +9,19 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, compare, pareto, simulate, tune
 from softstart.controller import make_controller
-from softstart.controller.gain_files import (
+from softstart.controller.tuned import (
     Gain,
+    GainSchedule,
     RobustFile,
+    RobustGains,
     ScheduleFile,
     read_gain_file,
     read_gains,
     robust_text,
     schedule_csv,
     schedule_text,
+    scheduled,
 )
-from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 GAPS, INERTIAS = (0.5, 1.0, 2.0), (0.07, 0.175)

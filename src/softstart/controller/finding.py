@@ -10,13 +10,20 @@ from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from softstart.controller.base import Controller, Sensor
-from softstart.controller.gain_files import SUFFIXES
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
+
+if TYPE_CHECKING:
+    from softstart.controller import tuned
+else:
+    tuned = late("softstart.controller.tuned")
+
+GAIN_FILES = (".toml", ".csv")  # endings of files of tuned gains
 
 
 def controller_names() -> tuple[str, ...]:
@@ -78,10 +85,8 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, "
             "or a Controller object."
         )
-    if name.lower().endswith(SUFFIXES):
-        from softstart.controller.tuned import load_gains
-
-        return load_gains(name, parameters)
+    if name.lower().endswith(GAIN_FILES):
+        return tuned.load_gains(name, parameters)
     cls = controller_class(name)
     known = {f.name: f for f in fields(cls)}
     values: dict[str, Any] = {}

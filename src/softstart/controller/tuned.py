@@ -1,25 +1,70 @@
-"""Controllers that stand for tuned gains: one robust set, or a schedule over gap and load inertia."""
+"""Tuned gains: controllers with one robust set or with a schedule over gap and load inertia, and their files.
+
+A robust set is a TOML file, a schedule TOML or CSV; both are read back to the last bit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, PlainController, Sensor
 from softstart.controller.finding import make_controller
-from softstart.controller.gain_files import RobustFile, Scale, ScheduleFile, read_gain_file
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.input.documents import literal, parsed
+from softstart.input.files import ABSENT, read_text
+from softstart.input.parameters import Wording
+from softstart.quantities import RefusedError
+
+Scale = Literal["linear", "logarithmic"]
+
+ROBUST, SCHEDULE = "robust set", "gain schedule"
+CSV_TITLE = "# softstart gain schedule"
+AXES = ("gap", "load_inertia")
+
+
+class Gain(NamedTuple):
+    """A parameter over the grid: a value for each gap (rows) and load inertia (columns)."""
+
+    scale: Scale
+    values: NDArray[np.float64]
+
+
+class RobustFile(NamedTuple):
+    """A robust set: a controller, its parameters, and the drive they are fitted to."""
+
+    controller: str
+    parameters: dict[str, Any]
+    drive: Drive
+
+
+class ScheduleFile(NamedTuple):
+    """A schedule: a controller, its gains over gaps (rad) and load inertias (kg m2), fixed parameters."""
+
+    controller: str
+    gaps: tuple[float, ...]
+    load_inertias: tuple[float, ...]
+    gains: dict[str, Gain]
+    fixed: dict[str, Any]
+
+
+# ---- controllers ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
 class Tuned(Controller):
-    """What stands for another controller with tuned gains; `label` tells it from that one in tables."""
+    """Another controller with tuned gains; `label` distinguishes it from that one in tables."""
 
     label: str
     controller: Controller
@@ -29,7 +74,7 @@ class Tuned(Controller):
 
     @property
     def sensors(self) -> Sensor:  # type: ignore[override]
-        """Those of the controller it stands for."""
+        """Those of the controller with these gains."""
         return self.controller.sensors
 
     def _called(self, controller: Controller) -> Controller:
@@ -137,12 +182,12 @@ def _mixed(first: Any, second: Any, share: Any, scale: Scale) -> Any:
 
 
 def named(controller: Controller, label: str) -> str:
-    """The name under which tuned gains stand in tables."""
+    """The name of tuned gains in tables."""
     return f"{controller.name or type(controller).__name__} ({label})"
 
 
 def load_gains(name: str, parameters: Mapping[str, object] | None = None) -> Tuned:
-    """The controller that a file of tuned gains stands for. Raises InputError."""
+    """The controller with the gains of a file. Raises InputError."""
     path = Path(name)
     saved = read_gain_file(path)
     if parameters:
@@ -159,7 +204,7 @@ def load_gains(name: str, parameters: Mapping[str, object] | None = None) -> Tun
 
 
 def scheduled(saved: ScheduleFile, label: str, controller: Controller | None = None) -> GainSchedule:
-    """The controller that plays a schedule; made from its name if it is not given."""
+    """The controller with a schedule; made from its name if it is not given."""
     controller = make_controller(saved.controller, saved.fixed) if controller is None else controller
     known = [f.name for f in fields(controller)]
     unknown = [name for name in saved.gains if name not in known]
@@ -174,3 +219,250 @@ def scheduled(saved: ScheduleFile, label: str, controller: Controller | None = N
         for inertia in saved.load_inertias:
             replace(controller, **made.gains_at(gap, inertia))
     return made
+
+
+# ---- reading --------------------------------------------------------------------------------------------
+
+
+def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
+    """Tuned gains from a file. Raises InputError in sentences that name file, key and remedy."""
+    try:
+        text = read_text(path)
+    except RefusedError as refusal:
+        remedy = "; softstart tune --out DIR writes robust.toml and schedule.toml"
+        raise _wrong(path, refusal.reason + (remedy if refusal.reason == ABSENT else "")) from None
+    return read_gains(text, path)
+
+
+def read_gains(text: str, path: Path) -> RobustFile | ScheduleFile:
+    """Tuned gains from text; the name of `path` tells TOML from CSV."""
+    if path.suffix.lower() == ".csv":
+        return _read_csv(text, path)
+    document = parsed(text, Wording(f'controller = "{path}"', style="toml"), "a gain")
+    kind = document.get("kind")
+    if kind == ROBUST:
+        return _read_robust(document, path)
+    if kind == SCHEDULE:
+        return _read_schedule(document, path)
+    raise _foreign(path)
+
+
+def _foreign(path: Path) -> InputError:
+    return _wrong(
+        path,
+        "this file holds no tuned gains; give one that softstart tune has written, or play a torque profile "
+        "with --controller profile --param file=PATH",
+    )
+
+
+def _wrong(path: Path, reason: str) -> InputError:
+    return InputError(f'controller = "{path}": {reason}.')
+
+
+def _name(document: Mapping[str, Any], path: Path) -> str:
+    name = document.get("controller")
+    if not isinstance(name, str) or not name:
+        raise _wrong(
+            path, 'the key controller is missing; write the controller\'s name, as controller = "ramp"'
+        )
+    return name
+
+
+def _section(document: Mapping[str, Any], key: str, path: Path, needed: bool = True) -> dict[str, Any]:
+    found = document.get(key, None if needed else {})
+    if not isinstance(found, dict):
+        raise _wrong(path, f"the table [{key}] is missing; let softstart tune write the file anew")
+    return found
+
+
+def _read_robust(document: Mapping[str, Any], path: Path) -> RobustFile:
+    name = _name(document, path)
+    parameters = _section(document, "parameters", path)
+    tables = _section(document, "drive", path)
+    drive = Drive.from_tables(tables, where=f'controller = "{path}", [drive]')
+    return RobustFile(name, dict(parameters), drive)
+
+
+def _read_schedule(document: Mapping[str, Any], path: Path) -> ScheduleFile:
+    name = _name(document, path)
+    gaps = _axis(document.get("gaps"), "gaps", path)
+    inertias = _axis(document.get("load_inertias"), "load_inertias", path)
+    gains: dict[str, Gain] = {}
+    for key, table in _section(document, "gains", path).items():
+        scale = table.get("scale") if isinstance(table, dict) else None
+        values = table.get("values") if isinstance(table, dict) else None
+        shape = (len(gaps), len(inertias))
+        gains[key] = Gain(_scale(scale, key, path), _values(values, shape, key, path))
+    fixed = _section(document, "fixed", path, needed=False)
+    return ScheduleFile(name, gaps, inertias, _positive(gains, path), dict(fixed))
+
+
+def _axis(values: Any, name: str, path: Path) -> tuple[float, ...]:
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    good = numbers.ndim == 1 and numbers.size > 0 and bool(np.all(np.isfinite(numbers)))
+    if not good or bool(np.any(np.diff(numbers) <= 0.0)) or numbers[0] < 0.0:
+        raise _wrong(path, f"{name} = {values}: give a list of numbers that rise, 0 or more")
+    return tuple(numbers.tolist())
+
+
+def _scale(scale: Any, name: str, path: Path) -> Scale:
+    if scale == "linear":
+        return "linear"
+    if scale == "logarithmic":
+        return "logarithmic"
+    raise _wrong(path, f'[gains.{name}] scale = {scale!r}: write "linear" or "logarithmic"')
+
+
+def _values(values: Any, shape: tuple[int, int], name: str, path: Path) -> NDArray[np.float64]:
+    try:
+        table = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        table = np.zeros(0)
+    if table.shape != shape or not np.all(np.isfinite(table)):
+        raise _wrong(
+            path,
+            f"[gains.{name}] values: give {shape[0]} rows, one a gap, of {shape[1]} numbers, one an inertia",
+        )
+    return table
+
+
+def _positive(gains: dict[str, Gain], path: Path) -> dict[str, Gain]:
+    for name, gain in gains.items():
+        if gain.scale == "logarithmic" and not np.all(gain.values > 0.0):
+            raise _wrong(path, f'the gain {name} is 0 or less in a cell; its scale must be "linear"')
+    if not gains:
+        raise _wrong(path, "it has no gains; let softstart tune write the file anew")
+    return gains
+
+
+def _read_csv(text: str, path: Path) -> ScheduleFile:
+    lines = text.splitlines()
+    if not lines or lines[0].strip() != CSV_TITLE:
+        raise _foreign(path)
+    notes = {}
+    for line in lines[1:]:
+        if line.startswith("#"):
+            key, _, value = line[1:].partition(":")
+            notes[key.strip()] = value.strip()
+    scales, fixed = _note(notes, "gains", path), _note(notes, "fixed", path)
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    cells = [_row(row, (*AXES, *scales), path) for row in rows]
+    gaps = tuple(sorted({cell["gap"] for cell in cells}))
+    inertias = tuple(sorted({cell["load_inertia"] for cell in cells}))
+    if len(cells) != len(gaps) * len(inertias) or len({(c["gap"], c["load_inertia"]) for c in cells}) < len(
+        cells
+    ):
+        raise _wrong(path, "give one row for each combination of gap and load inertia, no more and no fewer")
+    document = {
+        "controller": notes.get("controller"),
+        "gaps": gaps,
+        "load_inertias": inertias,
+        "gains": {name: {"scale": scale, "values": _grid(cells, name)} for name, scale in scales.items()},
+        "fixed": fixed,
+    }
+    return _read_schedule(document, path)
+
+
+def _note(notes: Mapping[str, str], key: str, path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(notes.get(key, "{}"))
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise _wrong(path, f'the comment line "# {key}: ..." is no JSON object, as {{"time": "linear"}}')
+    return found
+
+
+def _row(row: Mapping[str, str | None], names: Sequence[str], path: Path) -> dict[str, float]:
+    found = {}
+    for name in names:
+        try:
+            found[name] = float(row.get(name) or "")
+        except ValueError:
+            raise _wrong(path, f'{name} = "{row.get(name) or ""}": give a number in each row') from None
+    return found
+
+
+def _grid(cells: Sequence[Mapping[str, float]], name: str) -> list[list[float]]:
+    ordered = sorted(cells, key=lambda cell: (cell["gap"], cell["load_inertia"]))
+    width = len({cell["load_inertia"] for cell in cells})
+    values = [cell[name] for cell in ordered]
+    return [values[k : k + width] for k in range(0, len(values), width)]
+
+
+# ---- writing --------------------------------------------------------------------------------------------
+
+
+def robust_text(saved: RobustFile, about: Mapping[str, Any] | None = None) -> str:
+    """The TOML text of a robust set; `about` says where it comes from and is not read.
+
+    >>> from pathlib import Path
+    >>> saved = RobustFile("ramp", {"time": 0.12}, Drive.load("crane-4amtkf"))
+    >>> read_gains(robust_text(saved), Path("robust.toml")) == saved
+    True
+    """
+    blocks = [
+        f"# softstart simulate DRIVE --controller FILE plays it\nkind = {literal(ROBUST)}\n"
+        f"controller = {literal(saved.controller)}",
+        _table("parameters", saved.parameters),
+        *([_table("about", about)] if about else []),
+        _nested(saved.drive),
+    ]
+    return "\n\n".join(blocks) + "\n"
+
+
+def schedule_text(saved: ScheduleFile, about: Mapping[str, Any] | None = None) -> str:
+    """The TOML text of a schedule; `about` says where it comes from and is not read."""
+    blocks = [
+        "# softstart simulate DRIVE --controller FILE plays it, with the gap and load inertia that DRIVE "
+        f"declares\nkind = {literal(SCHEDULE)}\ncontroller = {literal(saved.controller)}\n"
+        f"gaps = {literal(saved.gaps)}  # rad, the rows of each table of values\n"
+        f"load_inertias = {literal(saved.load_inertias)}  # kg*m^2, its columns",
+        *([_table("fixed", saved.fixed)] if saved.fixed else []),
+    ]
+    for name, gain in saved.gains.items():
+        rows = "".join(f"    {literal(row)},\n" for row in gain.values)
+        blocks.append(f"[gains.{name}]\nscale = {literal(gain.scale)}\nvalues = [\n{rows}]")
+    if about:
+        blocks.append(_table("about", about))
+    return "\n\n".join(blocks) + "\n"
+
+
+def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:
+    """The CSV text of a schedule: comment lines that say what it is, then one row a cell.
+
+    `columns` are further figures of each cell; they are not read back.
+    """
+    stream = io.StringIO()
+    stream.write(f"{CSV_TITLE}\n# controller: {saved.controller}\n")
+    stream.write(f"# gains: {json.dumps({name: gain.scale for name, gain in saved.gains.items()})}\n")
+    stream.write(f"# fixed: {json.dumps(saved.fixed)}\n")
+    tables = {name: gain.values for name, gain in saved.gains.items()} | dict(columns or {})
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([*AXES, *tables])
+    for i, gap in enumerate(saved.gaps):
+        for j, inertia in enumerate(saved.load_inertias):
+            writer.writerow([_cell(value) for value in (gap, inertia, *(t[i, j] for t in tables.values()))])
+    return stream.getvalue()
+
+
+def _cell(value: Any) -> str:
+    plain = value.item() if hasattr(value, "item") else value
+    if isinstance(plain, float):
+        return "" if math.isnan(plain) else repr(plain)
+    return str(plain)
+
+
+def _table(name: str, values: Mapping[str, Any]) -> str:
+    lines = [f"{key} = {literal(value)}" for key, value in values.items() if value is not None]
+    return "\n".join([f"[{name}]", *lines])
+
+
+def _nested(drive: Drive) -> str:
+    """The drive's own file, below the table [drive]."""
+    lines = drive.to_toml().splitlines()
+    nested = [f"[drive.{line[1:]}" if line.startswith("[") else line for line in lines]
+    return "\n".join(["[drive]", *nested])

@@ -10,8 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from softstart.controller.finding import controller_class, controller_names, make_controller
-from softstart.controller.gain_files import RobustFile, read_gains
-from softstart.controller.tuned import RobustGains, Tuned, scheduled
+from softstart.controller.tuned import RobustFile, RobustGains, Tuned, read_gains, scheduled
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.page import tasks

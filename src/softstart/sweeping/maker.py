@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softstart.controller.base import Controller
-from softstart.controller.finding import controller_class, make_controller
-from softstart.controller.gain_files import SUFFIXES
+from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -126,14 +125,14 @@ def about_name(name: str) -> dict[str, str]:
 
 def _split(name: str) -> tuple[Path | None, str]:
     """The file that a name begins with, and what follows."""
-    if name.lower().endswith(SUFFIXES):
+    if name.lower().endswith(GAIN_FILES):
         return Path(name), ""
     end = name.index(".py") + 3 if ".py" in name else 0
     return (Path(name[:end]), name[end:]) if end else (None, name)
 
 
 def _class_of(given: str | Controller) -> type[Controller]:
-    if isinstance(given, str) and not given.lower().endswith(SUFFIXES):
+    if isinstance(given, str) and not given.lower().endswith(GAIN_FILES):
         return controller_class(given)
     return type(make_controller(given))
 

@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from softstart import __version__
-from softstart.controller.gain_files import (
+from softstart.controller.tuned import (
     Gain,
+    GainSchedule,
     RobustFile,
+    RobustGains,
     ScheduleFile,
     robust_text,
     schedule_csv,
     schedule_text,
+    scheduled,
 )
-from softstart.controller.tuned import GainSchedule, RobustGains, scheduled
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.tuning.question import Question
