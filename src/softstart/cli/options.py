@@ -113,6 +113,14 @@ json_option = click.option(
 )
 
 
+workers_option = click.option(
+    "--workers", metavar="N", help="How much is computed at once. By default one for each processor."
+)
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead."
+)
+
+
 def param_option(metavar: str, text: str) -> Decorator:
     """--param, which differs between one controller and several."""
     return click.option(
@@ -168,6 +176,19 @@ def read_until(text: str | None) -> float | None:
     if not value > 0.0:
         raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 0.5 or "500 ms".')
     return value
+
+
+def read_count(text: str | None, option: str) -> int | None:
+    """A whole number of 1 or more; None where the option was left out.
+
+    >>> read_count("12", "--workers")
+    12
+    """
+    if text is None:
+        return None
+    if text.strip().isascii() and text.strip().isdigit() and int(text) > 0:
+        return int(text)
+    raise InputError(f'{option} = "{text}": give a whole number of 1 or more.')
 
 
 def read_names(text: str | None, option: str = "--controllers") -> list[str] | None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from softstart.cli.commands import Command
 from softstart.cli.completion import axes as axes_known
@@ -26,21 +27,32 @@ from softstart.cli.options import (
     json_option,
     out_option,
     param_option,
+    read_count,
     read_drive,
     read_fitted_to,
     read_params,
     read_until,
+    scheduler_option,
     set_option,
     until_option,
+    workers_option,
 )
+from softstart.cli.running import Attributed, working
 from softstart.errors import InputError
+from softstart.sweeping.entry import sweep as compute
+from softstart.sweeping.grid import read_column
+from softstart.sweeping.maker import Maker
+from softstart.sweeping.summary import summarise
 from softstart.views.markdown import output_folder
+from softstart.views.sweeps import MOST_SHOWN, axis_summary, cell_rows, show, write_sweep
+from softstart.views.terminal import console, print_json
 
 if TYPE_CHECKING:
     import xarray
 
     from softstart.drive import Drive
-    from softstart.sweeping.progress import Progress
+    from softstart.sweeping.entry import Progress
+    from softstart.sweeping.maker import Maker, Parameters
 
 RESULTS = "sweep.zarr"
 AT_MOST = 4.0  # times a second, that the line of progress changes
@@ -69,8 +81,8 @@ AT_MOST = 4.0  # times a second, that the line of progress changes
 @click.option(
     "--figures", metavar="A,B,...", help="Figures to keep, as k_dyn,start_time; the status always is."
 )
-@click.option("--workers", metavar="N", help="Processes on this machine. By default one a processor.")
-@click.option("--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead.")
+@workers_option
+@scheduler_option
 @click.option("--chunk", metavar="N", help="Most starts that are computed and written at a time.")
 @click.option(
     "--netcdf",
@@ -126,7 +138,7 @@ def sweep(
         asked["until"] = read_until(until)
     for option, text in (("workers", workers), ("chunk", chunk)):
         with mistakes.noted():
-            asked[option] = _count(text, f"--{option}")
+            asked[option] = read_count(text, f"--{option}")
     if figures is not None:
         asked["figures"] = [name.strip() for name in figures.split(",")]
     mistakes.settle()
@@ -135,19 +147,11 @@ def sweep(
     begin = time.monotonic()
     with output_folder(out) as folder, _kept(out) as to, _as_options():
         results, last = _computed(one, controller, values, axes, asked, to)
-        from softstart.cli.running import working
-        from softstart.sweeping.summary import summarise
 
         with working("summing up ..."):
             summary = summarise(results)
             if folder is not None:
-                from softstart.cli.sweep_report import write_sweep
-
                 write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
-
-    from softstart.cli.sweep_cells import MOST_SHOWN, cell_rows
-    from softstart.cli.sweep_text import axis_summary, show
-    from softstart.views.terminal import console, print_json
 
     if as_json:
         print_json(
@@ -178,13 +182,7 @@ def _computed(
     to: Path | None,
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
-    from softstart.cli.running import Attributed, working
-
     with working("starting the first drive ...") as status, Attributed():
-        from softstart.cli.sweep_axes import read_axes
-        from softstart.sweeping.entry import sweep as compute
-        from softstart.sweeping.maker import Maker
-
         grid = read_axes(axes, Maker(controller or "", values))
         last: Progress | None = None
         shown = 0.0
@@ -236,9 +234,90 @@ def as_option(sentence: str) -> str:
     return re.sub(rf"\b{word}(?= =|:|,| out\b)", option, sentence)
 
 
-def _count(text: str | None, option: str) -> int | None:
-    if text is None:
-        return None
-    if text.strip().isascii() and text.strip().isdigit() and int(text) > 0:
-        return int(text)
-    raise InputError(f'{option} = "{text}": give a whole number of 1 or more.')
+MOST_VALUES = 1_000_000  # of a range
+
+
+def read_axes(texts: Sequence[str], maker: Maker) -> dict[str, Any]:
+    """The grid of several --axis; all mistakes at once.
+
+    >>> from softstart.sweeping.maker import Maker
+    >>> grid = read_axes(["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"], Maker("direct"))
+    >>> grid["gap"].tolist(), grid["load_inertia"].tolist()
+    ([0.5, 1.0, 1.5, 2.0], [0.07, 0.175])
+    """
+    mistakes = Mistakes()
+    split: dict[str, str] = {}
+    for text in texts:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        with mistakes.noted():
+            if not (key and equals and values):
+                raise InputError(
+                    f'--axis "{text}": write a parameter, an equals sign and values, as shaft.gap=0.25:4:100 '
+                    "or load.inertia=0.07,0.175."
+                )
+            if key in split:
+                raise InputError(f'--axis "{text}": {key} is an axis already; name it once.')
+            split[key] = values
+    parameters = _parameters(split, maker, mistakes)
+    grid: dict[str, Any] = {}
+    for key, values in split.items():
+        with mistakes.noted():
+            try:
+                name, read = _read(key, values, parameters)
+            except InputError as error:
+                raise InputError([f"--axis {sentence}" for sentence in error.sentences]) from error
+            if name in grid:
+                raise InputError(f"--axis {key}: this parameter is an axis already, by its other name.")
+            grid[name] = read
+    mistakes.settle()
+    return grid
+
+
+def _parameters(split: dict[str, str], maker: Maker, mistakes: Mistakes) -> Parameters | None:
+    """Those that the controllers have, None if these are wrong."""
+    found: Parameters | None = None
+    with mistakes.noted():
+        if "controller" in split:
+            names = _listed(split["controller"])
+            for name in names:
+                check_name(name, "--axis controller")
+            found = maker.common_parameters(names)
+        elif maker.given:
+            found = maker.parameters()
+    return found
+
+
+def _read(key: str, text: str, parameters: Parameters | None) -> tuple[str, Any]:
+
+    parts = [part.strip() for part in text.split(":")]
+    is_range = len(parts) in (3, 4) and key != "controller" and not any(".py" in part for part in parts)
+    if not is_range:
+        column = read_column(key, _listed(text), parameters)
+        return column.name, column.values
+    column = read_column(key, parts[:2], parameters)
+    if not column.numeric:
+        raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
+    return column.name, _spaced(key, text, parts, *column.values.tolist())
+
+
+def _spaced(key: str, text: str, parts: Sequence[str], first: float, last: float) -> Any:
+
+    count = int(parts[2]) if parts[2].isascii() and parts[2].isdigit() else 0
+    if not 2 <= count <= MOST_VALUES:
+        raise InputError(f'{key} = "{text}": the count is a whole number from 2 to {MOST_VALUES:,}.')
+    if first == last:
+        raise InputError(f'{key} = "{text}": both ends are the same; write the one value.')
+    if len(parts) == 3:
+        return np.linspace(first, last, count)
+    if parts[3] != "log":
+        raise InputError(f'{key} = "{text}": a range is from:to:count, or from:to:count:log.')
+    if not (first > 0.0 and last > 0.0):
+        raise InputError(f'{key} = "{text}": the ends of a range in equal ratios (log) are above 0.')
+    return np.geomspace(first, last, count)
+
+
+def _listed(text: str) -> list[str]:
+    parts = [part.strip() for part in text.split(",")]
+    if not all(parts):
+        raise InputError(f'"{text}": a place in the list is empty; write values with commas between.')
+    return parts

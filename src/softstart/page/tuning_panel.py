@@ -35,7 +35,7 @@ from softstart.page.panel_parts import (
     table,
 )
 from softstart.page.session import Session
-from softstart.tuning.grid import gaps_of, inertias_of
+from softstart.tuning.question import gaps_of, inertias_of
 from softstart.views.printed import fixed, unit
 
 FIRST = "shaped"  # the controller offered first, if it is there

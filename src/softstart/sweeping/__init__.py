@@ -1,7 +1,7 @@
 """Sweeps: the starts of a whole grid, of any size, in memory or chunk by chunk on disk.
 
-`sweep` (entry.py) reads the grid (axes.py) and refuses what cannot be (checking.py), cuts it into chunks
-(plan.py), lets processes (workers.py) or a cluster (cluster.py) compute them (starts.py) and keeps what is
-finished in a Zarr folder (store.py) from which it goes on after any end. summary.py and pictures.py read
-such results piece by piece.
+`sweep` (entry.py) reads the grid and cuts it into chunks (grid.py), refuses what is impossible and computes
+the starts of each chunk (starts.py) in threads, processes or on a cluster (softstart.processes), and keeps
+what is finished in memory (results.py) or in a Zarr folder (store.py), from which it goes on after any end.
+summary.py and softstart.views.sweeps read such results piece by piece.
 """

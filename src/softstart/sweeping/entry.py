@@ -1,11 +1,14 @@
-"""`sweep`: the starts of a whole grid, however large."""
+"""`sweep`: the starts of a whole grid, however large, and how far they are."""
 
 from __future__ import annotations
 
 import math
 import os
+import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
 from functools import partial
 from numbers import Real
 from pathlib import Path
@@ -16,14 +19,10 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers, why_not_sendable
 from softstart.quantities import nearest, show
-from softstart.sweeping import netcdf as netcdf_file
-from softstart.sweeping.axes import Axis, read_grid
-from softstart.sweeping.checking import check_corners, first_start
+from softstart.sweeping.grid import Axis, Plan, checked_chunk, plan_for, read_grid
 from softstart.sweeping.maker import Maker, with_whole_path
-from softstart.sweeping.memory import Memory
-from softstart.sweeping.plan import Plan, checked_chunk, plan_for
-from softstart.sweeping.progress import Told, Watch
-from softstart.sweeping.starts import Question, Task, cut, known_figures
+from softstart.sweeping.results import Memory, check_netcdf, write_netcdf
+from softstart.sweeping.starts import Question, Task, check_corners, cut, first_start, known_figures
 from softstart.sweeping.store import Folder, compute_and_keep, open_folder, target_of, write_block
 
 if TYPE_CHECKING:
@@ -54,34 +53,54 @@ def sweep(
 
     Parameters
     ----------
-    drive : a Drive, or the name or file of one; it has what the grid does not vary.
-    controller : a name, `path/to/file.py:ClassName` or a Controller; None where controllers are an axis.
-    grid : the axes, in order: values by parameter. A parameter of the drive by name (`gap`) or as in a file
+    drive : Drive or str
+        The drive, or its name or file; it has what the grid does not vary.
+    controller : str, Controller or None
+        A name, `path/to/file.py:ClassName` or an object; None where controllers are an axis.
+    grid : mapping
+        The axes, in order: values by parameter. A parameter of the drive by name (`gap`) or as in a file
         (`shaft.gap`), one of the controller as `controller.NAME`, and `controller` itself with names. Values
-        are numbers in SI, strings with units or texts (`load.kind`). A mapping in the place of values is one
-        axis of samples, whose parameters vary together: {"sample": {"gap": [...], "load.inertia": [...]}}.
-    parameters : parameters of the controller that are the same everywhere.
-    until, fitted_to, base, time_limit : as in `simulate`.
-    to : Zarr folder for the results. It is written chunk by chunk; the same call on it goes on where an
+        are numbers in SI, strings with units or texts (`load.kind`). A mapping instead of values is one axis
+        of samples, whose parameters vary together: {"sample": {"gap": [...], "load.inertia": [...]}}.
+    parameters : mapping, optional
+        Parameters of the controller that are the same everywhere.
+    until, time_limit : float, optional
+        As in `simulate`, s.
+    fitted_to, base : Drive, optional
+        As in `simulate`.
+    to : path, optional
+        Zarr folder for the results. It is written chunk by chunk; the same call on it goes on where an
         earlier one ended, however that ended. Without it the results are kept in memory.
-    netcdf : also write the finished results into this netCDF file.
-    figures : those to keep, by name; the status always is.
-    chunk : most starts of a chunk; memory and what an interruption loses go with it.
-    workers : how many starts are computed at once on this machine, by default one for each processor: by
-        threads where the controllers are compiled, else by processes. 1 computes in this thread.
-    scheduler : address of a dask scheduler whose workers compute instead.
-    progress : called with a `Progress` at the beginning and after each chunk.
+    netcdf : path, optional
+        Also write the finished results into this netCDF file.
+    figures : sequence of str
+        Those to keep, by name; the status always is.
+    chunk : int, optional
+        Most starts of a chunk; memory and what an interruption loses go with it.
+    workers : int, optional
+        How many chunks are computed at once on this machine, by default one for each processor: by threads
+        where the controllers are compiled, else by processes. 1 computes in this thread.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers compute instead.
+    progress : callable, optional
+        Called with a `Progress` at the beginning and after each chunk.
 
     Returns
     -------
-    An xarray.Dataset with a dimension for each axis, called as the parameter is in Python (`load_inertia`,
-    `controller_torque`). Figures of starts that could not be finished are NaN, `status` says why by code.
-    With `to` nothing is read before it is looked at; `xarray.open_zarr(to)` opens it with dask.
+    xarray.Dataset
+        With a dimension for each axis, called as the parameter is in Python (`load_inertia`,
+        `controller_torque`). Figures of starts that could not be finished are NaN, `status` says why by code.
+        With `to` nothing is read before it is looked at; `xarray.open_zarr(to)` opens it with dask.
 
-    Raises InputError for bad input, an impossible drive anywhere on the grid, or a folder that holds
-    something else; SimulationError for workers that cannot go on. After a KeyboardInterrupt finished chunks
-    are kept.
+    Raises
+    ------
+    InputError
+        For bad input, an impossible drive anywhere on the grid, or a folder that holds something else.
+    SimulationError
+        For workers that cannot go on. As after a KeyboardInterrupt, finished chunks are kept.
 
+    Examples
+    --------
     >>> from softstart import Drive, sweep
     >>> found = sweep(Drive.load("crane-4amtkf"), "direct", {"gap": [0.5, 2], "load.inertia": [0.07, 0.175]})
     >>> found.k_dyn.sel(gap=2, load_inertia=0.175).item().__round__(4)
@@ -97,7 +116,7 @@ def sweep(
     most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
     target = None if to is None else target_of(Path(to))
     if netcdf is not None:
-        netcdf_file.check_place(Path(netcdf))
+        check_netcdf(Path(netcdf))
     check_corners(question, axes)
     single = [not axis.numeric for axis in axes]
     plan = plan_for([axis.size for axis in axes], single, most)
@@ -122,7 +141,7 @@ def sweep(
             _run(None, folder, plan, axes, question, pool, progress)
             results = open_folder(target.path)
         if netcdf is not None:
-            netcdf_file.write_netcdf(Path(netcdf), results, plan, axes, question)
+            write_netcdf(Path(netcdf), results, plan, axes, question)
     return results
 
 
@@ -230,3 +249,76 @@ def _figure_mistakes(figures: object) -> list[str]:
 
 def _time(value: float | None) -> float | None:
     return None if value is None else float(value)
+
+
+RECENT = 30.0  # s, over which the rate is taken
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Starts finished of all, and of these by an earlier run; seconds of this run, and starts a second.
+
+    >>> print(Progress(1500, 4000, 500, 2.0, 500.0))
+    1,500 of 4,000 starts (37 %), 500 starts/s, 5 s left
+    """
+
+    done: int
+    starts: int
+    before: int
+    seconds: float
+    rate: float
+
+    @property
+    def left(self) -> float:
+        """Seconds that are left at this rate, NaN as long as there is none."""
+        return (self.starts - self.done) / self.rate if self.rate > 0.0 else math.nan
+
+    def __str__(self) -> str:
+        share = f"{self.done:,} of {self.starts:,} starts ({100 * self.done // self.starts:.0f} %)"
+        if not self.rate > 0.0:
+            return share
+        return f"{share}, {self.rate:,.0f} starts/s, {_duration(self.left)} left"
+
+
+Told = Callable[[Progress], object]
+
+
+class Watch:
+    """Counts finished starts and tells how far the sweep is; the rate is that of the last half minute."""
+
+    def __init__(self, starts: int, before: int, told: Told | None) -> None:
+        self.starts, self.before, self.told = starts, before, told
+        self.done = before
+        self.begin = time.monotonic()
+        self.marks = deque([(self.begin, before)])
+        self._tell(self.begin)
+
+    def add(self, starts: int) -> None:
+        """So many more are finished."""
+        self.done += starts
+        now = time.monotonic()
+        self.marks.append((now, self.done))
+        while len(self.marks) > 2 and now - self.marks[1][0] > RECENT:
+            self.marks.popleft()
+        self._tell(now)
+
+    def _tell(self, now: float) -> None:
+        if self.told is None:
+            return
+        since, done = self.marks[0]
+        rate = (self.done - done) / (now - since) if now > since else 0.0
+        self.told(Progress(self.done, self.starts, self.before, now - self.begin, rate))
+
+
+def _duration(seconds: float) -> str:
+    """A duration in words.
+
+    >>> _duration(59), _duration(125), _duration(7300)
+    ('59 s', '2 min 5 s', '2 h 1 min')
+    """
+    whole = math.ceil(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

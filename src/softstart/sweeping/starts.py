@@ -1,22 +1,25 @@
-"""The starts of one chunk: everything that is needed to compute them, and computing them, anywhere."""
+"""The starts of one chunk, computed anywhere; whether every drive and controller of a grid is possible."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
 
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive
+from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.status import Status
-from softstart.sweeping.axes import Axis, Column
+from softstart.sweeping.grid import Axis, Column
 from softstart.sweeping.maker import Maker
 
 Block = dict[str, Any]  # figure -> array of the chunk's shape
@@ -121,3 +124,72 @@ def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], cont
         made = maker.make({**parameters, **own}, controller)
         rows.append(array_starts(one, made, question.until, fitted_to, question.time_limit))
     return np.concatenate(rows)
+
+
+MOST_CORNERS = 4096
+TOLD = 5  # combinations in one refusal
+
+
+def check_corners(question: Question, axes: tuple[Axis, ...]) -> None:
+    """Raise one InputError if a drive or a controller of the grid is impossible."""
+    told: dict[str, str] = {}
+    for corner in islice(product(*map(_ends, axes)), MOST_CORNERS):
+        values = [pair for place in corner for pair in place]
+        try:
+            _make(question, values)
+        except InputError as error:
+            for sentence in error.sentences:
+                rule = re.sub(r"= (\"[^\"]*\"|\S+)", "", sentence)  # the same mistake with other numbers
+                told.setdefault(rule, sentence)
+    if told:
+        raise InputError(list(told.values())[:TOLD])
+
+
+def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
+    """Make the first start of the grid: compiles what is to be compiled, and finds controllers that fail.
+
+    Returns whether all controllers are compiled, so that threads serve as well as processes.
+    """
+    compiled = True
+    controllers = next((c.values for axis in axes for c in axis.columns if c.owner == "controller"), ("",))
+    for controller in controllers:
+        first = tuple(
+            Axis(axis.name, tuple(_one(column, controller) for column in axis.columns)) for axis in axes
+        )
+        compute(Task(0, question, first, tuple(slice(0, 1) for _ in axes)))
+        ready, _ = question.maker.make({}, controller).set_up(question.fitted_to or question.drive)
+        compiled = compiled and isinstance(ready, CompiledController)
+    return compiled
+
+
+def _one(column: Column, controller: str) -> Column:
+    return replace(column, values=(controller,)) if column.owner == "controller" else column.part(slice(0, 1))
+
+
+def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
+    """The places along an axis that stand for all others; samples are taken together, as a batch."""
+    if axis.paired:
+        return [tuple((column, column.values) for column in axis.columns)]
+    (column,) = axis.columns
+    if not column.numeric:
+        return [((column, text),) for text in dict.fromkeys(column.values)]
+    low, high = float(column.values.min()), float(column.values.max())
+    return [((column, value),) for value in dict.fromkeys((low, high))]
+
+
+def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
+    drive: dict[str, Any] = {c.field: value for c, value in values if c.owner == "drive"}
+    parameters = {c.field: value for c, value in values if c.owner == "parameter"}
+    controller = next((value for c, value in values if c.owner == "controller"), "")
+    sentences: list[str] = []
+    attempts: tuple[Callable[[], object], ...] = (
+        lambda: question.drive.replace(**drive),
+        lambda: question.maker.make(parameters, controller),
+    )
+    for attempt in attempts:
+        try:
+            attempt()
+        except InputError as error:
+            sentences += error.sentences
+    if sentences:
+        raise InputError(sentences)

@@ -20,15 +20,21 @@ from typing import TYPE_CHECKING, Any
 
 from softstart import __version__
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.store import Target
-from softstart.sweeping.axes import Axis
+from softstart.sweeping.grid import Axis, Plan
 from softstart.sweeping.maker import about_name
-from softstart.sweeping.plan import Plan
+from softstart.sweeping.results import STATUS, Variable, about, coordinate_variables, figure_variables
 from softstart.sweeping.starts import Block, Question, Task, compute
-from softstart.sweeping.variables import STATUS, Variable, about, coordinate_variables, figure_variables
 
 if TYPE_CHECKING:
     import xarray
+    import zarr
+    from zarr import errors
+else:
+    errors = late("zarr.errors")
+    xarray = late("xarray")
+    zarr = late("zarr")
 
 Axes = tuple[Axis, ...]
 INPUTS = "softstart_inputs"
@@ -122,8 +128,6 @@ def open_folder(path: Path) -> xarray.Dataset:
     Traceback (most recent call last):
     softstart.errors.InputError: to = nowhere.zarr: there is no sweep in this folder.
     """
-    import xarray
-
     if not _is_sweep(path):
         raise InputError(f"to = {path}: there is no sweep in this folder.")
     figures = json.loads(_attributes(path)[INPUTS])["figures"]
@@ -134,7 +138,6 @@ def open_folder(path: Path) -> xarray.Dataset:
 
 @lru_cache(maxsize=4)
 def _arrays(path: str) -> dict[str, Any]:
-    import zarr
 
     return dict(zarr.open_group(path, mode="r+").arrays())
 
@@ -195,8 +198,6 @@ def _create(
 def _fill(
     fresh: Path, plan: Plan, axes: tuple[Axis, ...], question: Question, inputs: dict[str, Any]
 ) -> None:
-    import zarr
-    from zarr.errors import ZarrUserWarning
 
     attributes = {**about(question, plan), INPUTS: json.dumps(inputs)}
     samples = [c.name for axis in axes if axis.paired for c in axis.columns]
@@ -209,7 +210,7 @@ def _fill(
         _array(group, one, plan.shape, plan.chunk)
     with warnings.catch_warnings():
         # All metadata in one file is a convention that Zarr 3 has not adopted; xarray asks for it.
-        warnings.filterwarnings("ignore", "Consolidated metadata", ZarrUserWarning)
+        warnings.filterwarnings("ignore", "Consolidated metadata", errors.ZarrUserWarning)
         zarr.consolidate_metadata(fresh)
 
 

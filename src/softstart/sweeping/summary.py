@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.start.status import Status
-from softstart.sweeping.plan import Plan, plan_for
-from softstart.sweeping.variables import NOT_COMPUTED, STATUS
+from softstart.sweeping.grid import Plan, plan_for
+from softstart.sweeping.results import NOT_COMPUTED, STATUS
 
 if TYPE_CHECKING:
     import xarray

@@ -24,12 +24,15 @@ from softstart.controller.tuned import (
 )
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.late import late
 from softstart.tuning.question import Question
 
 if TYPE_CHECKING:
     import xarray
 
     from softstart.drive import Drive
+
+views = late("softstart.views.tuning")
 
 What = Literal["schedule", "robust"]
 
@@ -84,14 +87,34 @@ class RobustSet:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """Tuned gains of one controller over a grid of gaps and load inertias.
+    """Tuned gains of one controller over a grid of gaps and load inertias; the result of `tune`.
 
-    `schedule` is a Dataset over `gap` (rad) and `load_inertia` (kg m2): each tuned parameter, the metric
-    tuned and with the defaults, start times, their bounds, and how many searches agree. `robust` is the one
-    set for all cells. `price` sets side by side, per cell, the robust set, the schedule, and the certified
-    optimum within the same time. `between` has the schedule half way between the cells, where its gains are
-    interpolated: where these differ much from cell to cell, nothing says that it does well there. What was
-    not asked for is None. `starts` were simulated in `seconds`.
+    Attributes
+    ----------
+    question : Question
+        What was asked.
+    schedule : xarray.Dataset or None
+        Over `gap` (rad) and `load_inertia` (kg m2): each tuned parameter, the metric tuned and with the
+        defaults, start times (s), their bounds (s), and how many searches agree. None if not asked for.
+    robust : RobustSet or None
+        The one set of gains for all cells. None if not asked for.
+    price : xarray.Dataset or None
+        For each cell: the robust set, the schedule, and the certified optimum within the same time.
+    between : xarray.Dataset or None
+        The schedule half way between the cells, where its gains are interpolated: where these differ much
+        from cell to cell, nothing says that it does well there.
+    starts : int
+        Simulated starts.
+    seconds : float
+        How long that took, s.
+
+    Examples
+    --------
+    >>> from softstart import tune
+    >>> options = {"free": ["torque"], "certified": False, "generations": 3, "restarts": 1}
+    >>> tuned = tune("crane-4amtkf", "reduced-first-stage", ["1x"], ["1x"], **options)
+    >>> tuned.controller, tuned.metric, dict(tuned.schedule.sizes)
+    ('reduced-first-stage', 'k_dyn', {'gap': 1, 'load_inertia': 1})
     """
 
     question: Question
@@ -157,9 +180,7 @@ class Tuning:
 
         By default the price of robustness if there is one, else the maps of the metric.
         """
-        from softstart.tuning.pictures import figure_of
-
-        return figure_of(self, what)
+        return views.figure_of(self, what)
 
     def to_toml(self, path: str | Path, what: What | None = None) -> None:
         """Write the schedule or the robust set as TOML, which any controller's name may stand for.

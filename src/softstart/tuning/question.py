@@ -1,20 +1,26 @@
-"""What is to be tuned, for what, and how thoroughly: read and checked once, then fixed."""
+"""What is to be tuned, over what, for what, and how thoroughly: read and checked once, then fixed."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from numbers import Real
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from softstart import __version__
-from softstart.drive import Drive
+from softstart.controller import Controller, make_controller
+from softstart.controller.tuned import Tuned
+from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
-from softstart.quantities import to_si
+from softstart.plugins import CONTROLLERS, registered
+from softstart.quantities import nearest, to_si
 from softstart.tuning.ranges import Range, check_number
-from softstart.tuning.recipe import Recipe
-from softstart.tuning.tolerances import Scenario
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
 
@@ -133,3 +139,222 @@ def _code_of(metric: Callable[..., Any]) -> str:
     code = getattr(metric, "__code__", None)
     told = "" if code is None else f" {code.co_code.hex()} {code.co_consts!r} {code.co_names!r}"
     return f"{getattr(metric, '__module__', '')}.{getattr(metric, '__qualname__', repr(metric))}{told}"
+
+
+LOOSE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """The name of a controller and the parameters given to it, or the object where it has no such name.
+
+    >>> recipe = recipe_of("ramp", {"initial": "10 N*m"})
+    >>> recipe.name, recipe.given, recipe.make().initial
+    ('ramp', {'initial': 10.0}, 10.0)
+    """
+
+    name: str
+    given: dict[str, Any]
+    object: Controller | None = None
+
+    def make(self) -> Controller:
+        """The controller."""
+        return self.object if self.object is not None else make_controller(self.name, self.given)
+
+    @property
+    def label(self) -> str:
+        """How the controller is called."""
+        made = self.make()
+        return made.name or type(made).__name__
+
+
+def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
+    """The recipe of a controller; InputError for one whose gains are tuned already."""
+    made = make_controller(controller, parameters)
+    if isinstance(made, Tuned):
+        raise InputError(
+            f"controller = {made.name}: its gains are tuned already; tune the controller itself."
+        )
+    given = {
+        f.name: value
+        for f in fields(made)
+        if (value := getattr(made, f.name)) is not None and (f.default is MISSING or value != f.default)
+    }
+    name = controller if isinstance(controller, str) else _name_of(made)
+    return Recipe(name, given, None if name else made)
+
+
+def _name_of(controller: Controller) -> str:
+    """The name under which the controller's class is found, or nothing."""
+    cls = type(controller)
+    point = registered(CONTROLLERS).get(cls.name)
+    if point is not None and point.value == f"{cls.__module__}:{cls.__qualname__}":
+        return cls.name
+    if cls.__module__.startswith(LOOSE):
+        file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+        return f"{file}:{cls.__name__}" if file else ""
+    return ""
+
+
+GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
+INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia
+
+
+def gaps_of(drive: Drive, given: Iterable[Any] | Any | None, name: str = "gaps") -> tuple[float, ...]:
+    """Gaps in rad, rising: numbers, texts with a unit, or multiples of the drive's own as "2x".
+
+    >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
+    (0.5, 0.5235987755982988, 1.0)
+    """
+    if given is None:
+        if not drive.gap > 0.0:
+            raise InputError(
+                f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
+            )
+        given = [f"{multiple}x" for multiple in GAP_MULTIPLES]
+    return _axis(given, name, "rad", drive, {"x": float(drive.gap)})
+
+
+def inertias_of(drive: Drive, given: Iterable[Any] | Any | None, name: str = "inertias") -> tuple[float, ...]:
+    """Load inertias in kg m2, rising; also multiples of the drive's own ("2x") or of the motor's ("5 J1").
+
+    >>> [round(inertia, 3) for inertia in inertias_of(Drive.load("crane-4amtkf"), ["2 J1", "1x", 0.1])]
+    [0.07, 0.1, 0.175]
+    """
+    if given is None:
+        given = [f"{multiple}x" for multiple in INERTIA_MULTIPLES]
+    units = {"x": float(drive.load_inertia), "J1": float(drive.motor_inertia)}
+    return _axis(given, name, "kg*m^2", drive, units)
+
+
+def _axis(
+    given: Iterable[Any] | Any, name: str, unit: str, drive: Drive, units: dict[str, float]
+) -> tuple[float, ...]:
+    """Values in SI, each once, rising."""
+    listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
+    if not listed:
+        raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
+    found: list[float] = []
+    wrong: list[str] = []
+    for value in listed:
+        try:
+            found.append(_value(value, name, unit, units))
+        except InputError as error:
+            wrong += error.sentences
+    key = "gap" if unit == "rad" else "load_inertia"
+    for value in found:
+        try:
+            changed: Any = {key: value}
+            drive.replace(**changed)
+        except InputError as error:
+            wrong += [f"{name}: {sentence}" for sentence in error.sentences]
+    if wrong:
+        raise InputError(wrong)
+    return tuple(sorted(set(found)))
+
+
+def _value(value: Any, name: str, unit: str, units: dict[str, float]) -> float:
+    if isinstance(value, str):
+        for ending, one in units.items():
+            if value.strip().endswith(ending):
+                multiple = float(to_si(value.strip().removesuffix(ending), "1", name=name))
+                return float(f"{multiple * one:.12g}")  # 5 x 0.035 is 0.175, whatever binary makes of it
+    return float(to_si(value, unit, name=name))
+
+
+MOST = 16  # scenarios beside the drive as it is; more combinations are sampled
+
+
+class Level(NamedTuple):
+    """A changed value: factor * value + offset."""
+
+    factor: float
+    offset: float
+
+    def of(self, value: Any) -> Any:
+        """The value changed."""
+        return self.factor * value + self.offset
+
+
+Scenario = dict[str, Level]
+
+
+def scenarios_of(
+    drive: Drive, tolerances: Mapping[str, Any] | None, seed: int = 0, most: int = MOST
+) -> tuple[Scenario, ...]:
+    """The drive as it is, and its parameters off by their tolerances in all combinations.
+
+    A tolerance is a share as "10 %" (the value 10 % lower and higher), a quantity as 0.5 or "0.2 ms" (so much
+    lower and higher), or a list of the values to be met. Where there are more than `most` combinations, a
+    Latin hypercube of `most` within the tolerances stands for them, drawn with `seed`. Raises InputError.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> scenarios_of(crane, {"stiffness": "10 %"})
+    ({}, {'stiffness': Level(factor=0.9, offset=0.0)}, {'stiffness': Level(factor=1.1, offset=0.0)})
+    >>> len(scenarios_of(crane, {"stiffness": "10 %", "load_torque": "20 %", "torque_lag": [0, "2 ms"]}))
+    9
+    """
+    levels: dict[str, list[Level]] = {}
+    wrong: list[str] = []
+    for name, given in (tolerances or {}).items():
+        try:
+            levels[name] = _levels(name, given)
+            for level in levels[name]:
+                changed: Any = {name: level.of(getattr(drive, name))}
+                drive.replace(**changed)
+        except InputError as error:
+            wrong += [s if s.startswith("tolerances") else f"tolerances: {s}" for s in error.sentences]
+    if wrong:
+        raise InputError(wrong)
+    if not levels:
+        return ({},)
+    if math.prod(map(len, levels.values())) <= most:
+        combined = [dict(zip(levels, one, strict=True)) for one in itertools.product(*levels.values())]
+    else:
+        combined = _sampled(levels, seed, most)
+    return ({}, *combined)
+
+
+def _levels(name: str, given: Any) -> list[Level]:
+    parameter = PARAMETERS.get(name)
+    if parameter is None or not parameter.unit:
+        near = nearest(name, [p.name for p in PARAMETERS.values() if p.unit])
+        hint = f"did you mean {near}?" if near else "name a field of a Drive, as stiffness."
+        raise InputError(f"tolerances: {name} is no quantity of a drive; {hint}")
+    if isinstance(given, list | tuple | np.ndarray):
+        values = np.atleast_1d(to_si(list(given), parameter.unit, name=f"tolerances {name}"))
+        return [Level(0.0, float(value)) for value in values]
+    if isinstance(given, str) and given.strip().endswith("%"):
+        share = 0.01 * float(to_si(given.strip()[:-1], "1", name=f"tolerances {name}"))
+        if not 0.0 < share < 1.0:
+            raise InputError(f'tolerances: {name} = "{given}": give a share above 0 % and below 100 %.')
+        return [Level(1.0 - share, 0.0), Level(1.0 + share, 0.0)]
+    if isinstance(given, bool) or not isinstance(given, str | Real):
+        raise InputError(
+            f'tolerances: {name} = {given!r}: give a share as "10 %", a quantity, or a list of values.'
+        )
+    spread = float(to_si(given, parameter.unit, name=f"tolerances {name}"))
+    if not spread > 0.0:
+        raise InputError(f"tolerances: {name} = {given}: give how far it may be off, above 0.")
+    return [Level(1.0, -spread), Level(1.0, spread)]
+
+
+def _sampled(levels: dict[str, list[Level]], seed: int, count: int) -> list[Scenario]:
+    """A Latin hypercube between the levels of each parameter; lists of values are drawn from."""
+    rng = np.random.default_rng([seed, 1])
+    strata = rng.permuted(np.tile(np.arange(count), (len(levels), 1)), axis=1).T
+    points = (strata + rng.random(strata.shape)) / count
+    found = []
+    for point in points:
+        scenario = {}
+        for (name, ends), share in zip(levels.items(), point, strict=True):
+            if ends[0].factor == 0.0:
+                scenario[name] = ends[int(share * len(ends))]
+            else:
+                low, high = ends
+                scenario[name] = Level(
+                    low.factor + share * (high.factor - low.factor),
+                    low.offset + share * (high.offset - low.offset),
+                )
+        found.append(scenario)
+    return found

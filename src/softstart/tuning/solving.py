@@ -11,19 +11,31 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers
 from softstart.store import Records, Target
-from softstart.tuning.grid import gaps_of, inertias_of
-from softstart.tuning.log import Log, Progress
+from softstart.tuning.gains import robust_set
+from softstart.tuning.gains import schedule as tuned_schedule
 from softstart.tuning.outcome import Tuning
-from softstart.tuning.price import Asked, Optima, optima
-from softstart.tuning.question import Metric, Question, bound_of
+from softstart.tuning.question import (
+    Metric,
+    Question,
+    bound_of,
+    gaps_of,
+    inertias_of,
+    recipe_of,
+    scenarios_of,
+)
 from softstart.tuning.ranges import Free, check_number, ranges_of
-from softstart.tuning.recipe import recipe_of
-from softstart.tuning.robust_set import robust_set
-from softstart.tuning.schedule import schedule as tuned_schedule
-from softstart.tuning.tables import between_table, check_metric, price_table, robust_outcome, schedule_table
-from softstart.tuning.tolerances import scenarios_of
+from softstart.tuning.tables import (
+    Asked,
+    Optima,
+    between_table,
+    check_metric,
+    optima,
+    price_table,
+    robust_outcome,
+    schedule_table,
+)
 from softstart.tuning.trials import Trials
-from softstart.tuning.workers import Workers, pool_for
+from softstart.tuning.work import Log, Progress, Workers, pool_for
 
 GENERATIONS = 40
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
@@ -56,41 +68,74 @@ def tune(
 ) -> Tuning:
     """Find the gains of a controller for each gap and load inertia, and one set of gains for all.
 
+    *Schedule*: the best gains of each cell of the grid, the controller set up for that cell's drive. *Robust
+    set*: one set of gains, set up for the nominal drive, that is best over all cells. Candidates are ranked
+    by feasibility (start time within its bound), then excess, then metric. The defaults are a candidate
+    everywhere, so that no cell becomes worse by this rule, unless the user's own range in `free` leaves
+    them out.
+
     Parameters
     ----------
-    drive : the nominal drive, or its name or file.
-    controller : a name, `path/to/file.py:ClassName`, or a Controller object.
-    gaps : gaps in rad, numbers or texts with a unit, or multiples of the drive's own as "2x". By default
-        0.5, 1, 2 and 4 times its own.
-    inertias : load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1
-        and 2 times the drive's own.
-    parameters : parameters of a controller given by name. What is given is not tuned, unless it is `free`.
-    free : names of the parameters to tune, or name -> (low, high) with ends in SI, with a unit, or as
-        multiples of the default ("0.5x", "2x"). By default all that the controller says may be tuned,
-        within the ranges that it names.
-    metric : what is made small: a figure of `softstart.start.batch.figures`, or a function of those figures.
-    start_time : bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x").
-        By default each start is to be no slower than with the controller's own defaults.
-    tolerances : what drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity,
-        or a list of values; see `softstart.tuning.tolerances`. Every candidate has to stand all of them.
-    quantile : share of the starts that metric and bound are judged by: 1 is the worst case.
-    schedule, robust : which of the two questions to answer. *Schedule*: the best gains of each cell, the
-        controller set up for that cell's drive. *Robust*: one set, set up for the nominal drive, that is best
-        over all cells.
-    certified : whether to compute each cell's optimum within the same time (metric `k_dyn` only).
-    base : the drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
-    seed, restarts, population, generations : of the search. The same ones give the same bits, however many
-        workers there are.
-    workers : how many parts of the work are done at once on this machine, by default one for each processor:
-        by threads where the controller is compiled, else by processes. 1 computes in this thread.
-    scheduler : address of a dask scheduler whose workers compute instead.
-    save_to : a file in which each finished part is kept at once, from which the same call goes on.
-    progress : told what is being done, how many starts were made, and how many a second.
+    drive : Drive or str
+        The nominal drive, or its name or file.
+    controller : str or Controller
+        A name, `path/to/file.py:ClassName`, or an object.
+    gaps : iterable, optional
+        Gaps in rad: numbers, texts with a unit, or multiples of the drive's own as "2x". By default 0.5, 1,
+        2 and 4 times its own.
+    inertias : iterable, optional
+        Load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1 and 2 times
+        the drive's own.
+    parameters : mapping, optional
+        Parameters of a controller given by name. What is given is not tuned, unless it is `free`.
+    free : iterable or mapping, optional
+        Names of the parameters to tune, or name -> (low, high) with ends in SI, with a unit, or as multiples
+        of the default ("0.5x", "2x"). By default all that the controller says may be tuned, within the ranges
+        that it names.
+    metric : str or callable
+        What is minimised: a figure of a start, or a function of the mapping of all figures (arrays, one value
+        a start) that returns one number a start.
+    start_time : float or str, optional
+        Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
+        default each start is to be no slower than with the controller's own defaults.
+    tolerances : mapping, optional
+        What drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity, or a
+        list of values. Every candidate is judged by all of these scenarios.
+    quantile : float
+        Share of the starts that metric and bound are judged by; 1 is the worst case.
+    schedule, robust : bool
+        Which of the two questions to answer.
+    certified : bool
+        Whether to compute each cell's certified optimum within the same time (metric `k_dyn` only).
+    base : Drive, optional
+        The drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
+    seed, restarts, population, generations : int
+        Of the search. The same ones give the same bits, whoever computes.
+    workers : int, optional
+        How many parts of the work are done at once on this machine, by default one for each processor: by
+        threads where the controller is compiled, else by processes. 1 computes in this thread.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers compute instead.
+    save_to : str or Path, optional
+        A file in which each finished part is kept at once, from which the same call goes on.
+    progress : callable, optional
+        Called with a text: what is being done, how many starts were made, and how many a second.
 
-    A candidate that keeps the bound beats one that does not, then the smaller excess, then the smaller
-    metric. The defaults are a candidate everywhere, so that no cell becomes worse by this rule (but where the
-    user's own range in `free` leaves them out). Raises InputError for bad input.
+    Returns
+    -------
+    Tuning
+        The schedule, the robust set, and the price of robustness, over `gap` and `load_inertia`.
 
+    Raises
+    ------
+    InputError
+        For bad input, for a file in `save_to` that holds something else, and for a controller or metric that
+        other processes cannot load where these are asked for.
+    SimulationError
+        For workers that cannot go on; finished parts are kept.
+
+    Examples
+    --------
     >>> from softstart import Drive, tune
     >>> crane = Drive.load("crane-4amtkf")
     >>> options = {"free": ["torque"], "certified": False, "workers": 1}
@@ -98,6 +143,11 @@ def tune(
     >>> cell = tuned.schedule.isel(gap=0, load_inertia=0)
     >>> bool(cell.k_dyn <= cell.k_dyn_default), tuned.robust.agreement
     (True, 3)
+
+    References
+    ----------
+    R. Storn, K. Price: Differential evolution - a simple and efficient heuristic for global optimization over
+    continuous spaces, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)

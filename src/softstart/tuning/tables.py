@@ -1,25 +1,33 @@
-"""What was found, as labelled tables over the grid."""
+"""What tuning has found as tables, and the price of robustness beside the certified optimum of each cell."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
+from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.optimal.solving import optimize
+from softstart.processes import Pool
+from softstart.store import Records
+from softstart.tuning.gains import ScheduleFound, SetFound
 from softstart.tuning.outcome import RobustSet, gains_on_grid
-from softstart.tuning.price import Optima
-from softstart.tuning.ranking import excess, in_time, upper
-from softstart.tuning.robust_set import SetFound
-from softstart.tuning.schedule import ScheduleFound
+from softstart.tuning.question import Question
 from softstart.tuning.search import agreement
-from softstart.tuning.trials import Judged, Trials, single
+from softstart.tuning.trials import Judged, Trials, excess, in_time, single, upper
+from softstart.tuning.work import Log
 
 if TYPE_CHECKING:
     import xarray
+else:
+    xarray = late("xarray")
 
 Columns = dict[str, tuple[Any, str, str]]  # name -> values of the cells, unit, meaning
 
@@ -182,7 +190,6 @@ def _quantile(values: Any, share: float) -> float:
 
 
 def _dataset(trials: Trials, columns: Columns) -> xarray.Dataset:
-    import xarray
 
     question = trials.question
     shape = (len(question.gaps), len(question.load_inertias))
@@ -201,3 +208,58 @@ def _dataset(trials: Trials, columns: Columns) -> xarray.Dataset:
         ),
     }  # fmt: skip
     return xarray.Dataset(data, coords=coordinates)
+
+
+Optima = dict[tuple[int, float], dict[str, Any]]  # by cell and bound in s
+
+
+class Asked(NamedTuple):
+    """An optimum: its cell, the bound on the start time in s, the drive, and that to which K_dyn refers."""
+
+    cell: int
+    bound: float
+    drive: Drive
+    base: Drive | None
+
+
+def optima(
+    pool: Pool, question: Question, saved: Records, log: Log, bounds: list[tuple[int, float]]
+) -> Optima:
+    """The least K_dyn of cells within bounds on the start time, each with its lower bound."""
+    asked = list(dict.fromkeys((cell, bound) for cell, bound in bounds if math.isfinite(bound)))
+    found: Optima = {}
+    for cell, bound in asked:
+        record = saved.find(("optimum", cell, bound))
+        if record is not None:
+            found[cell, bound] = {name: value for name, value in record.items() if name != "part"}
+    missing = [
+        Asked(cell, bound, question.drive_of(cell), question.base)
+        for cell, bound in asked
+        if (cell, bound) not in found
+    ]
+    log.begin("certified optima", len(asked), len(found))
+    for one, record in pool.results(optimum_of, missing):
+        found[one.cell, one.bound] = record
+        if record["status"] != "NOT_FOUND":  # another attempt may find it
+            saved.add({"part": ("optimum", one.cell, one.bound), **record})
+        log.did(0)
+    return found
+
+
+def optimum_of(asked: Asked) -> dict[str, Any]:
+    """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick."""
+    ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)
+    nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
+    try:
+        best = optimize(ideal, asked.bound, terminal="reached", base=asked.base)
+    except InfeasibleError:
+        return {**nothing, "status": "INFEASIBLE"}
+    except (OptimumError, NotConverged, InputError):
+        return {**nothing, "status": "NOT_FOUND"}
+    low = best.k_dyn_lower_bound
+    return {
+        "k_dyn": best.k_dyn,
+        "k_dyn_lower_bound": low if low is not None and math.isfinite(low) else None,
+        "method": best.method,
+        "status": "OPTIMAL",
+    }

@@ -125,14 +125,14 @@ def test_a_start_that_went_wrong_stands_out_and_a_large_grid_is_not_listed(run, 
 
 def test_a_grid_too_large_for_a_table_writes_no_cells(place, monkeypatch):
     from softstart import sweep
-    from softstart.cli import sweep_cells
+    from softstart.views import sweeps
 
     results = sweep(CRANE, "direct", {"gap": [0.5, 1.0, 2.0]}, workers=1)
-    monkeypatch.setattr(sweep_cells, "MOST_WRITTEN", 2)
-    assert not sweep_cells.write_cells(results, place)
-    assert not (place / sweep_cells.FILE).exists()
-    monkeypatch.setattr(sweep_cells, "MOST_WRITTEN", 3)
-    assert sweep_cells.write_cells(results, place)
+    monkeypatch.setattr(sweeps, "MOST_WRITTEN", 2)
+    assert not sweeps.write_cells(results, place)
+    assert not (place / sweeps.FILE).exists()
+    monkeypatch.setattr(sweeps, "MOST_WRITTEN", 3)
+    assert sweeps.write_cells(results, place)
 
 
 LONG = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, sweep
-from softstart.sweeping.axes import read_grid
+from softstart.sweeping.grid import read_grid
 from softstart.sweeping.maker import Maker
 
 CRANE = Drive.load("crane-4amtkf")

@@ -1,4 +1,4 @@
-"""A sweep on a dask cluster: a real scheduler and workers in processes of their own, one of them killed."""
+"""Sweeps, tunings and limit curves on a dask cluster: a real scheduler and workers, one of them killed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, SimulationError, processes, sweep
+from softstart import Drive, InputError, SimulationError, pareto, processes, sweep, tune
 
 pytest.importorskip("distributed")
 CRANE = Drive.load("crane-4amtkf")
@@ -99,6 +99,39 @@ def test_two_workers_of_which_one_is_killed_find_the_same(
             CRANE, f"{tmp_path / 'mine.py'}:Fails", {"controller.share": [1.0, 0.0]}, chunk=1,
             scheduler=address,
         )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_tunings_and_limit_curves_are_the_same_on_a_cluster(cluster, tmp_path):
+    address = cluster.address()
+    cluster.add_worker()
+    crane = CRANE.replace(target_speed=60.0)
+
+    def told(result):
+        return {key: value for key, value in result.summary().items() if key != "seconds"}
+
+    options = {"generations": 3, "population": 8, "restarts": 2, "start_time": "1.4x"}
+    asked = (crane, "ramp", [0.5, 2.0], ["2 J1", "5 J1"])
+    alone = tune(*asked, **options, workers=1)
+    assert told(tune(*asked, **options, scheduler=address)) == told(alone)
+    kept = tmp_path / "tuning.jsonl"
+    tune(*asked, **options, scheduler=address, save_to=kept)
+    again = tune(*asked, **options, workers=1, save_to=kept)
+    assert again.starts == 0
+    assert told(again) | {"starts": alone.starts} == told(alone)
+    with pytest.raises(InputError, match="scheduler: the controller or the metric cannot be handed"):
+        tune(*asked, **options, metric=lambda figures: figures["peak_torque"], scheduler=address)
+
+    def points(front):
+        return [{**point.summary(), "seconds": 0.0} for point in front.points], [
+            one.summary() for one in front.controllers
+        ]
+
+    for drive in (crane, crane.replace(torque_lag=0.002)):  # by formula, and by linear program
+        asked = (drive, [0.2, 0.3, 0.33])
+        alone = points(pareto(*asked, controllers=["ramp"]))
+        assert points(pareto(*asked, controllers=["ramp"], scheduler=address)) == alone
+        assert points(pareto(*asked, controllers=["ramp"], workers=2)) == alone
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch):

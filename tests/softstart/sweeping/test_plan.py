@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softstart import InputError
-from softstart.sweeping.plan import Plan, checked_chunk, plan_for
+from softstart.sweeping.grid import Plan, checked_chunk, plan_for
 
 SHAPES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 

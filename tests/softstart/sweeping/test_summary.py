@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import Drive, Status, simulate, sweep
-from softstart.sweeping.pictures import sweep_figure
-from softstart.sweeping.progress import Progress, Watch
+from softstart.sweeping.entry import Progress, Watch
 from softstart.sweeping.summary import spread, summarise
 from softstart.views.drawing import save_figure
+from softstart.views.sweeps import sweep_figure
 
 CRANE = Drive.load("crane-4amtkf")
 NUMBERS = st.lists(st.floats(-1e300, 1e300) | st.just(np.nan), min_size=1, max_size=40)

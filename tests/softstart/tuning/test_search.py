@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import rosen
 
-from softstart.tuning.ranking import cost, excess, in_time, upper
-from softstart.tuning.search import agreement, polish, search
-from softstart.tuning.together import together
+from softstart.tuning.search import agreement, polish, search, together
+from softstart.tuning.trials import cost, excess, in_time, upper
 
 
 def valley(places):

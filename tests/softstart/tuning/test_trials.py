@@ -7,11 +7,8 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import make_controller
-from softstart.tuning.grid import gaps_of, inertias_of
-from softstart.tuning.question import Question, bound_of
+from softstart.tuning.question import Question, bound_of, gaps_of, inertias_of, recipe_of, scenarios_of
 from softstart.tuning.ranges import Range, ranges_of
-from softstart.tuning.recipe import recipe_of
-from softstart.tuning.tolerances import scenarios_of
 from softstart.tuning.trials import Trials
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -160,9 +160,9 @@ def test_the_same_seed_gives_the_same_bits(alone):
 
 @pytest.mark.parametrize("threads", [True, False])
 def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
-    monkeypatch.setattr("softstart.tuning.workers.WORTH_SHARING", 0)
-    monkeypatch.setattr("softstart.tuning.schedule.LARGEST_BLOCK", 3)  # so that there is something to share
-    monkeypatch.setattr("softstart.tuning.robust_set.STARTS_A_CALL", 48)
+    monkeypatch.setattr("softstart.tuning.work.WORTH_SHARING", 0)
+    monkeypatch.setattr("softstart.tuning.gains.LARGEST_BLOCK", 3)  # so that there is something to share
+    monkeypatch.setattr("softstart.tuning.gains.STARTS_A_CALL", 48)
     begun = []
     results = Pool.results
 
@@ -181,7 +181,7 @@ def test_the_number_of_workers_changes_nothing(alone, monkeypatch, threads):
 
 @pytest.mark.parametrize("word", ["schedule, searches 5", "neighbours", "robust set, search 2"])
 def test_an_interrupted_tuning_goes_on_where_it_was(alone, tmp_path, word, monkeypatch):
-    monkeypatch.setattr("softstart.tuning.schedule.LARGEST_BLOCK", 3)
+    monkeypatch.setattr("softstart.tuning.gains.LARGEST_BLOCK", 3)
     kept = tmp_path / "deep" / "tuning.jsonl"
     options = {**GRID, **SMALL, **SURE, "save_to": kept}
 

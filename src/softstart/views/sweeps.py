@@ -1,0 +1,508 @@
+"""What is shown of a sweep: sentences, tables, maps and curves, and the files of --out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.drive import PARAMETERS
+from softstart.late import late
+from softstart.start.status import Status
+from softstart.sweeping.summary import plan_of
+from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, save_figure
+from softstart.views.drives import controllers_set_up, drive_lines
+from softstart.views.markdown import (
+    drive_table,
+    markdown,
+    markdown_table,
+    provenance,
+    write_fitted_to,
+    write_table,
+    write_text,
+)
+from softstart.views.numbers import Column, column_of, number
+from softstart.views.terminal import fits, print_table, sentence
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib import colors, patheffects, ticker
+    from matplotlib.axes import Axes
+    from rich.console import Console
+
+    from softstart.drive import Drive
+    from softstart.sweeping.entry import Progress
+    from softstart.sweeping.summary import Summary
+else:
+    colors = late("matplotlib.colors")
+    patheffects = late("matplotlib.patheffects")
+    ticker = late("matplotlib.ticker")
+
+MOST_PANELS = 6
+MOST_LINES = 8
+MOST_CELLS = 4_000_000  # of a map
+COLOUR_MAP = "cividis"  # for colour-blind readers, and even in grey
+WIDE = 10.0  # largest over smallest value from which on colours are logarithmic
+MISSING = "#D0D0D0"
+FINEST_CONTOUR = 50  # points along each side
+
+
+def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Any:
+    """A figure of the starts over the grid, or None where nothing can be drawn.
+
+    Two long axes of numbers make a map; further axes make panels, or, if these were too many, the map shows
+    the largest value over them. One axis of numbers makes curves.
+    """
+    field = results[name]
+    long = [str(dim) for dim in field.dims if field.sizes[dim] > 1]
+    numeric = [dim for dim in long if dim in results.coords and results[dim].dtype.kind in "fiu"]
+    across = sorted(sorted(numeric, key=lambda dim: -field.sizes[dim])[:2], key=long.index)
+    rest = [dim for dim in long if dim not in across]
+    if not across or math.prod(field.sizes[dim] for dim in across) > MOST_CELLS:
+        return None
+    combinations = math.prod(field.sizes[dim] for dim in rest)
+    if len(across) == 1:
+        if combinations > MOST_LINES:
+            return _curves(
+                results, name, across[0], [("largest over the rest", _largest(results, name, across))]
+            )
+        return _curves(results, name, across[0], _each(results, name, across, rest))
+    if combinations > MOST_PANELS:
+        others = ", ".join(_shown(dim) for dim in rest)
+        return _maps(results, name, across, [(f"largest over {others}", _largest(results, name, across))])
+    return _maps(results, name, across, _each(results, name, across, rest))
+
+
+Part = tuple[str, Any]  # title, and the values along the axes drawn
+
+
+def _each(results: xarray.Dataset, name: str, across: list[str], rest: list[str]) -> list[Part]:
+    """A part for every combination of the other axes."""
+    parts = []
+    for index in np.ndindex(*(results.sizes[dim] for dim in rest)):
+        one = results[name].isel(dict(zip(rest, index, strict=True)))
+        values = [(dim, results[dim].values[i]) for dim, i in zip(rest, index, strict=True)]
+        labels = [
+            str(value) if dim == "controller" else f"{_shown(dim)} {_text(value)}" for dim, value in values
+        ]
+        parts.append((", ".join(labels), one.squeeze().transpose(*across).values))
+    return parts
+
+
+def _largest(results: xarray.Dataset, name: str, across: list[str]) -> Any:
+    """The largest value over all axes that are not drawn, read piece by piece."""
+    field, plan = results[name], plan_of(results)
+    kept = [list(field.dims).index(dim) for dim in across]
+    away = tuple(i for i in range(field.ndim) if i not in kept)
+    found = np.full([plan.shape[i] for i in kept], np.nan)
+    for chunk in range(plan.chunks):
+        place = plan.place(chunk)
+        part = tuple(place[i] for i in kept)
+        values = field[place].values
+        found[part] = np.fmax(found[part], np.fmax.reduce(values, axis=away) if away else values)
+    return found
+
+
+def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Any:
+
+    high, wide = across
+    orders = [np.argsort(results[dim].values) for dim in across]
+    y, x = (results[dim].values[order] for dim, order in zip(across, orders, strict=True))
+    finite = np.concatenate([values[np.isfinite(values)] for _, values in parts])
+    if not finite.size:
+        return None
+    low, top = float(finite.min()), float(finite.max())
+    logarithmic = low > 0.0 and top > WIDE * low
+    scale = (
+        colors.LogNorm(low, top) if logarithmic else colors.Normalize(low, top if top > low else low + 1.0)
+    )
+    columns = 2 if len(parts) == 4 else min(len(parts), 3)
+    rows = -(-len(parts) // columns)
+    with drawing():
+        size = (2.2 + 3.6 * columns, 0.9 + 3.1 * rows) if len(parts) > 1 else (7.6, 5.2)
+        figure, axes = new_figure(rows, columns, size, sharex=True, sharey=True, squeeze=False)
+        for panel in axes.flat[len(parts) :]:
+            panel.set_visible(False)
+        for panel, (title, values) in zip(axes.flat, parts, strict=False):
+            drawn = _map(panel, x, y, values[np.ix_(*orders)], scale)
+            panel.set_title(title, loc="left", fontsize=9.5)
+            for axis, values_of, set_scale in (("x", x, panel.set_xscale), ("y", y, panel.set_yscale)):
+                if _geometric(values_of):
+                    set_scale("log")
+                    _plain_ticks(getattr(panel, f"{axis}axis"))
+        for panel in axes.flat[max(0, len(parts) - columns) : len(parts)]:  # the lowest of each column
+            panel.tick_params(labelbottom=True)
+            panel.set_xlabel(_label(results, wide))
+        for panel in axes[:, 0]:
+            panel.set_ylabel(_label(results, high))
+        bar = figure.colorbar(drawn, ax=axes, label=_label(results, name))
+        if logarithmic:
+            _plain_ticks(bar.ax.yaxis)
+        note = "   (grey: no figure)" if any(np.isnan(values).any() for _, values in parts) else ""
+        figure.suptitle(f"{_title(results)}: {_label(results, name)}{note}", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _map(panel: Axes, x: Any, y: Any, values: Any, scale: Any) -> Any:
+    panel.set_facecolor(MISSING)
+    panel.grid(visible=False)
+    drawn = panel.pcolormesh(x, y, values, norm=scale, cmap=COLOUR_MAP, shading="nearest", rasterized=True)
+    if min(values.shape) > 2 and np.isfinite(values).all() and float(np.ptp(values)) > 0.0:
+        around: list[Any] = [patheffects.withStroke(linewidth=2.0, foreground="#333333")]
+        lines = panel.contour(*_coarse(x, y, values), levels=6, colors="white", linewidths=0.9)
+        for text in panel.clabel(lines, fontsize=8, fmt="%.3g"):
+            text.set_path_effects(around)
+        lines.set_path_effects(around)
+    if np.isfinite(values).any():
+        i, j = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        panel.plot([x[j]], [y[i]], "X", ms=8, color=COLOURS[1], mec="white", clip_on=False)
+        panel.annotate(
+            f"{values[i, j]:.3g}", (x[j], y[i]), xytext=(-7 if j > len(x) / 2 else 7, -4), color="white",
+            textcoords="offset points", ha="right" if j > len(x) / 2 else "left",
+            va="top" if i > len(y) / 2 else "bottom", fontsize=8.5,
+            bbox={"fc": "#333333", "ec": "none", "pad": 1.5}, zorder=6,
+        )  # fmt: skip
+    return drawn
+
+
+def _coarse(x: Any, y: Any, values: Any) -> tuple[Any, Any, Any]:
+    """Means over small blocks: contour lines of a fine grid are smooth where their values ripple."""
+    for axis in (0, 1):
+        step = -(-values.shape[axis] // FINEST_CONTOUR)
+        whole = values.shape[axis] // step * step
+        values = np.moveaxis(values, axis, 0)[:whole]
+        values = np.moveaxis(values.reshape(-1, step, values.shape[1]).mean(axis=1), 0, axis)
+        if axis == 0:
+            y = y[:whole].reshape(-1, step).mean(axis=1)
+        else:
+            x = x[:whole].reshape(-1, step).mean(axis=1)
+    return x, y, values
+
+
+def _curves(results: xarray.Dataset, name: str, along: str, parts: list[Part]) -> Any:
+    order = np.argsort(results[along].values)
+    x = results[along].values[order]
+    with drawing():
+        figure, axes = new_figure(1, 1, (8.0, 4.8))
+        for index, (label, values) in enumerate(parts):
+            axes.plot(x, values[order], color=COLOURS[index % 8], ls=DASHES[index % 8], label=label or None,
+                      marker="o" if len(x) < 30 else None, ms=3.5)  # fmt: skip
+        if _geometric(x):
+            axes.set_xscale("log")
+            _plain_ticks(axes.xaxis)
+        if name == "k_dyn":
+            axes.axhline(1.0, color="#666666", lw=0.8, ls=":")
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel(_label(results, along))
+        axes.set_ylabel(_label(results, name))
+        axes.set_title(_title(results), loc="left")
+        if any(label for label, _ in parts):
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _geometric(values: Any) -> bool:
+    """Whether values in order rise by a constant factor, over at least half a decade."""
+    if len(values) < 3 or values[0] <= 0.0 or values[-1] < 3.0 * values[0]:
+        return False
+    steps = np.diff(np.log(values))
+    return bool(np.ptp(steps) < 1e-6 * steps.mean())
+
+
+def _plain_ticks(axis: Any) -> None:
+    """Numbers as they are, at 1, 2 and 5 of each decade."""
+    axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(ticker.NullLocator())
+
+
+def _title(results: xarray.Dataset) -> str:
+    return str(results.attrs.get("title", "sweep"))
+
+
+def _shown(name: str) -> str:
+    return name.removeprefix("controller_").replace("_", " ")
+
+
+def _label(results: xarray.Dataset, name: str) -> str:
+    """What an axis of the picture is called: symbol or words, and the unit."""
+    if name == "k_dyn":
+        return "K_dyn"
+    unit = str(results[name].attrs.get("units", ""))
+    symbol = PARAMETERS[name].symbol if name in PARAMETERS else ""
+    words = f"{_shown(name)} {symbol}" if symbol and symbol != name else _shown(name)
+    return f"{words}, {unit.replace('*', ' ').replace('^', '')}" if unit not in ("", "1") else words
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+MOST_SHOWN = 40  # starts in the table on the screen, in report.md and in JSON
+MOST_WRITTEN = 100_000  # starts in the file
+FILE = "cells.csv"
+STATUS = "status"
+
+
+def cell_columns(results: xarray.Dataset) -> dict[str, list[Any]]:
+    """What each start has: its place on the axes, its figures, and the name of its status.
+
+    >>> from softstart import sweep
+    >>> found = cell_columns(sweep("crane-4amtkf", "direct", {"gap": [0.5, 2.0]}, workers=1))
+    >>> found["gap"], [round(k, 4) for k in found["k_dyn"]], found["status"]
+    ([0.5, 2.0], [3.1179, 4.8654], ['REACHED', 'REACHED'])
+    """
+    status = results[STATUS]
+    dims = status.dims
+    columns: dict[str, list[Any]] = {}
+    for name in [*results.coords, *(name for name in results.data_vars if name != STATUS)]:
+        one = results[name]
+        along = [status.sizes[dim] if dim in one.dims else 1 for dim in dims]
+        columns[str(name)] = np.broadcast_to(one.values.reshape(along), status.shape).ravel().tolist()
+    names = ["NOT_COMPUTED", *(one.name for one in Status)]
+    columns[STATUS] = [names[1 + int(code)] for code in status.values.ravel()]
+    return columns
+
+
+def cell_rows(results: xarray.Dataset) -> Iterator[dict[str, Any]]:
+    """The starts one by one, in the order of the axes, the last one changing fastest."""
+    columns = cell_columns(results)
+    for row in zip(*columns.values(), strict=True):
+        yield dict(zip(columns, row, strict=True))
+
+
+def cell_table(results: xarray.Dataset, to: Console | None = None) -> tuple[list[str], list[list[str]], int]:
+    """Headings with units, rows, and how many columns from the left are axes.
+
+    Figures without a place on the screen are left out from the right. The status is among them only where
+    not every start reached its target speed.
+    """
+    columns = cell_columns(results)
+    ended = columns.pop(STATUS)
+    axes = len(results.coords)
+    cells = [
+        [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+        if index < axes
+        else _figures([float(value) for value in values])
+        for index, values in enumerate(columns.values())
+    ]
+    headings = [_with_unit(results, name, "\n") for name in columns]
+    if any(name != Status.REACHED.name for name in ended):
+        headings.insert(axes + 1, STATUS)
+        cells.insert(axes + 1, [name.lower().replace("_", " ") for name in ended])
+    while to is not None and len(cells) > axes + 2:
+        rows = [list(row) for row in zip(*cells, strict=True)]
+        if fits(to, [Column(heading) for heading in headings], rows):
+            break
+        headings.pop()
+        cells.pop()
+    return headings, [list(row) for row in zip(*cells, strict=True)], axes
+
+
+def write_cells(results: xarray.Dataset, folder: Path) -> bool:
+    """All starts as CSV, with all digits; nothing for a grid that is too large for it."""
+    if results[STATUS].size > MOST_WRITTEN:
+        return False
+    columns = cell_columns(results)
+    headings = [_with_unit(results, name, " [", "]") for name in columns]
+    rows = zip(*columns.values(), strict=True)
+    write_table(folder / FILE, headings, [[_cell(value) for value in row] for row in rows])
+    return True
+
+
+def _figures(values: list[float]) -> list[str]:
+
+    whole = all(math.isnan(value) or value.is_integer() for value in values)
+    return [number(value, 0) for value in values] if whole else column_of(values, 5)
+
+
+def _with_unit(results: xarray.Dataset, name: str, before: str, after: str = "") -> str:
+    unit = str(results[name].attrs.get("units", "1"))
+    shown = name
+    if before == "\n":
+        shown = "K_dyn" if name == "k_dyn" else name.replace("_", " ")
+    return shown if unit in ("", "1") else f"{shown}{before}{unit}{after}"
+
+
+def _cell(value: Any) -> Any:
+    """A figure that a start does not have is an empty cell."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def axis_summary(results: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """The axes as plain data: how many values, from where to where or which."""
+    found: dict[str, dict[str, Any]] = {}
+    for dim in results.k_dyn.dims if "k_dyn" in results else results.status.dims:
+        values = results[dim].values
+        about: dict[str, Any] = {"count": int(values.size), "unit": results[dim].attrs.get("units", "")}
+        if values.dtype.kind in "fiu":
+            about |= {"from": float(values.min()), "to": float(values.max())}
+        else:
+            about["values"] = [str(value) for value in values]
+        found[str(dim)] = about
+    return found
+
+
+def axis_columns(results: xarray.Dataset) -> dict[str, list[str]]:
+    """The table of the axes."""
+    columns: dict[str, list[str]] = {"axis": [], "values": [], "from": [], "to": [], "unit": []}
+    for name, about in axis_summary(results).items():
+        ends = [f"{about[end]:.6g}" if end in about else "-" for end in ("from", "to")]
+        unit = about["unit"] or ", ".join(about.get("values", ()))
+        for column, cell in zip(columns.values(), (name, f"{about['count']:,}", *ends, unit), strict=True):
+            column.append(cell)
+    return columns
+
+
+def figure_columns(results: xarray.Dataset, summary: Summary) -> dict[str, list[str]]:
+    """The table of the figures."""
+    names = list(summary.spreads)
+    rows = [
+        column_of([spread.least, *spread.quantiles.values(), spread.most], 5)
+        for spread in summary.spreads.values()
+    ]
+    headings = ["least", "5 %", "median", "95 %", "most"]
+    cells = zip(*rows, strict=True)
+    units = [str(results[name].attrs.get("units", "")) for name in names]
+    return {
+        "figure": names,
+        "unit": ["" if unit == "1" else unit for unit in units],
+        **{heading: list(column) for heading, column in zip(headings, cells, strict=True)},
+    }
+
+
+def conclusion(results: xarray.Dataset, summary: Summary) -> str:
+    """Where the worst case sits, and what share came to its speed."""
+    share = f"{summary.share_reached:.4g}" if summary.share_reached < 1.0 else "1"
+    reached = (
+        "All starts reached the target speed."
+        if summary.share_reached == 1.0
+        else f"A share of {share} of the starts reached the target speed."
+    )
+    if not summary.worst:
+        return reached
+    most = summary.spreads[summary.judged].most
+    unit = results[summary.judged].attrs.get("units", "1")
+    places = ", ".join(
+        f"{name} {value if isinstance(value, str) else format(value, '.5g')}"
+        for name, value in summary.worst.items()
+    )
+    name = "K_dyn" if summary.judged == "k_dyn" else summary.judged.replace("_", " ")
+    return f"Largest {name} {most:.4g}{'' if unit == '1' else ' ' + unit} at {places}. {reached}"
+
+
+def endings(summary: Summary) -> list[str]:
+    """How the starts ended, where not all reached their target speed."""
+    if set(summary.statuses) == {Status.REACHED.name}:
+        return []
+    return [f"{count:,} starts: {Status[name].value}" for name, count in summary.statuses.items()]
+
+
+def pace(last: Progress | None) -> str:
+    """How many starts were made, and how fast."""
+    if last is None:
+        return ""
+    made = last.done - last.before
+    said = f"{last.starts:,} starts"
+    if last.before:
+        said += f", of which {last.before:,} were finished before"
+    if made and last.seconds > 0.0:
+        said += f"; {made / last.seconds:,.0f} starts/s in {last.seconds:.1f} s"
+    return said + "."
+
+
+def show(
+    to: Console,
+    drive: Drive,
+    fitted_to: Drive | None,
+    results: xarray.Dataset,
+    summary: Summary,
+    last: Progress | None,
+) -> None:
+    """Print everything."""
+    for index, line in enumerate(drive_lines(drive)):
+        sentence(to, line, "bold" if index == 0 else "")
+    if fitted_to is not None:
+        sentence(to, f"  {controllers_set_up(None, fitted_to)}")
+    for title, columns, texts in (
+        ("The grid", axis_columns(results), ("axis", "unit")),
+        ("Over all starts", figure_columns(results, summary), ("figure", "unit")),
+    ):
+        rows = [list(row) for row in zip(*columns.values(), strict=True)]
+        if rows:
+            to.print()
+            print_table(to, [Column(name, name not in texts) for name in columns], rows, title=title)
+    if summary.starts <= MOST_SHOWN:
+        headings, cells, _ = cell_table(results, to)
+        to.print()
+        print_table(to, [Column(name, _numbers(cells, i)) for i, name in enumerate(headings)], cells,
+                    title="Each start")  # fmt: skip
+    to.print()
+    sentence(to, conclusion(results, summary), "bold")
+    for note in (*endings(summary), pace(last)):
+        if note:
+            sentence(to, note, "dim")
+
+
+def _numbers(cells: list[list[str]], column: int) -> bool:
+    """Whether a column holds numbers, which are set to the right."""
+    return not any(row[column][:1].isalpha() for row in cells)
+
+
+OPEN = """\
+```python
+import xarray
+
+results = xarray.open_zarr("sweep.zarr")
+```"""
+
+
+def write_sweep(
+    results: xarray.Dataset,
+    summary: Summary,
+    drive: Drive,
+    folder: Path,
+    command: str,
+    fitted_to: Drive | None,
+) -> None:
+    """Everything that sums a sweep up."""
+    picture = sweep_figure(results, summary.judged) if summary.judged else None
+    if picture is not None:
+        save_figure(picture, folder, "sweep")
+    write_text(folder / "drive.toml", drive.to_toml())
+    write_fitted_to(fitted_to, folder)
+    rows = []
+    for name, spread in summary.spreads.items():
+        unit = results[name].attrs.get("units", "")
+        rows.append([name, unit, *spread.summary().values()])
+    headings = list(next(iter(summary.spreads.values())).summary()) if rows else []
+    write_table(folder / "sweep.csv", ["figure", "unit", *headings], rows)
+    parts = [
+        f"# {markdown(drive.name)}: {summary.starts:,} starts",
+        markdown(conclusion(results, summary)),
+        *map(markdown, endings(summary)),
+        *(["![sweep](sweep.svg)"] if picture is not None else []),
+    ]
+    for title, columns in (
+        ("The grid", axis_columns(results)),
+        ("Over all starts", figure_columns(results, summary)),
+    ):
+        cells = [list(row) for row in zip(*columns.values(), strict=True)]
+        parts += [f"## {title}", markdown_table(list(columns), cells)] if cells else []
+    if summary.starts <= MOST_SHOWN:
+        headings, cells, axes = cell_table(results)
+        headings = [" ".join(heading.split()) for heading in headings]
+        parts += ["## Each start", markdown_table(headings, cells, numbers_from=axes)]
+    written = f", each start in [{FILE}]({FILE})" if write_cells(results, folder) else ""
+    parts += [
+        f"All numbers with their digits: [sweep.csv](sweep.csv){written}. Every start is in the folder "
+        "`sweep.zarr`:",
+        OPEN,
+        "## The drive",
+        drive_table(drive),
+        provenance(drive, command, fitted_to, one=False),
+    ]
+    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
