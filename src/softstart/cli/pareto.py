@@ -32,8 +32,10 @@ from softstart.cli.options import (
     drive_argument,
     json_option,
     out_option,
+    read_count,
     read_drive,
     read_names,
+    scheduler_option,
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
@@ -70,6 +72,8 @@ STATE = "pareto.jsonl"
 @controller_option(
     "--controllers", "A,B,...", "Controllers to show beside the curve. By default all that need no parameter."
 )
+@click.option("--workers", metavar="N", help="Optima computed at once. By default 1.")
+@scheduler_option
 @set_option
 @json_option
 @out_option(
@@ -84,6 +88,8 @@ def pareto(
     method: str | None,
     torque_speed: str | None,
     controllers: str | None,
+    workers: str | None,
+    scheduler: str | None,
     settings: tuple[str, ...],
     as_json: bool,
     out: str | None,
@@ -97,7 +103,7 @@ def pareto(
     one: Drive | None = None
     names: Sequence[str] | None = None
     asked: list[StartTime] | None = None
-    bounds: dict[str, Any] = {}
+    bounds: dict[str, Any] = {"scheduler": scheduler}
     with mistakes.noted():
         one = read_drive(drive, settings)
     with mistakes.noted():
@@ -113,6 +119,8 @@ def pareto(
             bounds[name] = read_choice(text, option, choices)
     with mistakes.noted():
         bounds["torque_speed"] = read_corners(torque_speed)
+    with mistakes.noted():
+        bounds["workers"] = read_count(workers, "--workers") or 1
     if one is not None and not mistakes.sentences:
         with mistakes.noted(), named_as_options():
             Problem(one, 1.0, bounds["terminal"], torque_speed=bounds["torque_speed"])

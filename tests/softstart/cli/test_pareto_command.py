@@ -110,6 +110,19 @@ def test_points_of_another_drive_are_refused(run, place, begun):
     assert {path.name: path.read_bytes() for path in (place / "front").iterdir()} == before
 
 
+def test_who_computes_changes_nothing(run):
+    arguments = ("pareto", *SIXTY, "--start-times", "0.2,0.28,0.3", "--controllers", "ramp", "--json")
+
+    def told(out):
+        found = json.loads(out)
+        return [{**point, "seconds": None} for point in found["points"]], found["controllers"]
+
+    assert told(run(*arguments, "--workers", "2").out) == told(run(*arguments).out)
+    code, out, err = run(*arguments, "--workers", "none")
+    assert (code, out) == (2, "")
+    assert err == 'softstart: --workers = "none": give a whole number of 1 or more.\n'
+
+
 def test_no_feasible_start_time(run):
     code, out, err = run("pareto", *SIXTY, "--start-times", "0.1,0.2", "--controllers", "ramp", "--json")
     assert code == 3
