@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+import softstart
 from softstart.cli.commands import Command
 from softstart.cli.completion import axes as axes_known
 from softstart.cli.completion import files_only
@@ -39,20 +40,22 @@ from softstart.cli.options import (
 )
 from softstart.cli.running import Attributed, working
 from softstart.errors import InputError
-from softstart.sweeping.entry import sweep as compute
-from softstart.sweeping.grid import read_column
-from softstart.sweeping.maker import Maker
-from softstart.sweeping.summary import summarise
+from softstart.late import late
 from softstart.views.markdown import output_folder
-from softstart.views.sweeps import MOST_SHOWN, axis_summary, cell_rows, show, write_sweep
 from softstart.views.terminal import console, print_json
 
 if TYPE_CHECKING:
     import xarray
 
     from softstart.drive import Drive
+    from softstart.sweeping import grid as grids
+    from softstart.sweeping import maker as makers
+    from softstart.sweeping import summary as summaries
     from softstart.sweeping.entry import Progress
-    from softstart.sweeping.maker import Maker, Parameters
+    from softstart.views import sweeps as views
+else:  # no numba for a help, a wrong option or the Tab key
+    grids, makers = late("softstart.sweeping.grid"), late("softstart.sweeping.maker")
+    summaries, views = late("softstart.sweeping.summary"), late("softstart.views.sweeps")
 
 RESULTS = "sweep.zarr"
 AT_MOST = 4.0  # times a second, that the line of progress changes
@@ -149,9 +152,9 @@ def sweep(
         results, last = _computed(one, controller, values, axes, asked, to)
 
         with working("summing up ..."):
-            summary = summarise(results)
+            summary = summaries.summarise(results)
             if folder is not None:
-                write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
+                views.write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
 
     if as_json:
         print_json(
@@ -159,16 +162,16 @@ def sweep(
                 "drive": one.name,
                 "fitted_to": asked["fitted_to"].name if asked["fitted_to"] else None,
                 "controller": controller,
-                "axes": axis_summary(results),
+                "axes": views.axis_summary(results),
                 **summary.summary(),
-                "cells": list(cell_rows(results)) if summary.starts <= MOST_SHOWN else None,
+                "cells": list(views.cell_rows(results)) if summary.starts <= views.MOST_SHOWN else None,
                 "seconds": time.monotonic() - begin,
                 "computed": last.done - last.before if last else 0,
                 "results": None if to is None else str(to),
             }
         )
         return
-    show(console(), one, asked["fitted_to"], results, summary, last)
+    views.show(console(), one, asked["fitted_to"], results, summary, last)
     if out is not None:
         print(f"\nWritten to {out}: {RESULTS}, report.md, the figure and the tables.")
 
@@ -183,7 +186,7 @@ def _computed(
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
     with working("starting the first drive ...") as status, Attributed():
-        grid = read_axes(axes, Maker(controller or "", values))
+        grid = read_axes(axes, makers.Maker(controller or "", values))
         last: Progress | None = None
         shown = 0.0
 
@@ -194,7 +197,9 @@ def _computed(
                 shown = time.monotonic()
                 status.update(f"{now} ...")
 
-        return compute(drive, controller, grid, parameters=values, to=to, progress=progress, **asked), last
+        return softstart.sweep(
+            drive, controller, grid, parameters=values, to=to, progress=progress, **asked
+        ), last
 
 
 @contextmanager
@@ -237,7 +242,7 @@ def as_option(sentence: str) -> str:
 MOST_VALUES = 1_000_000  # of a range
 
 
-def read_axes(texts: Sequence[str], maker: Maker) -> dict[str, Any]:
+def read_axes(texts: Sequence[str], maker: makers.Maker) -> dict[str, Any]:
     """The grid of several --axis; all mistakes at once.
 
     >>> from softstart.sweeping.maker import Maker
@@ -273,9 +278,9 @@ def read_axes(texts: Sequence[str], maker: Maker) -> dict[str, Any]:
     return grid
 
 
-def _parameters(split: dict[str, str], maker: Maker, mistakes: Mistakes) -> Parameters | None:
+def _parameters(split: dict[str, str], maker: makers.Maker, mistakes: Mistakes) -> makers.Parameters | None:
     """Those that the controllers have, None if these are wrong."""
-    found: Parameters | None = None
+    found: makers.Parameters | None = None
     with mistakes.noted():
         if "controller" in split:
             names = _listed(split["controller"])
@@ -287,14 +292,14 @@ def _parameters(split: dict[str, str], maker: Maker, mistakes: Mistakes) -> Para
     return found
 
 
-def _read(key: str, text: str, parameters: Parameters | None) -> tuple[str, Any]:
+def _read(key: str, text: str, parameters: makers.Parameters | None) -> tuple[str, Any]:
 
     parts = [part.strip() for part in text.split(":")]
     is_range = len(parts) in (3, 4) and key != "controller" and not any(".py" in part for part in parts)
     if not is_range:
-        column = read_column(key, _listed(text), parameters)
+        column = grids.read_column(key, _listed(text), parameters)
         return column.name, column.values
-    column = read_column(key, parts[:2], parameters)
+    column = grids.read_column(key, parts[:2], parameters)
     if not column.numeric:
         raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
     return column.name, _spaced(key, text, parts, *column.values.tolist())

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import softstart
 from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.options import (
     DEFAULT_DRIVE,
@@ -30,15 +31,17 @@ from softstart.cli.options import (
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, SimulationError
+from softstart.late import late
 from softstart.quantities import to_si
-from softstart.tuning.solving import tune as compute
 from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import console, print_json
-from softstart.views.tuning import any_in_time, show, write_tuning
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
     from softstart.tuning.outcome import Tuning
+    from softstart.views import tuning as views
+else:  # no numba for a help, a wrong option or the Tab key
+    views = late("softstart.views.tuning")
 
 STATE = "tuning.jsonl"
 QUESTIONS = ("schedule", "robust")
@@ -161,15 +164,15 @@ def tune(
         tuning = _computed(one, controller, state, asked)
         if folder is not None:
             with working("drawing the figures ..."):
-                write_tuning(tuning, folder, command_line())
+                views.write_tuning(tuning, folder, command_line())
 
     if as_json:
         print_json(tuning.summary())
     else:
-        show(console(), tuning)
+        views.show(console(), tuning)
         if out is not None:
             print(f"\nWritten to {out}: report.md, the gains, figures, tables and the finished parts.")
-    if not any_in_time(tuning):
+    if not views.any_in_time(tuning):
         raise SimulationError(
             f"No gains within these ranges start in time ({tuning.question.bound.text()}); allow more time "
             "with --start-time, or wider ranges with --free."
@@ -186,7 +189,7 @@ def _computed(drive: Drive, controller: str, state: Path | None, asked: dict[str
                 status.update(f"{doing} ...")
 
         with Attributed(), named_as_options():
-            return compute(drive, controller, save_to=state, progress=progress, **asked)
+            return softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
 
 
 def _whole(name: str, text: str | None) -> dict[str, int]:
