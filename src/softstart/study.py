@@ -128,6 +128,13 @@ class Study(ABC):
     title: ClassVar[str] = ""
     pictures: ClassVar[tuple[str, ...]] = ()
 
+    @classmethod
+    def result(
+        cls, tables: Sequence[Table], claims: Sequence[Claim], figures: Sequence[Figure]
+    ) -> StudyResult:
+        """The result, with the figures in the order of `pictures`."""
+        return StudyResult(tables, claims, dict(zip(cls.pictures, figures, strict=True)))
+
     @abstractmethod
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """Do the study; tell `progress` what is being done.

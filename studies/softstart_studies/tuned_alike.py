@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -20,7 +21,9 @@ from softstart.study import Progress
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
 from softstart.tuning.solving import tune
+from softstart.views.drawing import new_figure
 
+ACROSS = 3  # panels
 TARGET = 60.0  # rad/s
 LAG = 0.002  # s, of the torque of an inverter
 # [G]: J1 = 0.035 kg m2, Ms = 62 N m, Mc = 7.16 N m; encoder of 4096 lines; the lag is assumed
@@ -91,3 +94,23 @@ def front(drive: Drive, times: Sequence[float], points: int) -> Front:
             continue
     solved = np.array(found).reshape(-1, 2)
     return Front(solved[:, 0], solved[:, 1])
+
+
+def rounded(value: Any, digits: int = 3) -> float | None:
+    """A number for a table; None where there is none.
+
+    >>> rounded(1.23456), rounded(float("nan"))
+    (1.235, None)
+    """
+    return round(float(value), digits) if np.isfinite(value) else None
+
+
+def panel_grid(count: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
+    """A figure with `count` panels of this size (inches), three across, and its axes by row and column."""
+    rows = math.ceil(count / ACROSS)
+    figure, axes = new_figure(
+        rows, ACROSS, (size[0] * ACROSS, 0.6 + size[1] * rows), squeeze=False, **options
+    )
+    for unused in axes.flat[count:]:
+        unused.set_axis_off()
+    return figure, axes

@@ -97,7 +97,7 @@ def present(found: Found, progress: Progress) -> StudyResult:
         worth_figure(found.sensed[0].worth),
         pictures.smooth_figure(found.prices),
     )
-    return StudyResult(
+    return OptimalStarts.result(
         tables=(
             limits.table(found.fronts),
             profiles.table(found.profiles),
@@ -109,5 +109,5 @@ def present(found: Found, progress: Progress) -> StudyResult:
             kinds.table(found.kinds, found.profiles),
         ),
         claims=claims,
-        figures=dict(zip(OptimalStarts.pictures, drawn, strict=True)),
+        figures=drawn,
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
+from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
 from softstart_studies.paper_b import convergence, over_speed, pictures, printed, sensitivity, verdicts
 from softstart_studies.paper_b.vaz import VAZ, balanced
@@ -38,8 +39,6 @@ class PaperB(Study):
         progress("balancing the engine over its speeds")
         found = balanced()
         if out is not None:
-            from softstart.input.files import write_whole
-
             write_whole(out / "vaz-11113.toml", lambda stream: stream.write(VAZ.to_toml()))
         progress("varying what is assumed")
         tables = (
@@ -61,4 +60,4 @@ class PaperB(Study):
             drawn["residual"],
             drawn["forces"],
         )
-        return StudyResult(tables, claims, dict(zip(self.pictures, figures, strict=True)))
+        return self.result(tables, claims, figures)

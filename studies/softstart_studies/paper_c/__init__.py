@@ -49,7 +49,7 @@ class PaperC(Study):
             ),
             front_figure(found, IN_KGF),
         )  # fmt: skip
-        return StudyResult(
+        return self.result(
             tables=(
                 printed.comparison_table(runs),
                 printed.behind_table(runs),
@@ -60,5 +60,5 @@ class PaperC(Study):
                 checked,
             ),
             claims=verdicts.claims(runs, search, several, found),
-            figures=dict(zip(self.pictures, drawn, strict=True)),
+            figures=drawn,
         )

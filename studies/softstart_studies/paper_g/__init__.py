@@ -80,7 +80,7 @@ class PaperG(Study):
             pictures.frequency_figure(sweeps),
             pictures.invariance_figure(spreads),
         )
-        return StudyResult(
+        return self.result(
             tables=(
                 curves.worked_table(),
                 curves.agreement_table(figures),
@@ -99,7 +99,7 @@ class PaperG(Study):
                 *frequency.claims(sweeps),
                 *invariance.claims(spreads),
             ),
-            figures=dict(zip(self.pictures, drawn, strict=True)),
+            figures=drawn,
         )
 
 

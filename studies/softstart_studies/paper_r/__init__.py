@@ -62,4 +62,4 @@ class PaperR(Study):
             pictures.locking_figure(),
         )
         shown = (tables.recomputed_table(), four_to_two.map_table(), *of_free, *of_locked)
-        return StudyResult(shown, claims, dict(zip(self.pictures, figures, strict=True)))
+        return self.result(shown, claims, figures)

@@ -49,7 +49,7 @@ def present(extent: Extent, progress: Progress) -> StudyResult:
         pictures.ratios_figure(grids),
         pictures.tolerances_figure(cases),
     )
-    return StudyResult(
+    return PulseCoastHoldStudy.result(
         tables=(
             *(cells.table(kind, found) for kind, found in grids.items()),
             prices.table(steps),
@@ -61,5 +61,5 @@ def present(extent: Extent, progress: Progress) -> StudyResult:
             verdicts.of_tolerances(cases),
             verdicts.of_rivals(others),
         ),
-        figures=dict(zip(PulseCoastHoldStudy.pictures, drawn, strict=True)),
+        figures=drawn,
     )
