@@ -26,39 +26,72 @@ Kind = Literal["quantity", "text", "object"]
 class Sensor(IntFlag):
     """What a controller may see beyond time, encoder and motor torque; it must declare it.
 
+    Attributes
+    ----------
+    NONE : nothing more.
+    STAGE : number of the stage, and to be asked at each closing and opening of the gap.
+    SHAFT_TORQUE : torque of the shaft.
+    LOAD_SPEED : speed of the load.
+
+    Examples
+    --------
     >>> Sensor.STAGE | Sensor.LOAD_SPEED
     <Sensor.STAGE|LOAD_SPEED: 5>
     """
 
     NONE = 0
-    STAGE = SEES_STAGE  # number of the stage, and to be asked at each closing and opening of the gap
+    STAGE = SEES_STAGE
     SHAFT_TORQUE = SEES_SHAFT_TORQUE
     LOAD_SPEED = SEES_LOAD_SPEED
 
 
 class Measured(NamedTuple):
-    """What is measured at the instant of asking. What the controller has not declared is NaN."""
+    """What is measured at the instant of asking. What the controller has not declared is NaN.
 
-    time: float  # s since the start
-    motor_angle: float  # rad, rounded to the encoder's counts
-    motor_speed: float  # rad/s, difference of encoder angles since the last asking
-    motor_torque: float  # N m, the realised torque, after limits, slew and lag
-    stage: float  # 1, 2, ... as in [G]: odd gap open, even gap closed
-    shaft_torque: float  # N m
-    load_speed: float  # rad/s
+    Parameters
+    ----------
+    time : s since the start.
+    motor_angle : rad, rounded to the counts of the encoder.
+    motor_speed : rad/s, difference of the encoder angles since the last asking.
+    motor_torque : N m, the realised torque, after limits, slew limiter and lag.
+    stage : 1, 2, ... as in [G]: odd with the gap open, even with the gap closed. Needs `Sensor.STAGE`.
+    shaft_torque : N m. Needs `Sensor.SHAFT_TORQUE`.
+    load_speed : rad/s. Needs `Sensor.LOAD_SPEED`.
+
+    Examples
+    --------
+    >>> Measured(0.1, 0.25, 12.0, 62.0, math.nan, math.nan, math.nan).motor_speed
+    12.0
+    """
+
+    time: float
+    motor_angle: float
+    motor_speed: float
+    motor_torque: float
+    stage: float
+    shaft_torque: float
+    load_speed: float
 
 
 NEVER = -math.inf  # as `ask_again`: not at gap events either, the torque stays as it is
 
 
 class Command(NamedTuple):
-    """A controller's answer: torque demand (N m), when to be asked again (s), new state, slope (N m/s).
+    """A controller's answer.
 
-    `ask_again` is an instant later than now. Infinity is none: then a controller that sees the stage is
-    still asked at each gap event, unless it says NEVER. The demand is `torque` now and changes at `slope`
-    until asked again; a slope needs an `ask_again`, where its line ends within the limits of the drive: both
-    ends of a line beyond them are clipped.
+    The demand is `torque` now and changes at `slope` until the controller is asked again.
 
+    Parameters
+    ----------
+    torque : torque demand, N m.
+    ask_again : when to be asked again, s, an instant later than now. Infinity is none: then a controller that
+        sees the stage is still asked at each gap event, unless it says NEVER.
+    state : the new state, handed to the next step.
+    slope : rate of the demand, N m/s. It needs an `ask_again`, where its line ends within the limits of the
+        drive: both ends of a line beyond them are clipped.
+
+    Examples
+    --------
     >>> Command(62.0)
     Command(torque=62.0, ask_again=inf, state=(), slope=0.0)
     """
@@ -99,13 +132,31 @@ def parameter(
 
 @dataclass(frozen=True)
 class Controller:
-    """A strategy for the start. Subclass `PlainController` or `CompiledController`."""
+    """A strategy for the start. Subclass `PlainController` or `CompiledController`.
+
+    A subclass is a frozen dataclass; its fields are its parameters.
+
+    Attributes
+    ----------
+    name : under which it is found.
+    summary : one line, what it does.
+    source : where it comes from.
+    sensors : what it may see beyond time, encoder and motor torque.
+    needs : parameters of which one must be given, as no drive implies it.
+
+    Examples
+    --------
+    >>> from softstart.controller import make_controller
+    >>> ramp = make_controller("ramp", {"time": "120 ms"})
+    >>> ramp.parameters["time"], ramp.fitted(Drive.load("crane-4amtkf")).parameters["full_torque"]
+    (0.12, 62.0)
+    """
 
     name: ClassVar[str] = ""
-    summary: ClassVar[str] = ""  # one line: what it does
-    source: ClassVar[str] = ""  # where it comes from
+    summary: ClassVar[str] = ""
+    source: ClassVar[str] = ""
     sensors: ClassVar[Sensor] = Sensor.NONE
-    needs: ClassVar[tuple[str, ...]] = ()  # parameters of which one must be given: no drive implies it
+    needs: ClassVar[tuple[str, ...]] = ()
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Values of the parameters that were not given, derived from the drive (never from the answer)."""
@@ -135,8 +186,14 @@ class Controller:
 
 @dataclass(frozen=True)
 class PlainController(Controller, ABC):
-    """A controller in plain Python: needs no numba, is slower.
+    """A controller in plain Python: needs no numba, is slower. A subclass defines `step`.
 
+    Attributes
+    ----------
+    initial_state : the state handed to the first step.
+
+    Examples
+    --------
     >>> class Half(PlainController):
     ...     name = "half"
     ...     def step(self, measured, state):
@@ -147,7 +204,17 @@ class PlainController(Controller, ABC):
 
     @abstractmethod
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
-        """The answer to what is measured now; `state` is what the last answer returned."""
+        """One control instant.
+
+        Parameters
+        ----------
+        measured : what is measured now.
+        state : what the last answer returned, `initial_state` at first.
+
+        Returns
+        -------
+        The answer.
+        """
 
 
 @dataclass(frozen=True)
@@ -157,6 +224,18 @@ class CompiledController(Controller, ABC):
     All four are float64 vectors: `parameters` is `vector(drive)`, `measured` holds the fields of
     `Measured` in order, `state` the last state (zeros at first), and `command` receives torque, ask_again,
     slope and the new state. See `softstart.controller.compiled_step`.
+
+    Attributes
+    ----------
+    kernel : the step, compiled by `compiled_step`.
+    state_size : how many numbers the state has.
+
+    Examples
+    --------
+    >>> from softstart.controller import make_controller
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> make_controller("direct").fitted(crane).vector(crane).tolist()
+    [62.0]
     """
 
     kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]
@@ -164,7 +243,12 @@ class CompiledController(Controller, ABC):
 
     @abstractmethod
     def vector(self, drive: Drive) -> Vector:
-        """The numbers the kernel needs, shape drive.shape + (n,); called on a fitted controller."""
+        """The numbers the kernel needs; called on a fitted controller.
+
+        Returns
+        -------
+        Shape drive.shape + (n,), in SI units.
+        """
 
     def as_plain(self, drive: Drive) -> PlainController:
         """Its twin in plain Python, step by step the same numbers."""

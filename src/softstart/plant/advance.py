@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from softstart.plant.crossing import load_speed
-from softstart.plant.jit import inlined
+from softstart.plant.jit import inlined, merged
 from softstart.plant.layout import (
     ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT, UNSOLVED,
     Matrix, Motion, Plant, Septuple, State,
@@ -80,7 +80,7 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
     x.time += s
 
 
-@inlined
+@merged
 def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, stages: Matrix) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way.
 

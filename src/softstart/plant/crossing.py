@@ -24,7 +24,7 @@ NO_CROSSING = -1.0
 LOST = -2.0  # the iteration did not end: reported as an error, never passed over
 
 # how f behaves at the start: f > 0; f = 0 and about to rise, because its event has just been handled
-WATCH, RISING = 0, 1
+WATCH, RISING = 0.0, 1.0  # floats: numba would compile the search anew for a literal integer
 
 ROUNDING = 4.0 * 2.220446049250313e-16
 MAX_STEPS = 20_000
@@ -97,7 +97,7 @@ def load_speed(m: Motion, load: Septuple, s: float, v: float) -> float:
 @compiled
 def first_crossing(
     m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
-    load: Septuple, start: int, begin: float, end: float,
+    load: Septuple, start: float, begin: float, end: float,
 ) -> float:  # fmt: skip
     """First s in [begin, end] at which f falls through zero, or NO_CROSSING."""
     s = begin

@@ -16,6 +16,8 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 
 compiled: Any = _njit(**OPTIONS)
 inlined: Any = _njit(**OPTIONS, forceinline=True)  # small and called from one or two places
+# large and called from one place: merged before compilation, where `inlined` compiles it by itself as well
+merged: Any = _njit(**OPTIONS, inline="always")
 
 
 def compiled_as(signature: object, cache: bool = True) -> Any:

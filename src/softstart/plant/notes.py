@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.plant.crossing import RISING, first_crossing
+from softstart.plant.crossing import RISING, WATCH, first_crossing
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     ASK, EVENT, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
@@ -57,7 +57,7 @@ def note_peak(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> int:
         if begin > 0.0:  # an extreme: T' changes sign here
             slope = k * a + dd * jerk
         sign = 1.0 if slope > 0.0 or (slope == 0.0 and k * a + dd * jerk > 0.0) else -1.0
-        start = RISING if begin > 0.0 else 0
+        start = RISING if begin > 0.0 else WATCH
         at = first_crossing(m, 0.0, 0.0, sign * k, sign * dd, 0.0, load, start, begin, s)
         if at < -1.0:
             return NOT_LOCATED

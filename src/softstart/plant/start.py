@@ -10,7 +10,7 @@ from numba import types
 
 from softstart.plant.advance import advance as go_on
 from softstart.plant.advance import take_demand
-from softstart.plant.jit import compiled, compiled_as, inlined
+from softstart.plant.jit import compiled, compiled_as, inlined, merged
 from softstart.plant.layout import (
     ANSWER, ASK, BAD_COMMAND, DEAD_ZONE, MEASURED, MOST_PENDING, MOTION, N_P, N_X, PLANT,
     QUEUE_FULL, STATE, Matrix, Motion, Plant, State, Vector, size,
@@ -135,7 +135,7 @@ def take_answer(p: Plant, x: State, m: Motion, torque: float, ask_again: float, 
     return ASK
 
 
-@compiled
+@merged
 def until_full(step, p, parameters, sees, x, m, measured, state, command, segments, events, stages):  # type: ignore[no-untyped-def]
     """One start to its end, or until a buffer is full: call again with larger ones."""
     answer = command[:NEW_STATE].view(ANSWER)[0]
