@@ -10,7 +10,6 @@ import click
 
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
-from softstart.chain.reduction import Reduction, reduce_chain
 from softstart.cli.commands import Command
 from softstart.cli.completion import Keys, names_or_files, table_keys
 from softstart.cli.completion import settings as settings_of
@@ -29,8 +28,6 @@ from softstart.cli.options import (
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.views import chains as views
-from softstart.views.chain_schemes import scheme_svg
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
     command_run,
@@ -43,10 +40,14 @@ from softstart.views.markdown import (
 from softstart.views.terminal import console, print_json, print_tables, sentence
 
 if TYPE_CHECKING:
-    from softstart.chain import simulation
+    from softstart.chain import reduction, simulation
+    from softstart.chain.reduction import Reduction
     from softstart.chain.simulation import Verification
-else:
-    simulation = late("softstart.chain.simulation")  # compiles its kernel: only needed with --verify
+    from softstart.views import chain_schemes
+    from softstart.views import chains as views
+else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
+    reduction, simulation = late("softstart.chain.reduction"), late("softstart.chain.simulation")
+    chain_schemes, views = late("softstart.views.chain_schemes"), late("softstart.views.chains")
 
 DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")
@@ -195,8 +196,8 @@ def _write(
 ) -> None:
     """Scheme, figures, tables, the chain with all changes, what came out, and the report that ties them."""
     vibration = found.whole_vibration
-    write_text(folder / "scheme.svg", scheme_svg(found.chain))
-    write_text(folder / "reduced-scheme.svg", scheme_svg(found.reduced))
+    write_text(folder / "scheme.svg", chain_schemes.scheme_svg(found.chain))
+    write_text(folder / "reduced-scheme.svg", chain_schemes.scheme_svg(found.reduced))
     pictures = {"shapes": vibration.plot()}
     if any(step.ratio != float("inf") for step in found.steps):
         pictures["reduction"] = found.plot()
@@ -269,7 +270,7 @@ def check(found: Reduction, names: Sequence[str] | None) -> None:
 def reduced(chain: Chain, asked: dict[str, Any]) -> Reduction:
     """The reduction asked for; keywords in sentences as options."""
     try:
-        return reduce_chain(chain, **asked)
+        return reduction.reduce_chain(chain, **asked)
     except InputError as error:
         said = error.sentences
         for keyword, option in (
@@ -291,7 +292,7 @@ def beside_it(found: Reduction) -> Reduction | None:
         return None
     other = "modal" if found.method == "lever" else "lever"
     try:
-        return reduce_chain(found.chain, 2, method=other, force=True)  # type: ignore[arg-type]
+        return reduction.reduce_chain(found.chain, 2, method=other, force=True)  # type: ignore[arg-type]
     except InputError:
         return None
 
