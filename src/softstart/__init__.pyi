@@ -31,7 +31,7 @@ from softstart.optimal.problem import Problem as Problem
 from softstart.optimal.result import InfeasibleError as InfeasibleError
 from softstart.optimal.result import Optimum as Optimum
 from softstart.optimal.result import OptimumError as OptimumError
-from softstart.optimal.robust import RobustOptimum as RobustOptimum
+from softstart.optimal.result import RobustOptimum as RobustOptimum
 from softstart.optimal.robust import optimize_robust as optimize_robust
 from softstart.optimal.robust import worth_of_contact_sensor as worth_of_contact_sensor
 from softstart.optimal.solving import optimize as optimize

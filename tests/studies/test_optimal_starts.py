@@ -10,7 +10,7 @@ import pytest
 
 from softstart import TorqueProfile
 from softstart.optimal.exact import replay
-from softstart.optimal.robust import RobustOptimum, SensorWorth
+from softstart.optimal.result import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
 from softstart.start.metrics import base_torque
 from softstart.study import Verdict, find_study

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
     from softstart import controller
     from softstart.optimal import robust, shortest
-    from softstart.optimal.result import Optimum
+    from softstart.optimal.result import Optimum, SensorWorth
     from softstart.start.run import Run
     from softstart.views import optima as views
 else:  # no numba for a help, a wrong option or the Tab key
@@ -179,7 +179,10 @@ def _weight(text: str) -> float:
 
 def _missing(bounds: Mapping[str, Any]) -> str:
     aim = views.AIMS[bounds.get("minimise", "k_dyn")]
-    return f"--start-time is missing: without it the start with the least {aim} would take for ever; give one"
+    return (
+        f"--start-time is missing: without it the start with the least {aim} would take indefinitely long; "
+        "give one"
+    )
 
 
 def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
@@ -268,7 +271,7 @@ def _optimize_for_all(
             print(f"\nWritten to {out}: report.md, both profiles, the figure and traces.")
 
 
-def _show_worth(to: Console, worth: robust.SensorWorth) -> None:
+def _show_worth(to: Console, worth: SensorWorth) -> None:
     blind = worth.blind
     print_lines(to, drive_lines(blind.base))
     sentence(to, f"  asked  {views.robust_question(blind)}")

@@ -187,7 +187,7 @@ def check(
     *,
     tolerance: float = 1e-3,
 ) -> Run:
-    """Run a profile on the exact plant to one elastic period after `end_time`, and hold it to its promises.
+    """Run a profile on the exact plant to one elastic period after `end_time`; compare it with the claims.
 
     `end_time` is t_f in s, `claimed` the value of what is minimised as the method computed it, `tolerance`
     how far, relatively, the exact figures may be from it and above bounds. Returns the run; raises
@@ -222,17 +222,11 @@ def check(
 def _demand(problem: Problem, profile: TorqueProfile, name: str = "demand") -> Iterator[str]:
     """A straight line is extreme at its ends."""
     low, high = problem.lowest_torque, problem.highest_torque
-    allowed = ROUNDING * max(abs(low), abs(high))
-    for i, limit, beyond in (
-        (int(np.argmax(profile.torque)), high, "above the highest"),
-        (int(np.argmin(profile.torque)), low, "below the lowest"),
-    ):
-        torque = float(profile.torque[i])
-        if (torque - limit if limit == high else limit - torque) > allowed:
-            yield (
-                f"The {name} is {torque:.6g} N m at {profile.time[i]:.6g} s, {beyond} motor torque of "
-                f"{limit:.6g} N m."
-            )
+    for torque, i, limit, beyond in _beyond(profile.torque, low, high):
+        yield (
+            f"The {name} is {torque:.6g} N m at {profile.time[i]:.6g} s, {beyond} motor torque of "
+            f"{limit:.6g} N m."
+        )
     if profile.after_contact is not None:
         yield from _demand(problem, profile.after_contact, "demand after contact")
 
@@ -250,18 +244,23 @@ def _realised(problem: Problem, run: Run) -> Iterator[str]:
         turns[bent] = lag * np.log(ue[bent] / (ub[bent] * lag))
     s = np.stack([np.zeros_like(length), length, np.clip(turns, 0.0, length)])
     u = ua + ub * s + (ue * np.exp(-s / lag) if lag > 0.0 else 0.0)
-    allowed = ROUNDING * max(abs(low), abs(high))
-    for i, limit, beyond in (
-        (int(np.argmax(u)), high, "above the highest"),
-        (int(np.argmin(u)), low, "below the lowest"),
-    ):
+    for torque, i, limit, beyond in _beyond(u.ravel(), low, high):
         row, span = np.unravel_index(i, u.shape)
-        torque = float(u[row, span])
-        if (torque - limit if limit == high else limit - torque) > allowed:
-            yield (
-                f"The motor torque is {torque:.6g} N m at {start[span] + s[row, span]:.6g} s, {beyond} of "
-                f"{limit:.6g} N m."
-            )
+        yield (
+            f"The motor torque is {torque:.6g} N m at {start[span] + s[row, span]:.6g} s, {beyond} of "
+            f"{limit:.6g} N m."
+        )
+
+
+def _beyond(torques: Vector, low: float, high: float) -> Iterator[tuple[float, int, float, str]]:
+    """Largest and least of some torques where they exceed a limit: torque, index, limit, on which side."""
+    allowed = ROUNDING * max(abs(low), abs(high))
+    for i, limit, sign, beyond in (
+        (int(np.argmax(torques)), high, 1.0, "above the highest"),
+        (int(np.argmin(torques)), low, -1.0, "below the lowest"),
+    ):
+        if sign * (float(torques[i]) - limit) > allowed:
+            yield float(torques[i]), i, limit, beyond
 
 
 def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:

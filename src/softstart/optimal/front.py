@@ -41,8 +41,8 @@ class FrontPoint:
     """The least K_dyn for one bound on the start time, or why there is none. Times in s.
 
     `status` is OPTIMAL, INFEASIBLE (no start is that quick; `shortest_start_time` would do) or NOT_FOUND (the
-    method gave up; `status_text` says why). What there is not is None. `time` and `torque` are the knots of
-    the profile, s and N m.
+    method failed; `status_text` has the reason). Missing values are None. `time` and `torque` are the knots
+    of the profile, s and N m.
 
     >>> point = FrontPoint(0.3, "reached", "OPTIMAL", "", k_dyn=1.01, k_dyn_lower_bound=1.0)
     >>> point.found, round(point.gap_percent, 6), FrontPoint.of_record(point.record()) == point
@@ -82,12 +82,12 @@ class FrontPoint:
     @classmethod
     def of_optimum(cls, best: Optimum, start_time: float) -> FrontPoint:
         """The point of an optimum for this bound on the start time."""
-        told = best.summary()
+        figures = best.summary()
         names = ("terminal", "k_dyn", "k_dyn_lower_bound", "bound_kind", "bound_covers", "start_time", "heat",
                  "contacts", "method", "why", "seconds")  # fmt: skip
         return cls(
             start_time, status="OPTIMAL", status_text="", time=tuple(best.profile.time.tolist()),
-            torque=tuple(best.profile.torque.tolist()), **{name: told[name] for name in names},
+            torque=tuple(best.profile.torque.tolist()), **{name: figures[name] for name in names},
         )  # fmt: skip
 
     @classmethod
@@ -99,15 +99,15 @@ class FrontPoint:
 
     @classmethod
     def not_found(cls, why: str, start_time: float, terminal: str) -> FrontPoint:
-        """The point of a start time for which the method gave up."""
+        """The point of a start time for which the method failed."""
         return cls(start_time, terminal, "NOT_FOUND", why)
 
     def for_shorter(self, start_time: float) -> FrontPoint:
         """The point of a start time shorter than this one, where this one is infeasible already."""
         shortest = self.shortest_start_time
         least = f"; the shortest is {shortest:.6g} s" if shortest is not None else ""
-        said = f"No start whose gap closes only once takes {start_time:.6g} s ({self.terminal}){least}."
-        return replace(self, start_time_bound=start_time, status_text=said)
+        reason = f"No start whose gap closes only once takes {start_time:.6g} s ({self.terminal}){least}."
+        return replace(self, start_time_bound=start_time, status_text=reason)
 
     def summary(self) -> dict[str, Any]:
         """The figures under the names used everywhere."""
@@ -162,17 +162,29 @@ class ControllerPoint:
         }
 
 
-def label_of(controller: Controller) -> str:
-    """The controller's name, or that of its class."""
-    return controller.name or type(controller).__name__
-
-
 @dataclass(frozen=True, eq=False)
 class Front:
     """The least K_dyn for each bound on the start time, and the controllers against that limit.
 
-    `points` in order of start time; `controllers` each with its own start time and K_dyn and the optimum at
-    just that start time with terminal `reached`.
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    terminal : {"synchronous", "steady", "reached"}
+        What holds at the end of each optimal start.
+    points : tuple of FrontPoint
+        The optima, in order of start time.
+    controllers : tuple of ControllerPoint
+        Each with its own start time and K_dyn, and the optimum at just that start time with terminal
+        `reached`.
+
+    Examples
+    --------
+    >>> from softstart import Drive, pareto
+    >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
+    >>> front = pareto(crane, [0.2883042], terminal="synchronous", controllers=[])
+    >>> [round(point.k_dyn, 4) for point in front.points], front.shortest_start_time
+    ([0.9092], nan)
     """
 
     drive: Drive
@@ -244,33 +256,59 @@ def pareto(
     workers: int = 1,
     scheduler: str | None = None,
 ) -> Front:
-    """The least K_dyn for each of several bounds on the start time, with its lower bound.
-
-    Parameters
-    ----------
-    drive : the drive.
-    start_times : bounds on the start time in s; by default `default_start_times(drive, terminal)`.
-    terminal, method, torque_speed, smoothness, base : as in `optimize`.
-    controllers : names or Controller objects to put beside the curve; by default all installed ones that run
-        without being given a parameter, none for an empty list. Each is simulated, and judged by the optimum
-        at its own start time with terminal `reached`: the fair yardstick.
-    save_to : a file in which each finished point is kept at once. A second call with the same inputs takes
-        them from there; other inputs are refused.
-    progress : told, before each point that is computed, what is being done.
-    each : given each point at once, also those of the controllers' own start times.
-    workers : processes of this machine; by default all is computed in this one.
-    scheduler : address of a dask scheduler whose workers compute instead.
+    """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
     The sweep goes from long start times to short ones. An optimum by collocation starts from the one before,
     so such points are computed one after another; all others at once. The results do not depend on who
-    computes them. Start times too short for any start are marked infeasible, no error. Raises InputError, and
-    OptimumError if not a single point could be computed.
+    computes them. Start times too short for any start are marked infeasible, no error.
 
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    start_times : sequence of float, optional
+        Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
+    terminal, method, torque_speed, smoothness, base
+        As in `optimize`.
+    controllers : sequence of str or Controller, optional
+        What to put beside the curve; by default all installed controllers that run without being given a
+        parameter, none for an empty list. Each is simulated, and judged by the optimum at its own start time
+        with terminal `reached`: the fair yardstick.
+    save_to : str or path, optional
+        A file in which each finished point is kept at once. A second call with the same inputs takes them
+        from there; other inputs are refused.
+    progress : callable, optional
+        Called with a text before each point that is computed.
+    each : callable, optional
+        Called with each point at once, also with those of the controllers' own start times.
+    workers : int
+        Processes of this machine; by default all is computed in this one.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers compute instead.
+
+    Returns
+    -------
+    Front
+        The curve and the controllers beside it.
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    OptimumError
+        If not a single point could be computed.
+
+    Examples
+    --------
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
     >>> front = pareto(crane, [0.2, 0.2883042], terminal="synchronous", controllers=[])
     >>> [point.status for point in front.points], round(front.points[1].k_dyn, 6)
     (['INFEASIBLE', 'OPTIMAL'], 0.909247)
+
+    References
+    ----------
+    docs/optimal-starts.md; each point: `optimize`.
     """
     Problem(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
     times = None if start_times is None else _checked(start_times)
@@ -352,7 +390,7 @@ def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
             return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
         except (OptimumError, NotConverged) as error:
             why = str(error)
-            continue  # where the last optimum led astray, it is tried without
+            continue  # where the warm start failed, it is tried without
         return FrontPoint.of_optimum(best, start_time), best.warm
     return FrontPoint.not_found(why, start_time, terminal), None
 
@@ -442,7 +480,7 @@ class _Chain:
 
 def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:
     return ControllerPoint(
-        label_of(run.controller), run.k_dyn, run.start_time, run.status.value,
+        run.controller.name or type(run.controller).__name__, run.k_dyn, run.start_time, run.status.value,
         None if math.isnan(run.start_time) else found[YARDSTICK, run.start_time],
     )  # fmt: skip
 

@@ -25,7 +25,7 @@ than the quarter period that this takes).
 Two sharper forms, where the twist cannot fall first and the load is active:
 
 - undamped: T is at no instant above that of pulse, coast, hold with the same peak P (pulse_coast_hold.py,
-  where the proof stands), and the hold is granted whether or not Ms suffices;
+  where the proof stands), and the hold is taken as possible whether or not Ms suffices;
 - damped (`no-pull`, `dead-zone`): no torque of 0 or more makes T(s) lower than coasting does, up to the
   first zero of c h + d h' after the contact (the answer of T to an impulse is not negative so long, so that
   T stays above 0 and the contact lasts). So the impact speed v has T_coasting(s; v) <= P for every s, which
@@ -130,11 +130,11 @@ def _gentle_contact(problem: Problem, starts: PulseCoastHold, time: float, plain
 
 def _contact_at(starts: PulseCoastHold, v: float) -> float:
     """Earliest contact in s with an impact speed of at most v: pulse, then coast."""
-    way = 0.5 * (v * v - starts.v0**2 + 2.0 * starts.pull * starts.z0) / starts.push
-    way = min(max(way, 0.0), -starts.z0)
-    t1 = fall_time(way, starts.v0, starts.push + starts.pull)
+    travel = 0.5 * (v * v - starts.v0**2 + 2.0 * starts.pull * starts.z0) / starts.push
+    travel = min(max(travel, 0.0), -starts.z0)
+    t1 = fall_time(travel, starts.v0, starts.push + starts.pull)
     v1 = starts.v0 + (starts.push + starts.pull) * t1
-    rest = -starts.z0 - way
+    rest = -starts.z0 - travel
     if rest > 0.0 and v1 == 0.0 and starts.pull == 0.0:
         return math.inf
     return t1 + fall_time(rest, v1, starts.pull)
@@ -165,20 +165,20 @@ def earliest_pull(problem: Problem) -> float:
     drive = problem.drive
     z0 = float(drive.start_position - 0.5 * drive.gap)
     v0 = float(drive.initial_motor_speed - drive.initial_load_speed)
-    way = max(-z0, 0.0)
+    travel = max(-z0, 0.0)
     if not _straight_up(problem):
         if _reactive(problem) or (drive.contact_law == "dead-zone" and drive.d > 0.0):
             return 0.0
         wound_up = drive.Omega * max(-0.5 * drive.gap - drive.start_position, 0.0)
         U = max(problem.highest_torque, -problem.lowest_torque)
         A = float(U / drive.J1 + drive.Mc / drive.J2)
-        return fall_time(way, math.hypot(v0, wound_up), A)
+        return fall_time(travel, math.hypot(v0, wound_up), A)
     at_rest = _reactive(problem) and drive.initial_load_speed == 0.0
     A = float(problem.highest_torque / drive.J1 + (0.0 if at_rest else drive.Mc / drive.J2))
-    contact = fall_time(way, v0, A)
+    contact = fall_time(travel, v0, A)
     if not at_rest or drive.d > 0.0:
         return contact
-    return contact + _winding_up(problem, max(z0, 0.0), v0 + A * contact if way > 0.0 else v0)
+    return contact + _winding_up(problem, max(z0, 0.0), v0 + A * contact if travel > 0.0 else v0)
 
 
 def _winding_up(problem: Problem, z: float, v: float) -> float:

@@ -105,19 +105,15 @@ class Problem:
                 wrong.append(f"{name} = {value!r}: give a bound above 0 (in {unit}), or leave it out.")
             else:
                 object.__setattr__(self, name, float(value))
-        if self.minimise == "start_time" and self.start_time is not None:
-            wrong.append(
-                "start_time: it is what is minimised; leave the bound out, or minimise something else."
-            )
-        elif self.minimise in ("k_dyn", "heat") and self.start_time is None:
+        if self.minimise in ("k_dyn", "heat") and self.start_time is None:
             wrong.append(
                 f"start_time: minimising {self.minimise} needs a bound on the start time, else the start may "
-                "take for ever."
+                "take indefinitely long."
             )
-        if self.minimise == "k_dyn" and self.k_dyn is not None:
-            wrong.append("k_dyn: it is what is minimised; leave the bound out, or minimise something else.")
-        if self.minimise == "heat" and self.heat is not None:
-            wrong.append("heat: it is what is minimised; leave the bound out, or minimise something else.")
+        if self.minimise in OBJECTIVES and getattr(self, self.minimise) is not None:
+            wrong.append(
+                f"{self.minimise}: it is what is minimised; leave the bound out, or minimise something else."
+            )
         if not _number(self.smoothness) or not 0.0 <= float(self.smoothness) < math.inf:
             wrong.append(f"smoothness = {self.smoothness!r}: a weight in s, 0 or more.")
         wrong += _check_corners(self.torque_speed)

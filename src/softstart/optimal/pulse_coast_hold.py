@@ -26,6 +26,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from scipy.optimize import brentq
+
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
 from softstart.profile import TorqueProfile
@@ -188,7 +190,6 @@ class PulseCoastHold:
         where the hold is within the limits. The load speed grows with P and stays the same only where all of
         the start is under full torque.
         """
-        from scipy.optimize import brentq
 
         def speed(P: float) -> float:
             return self.load_speed(self.course(P), time, P) - target
@@ -309,8 +310,6 @@ def solve(problem: Problem) -> Candidate:
 
 def _end(starts: PulseCoastHold, course: Course, P: float, target: float, latest: float) -> float:
     """First instant at which the load has its target speed, s."""
-    from scipy.optimize import brentq
-
     at_peak = starts.load_speed(course, course.t_peak, P)
     if at_peak <= target:
         held = (target - at_peak) * starts.J2 / (P - starts.Mc) if at_peak < target else 0.0

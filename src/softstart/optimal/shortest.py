@@ -108,7 +108,7 @@ def _by_whole_program(
 
 
 def _quickest(problem: Problem, soonest: float, speed_at: Callable[[float, int], float]) -> float:
-    """The end in s at which `speed_at(end, steps)` is the target; no end before `soonest` will do."""
+    """The end in s at which `speed_at(end, steps)` is the target; no end before `soonest` is enough."""
     if not math.isfinite(soonest):
         return math.inf
     contact = Contact.of(problem.drive)
@@ -201,7 +201,7 @@ def start_time_of_direct(drive: Drive) -> float:
 
 
 def verdict_on(problem: Problem) -> Verdict:
-    """Why the problem has no solution, which constraint is to blame, and what start time would do."""
+    """Why the problem has no solution, which constraint is the cause, and what start time would be enough."""
     assert problem.start_time is not None
     bound = problem.start_time
     shortest = shortest_start_time(problem)

@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
-from softstart.optimal.robust.evaluation import Evaluator, Matrix, ProfileParameters, Staircase
+from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase
 from softstart.start.simulation import simulate
 
 SEED = 0  # the same question has the same answer

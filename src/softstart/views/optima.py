@@ -12,8 +12,7 @@ import numpy as np
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
-from softstart.optimal.result import Optimum
-from softstart.optimal.robust import RobustOptimum, SensorWorth
+from softstart.optimal.result import Optimum, RobustOptimum, SensorWorth
 from softstart.start.run import Run
 from softstart.views.drawing import (
     COLOURS,
@@ -245,7 +244,6 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
     best.profile.to_c(folder / "profile.c")
     best.run.to_csv(folder / "trace-optimum.csv")
-    write_text(folder / "drive.toml", drive.to_toml())
     summary = {key: value for key, value in best.summary().items() if key not in ("profile", "seconds")}
     write_table(folder / "figures.csv", list(summary), [list(summary.values())])
     rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
@@ -266,11 +264,8 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "Traces of the start: [trace-optimum.csv](trace-optimum.csv).",
         "## The controllers on this drive",
         markdown_table(["strategy", "K_dyn", "start time s"], beside, numbers_from=1),
-        "## The drive",
-        drive_table(drive),
-        provenance(drive, command),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    _write_report(parts, drive, folder, command)
 
 
 # a front ----------------------------------------------------------------------------------------------------
@@ -429,7 +424,6 @@ def write_front(front: Front, folder: Path, command: str) -> None:
     """Everything about a curve over start times, but its saved state."""
     save_figure(front.plot(), folder, "pareto")
     front.to_csv(folder / "pareto.csv")
-    write_text(folder / "drive.toml", front.drive.to_toml())
     parts = [
         f"# {markdown(front.drive.name)}: least K\\_dyn against start time",
         f"Terminal {front.terminal}.",
@@ -443,11 +437,8 @@ def write_front(front: Front, folder: Path, command: str) -> None:
         *map(markdown, footnotes(front)),
         "All numbers with their digits: [pareto.csv](pareto.csv). Points with their torque profiles, from "
         "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
-        "## The drive",
-        drive_table(front.drive),
-        provenance(front.drive, command),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    _write_report(parts, front.drive, folder, command)
 
 
 # one profile for several drives -----------------------------------------------------------------------------
@@ -540,7 +531,6 @@ def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
     """Everything about one profile for several drives, without and with a contact sensor."""
     base = worth.blind.base
     save_figure(worth_figure(worth), folder, "contact-sensor")
-    write_text(folder / "drive.toml", base.to_toml())
     for stem, best in (("blind", worth.blind), ("reacting", worth.reacting)):
         best.profile.to_toml(folder / f"profile-{stem}.toml", about={"drive": base.name, "k_dyn": best.k_dyn})
         for index, run in enumerate(best.runs, start=1):
@@ -558,13 +548,17 @@ def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
         "[profile-blind.c](profile-blind.c). With one, its second part from the contact on: "
         "[profile-reacting.toml](profile-reacting.toml). Traces of each drive, in the order of the table: "
         "trace-blind-1.csv and so on.",
-        "## The drive",
-        drive_table(base),
-        provenance(base, command),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    _write_report(parts, base, folder, command)
 
 
 def _markdown(table: Table, numbers_from: int) -> str:
     headings = [" ".join(column.heading.split()) for column in table.columns]
     return markdown_table(headings, table.rows, numbers_from)
+
+
+def _write_report(parts: Sequence[str], drive: Drive, folder: Path, command: str) -> None:
+    """drive.toml, and report.md with what ends every report."""
+    write_text(folder / "drive.toml", drive.to_toml())
+    ending = ["## The drive", drive_table(drive), provenance(drive, command)]
+    write_text(folder / "report.md", "\n\n".join([*parts, *ending]) + "\n")

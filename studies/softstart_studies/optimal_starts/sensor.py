@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from softstart import Drive
-from softstart.optimal.result import InfeasibleError
-from softstart.optimal.robust import SensorWorth, scenarios_of, worth_of_contact_sensor
+from softstart.optimal.result import InfeasibleError, SensorWorth
+from softstart.optimal.robust import scenarios_of, worth_of_contact_sensor
 from softstart.optimal.solving import optimize
 from softstart.study import Claim, Progress, Table, Verdict
 from softstart_studies.optimal_starts.crane import Extent, crane, direct_time, percent, rounded

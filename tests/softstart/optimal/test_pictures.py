@@ -10,8 +10,7 @@ from softstart.controller import make_controller
 from softstart.optimal.exact import replay
 from softstart.optimal.front import ControllerPoint, Front, FrontPoint
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import LowerBound, Optimum
-from softstart.optimal.robust.solving import RobustOptimum, SensorWorth
+from softstart.optimal.result import LowerBound, Optimum, RobustOptimum, SensorWorth
 from softstart.profile import TorqueProfile
 from softstart.views.drawing import name_points, save_figure, shared
 from softstart.views.optima import front_figure, optimum_figure, worth_figure

@@ -16,8 +16,8 @@ from tests.oracle import integrate
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.optimal.result import InfeasibleError, Verdict
-from softstart.optimal.robust import RobustOptimum, SensorWorth, guesses, optimize_robust, solving
+from softstart.optimal.result import InfeasibleError, RobustOptimum, SensorWorth, Verdict
+from softstart.optimal.robust import guesses, optimize_robust, solving
 from softstart.optimal.robust.solving import reached
 from softstart.profile import TorqueProfile
 from softstart.start.metrics import base_torque

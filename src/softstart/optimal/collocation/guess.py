@@ -58,18 +58,18 @@ class Trajectory:
 
 def quickest_contact(p: Numbers) -> float:
     """Instant of the contact under full torque, roughly; 0 without a gap."""
-    way, v = max(0.0, -p.z_start), p.v_start
-    if way == 0.0 and v >= 0.0:
+    travel, v = max(0.0, -p.z_start), p.v_start
+    if travel == 0.0 and v >= 0.0:
         return 0.0
     a = p.highest / p.J1
     crossing = (
-        2.0 * way / (v + math.sqrt(v * v + 2.0 * a * way))
+        2.0 * travel / (v + math.sqrt(v * v + 2.0 * a * travel))
         if v > 0.0
-        else (math.sqrt(v * v + 2.0 * a * way) - v) / a
+        else (math.sqrt(v * v + 2.0 * a * travel) - v) / a
     )
     ramp = p.highest / p.rate
     # half of the ramp, and of the lag, are lost; a crossing wholly within the ramp goes with t^3
-    within = (6.0 * way * p.J1 / p.rate) ** (1.0 / 3.0) if p.rate < 1e20 else 0.0
+    within = (6.0 * travel * p.J1 / p.rate) ** (1.0 / 3.0) if p.rate < 1e20 else 0.0
     slow = min(crossing + 0.5 * ramp, within) if p.rate < 1e20 else crossing
     return max(crossing, slow) + min(p.lag, crossing)
 
@@ -101,8 +101,8 @@ def first_trajectory(program: Program, p: Numbers, contact: float, end: float) -
         if not phase.contact:
             continue
         if phase.load == 0 or phase.stiff:
-            way = 0.1 * p.d * v / p.c if phase.stiff else p.Mc / p.c - z
-            piece = _pressing(p, z, v, w2, max(way, 1e-6), left)
+            travel = 0.1 * p.d * v / p.c if phase.stiff else p.Mc / p.c - z
+            piece = _pressing(p, z, v, w2, max(travel, 1e-6), left)
             left -= piece.duration
             z, v = float(piece.states[-1, 0]), float(piece.states[-1, 1])
             arcs.append(piece)
@@ -129,9 +129,9 @@ def _crossing(
     """The gap, with constant relative acceleration."""
     z0, v0, w20 = start
     a2 = -phase.load * p.Mc / p.J2
-    way = (-z0 if lands else 0.25 * -z0) or 1e-6
+    travel = (-z0 if lands else 0.25 * -z0) or 1e-6
     time = max(time, 1e-6)
-    a = 2.0 * (way - v0 * time) / time**2
+    a = 2.0 * (travel - v0 * time) / time**2
     u = min(max(p.J1 * (a + a2), p.lowest), p.highest)
     pieces = []
     for k in range(phase.arcs):
@@ -139,16 +139,16 @@ def _crossing(
         w2 = w20 + a2 * t
         states = np.column_stack([z0 + v0 * t + 0.5 * a * t**2, v0 + a * t, w2, np.full(t.size, u)])
         pieces.append(ArcTrajectory(time / phase.arcs, FINE, states, ENDS, np.array([u, u])))
-    return pieces, (z0 + way, v0 + a * time, w20 + a2 * time)
+    return pieces, (z0 + travel, v0 + a * time, w20 + a2 * time)
 
 
-def _pressing(p: Numbers, z: float, v: float, w2: float, way: float, left: float) -> ArcTrajectory:
+def _pressing(p: Numbers, z: float, v: float, w2: float, travel: float, left: float) -> ArcTrajectory:
     """The first bit of a contact, until the load breaks away or the shaft softens."""
     u = 0.5 * p.highest
-    speed = math.sqrt(v * v + 2.0 * u / p.J1 * way)
-    time = min(2.0 * way / (v + speed), 0.2 * left)
+    speed = math.sqrt(v * v + 2.0 * u / p.J1 * travel)
+    time = min(2.0 * travel / (v + speed), 0.2 * left)
     t = time * FINE
-    rise = way / time
+    rise = travel / time
     states = np.column_stack([z + rise * t, np.full(t.size, rise), np.full(t.size, w2), np.full(t.size, u)])
     return ArcTrajectory(time, FINE, states, ENDS, np.array([u, u]))
 

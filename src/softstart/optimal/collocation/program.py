@@ -1,4 +1,4 @@
-"""Which motions follow each other in a start with a single contact, and the drive in units of its own.
+"""Which motions follow each other in a start with a single contact, and the drive in its own units.
 
 The units are such that IPOPT sees numbers near 1 whatever the drive.
 """
@@ -130,8 +130,8 @@ def _orders(problem: Problem, reactive: bool, touching: bool) -> list[tuple[list
     if touching:
         return [([stuck] if w2 == 0.0 and torque <= drive.Mc else [], False)]
     at_rest: list[tuple[list[Phase], bool]] = [([resting, stuck], False)]
-    way = max(0.0, half - drive.start_position)
-    fastest = math.sqrt(2.0 * problem.highest_torque / drive.J1 * way) + abs(drive.initial_motor_speed)
+    travel = max(0.0, half - drive.start_position)
+    fastest = math.sqrt(2.0 * problem.highest_torque / drive.J1 * travel) + abs(drive.initial_motor_speed)
     if drive.d * fastest > drive.Mc:
         at_rest.append(([resting], True))
     if w2 == 0.0:
@@ -204,7 +204,7 @@ def time_unit(problem: Problem) -> float:
 
 @dataclass(frozen=True)
 class Numbers:
-    """A problem in units of its own: `values` under the names that the statement uses.
+    """A problem in its own units: `values` under the names that the statement uses.
 
     `gap_scale` and `contact_scale` are the sizes of the states (z, v, w2, u) in the two kinds of phases.
     """
@@ -260,7 +260,7 @@ def numbers(problem: Problem, beyond: float = BEYOND) -> Numbers:
         lines.append(((u_a - slope * w_a) / units.torque, slope * units.speed / units.torque))
     twist = 1.0 / values["c"]
     Omega = math.sqrt(values["c"] / values["J1"] + values["c"] / values["J2"])
-    way = max(abs(values["z_start"]), 1e-3 * twist)
-    gap_scale = np.array([way, min(1.0, math.sqrt(2.0 * way / values["J1"])), 1.0, 1.0])
+    travel = max(abs(values["z_start"]), 1e-3 * twist)
+    gap_scale = np.array([travel, min(1.0, math.sqrt(2.0 * travel / values["J1"])), 1.0, 1.0])
     contact_scale = np.array([twist, min(1.0, Omega * twist), 1.0, 1.0])
     return Numbers(units, values, tuple(lines), gap_scale, contact_scale)

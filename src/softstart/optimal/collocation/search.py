@@ -81,7 +81,7 @@ class Solution:
     lam_x: Vector
     lam_g: Vector
     value: float  # objective
-    reason: str  # IPOPT's own word
+    reason: str  # IPOPT's own status
     violation: float
     iterations: int
 
@@ -162,7 +162,7 @@ CHECKS = 12  # per interval, at the re-simulated shaft torque
 
 @dataclass(frozen=True)
 class Claim:
-    """What a solution says: profile up to t_f, edges of its intervals in s, its figure."""
+    """A solution in SI units: profile up to t_f, edges of its intervals in s, its figure."""
 
     profile: TorqueProfile
     end_time: float
@@ -245,7 +245,7 @@ WORSE = 1e-3  # relative: so much a finer mesh may cost
 CLEARLY = 1.02  # of the start time: a quickest start on the first mesh is known to about 1 %
 SIMILAR = 0.02  # relative: within this the mesh of a warm start may stay as it is
 LANDING = 1e-6  # of target speed and Ms: how well the exact plant must meet the terminal conditions
-ASTRAY = 2e-3  # relative: what the exact plant contradicts by more is no solution
+CONTRADICTED = 2e-3  # relative: what the exact plant contradicts by more is no solution
 STRIDE = 0.35  # rad of the elastic oscillation an interval may span where the landing is to be exact
 JUMP = 0.02  # of the torque range: a larger one within an arc is a switch that has not been located
 
@@ -306,9 +306,9 @@ def solve(
         try:
             solution, cost = _first(problem, contact)
             return _refine(problem, solution, spent + cost, tolerance, max_refinements)
-        except NotConverged as astray:
-            failure = failure or astray
-            if astray.final:
+        except NotConverged as stopped:
+            failure = failure or stopped
+            if stopped.final:
                 break
     assert failure is not None
     raise failure
@@ -331,7 +331,7 @@ def _first(problem: Problem, contact: float) -> tuple[Solution, int]:
     """A first solution from an instant of contact, and the iterations it took.
 
     Where IPOPT finds none, it is asked for the quickest start on the same mesh, which always exists: that is
-    the better first guess, or says that there is nothing to find.
+    the better first guess, or shows that there is no start to find.
     """
     p = numbers(problem)
     tried: list[Solution] = []
@@ -358,7 +358,7 @@ def _first(problem: Problem, contact: float) -> tuple[Solution, int]:
         reason = f"IPOPT finds no start quicker than {quickest * p.units.time:.6g} s"
         raise NotConverged(reason, quickest - 1.0, final=quickest > CLEARLY)
     nearest = min(tried, key=lambda s: s.violation)
-    # a mesh and guess that led astray once mostly do so again, at length
+    # a mesh and guess that failed once mostly fail again, after a long search
     raise NotConverged(_reason_of(nearest.reason), nearest.violation, final=problem.start_time is not None)
 
 
@@ -394,7 +394,7 @@ def _reason_of(reason: str) -> str:
     return {
         "Infeasible_Problem_Detected": "IPOPT finds no start that meets all conditions",
         "Maximum_Iterations_Exceeded": "IPOPT came to its largest number of iterations",
-        "Maximum_CpuTime_Exceeded": "IPOPT lost its way",
+        "Maximum_CpuTime_Exceeded": "IPOPT came to its limit of computing time",
         "Restoration_Failed": "IPOPT cannot reduce the violation of the conditions any further",
     }.get(reason, f"IPOPT stopped with {reason}")
 
@@ -407,7 +407,8 @@ def _refine(
 ) -> Candidate:
     """Halve intervals until the claimed figure stands still and the exact plant agrees with it.
 
-    `known` is the figure of the similar problem for which the mesh was last made finer: near it, it will do.
+    `known` is the figure of the similar problem for which the mesh was last made finer: near it, the mesh is
+    fine enough.
     """
     refinements = 0
     before = (np.inf, np.inf)
@@ -442,7 +443,7 @@ def _refine(
         solution = finer
     _, solution, own, exact = best
     off = max(abs(exact.value - own.value) / max(abs(own.value), 1e-300), exact.landing)
-    if off > ASTRAY:
+    if off > CONTRADICTED:
         raise NotConverged(f"the exact plant is off by {off:.2g} after {refinements} refinements", off)
     mesh = solution.transcribed.mesh
     how = "cold" if known is None else "warm"
@@ -481,7 +482,7 @@ def _finer(
     p = solution.p
     trajectory = from_solution(old, solution.read(), np.array([p.z_start, p.v_start, p.w2_start, 0.0]))
     tried = []
-    for barrier in (NEAR_BARRIER, 0.0):  # a finer mesh can lead the search astray: then from a wider barrier
+    for barrier in (NEAR_BARRIER, 0.0):  # from a finer mesh the search may fail: then from a wider barrier
         tried.append(_on(program, p, mesh, trajectory, barrier))
         if tried[-1].found and tried[-1].value <= solution.value + WORSE * abs(solution.value):
             break

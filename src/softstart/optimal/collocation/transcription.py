@@ -142,7 +142,7 @@ class Piece(NamedTuple):
 def interval_piece(program: Program, phase: Phase, kept: float, on_border: bool) -> Piece:
     """Collocation, path constraints, limits of torque and rate in an interval.
 
-    `kept` is the least shaft torque, `on_border` says that a path constraint ends the phase there.
+    `kept` is the least shaft torque, `on_border` means that a path constraint ends the phase there.
     """
     p = Parameters(program)
     states = 4 if program.lagged else 3
@@ -207,7 +207,7 @@ def path_conditions(
 
 Mesh = tuple[tuple[float, ...], ...]  # the edges of the intervals of every arc, as shares of its duration
 
-SHORTEST = 1e-3  # of the time unit: an arc that is not needed shares another one's motion
+SHORTEST = 1e-3  # of the time unit: minimum length, to which a redundant arc shrinks
 SHORTEST_SMALL = 1e-6  # arcs of a narrow gap, of a load that breaks away
 # The least shaft torque, of Ms, from the second interval of a contact on: rounding must not part the flanks.
 KEPT = 5e-4
@@ -386,7 +386,7 @@ class _Writer:
         self.ask(statement.at_most("peak after the start", later, self.peak))
 
     def undetermined(self) -> SX:
-        """The place of a switch that is not needed, a peak that is not minimised: equal arcs, low peak."""
+        """What nothing else fixes (a redundant switch, a peak not minimised): equal arcs, low peak."""
         out: SX = self.peak if self.program.minimise != "k_dyn" else 0.0
         for (a, one), (b, other) in pairwise(zip(self.program.arcs, self.durations, strict=True)):
             if a is b:

@@ -45,6 +45,7 @@ from softstart.optimal.lp.rows import (
     below,
     checked_instants,
     contact_grid,
+    no_linear_objective,
     refined,
     single_row,
     split,
@@ -385,11 +386,7 @@ def not_linear(problem: Problem) -> str:
     """Why this is no linear program; empty if it is one."""
     if not problem.ideal_torque:
         return "the motor torque cannot jump freely (lag, rate, torque-speed curve or smoothness)"
-    if problem.minimise != "k_dyn":
-        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
-    if problem.heat is not None:
-        return "a bound on the heat is not linear"
-    return no_ideal(problem)
+    return no_linear_objective(problem) or no_ideal(problem)
 
 
 def search(problem: Problem) -> Answer | None:
@@ -546,7 +543,7 @@ def _best_end(problem: Problem, entry: Entry, latest: float) -> Answer | None:
 
 
 def golden(value: Callable[[float], float], low: float, high: float, width: float) -> None:
-    """Golden-section search; `value` remembers what it was asked."""
+    """Golden-section search; `value` keeps the values it has computed."""
     ratio = 0.5 * (math.sqrt(5.0) - 1.0)
     a, b = high - ratio * (high - low), low + ratio * (high - low)
     at_a, at_b = value(a), value(b)

@@ -3,7 +3,7 @@
 `Contact` gives shaft torque, twist and speeds as linear maps of any motor torque. With any torque between the
 limits at the motor's command (no lag, no rate limit), the gap part of a start whose gap closes once matters
 only through the instant `te` at which both masses begin to move in contact and the relative speed `v` they
-have then: an `Entry` says which `v` is possible at which `te`.
+have then: an `Entry` gives which `v` is possible at which `te`.
 """
 
 from __future__ import annotations
@@ -314,7 +314,7 @@ def _overlap(drive: Drive) -> float:
 
 
 def entry_of(problem: Problem) -> Entry:
-    """The way into moving contact of a problem for which `no_ideal` has nothing to say."""
+    """The entry into moving contact of a problem for which `no_ideal` gives no reason."""
     drive = problem.drive
     travel = max(float(0.5 * drive.gap - drive.start_position), 0.0)
     J1, J2, c, Mc, w1, w2 = (

@@ -13,6 +13,7 @@ from scipy.optimize import linprog
 
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.lp.motion import Contact
+from softstart.optimal.problem import Problem
 
 Steps = NDArray[np.int64]
 Marks = NDArray[np.bool_]
@@ -27,6 +28,13 @@ LONG_STEPS = 4  # between them
 ROUNDS = 3  # of finer grids where the torque switches
 FIRST_WIDTH = 4e-3  # of t_f: how far instants may move on the first finer grid
 SWITCH = 0.02  # of the largest torque: a larger change between two steps is a switch
+
+
+def no_linear_objective(problem: Problem) -> str:
+    """Why a problem is no linear program whatever its drive; empty if it may be one."""
+    if problem.minimise != "k_dyn":
+        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
+    return "a bound on the heat is not linear" if problem.heat is not None else ""
 
 
 class RowList:

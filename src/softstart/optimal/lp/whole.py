@@ -122,7 +122,7 @@ class WholeAnswer:
 
 
 def demand_shape(problem: Problem) -> Shape:
-    """Which demands the plant plays without bending them."""
+    """Which demands the plant follows exactly."""
     if math.isfinite(problem.drive.torque_rate):
         return "continuous"
     return "ramps" if problem.torque_speed else "steps"
@@ -478,11 +478,11 @@ class WholeProgram:
 
     def shifted(self, fast: bool, found: Vector, near: list[WholeProgram], by: Vector, ends: Matrix,
                 order: tuple[Vector, float]) -> Vector | None:  # fmt: skip
-        """By how much to shift the instants for the best, judged from here: the limits made linear in them.
+        """By how much to shift the instants for the best, with the limits linearised in them here.
 
         `found` are the variables here; `near` are programs with one instant shifted each, by `by` s; `ends`
         (instants, 2) say how far each may go, and weights @ shift >= least with `order` = (weights, least).
-        None where nothing can be said.
+        None where the two programs cannot be compared, or there is no better shift.
         """
         own = self.most_speed if fast else self.least_P
         others = [one.most_speed if fast else one.least_P for one in near]

@@ -1,8 +1,8 @@
 """The search for the instants of a whole start: the orders of phases, then the instants, then the grid.
 
 P over the instants is smooth but for kinks. A scan finds where its minima are; from there the program itself,
-linearised in the instants, says where to go, first on a coarse grid, then on grids that are finer where the
-torque switches or T exceeds its limits.
+linearised in the instants, gives the direction, first on a coarse grid, then on grids that are finer where
+the torque switches or T exceeds its limits.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.optimal.exact import replay
 from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import Refinement, contact_grid, refined
+from softstart.optimal.lp.rows import Refinement, contact_grid, no_linear_objective, refined
 from softstart.optimal.lp.whole import Grid, Instants, Kind, WholeAnswer, WholeProgram
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
@@ -45,14 +45,8 @@ EARLIEST = 1.0 + 1e-7  # just later than under full torque: the grid cannot do b
 
 def not_linear(problem: Problem) -> str:
     """Why the whole start is no linear program with given instants; empty if it is one."""
-    drive: Any = problem.drive
-    if problem.minimise != "k_dyn":
-        return f"what is asked for is the least {problem.minimise}, and only K_dyn is linear"
-    if problem.heat is not None:
-        return "a bound on the heat is not linear"
-    if problem.smoothness > 0.0:
-        return "the weight on the smoothness is not linear"
-    return _no_phases(drive)
+    smooth = "the weight on the smoothness is not linear" if problem.smoothness > 0.0 else ""
+    return no_linear_objective(problem) or smooth or _no_phases(problem.drive)
 
 
 def _no_phases(drive: Any) -> str:
@@ -178,7 +172,7 @@ def greatest_speed(
 class _Timings:
     """Answers over the instants of one order of phases, each computed once.
 
-    The instants are told as (x, w, end): x is when the load begins to be driven, w how long the shaft is
+    A timing is (x, w, end): x is when the load begins to be driven, w how long the shaft is
     wound up before, 0 where it is not; `latest` bounds the end.
     """
 
@@ -252,7 +246,7 @@ class _Timings:
         self._down(start, width, fast=False)
         return self.found()
 
-    def place(self, x: float, w: float, end: float) -> Timing:
+    def timing(self, x: float, w: float, end: float) -> Timing:
         """A shaft that is touched from the beginning is wound up all the time before x."""
         return (x, w, end) if self.waits or not self.winds else (x, x, end)
 
@@ -279,8 +273,8 @@ class _Timings:
         tried = {(end, 0.0, end): math.inf}
         late = 0
         for x in self._times(end):
-            places = [self.place(x, w, end) for w in windings]
-            here = {at: value(at) for at in places}
+            timings = [self.timing(x, w, end) for w in windings]
+            here = {at: value(at) for at in timings}
             tried |= here
             none = math.isinf(min(here.values()))
             late = late + 1 if none and math.isfinite(min(tried.values())) else 0
@@ -296,7 +290,7 @@ class _Timings:
         return (first + (end - first) * shares).tolist() if first < end else []
 
     def _down(self, start: Timing, width: float, fast: bool) -> Timing:
-        """From a start known to the best one near it: the program made linear in the instants says where to.
+        """From a known start to the best one near it, by the program linearised in the instants.
 
         A step is taken where it helps, and may then be longer; else it is tried again, shorter.
         """
@@ -344,7 +338,7 @@ class _Timings:
         for i, by, _ in free:
             moved = [x, w, end]
             moved[i] += by
-            near.append(self.program(self.place(*moved), own.grid))
+            near.append(self.program(self.timing(*moved), own.grid))
         if not free or any(one is None for one in near):
             return None
         weights = np.array([{0: 1.0, 1: -1.0, 2: 0.0}[i] for i, _, _ in free])
@@ -357,7 +351,7 @@ class _Timings:
         moved = [x, w, end]
         for (i, _, _), by in zip(free, shift.tolist(), strict=True):
             moved[i] += by
-        there = self.place(*moved)
+        there = self.timing(*moved)
         while self.waits and there[0] - there[1] < self.order.tc:  # by rounding
             there = there[0] + 1e-12 * end, there[1], there[2]
         return there
@@ -390,5 +384,5 @@ def _moved(problem: Problem, order: PhaseOrder, best: WholeAnswer, grid: Grid, w
     assert problem.start_time is not None
     near = _Timings(problem, order, float(problem.start_time), 0, grid, best.beyond)
     winding = best.at.tb - best.at.tc if near.winds else 0.0
-    found = near.moved(near.place(best.at.tb, winding, best.at.end), width)
+    found = near.moved(near.timing(best.at.tb, winding, best.at.end), width)
     return found if found is not None else best

@@ -5,12 +5,6 @@ Read in this order: evaluation.py (a staircase of torque on the exact plant, wit
 begin), solving.py (scenarios, the search from many starts down to one, the answer).
 """
 
-from softstart.optimal.robust.solving import (
-    RobustOptimum,
-    SensorWorth,
-    optimize_robust,
-    scenarios_of,
-    worth_of_contact_sensor,
-)
+from softstart.optimal.robust.solving import optimize_robust, scenarios_of, worth_of_contact_sensor
 
-__all__ = ["RobustOptimum", "SensorWorth", "optimize_robust", "scenarios_of", "worth_of_contact_sensor"]
+__all__ = ["optimize_robust", "scenarios_of", "worth_of_contact_sensor"]

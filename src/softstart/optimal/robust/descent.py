@@ -37,7 +37,7 @@ class Rules:
     floor: float = 0.0  # N m: a peak below it is worth no more
     rounds: int = 80
     trust: float = 0.1  # of the torque range, at first
-    enough: float = 1e-7  # of the torque range: the descent ends where less is promised
+    enough: float = 1e-7  # of the torque range: the descent ends where less is predicted
 
     @property
     def span(self) -> float:
@@ -50,7 +50,7 @@ class Step:
     """A change of all unknowns, and by how much it should lower the merit (N m)."""
 
     change: Vector
-    promise: float
+    predicted_gain: float
 
 
 def merit(peak: float, late: float, staircase: Staircase, start_time: float, rules: Rules) -> float:
@@ -211,7 +211,7 @@ MENDINGS = 6
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A staircase and what the exact plant says of it."""
+    """A staircase and its figures on the exact plant."""
 
     staircase: Staircase
     peak: float  # worst |T|, N m
@@ -225,11 +225,11 @@ def evaluate(evaluator: Evaluator, parameters: ProfileParameters, staircase: Sta
 
 
 def descend(evaluator: Evaluator, staircase: Staircase, rules: Rules, stalled: float = 1e-6) -> Point:
-    """The best staircase reached from `staircase`, in time if anything on the way was.
+    """The best staircase reached from `staircase`, in time if any of those passed was.
 
-    A step of the linear program is kept only if the exact plant's merit falls by a part of what was promised;
-    else the trust region shrinks. Ends where less than `rules.enough` is promised, or where the last rounds
-    gained less than `stalled`, both relative to the torque range.
+    A step of the linear program is kept only if the exact plant's merit falls by a part of the predicted
+    gain; else the trust region shrinks. Ends where the predicted gain is below `rules.enough`, or where the
+    last rounds gained less than `stalled`, both relative to the torque range.
     """
     parameters = ProfileParameters(staircase, evaluator.drives[0])
     here = best = evaluate(evaluator, parameters, staircase)
@@ -237,16 +237,16 @@ def descend(evaluator: Evaluator, staircase: Staircase, rules: Rules, stalled: f
     merits = [_merit(here, evaluator, rules)]
     for _ in range(rules.rounds):
         step = linear_step(evaluator, trajectories, here.staircase, rules, trust)
-        if step is None or step.promise <= rules.enough * rules.span:
+        if step is None or step.predicted_gain <= rules.enough * rules.span:
             break
         tried = evaluate(evaluator, parameters, _moved(here, step.change, rules))
         gain = merits[-1] - _merit(tried, evaluator, rules)
-        if gain < 0.5 * step.promise and tried.late > 0.0 and rules.aim == "gentle":
+        if gain < 0.5 * step.predicted_gain and tried.late > 0.0 and rules.aim == "gentle":
             tried, gain = _mended(
                 evaluator, parameters, trajectories, here, tried, trust, rules, merits[-1] - gain, gain
             )
-        if gain > 0.05 * step.promise:
-            trust = min(2.0 * trust, 0.5) if gain > 0.6 * step.promise else trust
+        if gain > 0.05 * step.predicted_gain:
+            trust = min(2.0 * trust, 0.5) if gain > 0.6 * step.predicted_gain else trust
             here = tried
             best = (
                 here

@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from softstart.arrays import Vector
+from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.controller.base import CompiledController, Sensor
 from softstart.drive import Drive
@@ -29,7 +29,6 @@ from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
 from softstart.start.engine import Recorder
 
-Matrix = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 LEVEL_PROBE, EDGE_PROBE = 1e-3, 1e-7  # N m, s
@@ -122,7 +121,7 @@ class ProfileParameters:
         self._trace(staircase, drive, np.arange(staircase.n_levels, self.origin.size), EDGE_PROBE)
 
     def _trace(self, staircase: Staircase, drive: Drive, which: Indices, probe: float | Vector) -> None:
-        """Find where the unknowns `which` stand in the vector: each is moved by an amount of its own."""
+        """Find where the unknowns `which` stand in the vector: each is moved by another amount."""
         if which.size == 0:
             return
         share = np.arange(1, which.size + 1) / which.size
@@ -284,7 +283,7 @@ class Trajectory:
     """Shaft torque of one scenario under one profile, and how it changes with the unknowns.
 
     `T` at instants of the run, `dT` (instants x unknowns); `late` in s is by how much the start misses the
-    time asked for (below 0: it is early), guessed from the missing speed where the run was given up.
+    time asked for (below 0: it is early), estimated from the missing speed where the run was stopped.
     """
 
     peak: float
@@ -341,15 +340,15 @@ class Evaluator:
         recorder = _Recorder(parameters, self.p[i])
         unknowns = staircase.unknowns
         numbers = parameters.vectors(unknowns)[0]
-        x = recorder.play(numbers, math.inf)
+        x = recorder.run(numbers, math.inf)
         peak, end, ts = abs(float(x[at.PEAK])), float(x[at.TIME]), float(x[at.START_TIME])
         first = end if math.isnan(x[at.FIRST_CONTACT]) else float(x[at.FIRST_CONTACT])
         times = self._instants(recorder, i, first, end)
-        asked = np.append(times, end if math.isnan(ts) else ts)
-        states = recorder.at(asked)
+        checked = np.append(times, end if math.isnan(ts) else ts)
+        states = recorder.at(checked)
         which, steps = self._steps(staircase, free_edges, low, high, first, end)
         rows = numbers + steps[:, None] * parameters.slopes[which]
-        T, w2 = recorder.moved(rows, end, asked)
+        T, w2 = recorder.moved(rows, end, checked)
         dT, dlate = np.zeros((times.size, unknowns.size)), np.zeros(unknowns.size)
         dT[:, which] = ((T[:, :-1] - states[:-1, record.T_OUT]) / steps[:, None]).T
         gain = self._gain(i, float(states[-1, record.T_OUT]))
@@ -369,7 +368,7 @@ class Evaluator:
         return float(p[at.TARGET] - p[at.W2_0]) / self.start_time
 
     def _behind(self, i: int, w2: float) -> float:
-        """How late a load comes that has only w2 when its run is given up, s."""
+        """How late a load comes that has only w2 when its run is stopped, s."""
         p = self.p[i][0]
         missing = max(float(p[at.TARGET]) - w2, 0.0) / self._needed(i)
         return float(p[at.TIME_LIMIT]) - self.start_time + missing
@@ -422,7 +421,7 @@ class _Recorder:
         self.command = np.zeros(kernel.NEW_STATE + self.controller.state_size)
         self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
 
-    def play(self, numbers: Vector, until: float) -> Vector:
+    def run(self, numbers: Vector, until: float) -> Vector:
         """The state at the end; the spans stay on the recorder."""
         records = self.records
         records.m[:] = 0.0

@@ -91,9 +91,9 @@ class Family:
 
 def _crossing(drive: Drive, high: float) -> float:
     """How long the motor takes through the gap at its highest torque, s, with what its torque is late by."""
-    way = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
+    travel = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
     delay = float(drive.torque_lag) + high / float(drive.torque_rate)
-    return math.sqrt(2.0 * way * float(drive.J1) / high) + delay
+    return math.sqrt(2.0 * travel * float(drive.J1) / high) + delay
 
 
 LATE = 100.0  # what being late costs, relative to the time asked for

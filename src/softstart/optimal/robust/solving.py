@@ -6,7 +6,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from numbers import Real
 from typing import Any
 
@@ -18,159 +18,19 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import InfeasibleError, LowerBound, OptimumError, Verdict
+from softstart.optimal.result import (
+    InfeasibleError,
+    LowerBound,
+    OptimumError,
+    RobustOptimum,
+    SensorWorth,
+    Verdict,
+)
 from softstart.optimal.robust.descent import Point, Rules, descend, evaluate
 from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
 from softstart.optimal.robust.guesses import Evolution, Family, gentleness, quickness
 from softstart.profile import TorqueProfile
-from softstart.start import metrics
-from softstart.start.run import Run
 from softstart.start.simulation import simulate
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RobustOptimum:
-    """One torque profile for several drives, as the exact plant runs it on each of them.
-
-    Parameters
-    ----------
-    scenarios : tuple of Drive
-        The drives, in the order given.
-    start_time : float
-        The time allowed, s.
-    base : Drive
-        The drive to whose mean shaft torque all K_dyn refer.
-    react_to_contact : bool
-        Whether a second part of the profile may start with the first contact.
-    profile : TorqueProfile
-        The demand over time.
-    runs : tuple of Run
-        One for each scenario, to one elastic period after its own start time.
-    lower_bound : LowerBound
-        The largest bound of a scenario by itself: no profile, reacting or not, does better on all of them.
-    seconds : float
-        Computing time, s.
-    note : str
-        Says so where a contact sensor is left unused.
-
-    Examples
-    --------
-    >>> from softstart import Drive, optimize_robust
-    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60)
-    >>> best = optimize_robust([drive], start_time=0.2883042)
-    >>> best.worst, best.k_dyn == best.k_dyn_each[0]
-    (0, True)
-    """
-
-    scenarios: tuple[Drive, ...]
-    start_time: float
-    base: Drive
-    react_to_contact: bool
-    profile: TorqueProfile
-    runs: tuple[Run, ...]
-    lower_bound: LowerBound
-    seconds: float
-    note: str = ""
-
-    @property
-    def k_dyn_each(self) -> tuple[float, ...]:
-        """Dynamic coefficient of each scenario's whole run."""
-        return tuple(float(metrics.k_dyn(run.peak_torque, self.base)) for run in self.runs)
-
-    @property
-    def k_dyn(self) -> float:
-        """The worst of them, which was minimised."""
-        return max(self.k_dyn_each)
-
-    @property
-    def worst(self) -> int:
-        """Index of the scenario with the worst K_dyn."""
-        return int(np.argmax(self.k_dyn_each))
-
-    @property
-    def start_times(self) -> tuple[float, ...]:
-        """Start time of each scenario, s."""
-        return tuple(run.start_time for run in self.runs)
-
-    @property
-    def gap_percent(self) -> float:
-        """How far the worst K_dyn lies above the bound, in per cent."""
-        return 100.0 * (self.k_dyn / self.lower_bound.k_dyn - 1.0)
-
-    def __repr__(self) -> str:
-        """One line that says what came out."""
-        what = "reacting to the contact" if self.react_to_contact else "one profile"
-        return (
-            f"<RobustOptimum: worst K_dyn {self.k_dyn:.5f} over {len(self.scenarios)} scenarios, {what}, "
-            f"latest start {max(self.start_times):.5f} s>"
-        )
-
-    def summary(self) -> dict[str, Any]:
-        """All figures under the names used everywhere (JSON, tables, docs)."""
-        bound = self.lower_bound
-        after = self.profile.after_contact
-        profile: dict[str, Any] = _knots(self.profile)
-        if after is not None:
-            profile["after_contact"] = _knots(after)
-        return {
-            "drive": self.base.name,
-            "terminal": "reached",
-            "react_to_contact": self.react_to_contact,
-            "note": self.note,
-            "start_time_bound": self.start_time,
-            "k_dyn": self.k_dyn,
-            "k_dyn_each": list(self.k_dyn_each),
-            "k_dyn_lower_bound": bound.k_dyn if bound.kind != "none" else None,
-            "bound_kind": bound.kind,
-            "bound_covers": bound.covers,
-            "start_times": list(self.start_times),
-            "worst": self.worst,
-            "scenarios": [
-                {"drive": d.name, "gap": d.gap, "load_inertia": d.J2, "load_torque": d.Mc}
-                for d in self.scenarios
-            ],
-            "seconds": self.seconds,
-            "profile": profile,
-        }
-
-
-def _knots(profile: TorqueProfile) -> dict[str, Any]:
-    return {"time": profile.time.tolist(), "torque": profile.torque.tolist()}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SensorWorth:
-    """The best profile that evaluator blindly, and the best that starts its second part at the contact.
-
-    `alone` holds the K_dyn that each scenario could have if it were the only one, where that was asked for.
-    """
-
-    blind: RobustOptimum
-    reacting: RobustOptimum
-    alone: tuple[float, ...] | None = None
-
-    @property
-    def percent(self) -> float:
-        """By how much the sensor lowers the worst K_dyn, per cent of the blind one; 0 if left unused."""
-        return max(100.0 * (1.0 - self.reacting.k_dyn / self.blind.k_dyn), 0.0)
-
-    def __repr__(self) -> str:
-        """One line that says what came out."""
-        return (
-            f"<SensorWorth: worst K_dyn {self.blind.k_dyn:.5f} blind, {self.reacting.k_dyn:.5f} reacting to "
-            f"the contact: {self.percent:.1f} % lower>"
-        )
-
-    def summary(self) -> dict[str, Any]:
-        """All figures under the names used everywhere (JSON, tables, docs)."""
-        return {
-            "k_dyn_blind": self.blind.k_dyn,
-            "k_dyn_reacting": self.reacting.k_dyn,
-            "percent": self.percent,
-            "k_dyn_alone": None if self.alone is None else list(self.alone),
-            "blind": self.blind.summary(),
-            "reacting": self.reacting.summary(),
-        }
 
 
 def scenarios_of(
@@ -298,11 +158,11 @@ QUICK_EVOLUTIONS = ((3, 0), (3, 1), (4, 0), (4, 1), (5, 0), (5, 1))
 REPRESENTED = 3  # scenarios that the first rounds are over
 DENSE, SPARSE = 12, 6  # intervals of an elastic period in the first rounds: in the first two periods, then
 FIRST_ROUNDS = 8  # of the descent from each start
-ALIKE = 3e-3  # relative: peaks on the way that count as one
+ALIKE = 3e-3  # relative: peaks after the first rounds that count as one
 PURSUED, FINISHED = 4, 1  # how many are followed to the end of the coarse grid, and on the fine one
 COARSE, FINE = 40, 90  # intervals
 ROUNDS = 80  # of each descent, at most
-CALM, CALMER = 2e-5, 3e-4  # weights of the torque steps, on the way and where the peak may not rise
+CALM, CALMER = 2e-5, 3e-4  # weights of the torque steps, during the search and where the peak may not rise
 MERGED = 0.002  # of the torque range: neighbouring levels that become one
 TIDY_COST = 2e-4  # relative, that a calmer profile of fewer knots may cost
 
