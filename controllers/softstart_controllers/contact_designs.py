@@ -16,13 +16,21 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
+from softstart.late import late
 from softstart_controllers.design_store import kept_all
+
+if TYPE_CHECKING:
+    import control
+    from scipy import linalg
+else:
+    control = late("control")
+    linalg = late("scipy.linalg")
 
 Array = NDArray[np.float64]
 
@@ -100,9 +108,6 @@ def _designs(kind: str, groups: tuple[Array, ...], make: Callable[[tuple[int, ..
 
 
 def _feedback(group: tuple[int, ...]) -> list[float]:
-    import control
-    from scipy.linalg import expm
-
     step = 10.0 ** (group[0] / PER_DECADE)
     torque_weight, rate_weight = (10.0 ** (group[i] / WEIGHTS_PER_DECADE) for i in (3, 4))
     ratio = group[1] / RATIO_STEPS
@@ -113,18 +118,15 @@ def _feedback(group: tuple[int, ...]) -> list[float]:
     if lagging:
         rate = 10.0 ** (-group[2] / PER_DECADE)
         A[2, 2], B[2, 0] = -rate, rate
-        whole = expm(step * np.block([[A, B], [np.zeros((1, 4))]]))
+        whole = linalg.expm(step * np.block([[A, B], [np.zeros((1, 4))]]))
         K = _solved(control.dlqr, whole[:3, :3], whole[:3, 3:], Q, np.eye(1))
         return [float(k) for k in K[0]]
-    whole = expm(step * A)
+    whole = linalg.expm(step * A)
     K = _solved(control.dlqr, whole[:2, :2], whole[:2, 2:], Q[:2, :2], np.eye(1))
     return [float(K[0, 0]), float(K[0, 1]), 0.0]
 
 
 def _observer(group: tuple[int, ...]) -> list[float]:
-    import control
-    from scipy.linalg import expm
-
     step, noise = 10.0 ** (group[0] / PER_DECADE), 10.0 ** (group[3] / NOISE_PER_DECADE)
     ratio, share = group[1] / RATIO_STEPS, group[2] / SHARE_STEPS
     A = np.zeros((5, 5))
@@ -133,7 +135,7 @@ def _observer(group: tuple[int, ...]) -> list[float]:
     A[3, 2:4] = -1.0, -2.0 * ratio
     density = np.diag([0.0, 0.0, 0.0, 1.0, LOAD_NOISE])
     # Van Loan: the noise of one sample
-    whole = expm(step * np.block([[-A, density], [np.zeros((5, 5)), A.T]]))
+    whole = linalg.expm(step * np.block([[-A, density], [np.zeros((5, 5)), A.T]]))
     Ad = whole[5:, 5:].T
     Q = Ad @ whole[:5, 5:]
     C = np.eye(1, 5)

@@ -5,16 +5,22 @@ from __future__ import annotations
 import math
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.plant.vector import encoder_count
 from softstart_controllers.design_store import kept
 from softstart_controllers.sampled import number
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = late("control")
 
 # One sample of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), without the known torque; h is the sample period.
 # In these scales the matrices are the same for every drive.
@@ -68,8 +74,6 @@ def design(steps: int) -> Design:
 
 
 def _designed(steps: int) -> list[float]:
-    import control
-
     A, G, C = (np.array(matrix) for matrix in (TRANSITION, DISTURBANCE, OUTPUT))
     try:
         L, P, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * DECADES)]]), np.array([[1.0]]))

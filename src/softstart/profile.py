@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,7 @@ from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.late import late
 
-if TYPE_CHECKING:
-    from softstart import profile_files
-else:
-    profile_files = late("softstart.profile_files")
+profile_files = late("softstart.profile_files")
 
 
 MOST_SAMPLES = 1_000_000

@@ -29,9 +29,7 @@ from softstart.late import late
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softstart.views import chains as views
-else:
-    views = late("softstart.views.chains")
+views = late("softstart.views.chains")
 
 Method = Literal["lever", "modal"]
 

@@ -42,9 +42,7 @@ from softstart.start.status import Status
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softstart.views import chains as views
-else:
-    views = late("softstart.views.chains")
+views = late("softstart.views.chains")
 
 EVENT_NAMES = {
     CLOSED: "gap closed",

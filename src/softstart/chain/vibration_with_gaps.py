@@ -28,10 +28,11 @@ from softstart.quantities import Value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from softstart.views import chains as views
+    from scipy import optimize
 else:
-    views = late("softstart.views.chains")
+    optimize = late("scipy.optimize")
+
+views = late("softstart.views.chains")
 
 
 def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Value:
@@ -125,8 +126,6 @@ def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60
 
 def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, periods: int, mode: int) -> float:
     """The frequency of the free vibration released with these shaft torques, rad/s."""
-    from scipy.optimize import minimize_scalar
-
     arrays = chain.at_motor_shaft()
     twist = torques / arrays.c + 0.5 * arrays.gap * np.sign(torques)
     masses = [Mass(float(J)) for J in arrays.J]
@@ -149,7 +148,7 @@ def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, perio
     lowest = 0.1 if mode == 1 else 0.5  # below lie the lines of lower modes
     places = np.arange(max(lowest * Omega, 4.0 * step), 1.15 * Omega, step)
     best = float(places[int(np.argmax([line(w) for w in places]))])
-    refined = minimize_scalar(
+    refined = optimize.minimize_scalar(
         lambda w: -line(w),
         bounds=(best - step, best + step),
         method="bounded",

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from softstart.controller.base import Controller, Sensor
 from softstart.errors import InputError
@@ -18,10 +18,7 @@ from softstart.late import late
 from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
 
-if TYPE_CHECKING:
-    from softstart.controller import tuned
-else:
-    tuned = late("softstart.controller.tuned")
+tuned = late("softstart.controller.tuned")
 
 GAIN_FILES = (".toml", ".csv")  # endings of files of tuned gains
 

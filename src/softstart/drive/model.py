@@ -20,9 +20,7 @@ from softstart.quantities import Value
 if TYPE_CHECKING:
     import control
 
-    from softstart.drive import control_systems
-else:
-    control_systems = late("softstart.drive.control_systems")
+control_systems = late("softstart.drive.control_systems")
 
 __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
 

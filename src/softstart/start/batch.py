@@ -14,6 +14,7 @@ from softstart import stages
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
@@ -23,6 +24,8 @@ from softstart.start.status import status_of
 
 if TYPE_CHECKING:
     import xarray
+else:
+    xarray = late("xarray")
 
 PATIENCE = 0.2  # s
 FIRST_TURN = 32  # starts
@@ -173,8 +176,6 @@ def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[s
 
 
 def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -> xarray.Dataset:
-    import xarray
-
     shape = drive.shape
     dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
     per_start = np.broadcast_to(metrics.base_torque(base), shape).reshape(-1)
@@ -193,8 +194,6 @@ def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -
 def _label_list(
     drives: list[Drive], results: at.Matrix, until: float | None, base: Drive | None
 ) -> xarray.Dataset:
-    import xarray
-
     per_start = np.array([metrics.base_torque(base or drive) for drive in drives])
     data = {
         name: (("start",), values, {"units": unit, "long_name": meaning})

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softstart import stages
+from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
@@ -20,10 +21,26 @@ from softstart.plant import layout as at
 
 if TYPE_CHECKING:
     from scipy import optimize
-
-    from softstart.start.run import Run
 else:
     optimize = late("scipy.optimize")
+
+
+class Recorded(Protocol):
+    """What is needed of a recorded start; `softstart.start.run.Run` has it."""
+
+    @property
+    def drive(self) -> Drive: ...
+    @property
+    def base(self) -> Drive: ...
+    @property
+    def segments(self) -> Matrix: ...
+    @property
+    def stages(self) -> Any: ...
+    @property
+    def end_time(self) -> float: ...
+    def at(self, times: ArrayLike) -> dict[str, Vector]: ...
+    def states_in(self, segment: NDArray[np.int64], times: Vector) -> dict[str, Vector]: ...
+
 
 # settling is looked for at this many points an elastic period, then located
 POINTS_PER_PERIOD = 64
@@ -50,7 +67,7 @@ def k_dyn(peak_torque: Any, drive: Drive) -> Any:
     return stages.dynamic_coefficient(peak_torque, base_torque(drive))
 
 
-def settling_time(run: Run, band: float) -> float:
+def settling_time(run: Recorded, band: float) -> float:
     """First instant from which |T - M12avg(u)| <= band * M12avg_base holds with the gap closed, s.
 
     It must hold for one elastic period at least, to the end of the run; NaN otherwise.
@@ -99,7 +116,7 @@ class Energy:
     residual: float
 
 
-def energy_balance(run: Run) -> Energy:
+def energy_balance(run: Recorded) -> Energy:
     """Motor work = kinetic + elastic + work against the load + dissipated + residual.
 
     Motor work int u w1 dt, load work int Mc' w2 dt (Mc' opposes motion when reactive), dissipated
@@ -155,12 +172,12 @@ def _pieces(rows: at.Matrix, scale: float, shortest: float) -> tuple[at.Vector, 
     return starts, starts + lengths, owners
 
 
-def _kinetic(run: Run, time: float) -> float:
+def _kinetic(run: Recorded, time: float) -> float:
     state = run.at(time)
     return float(0.5 * run.drive.J1 * state["w1"] ** 2 + 0.5 * run.drive.J2 * state["w2"] ** 2)
 
 
-def _elastic(run: Run, which: int) -> float:
+def _elastic(run: Recorded, which: int) -> float:
     row = run.segments[which]
     if row[at.S_SIDE] == 0.0:
         return 0.0
@@ -169,7 +186,7 @@ def _elastic(run: Run, which: int) -> float:
     return float(0.5 * run.drive.c * z * z)
 
 
-def _lost_at_parting(run: Run) -> float:
+def _lost_at_parting(run: Recorded) -> float:
     """Spring energy at the instants at which the torque vanishes though the flanks overlap."""
     rows = run.segments
     parts = np.flatnonzero((rows[:-1, at.S_SIDE] != 0.0) & (rows[1:, at.S_SIDE] == 0.0))

@@ -91,7 +91,7 @@ def test_all_mistakes_at_once(run, nothing_left):
     ("arguments", "said"),
     [
         (("tractor",), "shipped"),
-        (("good.toml",), "no such table"),
+        (("good.toml",), "inertia belongs below [[mass]]"),
         (("--to", "3", "--method", "modal"), "--to = 3: the modal method"),
         (("--to", "9"), "--to = 9: the chain has 4 masses"),
         (("--up-to", "1"), "--up-to = 1.0: the lowest elastic frequency"),
