@@ -42,6 +42,10 @@ class PeriodicTorque:
     >>> torque = PeriodicTorque(50.0, [1.0], [0.0], [20.0], speed=100.0)
     >>> float(torque.at(math.pi / 200))
     70.0
+
+    References
+    ----------
+    [B] (2), (3); harmonics of the gas and inertia torque: docs/theory/balancer.md.
     """
 
     mean: float

@@ -41,14 +41,41 @@ from softstart.quantities import nearest, show
 class Chain:
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
-    `motor` (None for a chain that is only analysed) acts on the mass it names, else on the first. `load_mass`
-    names the mass that is to reach `target_speed`, else it is the last; that speed is in rad/s *at the motor
-    shaft*, as in a `Drive`, and follows the rated speed of the motor. Masses without a name are called
-    "mass 1" and so on. `assumed` says which values are assumed; it goes with every output.
+    Each quantity is a number in SI or a string with a unit, on its own shaft.
 
+    Parameters
+    ----------
+    masses : iterable of Mass, length n
+        Two masses or more, in order: inertia in kg m2, load torque in N m. Those without a name are called
+        "mass 1" and so on.
+    shafts : iterable of Shaft, length n - 1
+        Stiffness in N m/rad, gap in rad, and the gear between the two masses.
+    motor : Motor, optional
+        Acts on the mass it names, else on the first. None for a chain that is only analysed.
+    load_mass : str, optional
+        Name of the mass that is to reach `target_speed`; by default the last.
+    target_speed : float or str, optional
+        Speed of the load, rad/s *at the motor shaft*, as in a `Drive`; by default the rated speed of the
+        motor.
+    name, source : str, optional
+        Name of the chain, and source of its numbers.
+    assumed : str, optional
+        Which values are assumed; it is printed with every output.
+
+    Raises
+    ------
+    InputError
+        If numbers of masses and shafts do not match, a name occurs twice, or there is no such mass.
+
+    Examples
+    --------
     >>> chain = Chain([Mass(0.035), Mass(0.7)], [Shaft(368.465, gap="0.5 rad", ratio=2)], Motor(62))
     >>> chain.brought_to("motor").masses[1].inertia
     0.175
+
+    References
+    ----------
+    [R]; everything at one shaft: docs/theory/reduction.md; the file: docs/reference/chain-file.md.
     """
 
     masses: tuple[Mass, ...]

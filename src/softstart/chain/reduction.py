@@ -336,19 +336,51 @@ def reduce_chain(
     factor: float = FACTOR,
     force: bool = False,
 ) -> Reduction:
-    """The chain with `to` masses, or with as few as keep its frequencies up to `up_to` (rad/s).
+    """Reduce a chain to `to` masses, or to as few as keep its frequencies up to `up_to`.
 
-    Kept are the `to - 1` lowest elastic frequencies, or those up to `up_to`. Method "lever" merges the
-    partial system of the highest frequency, again and again [R]; "modal" gives the two masses that have
-    the first frequency and the node of the chain exactly. The motor's and the load's mass are never shared or
-    put together. Refused with `InputError` where a partial system, or a piece between two gaps, lies below
-    sqrt(`factor`) times the highest wanted frequency, unless `force`.
+    Kept are the `to - 1` lowest elastic frequencies, or those up to `up_to`. The motor's and the load's mass
+    are never shared or put together.
 
+    Parameters
+    ----------
+    chain : Chain
+        The whole chain.
+    to : int, optional
+        Number of masses to reduce to, 2 or more. By default 2, or with `up_to` and "lever" as few as keep
+        those frequencies.
+    up_to : float, optional
+        Highest frequency to keep, rad/s.
+    method : {"lever", "modal"}
+        "lever" merges the partial system of the highest frequency, again and again [R]; "modal" gives the
+        two masses that have the first frequency and the node of the chain exactly.
+    factor : float
+        Smallest allowed (Omega/wanted)^2, 1 or more: Omega is the frequency of a partial system that is
+        merged, or of a piece between two gaps; wanted is the highest frequency to keep.
+    force : bool
+        Whether to reduce also where that condition fails.
+
+    Returns
+    -------
+    Reduction
+        The reduced chain at the motor shaft, its steps, and each kept frequency (rad/s) with its error and
+        the bound on that; `to_drive` makes a `Drive` of two masses.
+
+    Raises
+    ------
+    InputError
+        For bad input, and where the condition of `factor` fails, unless `force`.
+
+    Examples
+    --------
     >>> reduction = reduce_chain(Chain.load("crane-4-mass"), to=2)
     >>> [(step.kind, step.masses, round(step.ratio)) for step in reduction.steps]
     [('mass', ('pinion',), 190), ('mass', ('wheel shaft',), 26)]
     >>> round(reduction.frequencies[0].error, 4)
     -0.0195
+
+    References
+    ----------
+    [R]; the lever rule with its proved error, and the modal reduction: docs/theory/reduction.md.
     """
     to = _checked(chain, to, up_to, method, factor)
     whole = natural_vibration(chain).Omega[1:]

@@ -97,8 +97,56 @@ class ChainEnergy:
 class ChainRun(BaseRun):
     """One start of a chain. Angles, speeds and torques in SI at the motor shaft.
 
-    `.t, .phi, .w, .twist, .T, .u` are traces for plotting, a row an instant; `at(times)` evaluates any
-    instant exactly; peaks and events are located, not read off these traces.
+    It is returned by `simulate_chain`. The traces are for plotting, one row for each instant; `at(times)`
+    evaluates any instant exactly; peaks and events are located, not read off the traces. N is the number of
+    masses.
+
+    Attributes
+    ----------
+    chain : Chain
+        The chain that was started.
+    controller : Controller or None
+        The controller as it was set up; None where the motor was off.
+    base : Drive or None
+        The drive to whose mean torque K_dyn refers.
+    status : Status
+        How the start ended.
+    t, u : array of shape (n,)
+        Instants of the traces, s, and motor torque, N m.
+    phi, w : array of shape (n, N)
+        Angles, rad, and speeds, rad/s, of the masses.
+    twist, T : array of shape (n, N - 1)
+        Twists, rad, and torques, N m, of the shafts.
+    k_dyn : float
+        Dynamic coefficient of the shaft beside the motor.
+    peak_torques, peak_times : array of shape (N - 1,)
+        Largest |T| of each shaft, N m, and its instant, s.
+    peak_impulses : array of shape (N - 1,)
+        Largest impulse of the impacts of each rigid gap, N m s.
+    start_time, end_time : float
+        First instant at which the load mass has its target speed (NaN if never), and end of the run, s.
+    events : tuple of ChainEvent
+        Contacts, impacts and others, in order of time.
+    energy : ChainEnergy
+        Energy balance, J.
+    numbers : Numbers
+        The chain as the kernel has it.
+    recorded : Start
+        Records of the kernel at the end.
+
+    Examples
+    --------
+    >>> from softstart import simulate_chain
+    >>> run = simulate_chain("crane-4-mass", "direct")
+    >>> run.peak_torques.shape, run.w.shape == (run.t.size, 4)
+    ((3,), True)
+    >>> run.status.value
+    'The load reached its target speed.'
+
+    References
+    ----------
+    Everything at one shaft: [R], docs/theory/reduction.md; K_dyn: [G] (16); accuracy of the Taylor series:
+    docs/theory/numerics.md.
     """
 
     chain: Chain

@@ -49,23 +49,49 @@ def simulate_chain(
 
     Parameters
     ----------
-    chain : a Chain, or the name or file of one.
-    controller : a name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
-    until : end of the run in s; by default one elastic period after the load mass has its target speed.
-    fitted_to : the drive from which the controller's own defaults are derived: by default the modal reduction
-        of the chain to two masses, whatever its error.
-    parameters : parameters of a controller given by name.
-    base : the drive whose mean torque K_dyn refers to, if not that one.
-    time_limit : s, after which a start that has not reached its target speed is given up as not reached.
-    max_events : cap on the events and on the control instants; going over it is an error, not a result.
-    excitation : periodic torques by the names (or indices) of the masses on which they act, each at the speed
+    chain : Chain or str
+        A chain, or the name or file of one.
+    controller : str, Controller or None
+        A name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
+    until : float, optional
+        End of the run, s; by default one elastic period after the load mass has its target speed.
+    fitted_to : Drive, optional
+        The drive from which the controller's own defaults are derived: by default the modal reduction of
+        the chain to two masses, whatever its error.
+    parameters : mapping, optional
+        Parameters of a controller given by name: SI numbers or strings with a unit.
+    base : Drive, optional
+        The drive to whose mean torque K_dyn refers, if not `fitted_to`.
+    time_limit : float, optional
+        Time after which a start that has not reached its target speed ends as not reached, s.
+    max_events : int
+        Largest number of events and of control instants; more of them is an error, not a result.
+    excitation : mapping, optional
+        Periodic torques, N m, by the names (or indices) of the masses on which they act, each at the speed
         of its own shaft.
 
-    Raises InputError for bad input and SimulationError for a start that cannot be finished.
+    Returns
+    -------
+    ChainRun
+        Traces, events, peaks and energy: angles, speeds and torques in SI at the motor shaft.
 
+    Raises
+    ------
+    InputError
+        For bad input, and where nothing would end the run.
+    SimulationError
+        If the start cannot be finished; with the reason, see `Status`.
+
+    Examples
+    --------
     >>> run = simulate_chain("crane-4-mass", "direct")
     >>> round(run.k_dyn, 3), round(run.start_time, 4)
     (6.299, 0.3708)
+
+    References
+    ----------
+    Everything at one shaft: [R], docs/theory/reduction.md; K_dyn: [G] (16); the Taylor series and the
+    location of events: docs/theory/numerics.md.
     """
     if isinstance(chain, str):
         chain = Chain.load(chain)
@@ -234,13 +260,45 @@ def verify_on_chain(
     *,
     parameters: Mapping[str, object] | None = None,
 ) -> Verification:
-    """Run a controller that is set up for `drive` on that drive and on the chain it stands for.
+    """Run a controller that is set up for `drive` on that drive and on the chain it represents.
 
+    Parameters
+    ----------
+    chain : Chain or str
+        The whole chain, or the name or file of one.
+    drive : Drive
+        The two-mass drive to which it is reduced, a single one.
+    controller : str or Controller
+        A name, `path/to/file.py:ClassName`, or a Controller object.
+    until : float, optional
+        End of both runs, s; by default each ends one elastic period after its own start time.
+    parameters : mapping, optional
+        Parameters of a controller given by name: SI numbers or strings with a unit.
+
+    Returns
+    -------
+    Verification
+        Both runs, and the shaft between motor and load with the largest torque. K_dyn of both refers to
+        the mean torque of `drive`.
+
+    Raises
+    ------
+    InputError
+        For bad input, as a batch of drives or a chain without a motor.
+    SimulationError
+        If one of the two starts cannot be finished.
+
+    Examples
+    --------
     >>> from softstart.chain import Chain, reduce_chain
     >>> chain = Chain.load("crane-4-mass")
     >>> found = verify_on_chain(chain, reduce_chain(chain, to=2).to_drive(), "s-curve")
     >>> found.worst_place, found.chain.k_dyn > found.drive.k_dyn
     ('rotor - pinion', True)
+
+    References
+    ----------
+    What a reduction keeps: [R], docs/theory/reduction.md; how to use it: docs/howto/reduce-a-driveline.md.
     """
     if drive.shape != ():
         raise InputError(f"{drive.name}: a batch of shape {drive.shape}; give a single drive.")

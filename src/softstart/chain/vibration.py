@@ -143,10 +143,34 @@ class Vibration:
 
 
 def natural_vibration(chain: Chain) -> Vibration:
-    """Frequencies and shapes of the chain with its gaps closed.
+    """Frequencies and shapes of the chain with its gaps closed, undamped.
 
+    Parameters
+    ----------
+    chain : Chain
+        A chain of N masses; a motor is not needed.
+
+    Returns
+    -------
+    Vibration
+        At the motor shaft: `Omega` in rad/s, one for each mode, and `shape`, a row of N amplitudes for each
+        mode. A rigid joint makes one body of its two masses, and one mode less.
+
+    Raises
+    ------
+    InputError
+        If every joint of the chain is rigid, so that nothing vibrates.
+
+    Examples
+    --------
     >>> natural_vibration(Chain.load("crane-4-mass")).Omega.round(1)
     array([   0. ,  114.6,  618.5, 1630.3])
+
+    References
+    ----------
+    [R]; docs/theory/reduction.md.
+    J. Demmel, W. Kahan, SIAM J. Sci. Stat. Comput. 11 (1990) 873-912, doi:10.1137/0911052: frequencies.
+    I. S. Dhillon, B. N. Parlett, Linear Algebra Appl. 387 (2004) 1-28, doi:10.1016/j.laa.2003.12.028: shapes.
     """
     body = closed(chain.at_motor_shaft())
     elastic = elastic_frequencies(body.J, body.c)

@@ -37,6 +37,10 @@ class Sensor(IntFlag):
     --------
     >>> Sensor.STAGE | Sensor.LOAD_SPEED
     <Sensor.STAGE|LOAD_SPEED: 5>
+
+    References
+    ----------
+    docs/theory/feedback.md, what can be measured.
     """
 
     NONE = 0
@@ -62,6 +66,10 @@ class Measured(NamedTuple):
     --------
     >>> Measured(0.1, 0.25, 12.0, 62.0, math.nan, math.nan, math.nan).motor_speed
     12.0
+
+    References
+    ----------
+    docs/theory/feedback.md, what can be measured; the stages: [G], docs/theory/stages.md.
     """
 
     time: float
@@ -90,10 +98,20 @@ class Command(NamedTuple):
     slope : rate of the demand, N m/s. It needs an `ask_again`, where its line ends within the limits of the
         drive: both ends of a line beyond them are clipped.
 
+    Raises
+    ------
+    SimulationError
+        From `simulate`, not here: if `torque` is NaN, `ask_again` is not later than now, or a `slope` other
+        than 0 has no `ask_again`.
+
     Examples
     --------
     >>> Command(62.0)
     Command(torque=62.0, ask_again=inf, state=(), slope=0.0)
+
+    References
+    ----------
+    docs/howto/add-a-controller.md, what a controller answers.
     """
 
     torque: float
@@ -150,6 +168,10 @@ class Controller:
     >>> ramp = make_controller("ramp", {"time": "120 ms"})
     >>> ramp.parameters["time"], ramp.fitted(Drive.load("crane-4amtkf")).parameters["full_torque"]
     (0.12, 62.0)
+
+    References
+    ----------
+    The strategies and their sources: docs/controllers.md; to write one: docs/howto/add-a-controller.md.
     """
 
     name: ClassVar[str] = ""
@@ -198,6 +220,10 @@ class PlainController(Controller, ABC):
     ...     name = "half"
     ...     def step(self, measured, state):
     ...         return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.001)
+
+    References
+    ----------
+    docs/howto/add-a-controller.md.
     """
 
     initial_state: ClassVar[tuple[float, ...]] = ()
@@ -236,6 +262,10 @@ class CompiledController(Controller, ABC):
     >>> crane = Drive.load("crane-4amtkf")
     >>> make_controller("direct").fitted(crane).vector(crane).tolist()
     [62.0]
+
+    References
+    ----------
+    docs/howto/add-a-controller.md, the compiled form.
     """
 
     kernel: ClassVar[Callable[[Vector, Vector, Vector, Vector], None]]

@@ -60,6 +60,10 @@ class Drive(ParameterSet):
     starting_torque = "6 N": N is a force, not a torque; write a torque as "62 N*m" or as ...
     gap is missing: the total angular gap is needed; write for example gap="0.5 rad".
     target_speed is missing: the speed that the load is to reach is needed, or rated_speed ...
+
+    References
+    ----------
+    Equations of motion: [G] (1), docs/theory/stages.md; contact laws: docs/theory/contact-laws.md.
     """
 
     WHAT: ClassVar[str] = "a drive"

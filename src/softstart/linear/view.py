@@ -104,6 +104,12 @@ class LinearView:
     >>> view = linear_view("crane-4amtkf", "current-limit-feedback", limit_cycles=False)
     >>> view
     <LinearView: current-limit-feedback on ...: gain margin ..., phase margin ..., delay margin ...>
+
+    References
+    ----------
+    docs/linear-view.md.
+    M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002)
+    1633-1649, doi:10.1016/S0005-1098(02)00047-X.
     """
 
     drive: Drive

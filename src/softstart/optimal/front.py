@@ -185,6 +185,10 @@ class Front:
     >>> front = pareto(crane, [0.2883042], terminal="synchronous", controllers=[])
     >>> [round(point.k_dyn, 4) for point in front.points], front.shortest_start_time
     ([0.9092], nan)
+
+    References
+    ----------
+    docs/optimal-starts.md; the optimum at each start time: docs/theory/optimum.md.
     """
 
     drive: Drive
@@ -268,12 +272,20 @@ def pareto(
         The drive.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
-    terminal, method, torque_speed, smoothness, base
-        As in `optimize`.
+    terminal : {"synchronous", "steady", "reached"}
+        What holds at the end of each optimal start, as in `optimize`.
     controllers : sequence of str or Controller, optional
         What to put beside the curve; by default all installed controllers that run without being given a
         parameter, none for an empty list. Each is simulated, and judged by the optimum at its own start time
         with terminal `reached`: the fair yardstick.
+    method : {"auto", "closed-form", "lp", "collocation"}
+        As in `optimize`.
+    torque_speed : sequence of (float, float)
+        Corners (rad/s, N m) of a concave limit of the motor torque over the motor speed.
+    smoothness : float
+        Weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
+    base : Drive, optional
+        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
     save_to : str or path, optional
         A file in which each finished point is kept at once. A second call with the same inputs takes them
         from there; other inputs are refused.
@@ -297,6 +309,8 @@ def pareto(
         For bad input.
     OptimumError
         If not a single point could be computed.
+    SimulationError
+        If the start under a controller cannot be finished, or workers cannot go on.
 
     Examples
     --------

@@ -87,6 +87,10 @@ class Optimum:
     >>> best = optimize(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042)
     >>> round(best.k_dyn, 4), round(best.heat, 4), best.run.contacts
     (0.9092, 0.2153, 1)
+
+    References
+    ----------
+    The methods, their proofs and the lower bounds: docs/theory/optimum.md.
     """
 
     problem: Problem
@@ -187,6 +191,10 @@ class RobustOptimum:
     >>> best = optimize_robust([drive], start_time=0.2883042)
     >>> best.worst, best.k_dyn == best.k_dyn_each[0]
     (0, True)
+
+    References
+    ----------
+    docs/optimal-starts.md; the momentum bound: docs/theory/optimum.md.
     """
 
     scenarios: tuple[Drive, ...]

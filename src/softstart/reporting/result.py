@@ -88,6 +88,10 @@ class Report:
     '<!DOCTYPE html>'
     >>> round(made.summary()["k_dyn"], 3)
     2.106
+
+    References
+    ----------
+    docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
 
     drive: Drive
@@ -207,6 +211,10 @@ def report(
     <Report: shaped, K_dyn 1.004 recommended for Crane travel drive 4AMTKF(H)112L6>
     >>> found.choice.ordinary.name
     'ramp'
+
+    References
+    ----------
+    docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
     drive = Drive.load(drive) if isinstance(drive, str) else drive
     steps = _checked(drive, resolution, slower, budget)

@@ -66,6 +66,10 @@ class Comparison:
     ['direct', 'reduced-first-stage']
     >>> table.gentlest.run.controller.name
     'reduced-first-stage'
+
+    References
+    ----------
+    K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
 
     drive: Drive
@@ -135,6 +139,10 @@ def compare(
     >>> table = compare("crane-4amtkf", ["shaped", "pulse-coast-hold"], fitted_to=assumed)
     >>> [round(row.run.k_dyn, 3) for row in table.rows]
     [1.678, 1.274]
+
+    References
+    ----------
+    K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)

@@ -178,15 +178,58 @@ class BaseRun:
 class Run(BaseRun):
     """One start under one controller. All angles in rad at the motor shaft, SI units.
 
-    `.t, .phi1, .phi2, .w1, .w2, .u, .T` are traces for plotting; `at(times)` evaluates any instant exactly;
-    peaks and events are located, not read off these traces.
+    It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
+    peaks and events are located, not read off the traces.
 
+    Attributes
+    ----------
+    drive : Drive
+        The drive that was started.
+    controller : Controller
+        The controller as it was set up.
+    base : Drive
+        The drive to whose mean torque K_dyn refers.
+    status : Status
+        How the start ended.
+    t : array of shape (n,)
+        Instants of the traces, s.
+    phi1, phi2 : array of shape (n,)
+        Angles of motor and load, rad.
+    w1, w2 : array of shape (n,)
+        Speeds of motor and load, rad/s.
+    theta : array of shape (n,)
+        Twist phi1 - phi2, rad.
+    u, T : array of shape (n,)
+        Motor torque after limits and lag, and shaft torque, N m.
+    k_dyn, k_dyn_first_contact : float
+        Dynamic coefficient of the whole run, and of stage 2 alone.
+    peak_torque, peak_time : float
+        Largest |T|, N m, and its instant, s.
+    start_time, end_time : float
+        First instant at which the load has its target speed (NaN if never), and end of the run, s.
+    events : tuple of Event
+        Contacts and others, in order of time.
+    stages : tuple of Stage
+        Spans with the gap open (odd number) or closed (even).
+    plant, final : array of one dimension
+        Parameters of the drive as the kernel has them, and its state and figures at the end.
+    segments, event_rows, stage_rows : array of two dimensions
+        Records of the kernel: a row for each span, event and stage.
+
+    Examples
+    --------
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
     >>> run.status.value
     'The load reached its target speed.'
     >>> [round(stage.duration, 4) for stage in run.stages[:2]]
     [0.0166, 0.0367]
+    >>> float(run.at(run.peak_time)["T"].round(6)) == round(run.peak_torque, 6)
+    True
+
+    References
+    ----------
+    [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); docs/theory/stages.md.
     """
 
     drive: Drive

@@ -55,30 +55,56 @@ def simulate(
 ) -> Any:
     """Simulate the start of a drive under a controller, exactly.
 
+    Between two events the motion is a closed form; events are located to machine precision. There is no
+    step size and no output grid.
+
     Parameters
     ----------
-    drive : a Drive, a Drive whose fields hold arrays, a list of Drives, or the name or file of a drive.
-    controller : a name, `path/to/file.py:ClassName`, or a Controller object.
-    until : end of the run in s. Without it the run ends one elastic period 2 pi/Omega after the start time,
-        the instant at which the load first has its target speed.
-    parameters : parameters of a controller given by name.
-    fitted_to : the drive from which the controller's own defaults are derived, if not `drive`: what happens
-        to a controller set up for one drive when the gap has worn or the load changed.
-    base : the drive whose mean torque K_dyn refers to, if not `drive`.
-    time_limit : s, after which a start that has not reached its target speed is given up as not reached.
-    max_events : cap on the events and on the control instants of one start; going over it is an error,
-        not a result.
+    drive : Drive, sequence of Drive or str
+        A drive, one whose fields hold arrays, a list of drives, or the name or file of a drive.
+    controller : str or Controller
+        A name, `path/to/file.py:ClassName`, or a Controller object.
+    until : float, optional
+        End of the run, s. By default one elastic period 2 pi/Omega after the start time, the instant at
+        which the load first has its target speed.
+    parameters : mapping, optional
+        Parameters of a controller given by name: SI numbers or strings with a unit.
+    fitted_to : Drive, optional
+        The drive from which the controller's own defaults are derived, if not `drive`: what happens to a
+        controller set up for one drive when the gap has worn or the load changed.
+    base : Drive, optional
+        The drive to whose mean torque K_dyn refers, if not `drive`.
+    time_limit : float, optional
+        Time after which a start that has not reached its target speed ends as not reached, s.
+    max_events : int
+        Largest number of events and of control instants of one start; more of them is an error, not a
+        result.
 
     Returns
     -------
-    A Run for one drive; for many an xarray.Dataset with one entry a start (see `softstart.start.batch`).
+    Run or xarray.Dataset
+        A Run for one drive. For many a Dataset with one entry for each start: dimension `start`, or
+        `axis_0`, `axis_1`, ... for fields of more than one dimension; a start that cannot be finished has
+        a status of its own and NaN in every figure.
 
-    Raises InputError for bad input and SimulationError for a start that cannot be finished.
+    Raises
+    ------
+    InputError
+        For bad input; all its mistakes at once.
+    SimulationError
+        If the start of a single drive cannot be finished; with the reason, see `Status`.
 
+    Examples
+    --------
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
     >>> round(run.k_dyn, 4), round(run.start_time, 4)
     (3.1179, 0.3735)
+
+    References
+    ----------
+    [G] (1) to (18); the closed forms, and why no event is missed: docs/theory/stages.md; accuracy:
+    docs/theory/numerics.md.
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)

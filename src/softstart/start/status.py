@@ -10,8 +10,23 @@ from softstart.plant import layout as at
 class Status(Enum):
     """How a start ended; the value is the sentence shown.
 
+    Attributes
+    ----------
+    REACHED, STOPPED_EARLY, NOT_REACHED : the run went to its end and its figures are valid; `finished` is
+        True.
+    TOO_MANY_EVENTS, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL : the start could not be finished: an
+        error for a single start, NaN in every figure in a batch.
+
+    Examples
+    --------
     >>> Status.REACHED.value
     'The load reached its target speed.'
+    >>> [status.name for status in Status if status.finished]
+    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED']
+
+    References
+    ----------
+    How events are located: docs/theory/stages.md; accuracy: docs/theory/numerics.md.
     """
 
     REACHED = "The load reached its target speed."

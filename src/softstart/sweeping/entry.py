@@ -105,6 +105,10 @@ def sweep(
     >>> found = sweep(Drive.load("crane-4amtkf"), "direct", {"gap": [0.5, 2], "load.inertia": [0.07, 0.175]})
     >>> found.k_dyn.sel(gap=2, load_inertia=0.175).item().__round__(4)
     4.8654
+
+    References
+    ----------
+    docs/sweeps.md; each start: see `simulate`.
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)

@@ -115,6 +115,10 @@ class Tuning:
     >>> tuned = tune("crane-4amtkf", "reduced-first-stage", ["1x"], ["1x"], **options)
     >>> tuned.controller, tuned.metric, dict(tuned.schedule.sizes)
     ('reduced-first-stage', 'k_dyn', {'gap': 1, 'load_inertia': 1})
+
+    References
+    ----------
+    docs/tuning.md; the search: see `tune`.
     """
 
     question: Question

@@ -352,6 +352,8 @@ def optimize_robust(
         For bad input.
     InfeasibleError
         Where no profile was found that starts all drives in time.
+    OptimumError
+        If the exact runs contradict the search.
 
     Examples
     --------
@@ -420,8 +422,16 @@ def worth_of_contact_sensor(
 
     Parameters
     ----------
-    scenarios, start_time, base, progress, bound_of
-        As in `optimize_robust`.
+    scenarios : sequence of Drive
+        The drives.
+    start_time : float
+        The time allowed, s.
+    base : Drive, optional
+        The drive to whose mean shaft torque K_dyn refers; by default the first scenario.
+    progress : callable, optional
+        Called with a text after each stage of the search.
+    bound_of : callable, optional
+        Gives the bound of one scenario by itself, in K_dyn of `base`; by default the momentum bound.
     k_dyn_alone : callable, optional
         Gives the least K_dyn of one scenario by itself, in K_dyn of the base drive: what a drive could have
         whose gap, inertia and load torque were known.
@@ -433,8 +443,12 @@ def worth_of_contact_sensor(
 
     Raises
     ------
-    InputError, InfeasibleError
-        As `optimize_robust`.
+    InputError
+        For bad input.
+    InfeasibleError
+        Where no profile was found that starts all drives in time.
+    OptimumError
+        If the exact runs contradict the search.
 
     Examples
     --------
