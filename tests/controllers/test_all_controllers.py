@@ -83,7 +83,7 @@ def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> No
 @pytest.mark.parametrize("kind", ["active", "reactive"])
 def test_batch_equals_single_starts(name: str, kind: Any) -> None:
     rng = np.random.default_rng(5)
-    fields = [dict(random_drive(rng, load_kind=kind)) for _ in range(40)]
+    fields = [random_drive(rng, load_kind=kind).values() for _ in range(40)]
     varied = [key for key, value in fields[0].items() if isinstance(value, float)]
     batch = Drive(load_kind=kind, **{key: np.array([one[key] for one in fields]) for key in varied})
     together = simulate(batch, name)
