@@ -1,0 +1,119 @@
+"""The size of the house: a budget for each room, and no import circle.
+
+A number here may fall without a word. Raising one needs a sentence beside it that says what for.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SOURCES = ("src", "controllers", "studies")
+
+# room of src/softstart: lines, files, modules with a single importer, imports inside functions
+BUDGET = {
+    "(top)": (2260, 11, 0, 0),
+    "balancing": (2040, 7, 0, 0),
+    "chain": (4680, 14, 2, 0),
+    "cli": (4240, 20, 1, 0),
+    "clutch": (2380, 10, 5, 0),
+    "controller": (1160, 5, 0, 0),
+    "drive": (700, 4, 1, 0),
+    "input": (1240, 5, 0, 0),
+    "linear": (2140, 8, 1, 0),
+    "optimal": (8280, 27, 7, 0),
+    "page": (3940, 17, 3, 0),
+    "plant": (1980, 14, 2, 0),
+    "reporting": (3020, 12, 3, 0),
+    "stages": (680, 6, 1, 0),
+    "start": (1440, 8, 0, 0),
+    "sweeping": (1660, 8, 0, 0),
+    "tuning": (2340, 10, 1, 0),
+    "views": (4220, 16, 5, 0),
+}
+
+
+def modules() -> dict[str, Path]:
+    """All modules of the three roots by dotted name."""
+    found = {}
+    for source in SOURCES:
+        for path in (ROOT / source).rglob("*.py"):
+            parts = path.relative_to(ROOT / source).with_suffix("").parts
+            found[".".join(parts).removesuffix(".__init__")] = path
+    return found
+
+
+MODULES = modules()
+TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+
+
+def imported(name: str, node: ast.AST) -> set[str]:
+    """Modules of the house that an import statement in module `name` names."""
+    if isinstance(node, ast.Import):
+        return {alias.name for alias in node.names} & set(MODULES)
+    if not isinstance(node, ast.ImportFrom):
+        return set()
+    base = node.module or ""
+    targets = {f"{base}.{a.name}" if f"{base}.{a.name}" in MODULES else base for a in node.names}
+    return targets & (set(MODULES) - {name})
+
+
+# all imports count: those at the top, those within functions, those for type checkers only
+GRAPH = {name: set().union(*(imported(name, n) for n in ast.walk(tree))) for name, tree in TREES.items()}
+
+
+def room(name: str) -> str:
+    """The folder of src/softstart in which a module stands."""
+    parts = MODULES[name].relative_to(ROOT / "src" / "softstart").parts
+    return parts[0] if len(parts) > 1 else "(top)"
+
+
+OWN = [name for name in MODULES if name.split(".")[0] == "softstart"]
+ROOMS = {room(name) for name in OWN}
+
+
+def measured(one: str) -> tuple[int, int, int, int]:
+    """Lines, files, modules with a single importer, imports inside functions of a room."""
+    importers = Counter(target for targets in GRAPH.values() for target in targets)
+    names = [name for name in OWN if room(name) == one]
+    kinds = ast.FunctionDef | ast.AsyncFunctionDef
+    functions = (node for name in names for node in ast.walk(TREES[name]) if isinstance(node, kinds))
+    inner = {id(n) for f in functions for n in ast.walk(f) if isinstance(n, ast.Import | ast.ImportFrom)}
+    lines = sum(len(MODULES[name].read_text(encoding="utf-8").splitlines()) for name in names)
+    return lines, len(names), sum(importers[name] == 1 for name in names), len(inner)
+
+
+def test_every_room_has_a_budget() -> None:
+    assert set(BUDGET) == ROOMS
+
+
+@pytest.mark.parametrize("one", sorted(BUDGET))
+def test_a_room_keeps_its_budget(one: str) -> None:
+    over = [
+        f"{now} {what} where {most} are allowed"
+        for what, now, most in zip(
+            ("lines", "files", "modules with one importer", "imports inside functions"),
+            measured(one),
+            BUDGET[one],
+            strict=True,
+        )
+        if now > most
+    ]
+    assert not over, f"{one}: {'; '.join(over)}: make it simpler, or raise the number with a reason"
+
+
+def test_no_module_reaches_itself() -> None:
+    """No circle of imports, even through functions and types."""
+    left = {name: set(targets) for name, targets in GRAPH.items()}
+    while free := [name for name, targets in left.items() if not targets & left.keys()]:
+        for name in free:
+            del left[name]
+    # what is left are circles and what imports them; drop what nothing left imports
+    while free := [n for n in left if not any(n in targets for m, targets in left.items() if m != n)]:
+        for name in free:
+            del left[name]
+    assert not left, f"these import one another: {', '.join(sorted(left))}"
