@@ -2,6 +2,7 @@
 
     python tests/checkouts.py OLD NEW                   compare all parts
     python tests/checkouts.py OLD NEW --only starts,optima
+    python tests/checkouts.py OLD NEW --speed           how long the new one takes, as a ratio
     python tests/checkouts.py --list                    what is compared
 
 Each part runs in a process of its own for each checkout, with that checkout's sources first on the path, and
@@ -246,6 +247,52 @@ PARTS: dict[str, Callable[[], Values]] = {
 }
 
 
+def speed() -> Values:
+    """Least time in s of three runs of each: batches of starts, single starts, chains."""
+    from softstart import Chain, Drive, simulate, simulate_chain
+
+    crane = Drive.load("crane-4amtkf")
+    chain = Chain.load("crane-4-mass")
+    damped = crane.replace(damping=1.5)
+
+    def batch(drive: Drive, starts: int) -> Drive:
+        return drive.replace(gap=np.linspace(0.1, 2.0, starts))
+
+    work: dict[str, Callable[[], Any]] = {
+        "batch direct": lambda: simulate(batch(crane, 100_000), "direct"),
+        "batch direct, damped": lambda: simulate(batch(damped, 10_000), "direct"),
+        "start direct": lambda: [simulate(crane, "direct") for _ in range(200)],
+        "start ramp with traces": lambda: [simulate(crane, "ramp").T for _ in range(20)],
+        "chain direct": lambda: [simulate_chain(chain, "direct") for _ in range(3)],
+        "chain ramp": lambda: [simulate_chain(chain, "ramp") for _ in range(3)],
+    }
+    for name in ready():
+        if name != "direct":
+            work[f"batch {name}"] = lambda k=name: simulate(batch(crane, 1500), k)
+    for label, run in work.items():
+        run()  # compiled and loaded
+        times = []
+        for _ in range(3):
+            begun = time.perf_counter()
+            run()
+            times.append(time.perf_counter() - begun)
+        yield label, min(times)
+
+
+def race(old: Path, new: Path, rounds: int = 4) -> int:
+    """Run `speed` on both checkouts in turns and print old over new: above 1, the new one is faster."""
+    least: list[dict[str, float]] = [{}, {}]
+    for turn in range(rounds):
+        for which in (0, 1) if turn % 2 else (1, 0):
+            text = run_part((old, new)[which], "speed").communicate()[0]
+            for label, value in map(json.loads, text.splitlines()):
+                took = float.fromhex(value)
+                least[which][label] = min(took, least[which].get(label, took))
+    for label, before in least[0].items():
+        print(f"{label:28} {before:9.4f} s {least[1][label]:9.4f} s  ratio {before / least[1][label]:.3f}")
+    return 0
+
+
 def outcome(work: Callable[[], Any]) -> Any:
     """What `work` returns, or the refusal as text."""
     try:
@@ -358,13 +405,14 @@ def main() -> int:
     parser.add_argument("old", nargs="?", type=Path)
     parser.add_argument("new", nargs="?", type=Path)
     parser.add_argument("--only", default=",".join(PARTS), help="parts, with commas between")
+    parser.add_argument("--speed", action="store_true", help="compare times instead of numbers")
     parser.add_argument("--list", action="store_true", help="what is compared")
     parser.add_argument("--part", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.part:
         out = sys.stdout
         with contextlib.redirect_stdout(sys.stderr):
-            for label, value in PARTS[given.part]():
+            for label, value in (PARTS | {"speed": speed})[given.part]():
                 out.write(json.dumps([label, frozen(value)]) + "\n")
         return 0
     if given.list:
@@ -376,6 +424,8 @@ def main() -> int:
     unknown = [part for part in given.only.split(",") if part not in PARTS]
     if unknown:
         parser.error(f"--only: no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    if given.speed:
+        return race(given.old.resolve(), given.new.resolve())
     return int(compare(given.old.resolve(), given.new.resolve(), given.only.split(",")) > 0)
 
 

@@ -184,7 +184,7 @@ class CurrentLimitFeedback(CompiledController):
     the soft approach and the rise all the same; its gap, once closed, then counts as closed for good.
 
     If the load is not at its target speed within `patience`, the feedback is dropped and the limit raised,
-    so that an estimate gone wrong does not hold up the start for ever.
+    so that a wrong estimate does not delay the start indefinitely.
 
     Source: [G], conclusions ("regulators acting on the current-limit level or as a flexible feedback").
 

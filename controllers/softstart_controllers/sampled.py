@@ -55,7 +55,7 @@ def patience(drive: Drive) -> Any:
     """How long in s a controller waits for a contact it cannot see, before it goes on without.
 
     (J1 + J2)(target - w2(0))/(0.15 (Ms - max(0, Mc))) + 50 elastic periods: far beyond any sound start, so
-    that it is no switching by time, and yet no start waits for ever.
+    that it does not act as a timer, and yet no start waits indefinitely.
 
     >>> round(patience(Drive.load("crane-4amtkf")), 2)
     5.15

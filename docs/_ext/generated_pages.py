@@ -40,7 +40,7 @@ WRITERS: dict[str, Callable[[], str]] = {
 
 
 def fill(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Put the text in the place of each mark."""
+    """Replace each mark by its text."""
 
     def text(found: re.Match[str]) -> str:
         if found[1] not in WRITERS:

@@ -143,7 +143,7 @@ ROUNDING = 4.0 * EPS
 GRAZE = 1e-12
 # impacts that pile up within this share of a span are over: the accumulation time is known
 PILED_UP = 1e-9
-# flanks as elastic as this may tremble for ever: once they rise by no more than GRAZE of the gap, they rest
+# flanks as elastic as this may bounce indefinitely: once they rise by GRAZE of the gap or less, they rest
 ELASTIC = 0.999
 # `zeros` of a contact whose torque has just come back: it begins at zero
 REJOINED = 3

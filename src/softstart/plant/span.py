@@ -2,7 +2,7 @@
 
 `torque_course` and `begin_span` turn the state into the coefficients of the motion; `next_event` finds the
 earliest event within the horizon. Every event that has just fired is masked, so that a start on the
-switching surface does not fire it for ever.
+switching surface does not fire it indefinitely.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -60,7 +61,7 @@ class Stage:
         return self.end - self.start
 
 
-class BaseRun:
+class BaseRun(ABC):
     """What finished starts of drives and of chains have in common."""
 
     controller: Controller | None
@@ -68,30 +69,30 @@ class BaseRun:
     status: Status
 
     @property
+    @abstractmethod
     def peak_torque(self) -> float:
         """Largest |T| of the (motor's) shaft, N m, located."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def _final(self) -> Vector:
         """The kernel's state at the end."""
-        raise NotImplementedError
 
+    @abstractmethod
     def at(self, times: ArrayLike) -> dict[str, Vector]:
         """States at any instants within the run."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _edges(self) -> Vector:
         """Times of the events, s."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _peak_times(self) -> Vector:
         """Times of the peaks that are located, s."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
         """The columns of `to_csv` after the time, by their headings."""
-        raise NotImplementedError
 
     @property
     def controller_name(self) -> str:

@@ -35,7 +35,7 @@ class Table(NamedTuple):
 
 
 def number(value: float | None, decimals: int) -> str:
-    """A number with so many decimals; a dash for what there is not.
+    """A number with so many decimals; a dash for a missing value.
 
     >>> number(0.01661, 4), number(float("nan"), 4), number(-0.00001, 3)
     ('0.0166', '-', '0.000')
