@@ -264,7 +264,7 @@ def _answer(frame: bytes, send: Callable[[Message], None]) -> None:
         text = "".join(traceback.format_exception(error))
         try:
             pickle.loads(pickle.dumps(error))
-        except Exception:
+        except Exception:  # a class that cannot be pickled is sent as its text
             error = RuntimeError(f"{type(error).__name__}: {error}")
         send(Message("error", (error, text)))
 

@@ -63,7 +63,7 @@ def test_random_starts(block):
 
 
 def test_the_start_at_which_the_torque_comes_back_within_rounding():
-    """`modelica`, overlapping flanks: found among 1500 random starts, the contact parted for ever at once."""
+    """`modelica`, overlapping flanks: one of 1500 random starts, it opened repeatedly at one instant."""
     compare(335)
 
 

@@ -74,7 +74,7 @@ def test_without_a_phase_the_encoder_rounds_to_the_nearest_count():
 
 def test_the_noise_is_standard_normal_and_white():
     drawn = np.array([gauss(7.0, float(i)) for i in range(20_000)])
-    # the 1e-4 levels of the tests: this seed is fixed, so they hold for ever or never
+    # the 1e-4 levels of the tests: this seed is fixed, so the outcome never changes
     assert stats.kstest(drawn, "norm").pvalue > 1e-4
     for lag in (1, 2, 3, 10):
         assert abs(np.corrcoef(drawn[lag:], drawn[:-lag])[0, 1]) < 4.0 / math.sqrt(drawn.size)

@@ -43,7 +43,7 @@ class Sweeping:
         )
 
     def begin(self, folder: Path, workers: int, processes: bool) -> subprocess.Popen[str]:
-        """Start it, with processes in the place of threads if asked."""
+        """Start it, with processes instead of threads if asked."""
         return subprocess.Popen(
             [
                 sys.executable, "-W", "error", "-c", PROCESSES + self.code if processes else self.code,
