@@ -8,16 +8,18 @@
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium)
 #   make pictures              the pictures of the README (needs chromium)
+#   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
 #   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
 #   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
 #                              whole suite from both, each in an empty folder
 #   make benchmark             speed and optima beside other packages
 PYTHON ?= python3
 VENV := .venv
+FLOORS := .venv-floors
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: compare test check fuzz serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test check fuzz everything floors serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
@@ -40,6 +42,17 @@ types: $(VENV)/.installed-dev
 
 layers: $(VENV)/.installed-dev
 	$(BIN)/lint-imports
+
+floors: $(FLOORS)/.installed
+	OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR=$(CURDIR)/$(FLOORS)/kernels $(FLOORS)/bin/softstart compare
+	OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR=$(CURDIR)/$(FLOORS)/kernels $(FLOORS)/bin/python -m pytest -q --few-kernels -W default \
+		tests/softstart/drive tests/softstart/plant/test_anchors.py tests/softstart/test_documents.py \
+		tests/softstart/test_profile.py tests/softstart/test_quantities.py tests/softstart/test_store.py \
+		tests/validation/test_gerasymiak_subbotin.py
+
+everything: $(VENV)/.installed-test
+	$(PIP) install --editable '.[dev,docs,page,package]'
+	@touch $(addprefix $(VENV)/.installed-,dev docs ui page package)
 
 serve: $(VENV)/.installed-ui
 	$(BIN)/softstart serve
@@ -74,7 +87,7 @@ benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/softstart study benchmark-chains --out results/benchmark-chains
 
 clean:
-	rm -rf $(VENV) results dist docs/_build docs/gallery_pages
+	rm -rf $(VENV) $(FLOORS) results dist docs/_build docs/gallery_pages
 
 $(VENV)/.installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "softstart needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
@@ -89,6 +102,12 @@ $(VENV)/.installed-test: $(VENV)/.installed
 
 $(VENV)/.installed-dev: $(VENV)/.installed-test
 	$(PIP) install --editable '.[dev]'
+	@touch $@
+
+$(FLOORS)/.installed: pyproject.toml $(VENV)/.installed-dev
+	rm -rf $(FLOORS)
+	$(BIN)/uv venv --quiet --python 3.11 $(FLOORS)
+	$(BIN)/uv pip install --quiet --python $(FLOORS)/bin/python --resolution lowest-direct --editable '.[test]'
 	@touch $@
 
 $(VENV)/.installed-benchmark: $(VENV)/.installed-test

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import signal
+import tempfile
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
-
-from softstart import Chain, Drive, TorqueProfile, optimize_robust, simulate, simulate_chain
-from softstart.controller import CompiledController, make_controller, ready_controller_names
+from tests import kernels
 
 # the suite draws the same examples every time; `make fuzz` draws new ones (--hypothesis-profile=fuzz)
 settings.register_profile("suite", derandomize=True, database=None, deadline=None)
@@ -19,15 +20,18 @@ settings.load_profile("suite")
 
 PAGE = Path(__file__).parent / "page"
 DOCS = Path(__file__).parent / "docs"
+SHARED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """`--page`: with the tests in a real browser, which need Chromium and playwright (`make page`).
 
     `--docs-commands`: run what the pages of the documentation tell to type (`make docs-commands`).
+    `--few-kernels`: compile what a test needs when it needs it, for a few tests from an empty cache.
     """
     parser.addoption("--page", action="store_true", help="with the tests of the page in Chromium")
     parser.addoption("--docs-commands", action="store_true", help="with the commands of the documentation")
+    parser.addoption("--few-kernels", action="store_true", help="compile nothing before the first test")
 
 
 def pytest_configure() -> None:
@@ -51,21 +55,69 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if collection_path == PAGE and not config.getoption("--page") else None
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_kernels() -> None:
-    """Compile everything before the first test: a fresh clone is not to compile within one of them.
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile before the modules of tests are imported: a fresh clone is not to compile within a test."""
+    config = session.config
+    if config.getoption("collectonly") or config.getoption("few_kernels"):
+        return
+    if folder := getattr(config, "workerinput", {}).get("kernels"):
+        kernels.compile_together(Path(folder))
+    elif config.getoption("dist", "no") == "no":
+        kernels.compile_all()
 
-    The command line says on standard error that it compiles, which tests of its output would trip over.
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """The workers of pytest-xdist share the work of compiling."""
+    if SHARED not in node.config.stash:
+        node.config.stash[SHARED] = tempfile.TemporaryDirectory(prefix="softstart-kernels-")
+    node.workerinput["kernels"] = node.config.stash[SHARED].name
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave nothing behind."""
+    if SHARED in config.stash:
+        config.stash[SHARED].cleanup()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Slow tests first in each worker, so that none is left for the end."""
+    items[:] = dealt(items, getattr(config, "workerinput", {}).get("workercount", 1))
+
+
+def dealt(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
+    """The tests in an order whose `workers` equal shares begin with files that hold slow tests.
+
+    pytest-xdist gives each worker one share, and the worker that is done first a part of the end of another
+    one's share. Files stay together, since their tests share fixtures.
     """
-    crane = Drive.load("crane-4amtkf")
-    profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
-    for controller in (profile, *map(make_controller, ready_controller_names())):
-        assert simulate(crane, controller).energy.residual < 1e-6
-        simulate(crane.replace(gap=[0.5, 2.0]), controller)
-    assert simulate_chain(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
-    assert optimize_robust([crane.replace(target_speed=60.0)], 0.3).k_dyn < 1.0
-    direct = make_controller("direct")
-    assert isinstance(direct, CompiledController)
-    plain = direct.as_plain(crane)
-    assert simulate(crane, plain).k_dyn == simulate(crane, "direct").k_dyn
-    simulate(crane.replace(gap=[0.5, 2.0]), plain)
+    files: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.nodeid.partition("::")[0], []).append(item)
+    slow = {name: sum(one.get_closest_marker("slow") is not None for one in files[name]) for name in files}
+    hands: list[list[str]] = [[] for _ in range(workers)]
+    for name in sorted((name for name in files if slow[name]), key=lambda name: -slow[name]):
+        min(hands, key=lambda hand: sum(slow[one] for one in hand)).append(name)
+    rest = [item for name in files if not slow[name] for item in files[name]]
+    found: list[pytest.Item] = []
+    for i, hand in enumerate(hands):
+        for name in hand:
+            found += sorted(files[name], key=lambda one: one.get_closest_marker("slow") is None)
+        fill = max(0, len(items) * (i + 1) // workers - len(found))
+        found, rest = found + rest[:fill], rest[fill:]
+    return found + rest
+
+
+@pytest.fixture(scope="module")
+def small_search() -> Iterator[None]:
+    """Robust optima from fewer starts: where there is one good optimum, or its quality is not the claim."""
+    from softstart.optimal.robust import guesses, solving
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(guesses, "PULSES", 3)
+        patch.setattr(guesses, "COASTS", 2)
+        patch.setattr(guesses, "COASTS_REACTING", 2)
+        patch.setattr(solving, "EVOLUTIONS", ((3, 0),))
+        patch.setattr(solving, "PURSUED", 2)
+        patch.setattr(solving, "FINE", 60)
+        yield

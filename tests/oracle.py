@@ -18,6 +18,8 @@ Corners defined here:
 - A reactive load whose speed passes zero without resting gives "load-stops" and "load-starts" at one instant.
 - `modelica` has the cut of ElastoBacklash, T = max(0, ...). Its special case of gap <= 1e-10 rad is left out.
 - Before the first torque piece the demand is u0. With rate = inf and lag = 0, u jumps with the demand.
+- With `release` a brake holds the motor (w1 = 0, w1_0 must be 0) until that instant, or, for infinity, until
+  u >= T for the first time ("released"; at t = 0 if it is so from the start).
 """
 
 from __future__ import annotations
@@ -88,6 +90,7 @@ class Mode:
     side: int = 0
     form: str = "open"
     direction: int = 1
+    held: bool = False
 
 
 def integrate(
@@ -111,11 +114,12 @@ def integrate(
     target: float | None = None,
     rtol: float = 1e-11,
     energy: bool = False,
+    release: float = 0.0,
 ) -> Start:
     """Integrate one start from t = 0 to t_end; see the module for its modes and corners."""
     drive = Drive(J1, J2, c, d, gap, Mc, kind == "reactive", law)
     path = TorquePath(torque_pieces, lag, rate, u0, t_end)
-    return _Run(drive, path, (theta0, w1_0 - w2_0, w2_0), target, rtol, energy).go()
+    return _Run(drive, path, (theta0, w1_0 - w2_0, w2_0), target, rtol, energy, release).go()
 
 
 class _Run:
@@ -129,6 +133,7 @@ class _Run:
         target: float | None,
         rtol: float,
         energy: bool,
+        release: float,
     ):
         self.drive, self.path, self.target, self.rtol, self.energy = drive, path, target, rtol, energy
         theta, v, w2 = start
@@ -144,7 +149,8 @@ class _Run:
             [speed / Omega, speed, speed, speed / Omega] + [torque * speed / Omega] * 3
         )
         self.atol = self.atol[: len(self.y)]
-        self.mode = Mode()
+        self.held_until = release
+        self.mode = Mode(held=release > 0.0)
         self.events: list[tuple[float, str]] = []
         self.contacts: list[Contact] = []
         self.peak, self.peak_time = 0.0, 0.0
@@ -165,13 +171,13 @@ class _Run:
         kq, kv = self.stiffness()
         J1, J2, energy = self.drive.J1, self.drive.J2, self.energy
         moves, friction = self.mode.direction != 0, self.mode.direction * self.drive.Mc
-        path, span = self.path, self.span
+        path, span, held = self.path, self.span, self.mode.held
 
         def derivative(t: float, y: np.ndarray) -> list[float]:
             q, v, w2, *_ = y.tolist()
             u, T = path.torque(t, span)[0], kq * q + kv * v
             a2 = (T - friction) / J2 if moves else 0.0
-            rates = [v, (u - T) / J1 - a2, a2, w2]
+            rates = [v, (0.0 if held else (u - T) / J1) - a2, a2, w2]
             return [*rates, u * (v + w2), T * v, friction * w2] if energy else rates
 
         return derivative
@@ -179,9 +185,10 @@ class _Run:
     def slope_functional(self) -> np.ndarray:
         """dT/dt as coefficients of (q, v, w2, u, 1)."""
         kq, kv = self.stiffness()
-        mobility = 1 / self.drive.J1 + (1 / self.drive.J2 if self.mode.direction else 0.0)
+        motor = 0.0 if self.mode.held else 1 / self.drive.J1
+        mobility = motor + (1 / self.drive.J2 if self.mode.direction else 0.0)
         friction = self.mode.direction * self.drive.Mc / self.drive.J2
-        return np.array([-kv * kq * mobility, kq - kv * kv * mobility, 0, kv / self.drive.J1, kv * friction])
+        return np.array([-kv * kq * mobility, kq - kv * kv * mobility, 0, kv * motor, kv * friction])
 
     def event_functionals(self) -> tuple[list[str], np.ndarray]:
         """Names, and coefficients of (q, v, w2, u, 1): each fires when it rises through zero."""
@@ -207,6 +214,9 @@ class _Run:
             kq, kv = self.stiffness()
             table["break forward"] = (kq, kv, 0, 0, -self.drive.Mc)
             table["break backward"] = (-kq, -kv, 0, 0, -self.drive.Mc)
+        if self.mode.held and math.isinf(self.held_until):
+            kq, kv = self.stiffness()
+            table["let go"] = (-kq, -kv, 0, 1, 0)
         if self.target is not None:
             table["target"] = (0, 0, 1, 0, -self.target)
         return list(table), np.array(list(table.values()), dtype=float)
@@ -263,6 +273,9 @@ class _Run:
         elif name == "stop":
             self.y[2], self.mode.direction = 0.0, 0
             self.happened("load-stops")
+        elif name == "let go":
+            self.mode.held = False
+            self.happened("released")
         elif name.startswith("break"):
             self.begin_move(1 if name.endswith("forward") else -1)
         else:
@@ -271,8 +284,9 @@ class _Run:
 
     def settle(self) -> None:
         """Changes that follow at once from where the drive is: flank touched, stuck load overcome."""
+        self.release_if_due()
         if self.mode.form == "open":
-            grows = self.path.torque(self.t, self.span)[1] / self.drive.J1
+            grows = 0.0 if self.mode.held else self.path.torque(self.t, self.span)[1] / self.drive.J1
             heading = next((x for x in (self.y[1], self.rhs()(self.t, self.y)[1], grows) if x != 0), 0.0)
             for side in (1, -1):
                 if side * self.y[0] >= self.drive.gap / 2 and side * heading > 0:
@@ -280,6 +294,13 @@ class _Run:
                     break
         if self.mode.direction == 0 and abs(self.torque()) > self.drive.Mc:
             self.begin_move(1 if self.torque() > 0 else -1)
+        self.release_if_due()
+
+    def release_if_due(self) -> None:
+        """Torque proved, or the instant has come."""
+        proved = math.isinf(self.held_until) and self.path.torque(self.t, self.span)[0] >= self.torque()
+        if self.mode.held and (proved or self.t >= self.held_until):
+            self.apply("let go")
 
     def note_torque(self) -> None:
         T = self.torque()
@@ -326,6 +347,8 @@ class _Run:
     def run_mode(self) -> None:
         """Go on in the present mode until an event changes it or the torque span ends."""
         rhs, end = self.rhs(), self.span[1]
+        if self.mode.held:
+            end = min(end, self.held_until)
         names, functionals = self.event_functionals()
         slope = self.slope_functional()
         size = np.abs(functionals[:, :3]) @ self.scale + np.abs(functionals[:, 4])

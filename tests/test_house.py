@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,24 +17,28 @@ SOURCES = ("src", "controllers", "studies")
 
 # room of src/softstart: lines, files, modules with a single importer, imports inside functions
 BUDGET = {
-    "(top)": (2260, 11, 0, 0),
-    "balancing": (2040, 7, 0, 0),
-    "chain": (4680, 14, 2, 0),
-    "cli": (4240, 20, 1, 0),
+    # 110 lines: lists and whole numbers as people type them, in one place; 180: checksums of what is kept,
+    # folders of killed processes, the end of a process that does not stop
+    "(top)": (2600, 11, 0, 0),
+    "balancing": (2020, 7, 0, 0),
+    "chain": (4620, 14, 2, 0),
+    "cli": (4300, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too
     "clutch": (2380, 10, 5, 0),
-    "controller": (1160, 5, 0, 0),
-    "drive": (700, 4, 1, 0),
-    "input": (1240, 5, 0, 0),
-    "linear": (2140, 8, 1, 0),
-    "optimal": (8280, 27, 7, 0),
+    "controller": (1180, 5, 0, 0),  # texts with choices
+    "drive": (860, 4, 1, 0),  # where a start begins: positions, brake, reversal
+    # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
+    # words, former names of keys
+    "input": (1510, 6, 0, 0),
+    "linear": (2120, 8, 1, 0),
+    "optimal": (8420, 27, 6, 0),  # ends before the bound; points of a limit curve share starts and bounds
     "page": (3940, 17, 3, 0),
-    "plant": (1980, 14, 2, 0),
-    "reporting": (3020, 12, 3, 0),
+    "plant": (2400, 15, 2, 0),  # a motor held by its brake; `terms`: rates decades apart
+    "reporting": (2980, 12, 3, 0),
     "stages": (680, 6, 1, 0),
-    "start": (1440, 8, 0, 0),
-    "sweeping": (1660, 8, 0, 0),
-    "tuning": (2340, 10, 1, 0),
-    "views": (4220, 16, 5, 0),
+    "start": (1560, 8, 0, 0),  # the worst of several positions, release of a brake
+    "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
+    "tuning": (2320, 10, 1, 0),
+    "views": (4250, 16, 5, 0),  # small cells beside a large one; where a start begins, in words
 }
 
 
@@ -48,7 +53,12 @@ def modules() -> dict[str, Path]:
 
 
 MODULES = modules()
-TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+
+
+@cache
+def tree(name: str) -> ast.Module:
+    """A module's syntax tree; parsed by the worker that asks, not by each that collects this file."""
+    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
 
 
 def imported(name: str, node: ast.AST) -> set[str]:
@@ -62,8 +72,10 @@ def imported(name: str, node: ast.AST) -> set[str]:
     return targets & (set(MODULES) - {name})
 
 
-# all imports count: those at the top, those within functions, those for type checkers only
-GRAPH = {name: set().union(*(imported(name, n) for n in ast.walk(tree))) for name, tree in TREES.items()}
+@cache
+def graph() -> dict[str, set[str]]:
+    """What each module imports: at the top, within functions, for type checkers only."""
+    return {name: set().union(*(imported(name, node) for node in ast.walk(tree(name)))) for name in MODULES}
 
 
 def room(name: str) -> str:
@@ -78,10 +90,10 @@ ROOMS = {room(name) for name in OWN}
 
 def measured(one: str) -> tuple[int, int, int, int]:
     """Lines, files, modules with a single importer, imports inside functions of a room."""
-    importers = Counter(target for targets in GRAPH.values() for target in targets)
+    importers = Counter(target for targets in graph().values() for target in targets)
     names = [name for name in OWN if room(name) == one]
     kinds = ast.FunctionDef | ast.AsyncFunctionDef
-    functions = (node for name in names for node in ast.walk(TREES[name]) if isinstance(node, kinds))
+    functions = (node for name in names for node in ast.walk(tree(name)) if isinstance(node, kinds))
     inner = {id(n) for f in functions for n in ast.walk(f) if isinstance(n, ast.Import | ast.ImportFrom)}
     lines = sum(len(MODULES[name].read_text(encoding="utf-8").splitlines()) for name in names)
     return lines, len(names), sum(importers[name] == 1 for name in names), len(inner)
@@ -108,7 +120,7 @@ def test_a_room_keeps_its_budget(one: str) -> None:
 
 def test_no_module_reaches_itself() -> None:
     """No circle of imports, even through functions and types."""
-    left = {name: set(targets) for name, targets in GRAPH.items()}
+    left = {name: set(targets) for name, targets in graph().items()}
     while free := [name for name, targets in left.items() if not targets & left.keys()]:
         for name in free:
             del left[name]

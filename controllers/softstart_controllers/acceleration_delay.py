@@ -13,7 +13,13 @@ from softstart.controller import CompiledController, compiled_step, parameter, s
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.plant.vector import encoder_count
-from softstart_controllers.reduced import reduced_torque
+from softstart_controllers.reduced import (
+    RAISE_AT,
+    closing_speed,
+    delay_of,
+    raise_parameter,
+    reduced_torque,
+)  # fmt: skip
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
@@ -132,9 +138,10 @@ class AccelerationDelay(CompiledController):
     too coarse) is waited for no longer: the torque is raised then.
 
     At the end of stage 2 the gap opens again, with the masses parting at the speed they met with. The torque
-    raised there, as [G] proposes, drives them into the second contact about as hard as method 1 does into the
-    first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`), the whole start is not
-    (`run.k_dyn`). Another `delay` may serve better.
+    raised there, as [G] proposes (`raise_at` "end"), drives them into the second contact about as hard as
+    method 1 does into the first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`),
+    the whole start is not (`run.k_dyn`). With `raise_at` "peak" the delay is half of that, [G](14): the
+    torque is raised while the shaft carries the most, and the gap stays closed.
 
     Source: [G], conclusions; stages by [G](10), (11), (15).
 
@@ -162,7 +169,7 @@ class AccelerationDelay(CompiledController):
     delay: float | None = parameter(
         "s",
         "how long the torque stays reduced after contact",
-        "length of stage 2, [G](15)",
+        "until the torque peak of stage 2, [G](14), or its end, [G](15)",
         multiples=(0.2, 3.0),
     )
     drop: float | None = parameter(
@@ -175,6 +182,7 @@ class AccelerationDelay(CompiledController):
     )
     patience: float | None = parameter("s", "longest wait for contact", PATIENCE_DEFAULT)
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+    raise_at: str | None = raise_parameter()
 
     def __post_init__(self) -> None:
         check(
@@ -191,11 +199,12 @@ class AccelerationDelay(CompiledController):
         return {
             "torque": number(torque),
             "full_torque": drive.Ms,
-            "delay": stage_2_duration(drive, torque),
+            "delay": delay_of(drive, torque, self.raise_at or RAISE_AT),
             "drop": number(drop),
             "latency": detection_latency(drive, torque, drop, period),
             "patience": patience(drive),
             "period": period,
+            "raise_at": RAISE_AT,
         }
 
     def vector(self, drive: Drive) -> Vector:
@@ -222,39 +231,6 @@ def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[Any, Any,
     stride = np.ceil(samples / LONGEST_WINDOW)
     half = np.ceil(samples / stride)
     return half, stride, a * (half * stride * period) ** 2
-
-
-def closing_speed(drive: Drive, torque: Any) -> Any:
-    """Speed in rad/s at which the driving flanks first meet, [G](10), from any start position and speeds.
-
-    >>> round(closing_speed(Drive.load("crane-4amtkf"), 62), 3)
-    30.103
-    """
-    rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
-    a = np.asarray(torque) / drive.J1 + rolling * drive.Mc / drive.J2
-    way = np.maximum(0.5 * np.asarray(drive.gap) - drive.start_position, 0.0)
-    v = np.asarray(drive.initial_motor_speed) - drive.initial_load_speed
-    return number(np.sqrt(np.maximum(v * v + 2.0 * a * way, 0.0)))
-
-
-def stage_2_duration(drive: Drive, torque: Any) -> Any:
-    """Length of stage 2 in s under the reduced torque: [G](15), for a stuck reactive load the exact one.
-
-    Where friction keeps the gap of a reactive load closed for good, [G](15) is taken all the same.
-
-    >>> round(stage_2_duration(Drive.load("crane-4amtkf"), 15.5), 4)
-    0.0328
-    """
-    dw12 = closing_speed(drive, torque)
-    mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
-    duration = np.asarray(stages.contact_stage_duration(mean, dw12, drive.c, drive.Omega))
-    if drive.load_kind == "reactive":
-        stuck = stages.reactive_contact_stage_duration(
-            torque, drive.Mc, dw12, J1=drive.J1, J2=drive.J2, c=drive.c
-        )
-        resting = np.asarray(drive.initial_load_speed) == 0.0
-        duration = np.where(resting & np.isfinite(stuck), stuck, duration)
-    return number(duration)
 
 
 def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:

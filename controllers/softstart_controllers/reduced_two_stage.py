@@ -6,10 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
 from softstart.drive import Drive
-from softstart_controllers.reduced import reduced_torque
+from softstart_controllers.reduced import RAISE_AT, delay_of, raise_parameter, reduced_torque
+from softstart_controllers.sampled import check
 
 
 class Parameters:
@@ -55,6 +58,9 @@ class ReducedTwoStage(CompiledController):
     into the second contact as hard as method 1 does into the first. The K_dyn of the whole start is
     therefore that of method 1; the one of [G](18) is `run.k_dyn_first_contact`.
 
+    With `raise_at` "peak" the torque is raised at the peak of stage 2 instead, after the time of [G](14) for
+    the nominal drive: the gap then stays closed.
+
     Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `patience` after
     contact.
 
@@ -84,14 +90,23 @@ class ReducedTwoStage(CompiledController):
         "s", "longest wait after contact", "two elastic periods; an undamped stage 2 lasts less than one"
     )
 
+    raise_at: str | None = raise_parameter()
+
+    def __post_init__(self) -> None:
+        check(self)
+
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Reduced torque from load and starting torque, patience from the elastic period."""
         return {
             "torque": reduced_torque(drive),
             "full_torque": drive.Ms,
             "patience": 2.0 * drive.elastic_period,
+            "raise_at": RAISE_AT,
         }
 
     def vector(self, drive: Drive) -> Vector:
-        """(torque, full torque, patience)."""
-        return stack(drive, self.torque, self.full_torque, self.patience)
+        """(torque, full torque, longest time from contact on)."""
+        longest: Any = self.patience
+        if self.raise_at == "peak":
+            longest = np.minimum(delay_of(drive, self.torque, "peak"), np.asarray(self.patience))
+        return stack(drive, self.torque, self.full_torque, longest)

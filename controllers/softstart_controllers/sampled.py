@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numba import njit
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.quantities import show
 
 LONGEST_PERIOD = 1e-3  # s
 SAMPLES_PER_ELASTIC_PERIOD = 32
@@ -88,10 +90,14 @@ def mean_torque(before: float, after: float, demand: float) -> float:
 def check(controller: Controller, above_zero: Iterable[str] = (), not_negative: Iterable[str] = ()) -> None:
     """Refuse impossible parameters, all in one `InputError`; None stands for "derive it from the drive".
 
-    Parameters named in neither list only have to be finite.
+    Parameters named in neither list only have to be finite; one with choices has to be one of these.
     """
     above, from_zero = set(above_zero), set(not_negative)
     wrong = []
+    for field in fields(controller):
+        value, choices = getattr(controller, field.name), field.metadata.get("choices", ())
+        if choices and value is not None and value not in choices:
+            wrong.append(f"{field.name} = {show(value)}: write {' or '.join(map(show, choices))}.")
     for name, value in controller.parameters.items():
         if value is None or isinstance(value, str):
             continue

@@ -11,7 +11,6 @@ import numpy as np
 from softstart.controller import CompiledController, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.errors import InputError
 from softstart.plant.jit import compiled
 from softstart_controllers import landing
 from softstart_controllers.landing import (
@@ -251,7 +250,7 @@ class Shaped(CompiledController):
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 
-    shaper: str | None = parameter("", "zv or zvd", "zv", "text")
+    shaper: str | None = parameter("", "zv or zvd", "zv", "text", choices=tuple(SHAPERS))
     low_torque: float | None = parameter(*landing.LOW_TORQUE, multiples=(0.3, 2.0))
     approach_speed: float | None = parameter(
         "rad/s",
@@ -270,10 +269,6 @@ class Shaped(CompiledController):
     period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
 
     def __post_init__(self) -> None:
-        if self.shaper is not None and self.shaper not in SHAPERS:
-            raise InputError(
-                f'shaper = "{self.shaper}": the controller shaped knows the shapers "zv" and "zvd".'
-            )
         check(
             self,
             above_zero=("low_torque", "approach_speed", "full_torque", "frequency", "threshold", "period"),

@@ -1,14 +1,19 @@
-"""The two errors that softstart raises."""
+"""The two errors that softstart raises, and its one warning."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
+MOST, LONGEST = 30, 1500  # sentences of one error, and letters of one sentence: more would fill pages
 
 
 class InputError(ValueError):
     """The input is wrong; each sentence names the key, the value, the reason and the remedy.
 
-    All mistakes of one input are collected, so that they can be corrected in one go.
+    All mistakes of one input are collected, so that they can be corrected in one go; what is more than can be
+    read is counted, and long sentences lose their middle.
 
     Parameters
     ----------
@@ -23,8 +28,18 @@ class InputError(ValueError):
     """
 
     def __init__(self, sentences: Iterable[str] | str) -> None:
-        self.sentences: tuple[str, ...] = (sentences,) if isinstance(sentences, str) else tuple(sentences)
+        found = [sentences] if isinstance(sentences, str) else list(sentences)
+        if len(found) > MOST + 1:
+            found[MOST:] = [f"{len(found) - MOST} more things are wrong."]
+        self.sentences: tuple[str, ...] = tuple(map(_readable, found))
         super().__init__("\n".join(self.sentences))
+
+
+def _readable(sentence: str) -> str:
+    """The sentence without its middle if it is too long: what is wrong, and the remedy at its end."""
+    if len(sentence) <= LONGEST:
+        return sentence
+    return f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 3 :]}"
 
 
 class SimulationError(RuntimeError):
@@ -41,3 +56,7 @@ class SimulationError(RuntimeError):
     >>> issubclass(SimulationError, RuntimeError)
     True
     """
+
+
+class DamagedWarning(UserWarning):
+    """Saved results are not as they were written; the sentence names the part, which is computed again."""

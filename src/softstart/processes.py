@@ -24,12 +24,12 @@ import traceback
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import IO, Any, Literal, NamedTuple, Self, TypeVar
+from typing import IO, Any, Literal, NamedTuple, NoReturn, Self, TypeVar
 
 from softstart import __version__
 from softstart.errors import InputError, SimulationError
@@ -49,7 +49,44 @@ ALONE = 300.0  # s, that a computation waits for new workers when all are lost
 CLUSTER_CHECK = 2.0  # s, between two checks of the cluster
 AHEAD = 2  # tasks under way for each thread of the cluster
 
+# what must not be left behind ----------------------------------------------------------------------------
+
+_UNDO: list[Callable[[], object]] = []
+
+
+@contextmanager
+def undone(action: Callable[[], object]) -> Iterator[None]:
+    """Call `action` at the end of the block, also if the process ends by `end_now` before.
+
+    >>> with undone(lambda: print("removed")):
+    ...     print("there")
+    there
+    removed
+    """
+    _UNDO.append(action)
+    try:
+        yield
+    finally:
+        _UNDO.remove(action)
+        action()
+
+
+def end_now(code: int) -> NoReturn:
+    """End this process with all that it has started, whatever its threads are doing."""
+    for action in reversed(_UNDO):
+        with suppress(Exception):
+            action()
+    for worker in tuple(_WORKERS):
+        _kill_group(worker)
+        with suppress(OSError):
+            os.waitpid(worker, 0)
+    os._exit(code)
+
+
 # one process --------------------------------------------------------------------------------------------
+
+
+_WORKERS: set[int] = set()  # processes that lead a group and have not been ended
 
 
 class DiedError(RuntimeError):
@@ -112,6 +149,7 @@ class Worker:
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,
         )
+        _WORKERS.add(self._process.pid)
         self._lock, self._over = threading.Lock(), False
         self._frames: SimpleQueue[bytes | None] = SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -179,6 +217,7 @@ class Worker:
                 _kill_group(process.pid)
                 process.kill()
                 process.wait()
+                _WORKERS.discard(process.pid)
         self._reader.join(GRACE)
         return process.returncode
 

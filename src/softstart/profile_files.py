@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import re
@@ -15,6 +14,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
+from softstart.input.columns import Wanted, read_columns
 from softstart.input.documents import literal, parsed
 from softstart.input.files import read_text, write_whole
 from softstart.input.parameters import Wording
@@ -29,8 +29,8 @@ else:
 
 
 HEADER = "time [s],torque [N*m]"
-TIME_NAMES = ("time", "t")
-TORQUE_NAMES = ("torque", "u", "demand")
+TIME = Wanted(("time", "t"), "s")
+TORQUE = Wanted(("torque", "u", "demand"), "N*m")
 TABLES = ("controller", "profile", "after_contact", "about")
 KEYS = ("time", "torque", "time_unit", "torque_unit")
 PER_LINE = 4
@@ -70,92 +70,17 @@ def write_csv(profile: TorqueProfile, path: Path) -> None:
 
 
 def read_csv(path: Path) -> Knots:
-    """Knots from two columns, time and torque.
-
-    A header is optional; it may name units as `torque [kN*m]`, and more than two columns if one is named
-    time (or t) and one torque (or u). Columns are separated by commas, semicolons or tabs; blank lines and
-    lines that begin with # are passed over.
-    """
-    lines = [
-        (number, line)
-        for number, line in enumerate(_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise _wrong(path, "it is empty; give one line a knot: time in s, a comma, torque in N m")
-    first = lines[0][1]
-    separator = next((mark for mark in (";", "\t") if mark in first), ",")
-    rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
-    heading = [cell.strip() for cell in rows[0][1]]
-    headed = not any(_looks_like_a_number(cell) for cell in heading)
-    columns, factors = _columns(path, heading if headed else [], rows[0][0])
-    width = len(heading)
-    times: list[float] = []
-    torques: list[float] = []
-    for number, row in rows[1:] if headed else rows:
-        if len(row) != width or width < 2:
-            comma = (
-                "; write decimal points, not decimal commas" if separator == "," and len(row) > width else ""
-            )
-            raise _wrong(
-                path,
-                f"line {number}, {_shown(separator.join(row))}, has {len(row)} "
-                f"value{'s' if len(row) > 1 else ''} instead of {max(width, 2)}{comma}",
-            )
-        cells = [row[column] for column in columns]
-        t, u = (
-            _number(path, number, cell, separator) * factor
-            for cell, factor in zip(cells, factors, strict=True)
-        )
-        if not times and t != 0.0:
-            raise _wrong(path, f"line {number}: the first time is {t:g} s; a profile begins at 0 s")
-        if times and t < times[-1]:
-            raise _wrong(
-                path, f"line {number}: time falls from {times[-1]:g} s to {t:g} s; sort the lines by time"
-            )
-        times.append(t)
-        torques.append(u)
-    if not times:
-        raise _wrong(path, "there is no knot below its header; give one line a knot: time, a comma, torque")
-    return np.array(times), np.array(torques), None
-
-
-def _columns(path: Path, heading: list[str], line: int) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Which columns are time and torque, and what turns them into s and N m."""
-    if not heading:
-        return (0, 1), (1.0, 1.0)
-    parts = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", cell) for cell in heading]
-    names = [part.group(1).lower() if part else "" for part in parts]
-    time = next((i for i, name in enumerate(names) if name in TIME_NAMES), None)
-    torque = next((i for i, name in enumerate(names) if name in TORQUE_NAMES), None)
-    if len(heading) == 2 and (time is None or torque is None):
-        time, torque = (0, 1) if time != 1 and torque != 0 else (1, 0)
-    if time is None or torque is None:
+    """Knots from two columns, time and torque, or from two among more that are named so (or t and u)."""
+    lines, (times, torques) = read_columns(_text(path), f"profile = {path}", (TIME, TORQUE))
+    if times[0] != 0.0:
+        raise _wrong(path, f"line {lines[0]}: the first time is {times[0]:g} s; a profile begins at 0 s")
+    for i in np.flatnonzero(np.diff(times) < 0.0)[:1].tolist():
         raise _wrong(
-            path, f"line {line}, {_shown(','.join(heading))}, names no column time and torque; name them so"
+            path,
+            f"line {lines[i + 1]}: time falls from {times[i]:g} s to {times[i + 1]:g} s; "
+            "sort the lines by time",
         )
-    units = [part.group(2) if part else None for part in (parts[time], parts[torque])]
-    factors = (_factor(path, "unit of time", units[0], "s"), _factor(path, "unit of torque", units[1], "N*m"))
-    return (time, torque), factors
-
-
-def _looks_like_a_number(cell: str) -> bool:
-    return re.match(r"[+-]?\.?[0-9]|[+-]?(inf|nan)\b", cell, re.IGNORECASE) is not None
-
-
-def _number(path: Path, line: int, cell: str, separator: str) -> float:
-    shown = _shown(cell.strip())
-    if separator != "," and re.fullmatch(r"\s*[+-]?[0-9]+,[0-9]+(e[+-]?[0-9]+)?\s*", cell, re.IGNORECASE):
-        raise _wrong(path, f"line {line}, {shown}: this is a decimal comma; write a decimal point")
-    try:
-        value = float(cell)
-    except ValueError:
-        raise _wrong(
-            path, f"line {line}, {shown}: this is no number; write one with a decimal point"
-        ) from None
-    if not math.isfinite(value):
-        raise _wrong(path, f"line {line}, {shown}: this is not finite; give a finite number")
-    return value
+    return times, torques, None
 
 
 # TOML ----------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import date, time
 from decimal import Decimal
 from functools import lru_cache
@@ -40,6 +40,9 @@ __all__ = [
     "read_unit",
     "show",
     "to_si",
+    "values_in",
+    "whole_number",
+    "with_points",
 ]
 
 Value = float | NDArray[np.float64]
@@ -145,6 +148,9 @@ _FACTOR = rf"(?:{_NAME.pattern}|1)(?:\s*(?:\*\*|\^)\s*[+-]?[1-9])?(?![\w.])"
 _PRODUCT = rf"\s*{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*\s*"
 
 
+LONGEST = 80  # letters of a unit: products of a thousand factors are no unit, and take time
+
+
 class Unit(NamedTuple):
     """A unit in the base units of the list: its size, and the exponent of each dimension."""
 
@@ -163,6 +169,8 @@ def read_unit(written: str) -> Unit | str:
     """
     if written == "1":
         return Unit(1.0, ())
+    if len(written) > LONGEST:
+        return f'"{written[:30]}..." is too long for a unit'
     text = written.translate(_SYMBOLS).replace("^-^", "^-").replace("^+^", "^")
     text = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", text)  # "N.m"
     text = re.sub(r"(?<=[^\W\d_])([+-]?[1-9])(?![\w.])", r"^\1", text)  # "kg m2", "s-1" as in data sheets
@@ -199,6 +207,8 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
     >>> nearest("RPM", ["rad/s", "rpm"]), nearest("zzz", ["rad/s", "rpm"])
     ('rpm', None)
     """
+    if len(name) > 60:  # to compare long names takes long, and nothing here has one
+        return None
     folded = {v.casefold(): v for v in reversed(list(valid))}
     close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else None
@@ -328,8 +338,8 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     if match is None:
         raise RefusedError(f"this is no number with a unit; {_remedy(unit)}")
     written = stripped[match.end() :].strip()
-    if written.startswith(","):
-        raise RefusedError(f"a comma may divide decimals or thousands; use a decimal point: {_remedy(unit)}")
+    if "," in written:
+        raise RefusedError(_doubtful_comma(stripped, unit))
     number = _checked(float(match.group()), unit, infinite)
     if not written:
         return number
@@ -340,6 +350,19 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     if scaled == 0.0 != number:
         raise RefusedError(f"the number is too small; {_remedy(unit)}")
     return _checked(scaled, unit, infinite)
+
+
+def _doubtful_comma(text: str, unit: str) -> str:
+    """The reason why a number with a comma is refused, and how to write it."""
+    reason = "a comma may divide decimals or thousands; "
+    number = re.match(r"([+-]?[0-9]*),([0-9]+)(?![0-9]*[.,])", text)
+    if number is None:
+        return f"{reason}use a decimal point and no other mark: {_remedy(unit)}"
+    rest = text[number.end() :]
+    decimal = f"{number[1]}.{number[2]}{rest}"
+    if _THOUSANDS.fullmatch(number.group()):
+        return f'{reason}write "{decimal}" with a decimal point, or "{number[1]}{number[2]}{rest}"'
+    return f'{reason}use a decimal point: "{decimal}"'
 
 
 def _factor(written: str, number: str, unit: str) -> float:
@@ -420,9 +443,12 @@ def show(value: object, *, toml: bool = False) -> str:
     ('"5 m"', 'true', '[0.5, 2.0]')
     """
     if isinstance(value, str):
-        shown = json.dumps(value, ensure_ascii=False)
-    elif toml and isinstance(value, list | dict):
-        shown = json.dumps(value, ensure_ascii=False, default=str)
+        shown = json.dumps(value[:100], ensure_ascii=False)
+    elif isinstance(value, list | tuple | dict):
+        try:
+            shown = json.dumps(value, ensure_ascii=False, default=str) if toml else repr(value)
+        except (RecursionError, ValueError):  # an integer with thousands of digits is not written either
+            shown = "a table" if isinstance(value, dict) else "a list"
     elif toml and isinstance(value, date | time):
         shown = str(value)
     elif isinstance(value, bool | np.bool_):
@@ -436,3 +462,101 @@ def show(value: object, *, toml: bool = False) -> str:
     else:
         shown = repr(value)
     return shown if len(shown) <= 70 else f"{shown[:60]}..."
+
+
+# ---- numbers as people type them ------------------------------------------------------------------------
+
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9,]*")
+_POINT = re.compile(r"[0-9]\.|\.[0-9]")
+
+
+def values_in(text: str, name: str = "value", *, whole: bool = False) -> list[str]:
+    """The values of a list as typed, each with a decimal point; what they are is read by `to_si` and others.
+
+    Semicolons divide values that may have decimal commas; without them commas divide values. A comma between
+    digits that could as well be a decimal comma is refused, unless the list has a decimal point elsewhere or
+    is one of `whole` numbers. Raises `InputError`: a sentence that begins with `name`.
+
+    >>> values_in("0.25, 500 mrad"), values_in("0,25; 1"), values_in("1x,2x"), values_in("0.5,1,2")
+    (['0.25', '500 mrad'], ['0.25', '1'], ['1x', '2x'], ['0.5', '1', '2'])
+    >>> values_in("0,1,0,2", "--gaps")
+    Traceback (most recent call last):
+    softstart.errors.InputError: --gaps = "0,1,0,2": a comma may divide values or decimals; write
+    "0, 1, 0, 2" for 4 values, or "0.1, 0.2" for 2.
+    """
+    try:
+        if ";" in text:
+            parts = with_points([part.strip() for part in text.split(";")])
+        else:
+            raw = text.split(",")
+            parts = [part.strip() for part in raw]
+            merged = _with_decimal_commas(raw)
+            even = len({part[:1].isspace() for part in raw[1:]}) < 2  # "1.5, 2,5" has commas of two kinds
+            settled = whole or (even and _POINT.search(text) is not None)
+            if len(merged) < len(parts) and all(parts) and not settled:
+                raise RefusedError(
+                    f'a comma may divide values or decimals; write "{", ".join(parts)}" for {len(parts)} '
+                    f'values, or "{", ".join(merged)}" for {len(merged)}'
+                )
+        if not all(parts):
+            raise RefusedError("a place in the list is empty; write values with commas between")
+    except RefusedError as refusal:
+        shown = show(text)
+        reason = refusal.reason if len(refusal.reason) < 300 else "a comma may divide values or decimals"
+        raise InputError(f"{name} = {shown}: {reason}.") from None
+    return parts
+
+
+def _with_decimal_commas(raw: Sequence[str]) -> list[str]:
+    """The parts between commas, with those put together that a decimal comma may have divided."""
+    merged: list[str] = []
+    open_end = False
+    for part in raw:
+        if open_end and part[:1].isdigit():
+            merged[-1] += f".{part.strip()}"
+            open_end = False
+        else:
+            merged.append(part.strip())
+            open_end = re.fullmatch(r"\s*[+-]?[0-9]+", part) is not None
+    return merged
+
+
+def with_points(texts: Sequence[str]) -> list[str]:
+    """The texts with decimal points instead of decimal commas, where nothing but decimals can be meant.
+
+    Raises `RefusedError` where commas stand beside points, or where all of them may divide thousands.
+
+    >>> with_points(["0,000", "62,5 N*m"])
+    ['0.000', '62.5 N*m']
+    """
+    numbers = [number for text in texts for number in _WITH_COMMA.findall(text)]
+    if not numbers:
+        return list(texts)
+    point = next((text for text in texts if _POINT.search(text)), None)
+    comma = next(text for text in texts if "," in text)
+    if point is not None:
+        raise RefusedError(f"{show(comma)} has a comma and {show(point)} a point; write decimal points only")
+    if any(number.count(",") > 1 for number in numbers) or all(map(_THOUSANDS.fullmatch, numbers)):
+        raise RefusedError(f"the comma in {show(comma)} may divide thousands; write decimal points only")
+    return [text.replace(",", ".") for text in texts]
+
+
+def whole_number(text: str, name: str, least: int = 1, most: int = 10**15) -> int:
+    """A whole number from `least` to `most`. Raises `InputError`: a sentence that begins with `name`.
+
+    >>> whole_number("12", "--workers")
+    12
+    >>> whole_number("1.5", "--workers")
+    Traceback (most recent call last):
+    softstart.errors.InputError: --workers = "1.5": give a whole number of 1 or more.
+    """
+    digits = re.fullmatch(r"\s*0*([0-9]{1,16})\s*", text)
+    if digits and least <= int(digits[1]) <= most:
+        return int(digits[1])
+    bound = (
+        f"of {least} or more"
+        if most >= 10**15
+        else f"from {least} to {most if most < 10_000 else f'{most:,}'}"
+    )
+    raise InputError(f"{name} = {show(text)}: give a whole number {bound}.")

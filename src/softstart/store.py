@@ -3,25 +3,34 @@
 A `Target` is the file or folder that a caller named. It holds a manifest, the inputs that the results follow
 from, and each finished part. The same call on it goes on; a target of other inputs, or of anything else, is
 refused and never touched. One process writes at a time. `Records` keeps parts as JSON lines (tuning, limit
-curves); sweeps keep theirs as chunks of a Zarr folder (sweeping/folder.py) with the same manifest, lock and
-sentences.
+curves); sweeps keep theirs as chunks of a Zarr folder (sweeping/store.py) with the same lock, seals and
+sentences. What is kept is `sealed`: a part that is not as it was written is computed again, and a
+DamagedWarning says so.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import shutil
 import socket
+import stat
 import sys
-from collections.abc import Iterator, Mapping
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from softstart.errors import InputError
+from softstart.errors import DamagedWarning, InputError
 from softstart.input.files import write_whole
+from softstart.processes import undone
 
 Record = dict[str, Any]
 
@@ -35,6 +44,47 @@ def fingerprint(inputs: Mapping[str, Any]) -> str:
     False
     """
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+
+
+def sealed(record: Mapping[str, Any], key: str = "") -> str:
+    """A line of JSON that begins with a checksum of what follows and of `key`: what it belongs to.
+
+    >>> line = sealed({"cost": 1.5}, "cell 3")
+    >>> unsealed(line, "cell 3"), unsealed(line, "cell 4"), unsealed(line.replace("5", "4"), "cell 3")
+    ({'cost': 1.5}, None, None)
+    """
+    rest = json.dumps(record, allow_nan=False)[1:]
+    return f"{_seal(rest, key)}{'' if rest == '}' else ', '}{rest}\n"
+
+
+def unsealed(line: str, key: str = "") -> Record | None:
+    """The record of such a line; None if anything in it was changed, or if it belongs to something else."""
+    line, size = line.rstrip("\r\n"), len(_seal("", ""))
+    for comma in (", ", ""):
+        rest = line[size + len(comma) :]
+        if line == f"{_seal(rest, key)}{comma}{rest}":
+            found: Record = json.loads("{" + rest)
+            return found
+    return None
+
+
+def _seal(rest: str, key: str) -> str:
+    return f'{{"sha256": "{hashlib.sha256(f"{key} {rest}".encode()).hexdigest()}"'
+
+
+NAMED = 3  # damaged parts that are named
+
+
+def warn_of_damage(path: Path, parts: Sequence[str]) -> None:
+    """Say which parts of a target are not as they were written; the caller makes them again."""
+    if parts:
+        shown = [*parts[:NAMED], f"{len(parts) - NAMED} more"] if len(parts) > NAMED + 1 else list(parts)
+        verb = "are" if len(parts) > 1 else "is"
+        warnings.warn(
+            f"{path}: {listed(shown)} {verb} damaged (wrong checksum) and made again; all else is kept.",
+            DamagedWarning,
+            stacklevel=2,
+        )
 
 
 class Target(NamedTuple):
@@ -53,6 +103,13 @@ class Target(NamedTuple):
     def foreign(self) -> InputError:
         """The error for a target that holds something else."""
         return self._error(f"this {self.kind} holds something else than a {self.content}; {self.other}.")
+
+    def older(self) -> InputError:
+        """The error for a target whose manifest is not there, or is damaged beyond use."""
+        return self._error(
+            f"its list of inputs has no checksum or a wrong one: this {self.kind} was damaged, or written by "
+            f"an older softstart; {self.other}, or delete this one to begin anew."
+        )
 
     def unwritable(self, error: OSError) -> InputError:
         """The error for a target that cannot be written."""
@@ -79,29 +136,34 @@ class Target(NamedTuple):
         """
         home = self.path.parent
         path = home / f".{self.path.name}.lock"
-        made = [folder for folder in (home, *home.parents) if not folder.exists()]
         try:
+            made = [folder for folder in (home, *home.parents) if not folder.exists()]
             home.mkdir(parents=True, exist_ok=True)
             handle = _open_locked(path)
         except OSError as error:
             raise self.unwritable(error) from None
         if handle is None:
-            owner = path.read_text("utf-8").strip() if sys.platform != "win32" else ""
+            owner = path.read_text("ascii", errors="replace").strip() if sys.platform != "win32" else ""
             raise self._error(
                 f"{f'process {owner}' if owner else 'another process'} is writing this {self.content} now; "
                 f"wait for it or end it, or {self.other}."
             )
-        try:
+        with undone(partial(_unlock, handle, path, made)):
             os.truncate(handle, 0)
             os.pwrite(handle, f"{os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+            for left in home.glob(f".{self.path.name}.*.part"):  # by an owner that was killed
+                with suppress(OSError):
+                    left.unlink()
             yield
-        finally:
-            if sys.platform != "win32":  # there, a file that is open cannot be removed
-                path.unlink(missing_ok=True)
-            os.close(handle)
-            with suppress(OSError):  # folders in which nothing was kept
-                for folder in made:
-                    folder.rmdir()
+
+    @contextmanager
+    def fresh_folder(self) -> Iterator[Path]:
+        """A hidden folder beside the target to fill and to rename, see the function of this name."""
+        try:
+            with fresh_folder(self.path.parent) as fresh:
+                yield fresh
+        except OSError as error:
+            raise self.unwritable(error) from None
 
     def _error(self, sentence: str) -> InputError:
         return InputError(f"{self.option} = {self.path}: {sentence}")
@@ -119,8 +181,8 @@ def listed(names: list[str]) -> str:
 class Records:
     """Finished parts in a file of JSON lines: first the manifest, then one part a line. Use it in a `with`.
 
-    The fields `keys` identify a part. Parts are appended; a last line that was cut off costs that part only.
-    Without a target nothing is kept on disk.
+    The fields `keys` identify a part. Parts are appended; a line that was cut off or damaged costs that part
+    only. Without a target nothing is kept on disk.
 
     >>> with Records(None, {"drive": "crane"}, ["cell", "restart"]) as kept:
     ...     kept.add({"cell": 3, "restart": 0, "cost": 1.1})
@@ -138,12 +200,12 @@ class Records:
     def __enter__(self) -> Self:
         if self.target is not None:
             path = self.target.path
-            if path.exists():
+            if _exists(path):
                 self._read()  # before the lock, which would be left beside a file of something else
             with self._lock as stack:
                 stack.enter_context(self.target.locked())
-                if path.exists():
-                    self._read()
+                if _exists(path):
+                    warn_of_damage(path, self._read())
                     self._write()  # without a line that was cut off
                 self._lock = stack.pop_all()
         return self
@@ -167,7 +229,7 @@ class Records:
             return
         try:
             with self.target.path.open("a", encoding="utf-8") as stream:
-                stream.write(_line(record))
+                stream.write(sealed(record, self._manifest["key"]))
         except OSError as error:
             raise self.target.unwritable(error) from None
 
@@ -176,53 +238,117 @@ class Records:
 
     def _write(self) -> None:
         assert self.target is not None
-        text = "".join(map(_line, [self._manifest, *self._records.values()]))
+        key = self._manifest["key"]
+        lines = (sealed(record, key) for record in self._records.values())
+        text = "".join([sealed(self._manifest, "manifest"), *lines])
         write_whole(self.target.path, lambda stream: stream.write(text))
         self._written = True
 
-    def _read(self) -> None:
-        """Take in the parts of a file that was begun with the same inputs."""
+    def _read(self) -> list[str]:
+        """Take in the parts of a file that was begun with the same inputs; what in it is damaged."""
         assert self.target is not None
         try:
-            texts = self.target.path.read_text("utf-8").splitlines()
-        except UnicodeDecodeError:
-            raise self.target.foreign() from None
+            if not stat.S_ISREG(self.target.path.stat().st_mode):
+                raise self.target.foreign()
+            content = self.target.path.read_bytes()
         except OSError as error:
             raise self.target.unwritable(error) from None
-        lines: list[Record] = []
-        for number, text in enumerate(texts):
-            line = _record(text)
-            if line is None and number == len(texts) - 1 > 0:
-                break  # it was cut off: that part is computed again
-            needed = self.keys if number else ["inputs", "key"]
-            if line is None or any(name not in line for name in needed):
+        *lines, torn = content.decode("ascii", errors="replace").split("\n")
+        if not content:
+            return []
+        key = self._manifest["key"]
+        manifest = unsealed(lines[0], "manifest") if lines else None
+        found = [unsealed(line, key) for line in lines[1:]]
+        if manifest is not None:
+            if manifest["key"] != key:
+                self.target.check_same(manifest["inputs"], self._manifest["inputs"])
                 raise self.target.foreign()
-            lines.append(line)
-        if lines and lines[0]["key"] != self._manifest["key"]:
-            self.target.check_same(lines[0]["inputs"], self._manifest["inputs"])
-            raise self.target.foreign()
-        self._records = {self._part_of(record): record for record in lines[1:]}
+        elif not any(found):  # nothing says that it belongs to these inputs
+            raise self.target.older() if '"inputs": ' in (lines or [torn])[0] else self.target.foreign()
+        self._records = {self._part_of(record): record for record in found if record is not None}
+        damaged = [] if manifest is not None else ["line 1, the list of inputs,"]
+        return damaged + [f"line {n}" for n, record in enumerate(found, start=2) if record is None]
 
 
-def _line(record: Mapping[str, Any]) -> str:
-    """A record as it stands in a file; with `_record` the one place for what protects it there."""
-    return json.dumps(record, allow_nan=False) + "\n"
+@contextmanager
+def fresh_folder(home: Path, *also: Path) -> Iterator[Path]:
+    """A hidden folder in `home`, gone at the end of the block; what is to stay is renamed.
+
+    Its owner holds a lock on it. Folders in `home`, and in the folders `also`, that nobody holds were left by
+    processes that were killed, and are removed. Raises OSError.
+    """
+    for place in (home, *also):
+        _sweep(place)
+    path, handle = _locked_folder(home)
+    with undone(partial(_remove, path, handle)):
+        yield path
 
 
-def _record(line: str) -> Record | None:
-    """The record of a line, None if it is none."""
-    try:
-        found = json.loads(line)
-    except ValueError:
-        return None
-    return found if isinstance(found, dict) else None
+PREFIX, SUFFIX = ".softstart-", ".part"
+FRESH = 5.0  # s, in which an empty folder may be one that its owner is about to lock
+
+
+def _locked_folder(home: Path) -> tuple[Path, int | None]:
+    while True:
+        path = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=home))
+        if sys.platform == "win32":
+            return path, None
+        handle = os.open(path, os.O_RDONLY)
+        with suppress(OSError):  # a file system without locks on folders: nobody can remove it either
+            if not _lock(handle) or not path.exists():
+                os.close(handle)
+                shutil.rmtree(path, ignore_errors=True)
+                continue
+        return path, handle
+
+
+def _remove(path: Path, handle: int | None) -> None:
+    shutil.rmtree(path, ignore_errors=True)
+    if handle is not None:
+        os.close(handle)
+
+
+def _sweep(home: Path) -> None:
+    """Remove the folders that processes left which were killed."""
+    if sys.platform == "win32":
+        return
+    with suppress(OSError):
+        for path in home.glob(f"{PREFIX}*{SUFFIX}"):
+            with suppress(OSError):
+                handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+                try:
+                    fresh = time.time() - os.fstat(handle).st_mtime < FRESH
+                    if _lock(handle) and not (fresh and not any(path.iterdir())):
+                        shutil.rmtree(path, ignore_errors=True)
+                finally:
+                    os.close(handle)
+
+
+def _exists(path: Path) -> bool:
+    with suppress(OSError):
+        return path.exists() or path.is_symlink()
+    return True  # but not to be read, which the reader says
+
+
+def _unlock(handle: int, path: Path, made: Sequence[Path]) -> None:
+    if sys.platform != "win32":  # there, a file that is open cannot be removed
+        path.unlink(missing_ok=True)
+    os.close(handle)
+    with suppress(OSError):  # folders in which nothing was kept
+        for folder in made:
+            folder.rmdir()
+
+
+NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # and no pipe that is waited for
 
 
 def _open_locked(path: Path) -> int | None:
     """The locked file, or None if it is locked by another process."""
     while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o666)
         try:
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                raise OSError(errno.EEXIST, f"{path.name} is no file")
             if not _lock(handle):
                 os.close(handle)
                 return None

@@ -33,6 +33,17 @@ class Verdict(Enum):
     REFUTED = "refuted"
     PARTLY = "partly"
 
+    @classmethod
+    def of(cls, *held: bool) -> Verdict:
+        """Confirmed if all held, refuted if none did.
+
+        >>> Verdict.of(True, False), Verdict.of(False)
+        (<Verdict.PARTLY: 'partly'>, <Verdict.REFUTED: 'refuted'>)
+        """
+        if all(held):
+            return cls.CONFIRMED
+        return cls.PARTLY if any(held) else cls.REFUTED
+
 
 @dataclass(frozen=True)
 class Claim:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.tuning.outcome import Tuning
 from softstart.views.drawing import drawing
+from softstart.views.tuning import draw_cells
 from softstart_studies.tuned_alike import (
     ACROSS,
     CRANE,
@@ -29,7 +30,6 @@ from softstart_studies.tuned_alike import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -294,10 +294,7 @@ def _core(grid: Grid) -> str:
     )
 
 
-MAP = "cividis"
 MOST = 3.0  # ratio from which on all colours are the same
-LIGHT = 0.55
-LATE = "#D55E00"
 
 
 def maps_figure(grid: Grid, prefix: str, heading: str) -> Figure:
@@ -305,10 +302,12 @@ def maps_figure(grid: Grid, prefix: str, heading: str) -> Figure:
     panels = [(name, grid.ratio(name, prefix), grid.late(name, prefix)) for name in grid.tunings]
     finite = np.concatenate([values[np.isfinite(values)] for _, values, _ in panels])
     low, high = 1.0, min(float(np.max(finite, initial=1.1)), MOST)
+    ratios, gaps = ([f"{v:g}" for v in axis] for axis in (grid.extent.inertias, grid.extent.gaps))
     with drawing():
         figure, axes = panel_grid(len(panels), (3.0, 2.2))
         for panel, (name, values, late) in zip(axes.flat, panels, strict=False):
-            _map(panel, grid, values, late, (low, high))
+            texts = [[f"{v:.2f}" if math.isfinite(v) else "-" for v in row] for row in values.tolist()]
+            draw_cells(panel, values, texts, (low, high), ratios, gaps, late & np.isfinite(values))
             panel.set_title(name, loc="left")
         for row in axes:
             row[0].set_ylabel("gap, rad")
@@ -320,25 +319,6 @@ def maps_figure(grid: Grid, prefix: str, heading: str) -> Figure:
             x=0.01, ha="left", fontsize=11,
         )  # fmt: skip
     return figure  # type: ignore[no-any-return]
-
-
-def _map(axes: Axes, grid: Grid, values: Any, late: Any, limits: tuple[float, float]) -> None:
-    low, high = limits
-    axes.grid(False)
-    axes.imshow(values, cmap=MAP, vmin=low, vmax=high, origin="lower", aspect="auto")
-    for (i, j), value in np.ndenumerate(values):
-        share = (value - low) / (high - low) if math.isfinite(value) else 1.0
-        text = f"{value:.2f}" if math.isfinite(value) else "-"
-        axes.text(
-            j, i, text, ha="center", va="center", fontsize=8, color="#000000" if share > LIGHT else "#FFFFFF"
-        )
-        if math.isfinite(value) and late[i, j]:
-            axes.plot([j - 0.45, j + 0.45], [i - 0.45, i + 0.45], color=LATE, lw=1.2)
-    axes.set_xticks(range(len(grid.extent.inertias)), [f"{v:g}" for v in grid.extent.inertias])
-    axes.set_yticks(range(len(grid.extent.gaps)), [f"{v:g}" for v in grid.extent.gaps])
-    axes.tick_params(length=0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
 
 
 class GapsAndInertias(Study):

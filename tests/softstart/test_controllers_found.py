@@ -99,7 +99,7 @@ def test_a_loose_file_works_without_numba(loose: Path) -> None:
         ("{}:Other", "derive the class"),
         ("{}:Lazy", "still lacks step"),
         ("{}", "say which class"),
-        ("nowhere.py:Mine", "there is no file nowhere.py"),
+        ("nowhere.py:Mine", "nowhere.py: there is no such file"),
         ("dirct", 'did you mean "direct"'),
         ("xyz", "softstart controllers"),
         ("", "no controller of this name"),

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.patience import patient
 
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
@@ -85,7 +86,7 @@ def alive(pid: int) -> bool:
 
 
 def until(what: Callable[[], bool], seconds: float = 20.0) -> None:
-    latest = time.monotonic() + seconds
+    latest = time.monotonic() + patient(seconds)
     while not what():
         assert time.monotonic() < latest
         time.sleep(0.01)
@@ -140,7 +141,7 @@ def test_an_end_takes_all_that_was_started(importable: Any, tmp_path: Path) -> N
     pids = [int(word) for word in file.read_text().split()]
     began = time.monotonic()
     worker.end()
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < patient(1.0)
     until(lambda: not any(map(alive, pids)), 1.0)
 
 
@@ -186,7 +187,7 @@ def test_a_pool_that_is_left_stops_what_runs(importable: Any, tmp_path: Path) ->
 
     with Pool(2) as pool, pytest.raises(KeyboardInterrupt):
         list(pool.results(importable.sleeping, tasks()))
-    assert time.monotonic() - began < 20.0
+    assert time.monotonic() - began < patient(20.0)
     assert not any(alive(int(file.read_text().split()[0])) for file in files)
 
 

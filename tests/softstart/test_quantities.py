@@ -14,7 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart.errors import InputError
-from softstart.quantities import OTHER_NOUNS, QUANTITIES, nearest, read_unit, show, to_si
+from softstart.quantities import (
+    OTHER_NOUNS,
+    QUANTITIES,
+    nearest,
+    read_unit,
+    show,
+    to_si,
+    values_in,
+    whole_number,
+)
 
 READ = [
     ("0.5", "rad", 0.5),
@@ -262,3 +271,83 @@ def test_helpers():
     assert show(np.zeros(100)) == "an array of shape (100,)"
     assert show(["x"], toml=True) == '["x"]'
     assert len(show("x" * 1000)) < 80
+
+
+# what a hand types into an option or a field, and the numbers that are meant
+LISTS = [
+    ("0.5", [0.5]),
+    ("0.5,1,2", [0.5, 1, 2]),
+    ("1, 2, 4", [1, 2, 4]),
+    ("1;2;4", [1, 2, 4]),
+    ("0,5; 1; 2,25", [0.5, 1, 2.25]),
+    ("0,000; 1,500", [0, 1.5]),
+    ("1e-3,2e-3", [1e-3, 2e-3]),
+    ("-1.5,-2", [-1.5, -2]),
+]
+
+
+@pytest.mark.parametrize(("text", "numbers"), LISTS, ids=str)
+def test_a_list_is_read_as_it_is_meant(text, numbers):
+    assert to_si(values_in(text), "rad").tolist() == numbers
+
+
+# each can be read in two ways, or has a mark too many
+DOUBTFUL = {
+    "0,1,0,2": '"0, 1, 0, 2" for 4 values, or "0.1, 0.2" for 2',
+    "0,5": '"0, 5" for 2 values, or "0.5" for 1',
+    "1.5, 2,5": '"1.5, 2, 5" for 3 values, or "1.5, 2.5" for 2',
+    "0,5x, 1x": '"0, 5x, 1x" for 3 values, or "0.5x, 1x" for 2',
+    "0,5 rad,1 rad": '"0.5 rad, 1 rad"',
+    "1,2,4": '"1, 2, 4" for 3 values, or "1.2, 4" for 2',
+    "1,500; 2,000": "may divide thousands",
+    "1,000,000; 0,5": "may divide thousands",
+    "1,5; 2.5": "has a comma",
+    "1.234,5; 2": "has a comma",
+    "1,,2": "a place in the list is empty",
+    "1;;2": "a place in the list is empty",
+    "": "a place in the list is empty",
+    "1," * 5000 + "1": "a comma may divide values or decimals",
+}
+
+
+@pytest.mark.parametrize("text", DOUBTFUL, ids=lambda text: text[:20])
+def test_a_list_that_can_be_read_in_two_ways_is_refused(text):
+    with pytest.raises(InputError) as error:
+        values_in(text, "--gaps")
+    (sentence,) = error.value.sentences
+    assert sentence.startswith("--gaps = ")
+    assert DOUBTFUL[text] in sentence
+    assert len(sentence) < 400
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=6))
+def test_with_decimal_commas_a_list_is_read_right_or_not_at_all(numbers):
+    commas = [f"{number:.4f}".replace(".", ",") for number in numbers]
+    for between in ("; ", ";", ", ", ","):
+        text = between.join(commas)
+        with contextlib.suppress(InputError):
+            read = [to_si(part, "rad") for part in values_in(text)]
+            assert read == [float(f"{number:.4f}") for number in numbers]
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [("0,5 rad", '"0.5 rad"'), ("1,500", '"1.500" with a decimal point, or "1500"'), ("0,07", '"0.07"')],
+)
+def test_a_decimal_comma_is_refused_with_the_text_to_write(text, written):
+    with pytest.raises(InputError, match="a comma may divide decimals or thousands") as error:
+        to_si(text, "rad")
+    assert written in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", "\N{ARABIC-INDIC DIGIT FIVE}", "", "1e3"], ids=str)
+def test_a_whole_number_is_one(text):
+    with pytest.raises(InputError, match="give a whole number of 1 or more"):
+        whole_number(text, "--workers")
+    assert whole_number(" 007 ", "--workers") == 7
+
+
+def test_a_product_of_a_thousand_units_is_refused_at_once():
+    with pytest.raises(InputError, match="is too long for a unit") as error:
+        to_si("1 " + "*".join(["kg"] * 5000), "kg")
+    assert len(str(error.value)) < 300

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+import warnings
+from pathlib import Path
 
 import pytest
 
-from softstart.errors import InputError
-from softstart.store import Records, Target
+from softstart.errors import DamagedWarning, InputError
+from softstart.store import Records, Target, fingerprint, fresh_folder, sealed
 
 KEYS = ["cell", "restart"]
 INPUTS = {"drive": "crane", "seed": 0, "metric": "k_dyn"}
@@ -70,8 +73,8 @@ def test_other_inputs_are_named_and_their_file_left_alone(tmp_path):
 @pytest.mark.parametrize(
     "content",
     [
-        b"not json\n", b"[1]\n", b'{"cell": 1}\n', b'{"inputs": {}, "key": ""}\n{"a": 1}\n', b"\xff\xfe\n",
-        b'{"inputs": {"drive": "crane", "seed": 0, "metric": "k_dyn"}, "key": "of others"}\n',
+        b"not json\n", b"[1]\n", b'{"cell": 1}\n', b"\xff\xfe\n", b"letter",
+        sealed({"inputs": INPUTS, "key": "of others"}, "manifest").encode(),
     ],
 )  # fmt: skip
 def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
@@ -83,6 +86,96 @@ def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
     ):
         pass
     assert path.read_bytes() == content
+
+
+def test_a_file_without_checksums_is_refused_and_left_alone(tmp_path):
+    path = tmp_path / "parts.jsonl"
+    old = (
+        json.dumps({"inputs": INPUTS, "key": fingerprint(INPUTS)})
+        + "\n"
+        + json.dumps(part(1, cost=2.0))
+        + "\n"
+    )
+    path.write_text(old)
+    with (
+        pytest.raises(InputError, match="or written by an older softstart; name another file"),
+        records(path),
+    ):
+        pass
+    assert path.read_text() == old
+
+
+def test_no_flipped_bit_comes_back_as_a_number(tmp_path):
+    path = tmp_path / "parts.jsonl"
+    parts = [part(k, cost=0.1 * k, place=[1.0 / k, None]) for k in (1, 2, 3)]
+    with records(path) as kept:
+        for one in parts:
+            kept.add(one)
+    whole = path.read_bytes()
+    starts = [0, *(i + 1 for i, byte in enumerate(whole) if byte == 10)]
+    for bit in range(0, 8 * len(whole), 7):  # each byte, and every bit of it somewhere
+        torn = bytearray(whole)
+        torn[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(torn)
+        line = sum(start <= bit // 8 for start in starts)
+        with warnings.catch_warnings(record=True, action="always") as told, records(path) as again:
+            found = [again.find(one["cell"], 0) for one in parts]
+            assert all(one in (None, true) for one, true in zip(found, parts, strict=True))
+            lost = sum(one is None for one in found)
+            assert lost <= (2 if torn.count(10) < 4 else 1)  # without its end a line takes the next one along
+            for one in parts:
+                again.add(one)
+        if bit // 8 < len(whole) - 1:  # else the last line only lacks its end, as after a kill
+            assert len(told) == 1
+            assert f"line {line}" in str(told[0].message) or torn.count(10) > 4
+    path.write_bytes(b"".join(whole.splitlines(keepends=True)[k] for k in (0, 3, 2, 1)))
+    with records(path) as again:
+        assert [again.find(one["cell"], 0) for one in parts] == parts
+
+
+def test_a_part_of_another_computation_is_no_part(tmp_path):
+    path, other = tmp_path / "parts.jsonl", tmp_path / "other.jsonl"
+    for place, inputs in ((path, INPUTS), (other, {**INPUTS, "seed": 1})):
+        with records(place, inputs) as kept:
+            kept.add(part(1, cost=inputs["seed"]))
+    path.write_bytes(
+        path.read_bytes().splitlines(keepends=True)[0] + other.read_bytes().splitlines()[1] + b"\n"
+    )
+    with pytest.warns(DamagedWarning, match=r"line 2 is damaged"), records(path) as again:
+        assert again.find(1, 0) is None
+
+
+@pytest.mark.parametrize("what", ["folder", "pipe", "link"])
+def test_something_else_in_the_place_of_file_or_lock(tmp_path, what):
+    make = {
+        "folder": Path.mkdir,
+        "pipe": os.mkfifo,
+        "link": lambda place: place.symlink_to(tmp_path / "precious"),
+    }
+    (tmp_path / "precious").write_text("dear")
+    make[what](tmp_path / "parts.jsonl")
+    make[what](tmp_path / ".more.jsonl.lock")
+    for name in ("parts.jsonl", "more.jsonl"):
+        with (
+            pytest.raises(InputError, match=f"save_to = .*{name}: .* (another file|a file in a folder)"),
+            records(tmp_path / name),
+        ):
+            pass
+    assert (tmp_path / "precious").read_text() == "dear"
+
+
+def test_what_a_killed_owner_left_is_removed_and_a_living_one_keeps_his(tmp_path):
+    for name in (".softstart-dead.part", ".parts.jsonl.dead.part"):
+        (tmp_path / name).mkdir() if "softstart" in name else (tmp_path / name).write_text("")
+    (tmp_path / ".softstart-dead.part" / "half").write_text("")
+    with fresh_folder(tmp_path) as mine:
+        assert [one.name for one in tmp_path.iterdir() if one.is_dir()] == [mine.name]
+        with fresh_folder(tmp_path) as other:
+            assert mine.is_dir()
+            assert mine != other
+    with records(tmp_path / "parts.jsonl"):
+        pass
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unwritable_place_is_one_sentence(tmp_path):

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, compare, pareto, simulate, tune
+from softstart import Drive, InputError, compare, pareto, simulate, sweep, tune
+from softstart.cli.main import main
 from softstart.controller import make_controller
 from softstart.controller.tuned import (
     Gain,
@@ -181,10 +182,14 @@ def test_a_loose_plain_controller_goes_the_whole_way(tmp_path):
         tuned.to_toml(tmp_path / f"{what}.toml", what)
     tuned.to_csv(tmp_path / "schedule.csv")
     drives = CRANE.replace(gap=[0.5, 0.75, 1.0])
-    schedule = simulate(drives, str(tmp_path / "schedule.toml"))
-    assert np.array_equal(schedule.k_dyn, simulate(drives, str(tmp_path / "schedule.csv")).k_dyn)
+    made = {
+        file: make_controller(str(tmp_path / file), allow_code=True)
+        for file in ("schedule.toml", "schedule.csv", "robust.toml")
+    }
+    schedule = simulate(drives, made["schedule.toml"])
+    assert np.array_equal(schedule.k_dyn, simulate(drives, made["schedule.csv"]).k_dyn)
     assert schedule.k_dyn[[0, 2]].to_numpy().tolist() == tuned.schedule.k_dyn[:, 0].to_numpy().tolist()
-    robust = simulate(drives, str(tmp_path / "robust.toml"))
+    robust = simulate(drives, made["robust.toml"])
     assert robust.k_dyn[[0, 2]].to_numpy().tolist() == tuned.robust.cells.k_dyn[:, 0].to_numpy().tolist()
 
 
@@ -240,6 +245,8 @@ BAD = {
     "parameter.toml": (ROBUST_TOML.replace("time = 0.1", "tme = 0.1"), ["did you mean", "time"]),
     "rows.csv": (CSV.rsplit("\n", 2)[0] + "\n", ["one row for each combination"]),
     "number.csv": (CSV.replace("0.1,8.0", "soon,8.0"), ['time = "soon"']),
+    "itself.toml": (TOML.replace('"ramp"', '"itself.toml"'), ["gains are those of a controller"]),
+    "comma.csv": (CSV.replace("0.5,0.07,", "0,5,0,07,"), ["decimal commas"]),
     "json.csv": (CSV.replace('# gains: {"time"', "# gains: {time"), ["no JSON object"]),
 }
 
@@ -263,3 +270,51 @@ def test_parameters_beside_a_file_are_refused(tmp_path):
     path.write_text(TOML, "utf-8")
     with pytest.raises(InputError, match="given beside the tuned gains"):
         make_controller(str(path), {"time": 0.1})
+
+
+# code in files of gains -----------------------------------------------------------------------------------
+
+CODE = """
+from pathlib import Path
+from softstart import Command, PlainController
+Path(__file__).with_name("ran").touch()
+
+class Own(PlainController):
+    def step(self, measured, state):
+        return Command(40.0)
+"""
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """A file of gains that names code, which leaves a trace when it runs."""
+    (tmp_path / "own.py").write_text(CODE)
+    path = tmp_path / "mine.toml"
+    path.write_text(robust_text(RobustFile(f"{tmp_path / 'own.py'}:Own", {}, CRANE)))
+    return path
+
+
+def test_code_named_by_a_file_of_gains_runs_only_when_it_is_allowed(foreign):
+    for attempt in (
+        lambda: make_controller(str(foreign)),
+        lambda: simulate(CRANE, str(foreign)),
+        lambda: sweep(CRANE, str(foreign), {"gap": [0.5, 1.0]}, workers=1),
+    ):
+        with pytest.raises(InputError, match=r"own\.py.*would run.*--allow-code.*allow_code=True"):
+            attempt()
+    assert not foreign.with_name("ran").exists()
+    run = simulate(CRANE, make_controller(str(foreign), allow_code=True))
+    assert foreign.with_name("ran").exists()
+    found = sweep(CRANE, str(foreign), {"gap": [0.5, 1.0]}, workers=1, allow_code=True)
+    assert found.k_dyn.values[0] == run.k_dyn
+
+
+@pytest.mark.parametrize("command", ["simulate", "compare", "linear"])
+def test_the_command_line_has_the_same_switch(foreign, command, capsys):
+    option = "--controllers" if command == "compare" else "--controller"
+    words = [command, "crane-4amtkf", option, str(foreign)]
+    assert main(words) == 2
+    assert "--allow-code" in capsys.readouterr().err
+    assert not foreign.with_name("ran").exists()
+    main([*words, "--allow-code"])
+    assert foreign.with_name("ran").exists()

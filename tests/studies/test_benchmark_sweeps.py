@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,9 @@ from softstart.drive import Drive
 from softstart.start import metrics
 from softstart.study import Verdict, find_study
 from softstart_studies.benchmarks import lsoda
-from softstart_studies.benchmarks.sweeps.study import BenchmarkSweeps, _same
+from softstart_studies.benchmarks.sweeps.process import finished
+from softstart_studies.benchmarks.sweeps.study import BenchmarkSweeps, Found, _same, claims
 from softstart_studies.benchmarks.sweeps.task import PERIOD, Task, sample
-from softstart_studies.benchmarks.sweeps.verdicts import Found, claims
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -66,6 +67,16 @@ def test_the_same_is_the_same_to_the_bit(few):
     assert _same(holes, holes.copy(deep=True))
 
 
+def test_a_chunk_killed_before_its_seal_is_not_counted_as_finished(tmp_path):
+    """A kill between the values of a chunk and its seal makes the next run compute that chunk again."""
+    chunk = tmp_path / "status" / "c" / "0" / "1"
+    chunk.parent.mkdir(parents=True)
+    chunk.write_bytes(b"")
+    assert finished(tmp_path) == {}
+    chunk.with_name("1.sha256").write_text("")
+    assert set(finished(tmp_path)) == {str(Path("status", "c", "0", "1.sha256"))}
+
+
 def test_verdicts():
     def verdicts(**change):
         good = {
@@ -91,10 +102,9 @@ def test_a_small_run_is_killed_and_has_the_same_bits(tmp_path):
     result = BenchmarkSweeps(starts=10_000, peer_starts=2, workers=1, clustered=False).run(
         tmp_path, told.append
     )
-    verdicts = {claim.statement: claim.verdict for claim in result.claims}
     for words in ("below 2 GiB", "Killed twice", "same K_dyn"):
-        (verdict,) = [verdict for statement, verdict in verdicts.items() if words in statement]
-        assert verdict is Verdict.CONFIRMED
+        (claim,) = [claim for claim in result.claims if words in claim.statement]
+        assert claim.verdict is Verdict.CONFIRMED, claim
     rates = dict(result.tables[1].rows)
     assert rates["starts by LSODA"] == 2
     assert not list(tmp_path.iterdir())

@@ -27,6 +27,7 @@ def grid():
     return one
 
 
+@pytest.mark.slow  # with the study that all tests of this file share
 @pytest.mark.parametrize("name", ["ramp", "acceleration-delay"])
 def test_every_cell_is_a_start_that_can_be_repeated(grid, name):
     tuning = grid.tunings[name]

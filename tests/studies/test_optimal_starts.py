@@ -88,6 +88,7 @@ def test_start_times_of_a_front_are_all_feasible_and_in_order():
 # what is found -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow  # with the study that all tests of this file share
 def test_profiles_are_those_of_the_anchor_and_end_in_step(found):
     short, start = found.profiles
     assert (short.run, short.point.status) == (None, "INFEASIBLE")

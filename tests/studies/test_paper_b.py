@@ -91,13 +91,13 @@ def test_assumptions_move_the_torque_as_they_should():
 
 def test_courses_of_figures_2_and_3():
     found = balanced()
-    one = over_speed.course(found)
+    one = over_speed.curves(found)
     i = found.tuning_index
     assert one.rpm[i] == pytest.approx(4500.0)
     assert one.shafts[i] == pytest.approx(one.sine[i], rel=1e-12)
     assert one.shafts / one.rpm**2 == pytest.approx(one.shafts[i] / 4500.0**2, rel=1e-12)
     assert one.inertia / one.rpm**2 == pytest.approx(one.inertia[i] / 4500.0**2, rel=1e-12)
-    assert [row[0] for row in over_speed.courses_table(found).rows] == list(SPEEDS)
+    assert [row[0] for row in over_speed.curves_table(found).rows] == list(SPEEDS)
 
 
 def test_an_arm_for_full_load_is_wrong_at_others():

@@ -12,7 +12,7 @@ them, at the height h above the crank axis and the offset e sideways, and so has
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -83,39 +83,30 @@ def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerS
 
 @dataclass(frozen=True)
 class Design:
-    """A layout of the balancer; `place(engine, speed, tuning speed, load)` is its arm h + i e in m."""
+    """A layout of the balancer: where its arm is computed, and what of it is used.
+
+    `gas`: for the gas torque too, not that of inertia alone; `variable`: anew at every speed, not at the
+    tuning speed once; `sideways`: its offset e too, not its height h alone.
+    """
 
     name: str
     about: str
-    place: Callable[[Engine, float, float, float | None], complex]
+    gas: bool = True
+    variable: bool = False
+    sideways: bool = False
 
-
-def _inertia_only(engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-    return complex(arm(engine, tuning, load, gas=False).real)
-
-
-def _fixed(engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-    return complex(arm(engine, tuning, load).real)
-
-
-def _variable(engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-    return complex(arm(engine, speed, load).real)
-
-
-def _fixed_both(engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-    return arm(engine, tuning, load)
-
-
-def _variable_both(engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
-    return arm(engine, speed, load)
+    def place(self, engine: Engine, speed: float, tuning: float, load: float | None) -> complex:
+        """The arm h + i e in m at a speed."""
+        found = arm(engine, speed if self.variable else tuning, load, gas=self.gas)
+        return found if self.sideways else complex(found.real)
 
 
 DESIGNS = (
-    Design("inertia-only", "h for the inertia torque alone", _inertia_only),
-    Design("fixed-h", "h for gas and inertia at the tuning speed [B]", _fixed),
-    Design("variable-h", "h(n) for gas and inertia at every speed [B]", _variable),
-    Design("fixed-h-e", "h and sideways offset e at the tuning speed", _fixed_both),
-    Design("variable-h-e", "h(n) and e(n) at every speed", _variable_both),
+    Design("inertia-only", "h for the inertia torque alone", gas=False),
+    Design("fixed-h", "h for gas and inertia at the tuning speed [B]"),
+    Design("variable-h", "h(n) for gas and inertia at every speed [B]", variable=True),
+    Design("fixed-h-e", "h and sideways offset e at the tuning speed", sideways=True),
+    Design("variable-h-e", "h(n) and e(n) at every speed", variable=True, sideways=True),
 )
 
 

@@ -9,14 +9,12 @@ rounding, since the pressure is smooth between known angles.
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -25,8 +23,10 @@ from numpy.polynomial import chebyshev
 from softstart.arrays import Complex, Vector
 from softstart.balancing.parts import CYCLE_ANGLE, Cylinders
 from softstart.errors import InputError
+from softstart.input.columns import Wanted, read_columns
+from softstart.input.files import text_of
 from softstart.input.parameter_set import MaybeSeries, Number, ParameterSet, Series, parameter
-from softstart.quantities import RefusedError, parse, show, to_si
+from softstart.quantities import to_si
 
 LONGEST = math.pi / 12.0  # rad, of a panel
 MANY = 100  # breaks, as of a measured pressure, leave panels so short that few nodes suffice
@@ -92,17 +92,16 @@ def _torque_shapes(cycle: GasCycle, cylinders: Cylinders) -> tuple[Vector, Vecto
 
 
 @lru_cache(maxsize=64)
-def _shape_work(cycle: GasCycle, cylinders: Cylinders) -> tuple[float, ...]:
-    return tuple(float(w) for w in _torque_shapes(cycle, cylinders)[1].sum(axis=1))
-
-
 def shape_work(cycle: GasCycle, cylinders: Cylinders) -> Vector:
     """Work in J of one cycle of one cylinder for each shape."""
-    return np.array(_shape_work(cycle, cylinders), dtype=np.float64)
+    work: Vector = _torque_shapes(cycle, cylinders)[1].sum(axis=1)
+    work.setflags(write=False)
+    return work
 
 
 @lru_cache(maxsize=32)
-def _torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Complex:
+def torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Complex:
+    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row a shape."""
     theta, torque = _torque_shapes(cycle, cylinders)
     turning = np.exp(-0.5j * np.outer(theta, np.arange(2 * highest + 1)))
     # einsum: threads of a BLAS cost more than such a small product where other processes work too
@@ -110,11 +109,6 @@ def _torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Co
     found[:, 0] *= 0.5
     found.setflags(write=False)
     return found
-
-
-def torque_harmonics(cycle: GasCycle, cylinders: Cylinders, highest: int) -> Complex:
-    """C_j of the torque Re sum C_j exp(i j theta/2), j = 0 .. 2 highest, of one cylinder; a row a shape."""
-    return _torque_harmonics(cycle, cylinders, highest)
 
 
 class SimpleCycle(ParameterSet, kw_only=False):
@@ -421,28 +415,11 @@ class MeasuredCycle:
         Raises InputError with the line.
         """
         place = f'"{path}"'
+        wanted = (Wanted(("angle",), "rad"), Wanted(("pressure",), "Pa"))
+        text = text_of(path, f"a table with {EXAMPLE}", "CSV")
+        angles, pressures = read_columns(text, place, wanted, headed="units").values
         try:
-            with Path(path).open(encoding="utf-8-sig", newline="") as stream:
-                rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
-        except FileNotFoundError:
-            raise InputError(f"{place}: there is no such file; give a CSV file with {EXAMPLE}.") from None
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise InputError(f"{place}: the file cannot be read as CSV ({error}).") from None
-        units = _units(rows[0] if rows else [], place)
-        columns: tuple[list[float], list[float]] = ([], [])
-        for number, row in enumerate(rows[1:], start=2):
-            try:
-                if len(row) != 2:
-                    raise RefusedError(f"there are {len(row)} values in it, and 2 are needed")
-                for column, cell, written, unit in zip(columns, row, units, ("rad", "Pa"), strict=True):
-                    column.append(float(parse(f"{cell.strip()} {written}", unit)))
-            except RefusedError as refusal:
-                line = show(",".join(row))
-                raise InputError(f"{place}: row {number}, {line}: {refusal.reason}.") from None
-        if not columns[0]:
-            raise InputError(f"{place}: there are no values below the first line.")
-        try:
-            return cls(tuple(columns[0]), tuple(columns[1]), crankcase_pressure)
+            return cls(tuple(angles.tolist()), tuple(pressures.tolist()), crankcase_pressure)
         except InputError as error:
             raise InputError(f"{place}: {sentence}" for sentence in error.sentences) from None
 
@@ -467,18 +444,6 @@ class MeasuredCycle:
     def refuse(self, cylinders: Cylinders | None) -> Sequence[str]:
         """No sentences: a measured pressure fits any cylinders."""
         return ()
-
-
-def _units(header: Sequence[str], place: str) -> list[str]:
-    """The units of the two columns."""
-    found = [cell.partition("[")[2].partition("]")[0].strip() for cell in header]
-    names = [cell.partition("[")[0].strip() for cell in header]
-    if len(header) != 2 or names != ["angle", "pressure"] or not all(found):
-        line = show(",".join(header))
-        raise InputError(f"{place}: the first line is {line}; it names both columns with units: {EXAMPLE}.")
-    for written, unit in zip(found, ("rad", "Pa"), strict=True):
-        to_si(f"1 {written}", unit, f"{place}: in the first line")
-    return found
 
 
 def _errors(angles: Vector, pressures: Vector) -> list[str]:

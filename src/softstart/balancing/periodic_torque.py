@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softstart.arrays import Vector
+from softstart.arrays import Vector, plain_fields
 from softstart.errors import InputError
 
 __all__ = ["PeriodicTorque"]
@@ -91,10 +91,4 @@ class PeriodicTorque:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        return {
-            "mean": self.mean,
-            "speed": self.speed,
-            "orders": self.orders.tolist(),
-            "cosine": self.cosine.tolist(),
-            "sine": self.sine.tolist(),
-        }
+        return plain_fields(self)

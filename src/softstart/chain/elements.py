@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind
 from softstart.input.documents import Table
@@ -197,6 +197,7 @@ class Motor(ParameterSet):
     minimum_torque: Number = like(Drive, "minimum_torque")
     rated_power: MaybeNumber = like(Drive, "rated_power")
     rated_speed: MaybeNumber = like(Drive, "rated_speed")
+    rated_torque: MaybeNumber = like(Drive, "rated_torque")
     torque_lag: Number = like(Drive, "torque_lag")
     torque_rate: Number = like(Drive, "torque_rate")
     encoder_lines: Number = like(Drive, "encoder_lines")
@@ -213,7 +214,7 @@ class Motor(ParameterSet):
                 f"{self.starting_torque!r} N*m."
             )
 
-    def keywords(self) -> dict[str, float]:
+    def keywords(self) -> dict[str, Any]:
         """The motor as keywords of `Drive`."""
         return {key: v for key, v in self.values().items() if key != "mass" and v is not None}
 

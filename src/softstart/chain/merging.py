@@ -168,13 +168,6 @@ class Working:
         """As a chain at the motor shaft, with the motor and the start of another one."""
         masses = [station.mass() for station in self.stations]
         motor = None if of.motor is None else replace(of.motor, mass=masses[self.motor].name)
-        return Chain(
-            masses,
-            [section.shaft() for section in self.sections],
-            motor,
-            load_mass=masses[self.load].name,
-            target_speed=of.target_speed,
-            name=of.name,
-            source=of.source,
-            assumed=of.assumed,
-        )
+        shafts = tuple(section.shaft() for section in self.sections)
+        load = masses[self.load].name
+        return replace(of, masses=tuple(masses), shafts=shafts, motor=motor, load_mass=load)

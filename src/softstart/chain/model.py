@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,31 +173,13 @@ class Chain:
         """
         if drive.shape != ():
             raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
-        of_motor = {key: getattr(drive, key) for key in Motor.PARAMETERS if key != "mass"}
-        rotor = Mass(
-            cast("float", drive.J1), name="motor", initial_speed=cast("float", drive.initial_motor_speed)
-        )
-        load = Mass(
-            cast("float", drive.J2),
-            name="load",
-            torque=cast("float", drive.Mc),
-            kind=drive.load_kind,
-            initial_speed=cast("float", drive.initial_load_speed),
-        )
-        shaft = Shaft(
-            cast("float", drive.c),
-            damping=cast("float", drive.d),
-            gap=cast("float", drive.gap),
-            contact_law=drive.contact_law,
-            start_position=cast("float", drive.start_position),
-        )
+        of: Any = drive  # one number for each parameter
+        rotor = Mass(of.J1, name="motor", initial_speed=of.initial_motor_speed)
+        load = Mass(of.J2, name="load", torque=of.Mc, kind=of.load_kind, initial_speed=of.initial_load_speed)
+        shaft = Shaft(of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=of.theta0)
+        motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key != "mass"})
         return cls(
-            (rotor, load),
-            (shaft,),
-            Motor(**of_motor),
-            target_speed=cast("float", drive.target_speed),
-            name=drive.name,
-            source=drive.source,
+            (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source
         )
 
     def to_toml(self) -> str:

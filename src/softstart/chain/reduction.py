@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Vector, plain_fields
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.merging import Working
 from softstart.chain.model import Chain
@@ -166,18 +166,7 @@ class Reduction:
             "factor": self.factor,
             "least_ratio": self.least_ratio,
             "forced": self.forced,
-            "steps": [
-                {
-                    "kind": step.kind,
-                    "masses": list(step.masses),
-                    "Omega": step.Omega,
-                    "ratio": step.ratio,
-                    "masses_left": step.masses_left,
-                    "errors": list(step.errors),
-                    "bounds": list(step.bounds),
-                }
-                for step in self.steps
-            ],
+            "steps": [plain_fields(step) for step in self.steps],
             "frequencies": [frequency._asdict() for frequency in self.frequencies],
             "whole": before._asdict(),
             "reduced": after._asdict(),
@@ -308,16 +297,7 @@ def modal(chain: Chain) -> tuple[Chain, list[Step]]:
         start_position=way * float(arrays.theta0.sum()),
     )
     motor = None if chain.motor is None else replace(chain.motor, mass=first.name)
-    reduced = Chain(
-        [rotor, load],
-        [shaft],
-        motor,
-        load_mass=last.name,
-        target_speed=chain.target_speed,
-        name=chain.name,
-        source=chain.source,
-        assumed=chain.assumed,
-    )
+    reduced = replace(chain, masses=(rotor, load), shafts=(shaft,), motor=motor, load_mass=last.name)
     second = float(vibration.Omega[2]) if vibration.Omega.size > 2 else math.inf
     error = float(np.sqrt(shaft.stiffness / J1 + shaft.stiffness / J2)) / Omega - 1.0
     names = tuple(mass.name for mass in chain.masses)

@@ -229,7 +229,7 @@ class ChainRun(BaseRun):
         motor = np.empty(flat.size, MOTOR)
         w, twist, T = (np.empty((flat.size, columns)) for columns in (count, count - 1, count - 1))
         kernel.states_at(self._replayed(), index, flat, motor, w, twist, T)
-        relative = np.concatenate([np.zeros((flat.size, 1)), -np.cumsum(twist, axis=1)], axis=1)
+        relative = angles_of(twist)
         place = self.numbers.place.motor
         phi = motor["phi"][:, None] + relative - relative[:, place : place + 1]
         shaped = {"phi": phi, "w": w, "twist": twist, "T": T}
@@ -330,3 +330,8 @@ def _stored(given: Numbers, rows: Record) -> float:
     acting = np.isin(rows["mode"], [CONTACT, DOUBLED, JOINED])
     z = np.where(acting, rows["theta"] - rows["side"] * given.shafts["half"], 0.0)
     return float(np.sum(0.5 * given.shafts["c"] * z * z))
+
+
+def angles_of(twist: Vector) -> Vector:
+    """Angles of the masses relative to the first, rad, from the twists of the shafts; a row an instant."""
+    return np.concatenate([np.zeros((len(twist), 1)), -np.cumsum(twist, axis=1)], axis=1)

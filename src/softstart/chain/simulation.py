@@ -207,7 +207,7 @@ class Verification:
     @property
     def name(self) -> str:
         """Name of the controller."""
-        return self.drive.controller.name or type(self.drive.controller).__name__
+        return self.drive.controller_name
 
     @property
     def worst_shaft(self) -> int:

@@ -23,7 +23,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.arrays import Vector
+from softstart.arrays import Vector, plain_fields
 from softstart.chain.model import Chain, ChainArrays
 from softstart.errors import InputError
 from softstart.late import late
@@ -77,10 +77,6 @@ class Vibration:
     def frequency(self) -> Vector:
         """The frequencies in Hz."""
         return self.Omega / (2.0 * math.pi)
-
-    def own_shape(self, mode: int) -> Vector:
-        """The amplitudes of the masses on their own shafts, in the scale of `shape`."""
-        return self.shape[mode] * np.array(self.chain.speed_ratios(self.chain.motor_index))
 
     @cached_property
     def nodes(self) -> tuple[tuple[Node, ...], ...]:
@@ -254,7 +250,7 @@ class PartialSystem:
 
     def summary(self) -> dict[str, Any]:
         """The same as plain data."""
-        return {"kind": self.kind, "masses": list(self.masses), "Omega": self.Omega}
+        return plain_fields(self)
 
 
 def squared_frequencies(J: Vector, c: Vector) -> tuple[Vector, Vector]:

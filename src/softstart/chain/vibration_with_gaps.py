@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Vector, plain_fields
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.reduction import reduce_chain
+from softstart.chain.run import angles_of
 from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration import natural_vibration
 from softstart.drive.checks import elastic_frequency
@@ -75,15 +76,7 @@ class Backbone:
 
     def summary(self) -> dict[str, Any]:
         """All of it as plain data."""
-        return {
-            "chain": self.chain.name,
-            "assumed": self.chain.assumed,
-            "mode": self.mode,
-            "Omega": self.Omega,
-            "torque": self.torque.tolist(),
-            "frequency": self.frequency.tolist(),
-            "two_masses": self.two_masses.tolist(),
-        }
+        return {"chain": self.chain.name, "assumed": self.chain.assumed, **plain_fields(self, "chain")}
 
     def plot(self) -> Figure:
         """The frequencies, over that without gaps, against the largest torque."""
@@ -134,9 +127,7 @@ def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, perio
     length = periods * 2.0 * math.pi / Omega
     run = simulate_chain(Chain(masses, shafts), None, length)
     t = np.linspace(0.0, length, 64 * periods + 1)
-    relative = np.concatenate(
-        [np.zeros((t.size, 1)), -np.cumsum(run.at(t)["twist"], axis=1)], axis=1
-    )  # the rigid motion has no part in a shape
+    relative = angles_of(run.at(t)["twist"])  # the rigid motion has no part in a shape
     along = relative @ (arrays.J * shape)
     window = np.hanning(t.size)
     signal = (along - along.mean()) * window / window.sum()
@@ -184,18 +175,9 @@ class ForcedResponse:
 
     def summary(self) -> dict[str, Any]:
         """All of it as plain data."""
-        return {
-            "chain": self.chain.name,
-            "assumed": self.chain.assumed,
-            "masses": [mass.name for mass in self.chain.masses],
-            "locking": self.locking,
-            "frequency": self.frequency.tolist(),
-            "amplitude": self.amplitude.tolist(),
-            "torque": self.torque.tolist(),
-            "without_gaps": self.without_gaps.tolist(),
-            "torque_without_gaps": self.torque_without_gaps.tolist(),
-            "spread": self.spread.tolist(),
-        }
+        names = [mass.name for mass in self.chain.masses]
+        about = {"chain": self.chain.name, "assumed": self.chain.assumed, "masses": names}
+        return {**about, **plain_fields(self, "chain")}
 
     def plot(self, mass: str | int = 0) -> Figure:
         """The amplitude of one mass against the frequency, with gaps and without."""
@@ -339,8 +321,7 @@ def _steady(
     run = simulate_chain(Chain(masses, shafts), None, end, excitation=acting)
     t = np.linspace(first * period, end, PERIODS * SAMPLES, endpoint=False)
     found = run.at(t)
-    angle = np.concatenate([np.zeros((t.size, 1)), -np.cumsum(found["twist"], axis=1)], axis=1)
-    swing = _about_mean(arrays, angle)
+    swing = _about_mean(arrays, angles_of(found["twist"]))
     halves = np.array([_height(part) for part in np.split(swing, 2)])
     spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
     without_gaps: Vector = np.abs(_about_mean(arrays, linear[None, :])[0])

@@ -26,14 +26,15 @@ from softstart.quantities import to_si
 from softstart.views import balances as views
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
-    command_run,
     markdown,
     output_folder,
     table_sections,
+    write_report,
+    write_rows,
     write_table,
     write_text,
 )
-from softstart.views.terminal import console, print_json, print_tables, sentence
+from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -121,13 +122,9 @@ def read_speeds(texts: Sequence[str]) -> list[float] | None:
 
 
 def _show(to: Console, found: Balance) -> None:
-    for index, line in enumerate(views.engine_lines(found)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, views.engine_lines(found))
     print_tables(to, views.tables(found))
-    to.print()
-    sentence(to, views.conclusion(found), "bold")
-    for note in views.footnotes(found):
-        sentence(to, note, "dim")
+    print_conclusion(to, [views.conclusion(found)], views.footnotes(found))
 
 
 def _write(found: Balance, folder: Path, command: str) -> None:
@@ -141,9 +138,8 @@ def _write(found: Balance, folder: Path, command: str) -> None:
     residuals = [
         {"balancer": one.name, **one.row(i)} for one in found.residuals for i in range(one.speeds.size)
     ]
-    for name, rows in (("orders.csv", found.orders()), ("residuals.csv", residuals)):
-        if rows:
-            write_table(folder / name, list(rows[0]), [list(row.values()) for row in rows])
+    write_rows(folder / "orders.csv", found.orders())
+    write_rows(folder / "residuals.csv", residuals)
     write_table(folder / "torque.csv", *views.torque_over_cycle(found))
     parts = [
         f"# {markdown(engine.name)}: forces, moments and balancers",
@@ -154,7 +150,6 @@ def _write(found: Balance, folder: Path, command: str) -> None:
         *map(markdown, views.footnotes(found)),
         "All numbers: [orders.csv](orders.csv), [residuals.csv](residuals.csv), torque over the cycle at the "
         "tuning speed [torque.csv](torque.csv).",
-        f"{command_run(command)}on the engine of [engine.toml](engine.toml), which holds all changes. "
-        f"Source: {markdown(engine.source) or 'none given'}.",
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    about = "on the engine of [engine.toml](engine.toml), which holds all changes. "
+    write_report(folder, parts, command, f"{about}Source: {markdown(engine.source) or 'none given'}.")

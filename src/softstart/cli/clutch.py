@@ -30,20 +30,19 @@ from softstart.clutch import (
 from softstart.clutch.laws import read_law
 from softstart.clutch.model import LIBRARY
 from softstart.errors import InputError
-from softstart.quantities import to_si
+from softstart.quantities import to_si, whole_number
 from softstart.views import clutches as views
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
-    command_run,
     markdown,
     markdown_table,
     output_folder,
-    plain_table,
+    write_report,
+    write_rows,
     write_table,
     write_text,
 )
-from softstart.views.numbers import Column
-from softstart.views.terminal import console, print_json, print_table, print_tables, sentence
+from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -188,35 +187,25 @@ def _points(text: str | None, optimal: bool, nondecreasing: bool, until: str | N
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
     if text is None:
         return DEFAULT_POINTS
-    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 200):
-        raise InputError(f'--points = "{text}": give a whole number of points from 1 to 200.')
-    return int(text)
+    return whole_number(text, "--points", 1, 200)
 
 
 def _show(to: Console, found: Engagement | EngagementFront) -> None:
-    for index, line in enumerate(views.clutch_lines(found.clutch)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, views.clutch_lines(found.clutch))
     if isinstance(found, Engagement):
-        to.print()
-        columns = [Column("figure", False), Column("value"), Column("unit", False), Column("meaning", False)]
-        print_table(to, columns, views.figure_rows(found))
+        print_tables(to, [views.figures_table(found)])
         headline, note = views.status(found), views.events(found)
     else:
         print_tables(to, [views.point_table(found), views.law_table(found)])
         headline, note = views.conclusion(found), f"The bounds cover {found.covers}."
-    to.print()
-    sentence(to, headline, "bold")
-    sentence(to, note, "dim")
+    print_conclusion(to, [headline], [note])
 
 
 def _write(found: Engagement | EngagementFront, folder: Path, command: str) -> None:
     parts = _engagement_files(found, folder) if isinstance(found, Engagement) else _front_files(found, folder)
     write_text(folder / "clutch.toml", found.clutch.to_toml())
-    parts.append(
-        f"{command_run(command)}on the clutch of [clutch.toml](clutch.toml), which holds all changes. "
-        f"Source: {markdown(found.clutch.source)}"
-    )
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    about = "on the clutch of [clutch.toml](clutch.toml), which holds all changes. "
+    write_report(folder, parts, command, f"{about}Source: {markdown(found.clutch.source)}")
 
 
 def _engagement_files(run: Engagement, folder: Path) -> list[str]:
@@ -229,7 +218,7 @@ def _engagement_files(run: Engagement, folder: Path) -> list[str]:
     return [
         f"# {markdown(run.clutch.name)}: {markdown(run.law.label)}",
         views.STATUS[run.status],
-        markdown_table(["figure", "value", "unit", "meaning"], views.figure_rows(run)),
+        markdown_table(views.figures_table(run)),
         "![engagement](engagement.svg)",
         "Traces: [traces.csv](traces.csv). Events: [events.csv](events.csv). Phases: "
         "[phases.csv](phases.csv).",
@@ -244,13 +233,12 @@ def _front_files(front: EngagementFront, folder: Path) -> list[str]:
     summaries = [
         {k: v for k, v in p.summary().items() if k not in ("times", "torques")} for p in front.points
     ]
-    for name, rows in (("front.csv", summaries), ("laws.csv", [law.summary() for law in front.laws])):
-        if rows:
-            write_table(folder / name, list(rows[0]), [list(one.values()) for one in rows])
+    write_rows(folder / "front.csv", summaries)
+    write_rows(folder / "laws.csv", [law.summary() for law in front.laws])
     return [
         f"# {markdown(front.clutch.name)}: optimal laws, {front.law_class}",
         views.conclusion(front),
-        *(plain_table(one) for one in (views.point_table(front), views.law_table(front)) if one.rows),
+        *(markdown_table(one) for one in (views.point_table(front), views.law_table(front)) if one.rows),
         f"The bounds cover {front.covers}.",
         "![front](front.svg)",
         "Points: [front.csv](front.csv). The laws: law-1.csv, ..., each readable by --law.",

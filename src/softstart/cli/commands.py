@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from importlib import import_module
@@ -11,6 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from softstart import __version__
+from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
@@ -140,7 +142,8 @@ class Commands(Command, click.Group):
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
         if name not in known and not name.startswith("-"):
-            hint = did_you_mean(name, known, "softstart ")
+            near = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
+            hint = (None if near else _by_subject(name)) or did_you_mean(name, known, "softstart ")
             raise click.UsageError(f'there is no command "{name}"; {hint}', ctx)
         return super().resolve_command(ctx, args)
 
@@ -178,6 +181,18 @@ def did_you_mean(name: str, valid: Iterable[str], before: str = "") -> str:
     if near:
         return f"did you mean {before}{near[0]}?"
     return f"there are {listed(known)}." if known else "there are none."
+
+
+def _by_subject(name: str) -> str | None:
+    """The command that a word is about, "chain" or "gains", or a controller of that name."""
+    stem = name.lower().rstrip("s")
+    about = [
+        one for one, (_, text) in COMMANDS.items() if stem in re.findall(r"[a-z]+?(?=s?\b)", text.lower())
+    ]
+    if about:
+        return f"did you mean softstart {about[0]}?"
+    near = get_close_matches(name.lower(), registered(CONTROLLERS), n=1, cutoff=0.6)
+    return f"did you mean softstart simulate DRIVE --controller {near[0]}?" if near else None
 
 
 def listed(words: Sequence[str]) -> str:

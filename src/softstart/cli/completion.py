@@ -23,6 +23,7 @@ from click.shell_completion import CompletionItem, ShellComplete, add_completion
 from softstart.cli.commands import Command, did_you_mean
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
+from softstart.input.files import read_text
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, STUDIES, registered
 
@@ -160,9 +161,8 @@ def files(begun: str, *endings: str) -> list[str]:
 def classes(path: str) -> list[str]:
     """Names of the classes in a Python file, which is read and not run."""
     try:
-        with open(os.path.expanduser(path), encoding="utf-8") as opened:
-            body = ast.parse(opened.read()).body
-    except (OSError, SyntaxError, ValueError):
+        body = ast.parse(read_text(os.path.expanduser(path))).body
+    except (RecursionError, SyntaxError, ValueError):
         return []
     return [node.name for node in body if isinstance(node, ast.ClassDef)]
 

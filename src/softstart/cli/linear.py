@@ -28,17 +28,22 @@ from softstart.late import late
 from softstart.views.drawing import save_figure
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import (
-    drive_table,
+    figure_table,
     markdown,
-    markdown_table,
     output_folder,
-    provenance,
     table_sections,
+    write_drive_report,
     write_table,
-    write_text,
 )
-from softstart.views.numbers import Column
-from softstart.views.terminal import console, print_json, print_table, print_tables, sentence
+from softstart.views.terminal import (
+    console,
+    print_conclusion,
+    print_figures,
+    print_json,
+    print_lines,
+    print_tables,
+    sentence,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -102,18 +107,15 @@ def linear(
 
 
 def _show(to: Console, view: softstart.LinearView) -> None:
-    for index, line in enumerate(drive_lines(view.drive)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, drive_lines(view.drive))
     sentence(to, f"  under  {view.name}")
     to.print()
     if view.margins is None:
         sentence(to, view.notes[0], "bold")
         return
-    print_table(to, [Column("", False), Column("", False)], views.margin_rows(view), headings=False)
+    print_figures(to, views.margin_rows(view))
     print_tables(to, views.tables(view))
-    to.print()
-    for note in views.notes(view):
-        sentence(to, note, "dim")
+    print_conclusion(to, [], views.notes(view))
 
 
 def write_linear(view: softstart.LinearView, folder: Path, command: str) -> None:
@@ -125,12 +127,10 @@ def write_linear(view: softstart.LinearView, folder: Path, command: str) -> None
         save_figure(view.plot(), folder, "linear")
         write_table(folder / "response.csv", *views.response(view))
         parts += [
-            markdown_table(["figure", "value"], views.margin_rows(view), numbers_from=1),
+            figure_table(views.margin_rows(view)),
             "![Bode and Nyquist diagrams](linear.svg)",
             "The loop over frequency: [response.csv](response.csv).",
             *table_sections(views.tables(view)),
             *map(markdown, views.notes(view)),
         ]
-    parts += ["## The drive", drive_table(view.drive), provenance(view.drive, command)]
-    write_text(folder / "drive.toml", view.drive.to_toml())
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    write_drive_report(folder, parts, view.drive, command)

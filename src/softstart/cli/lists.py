@@ -15,7 +15,7 @@ from softstart.cli.running import Attributed, working
 from softstart.drive import PARAMETERS, Drive, library
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.views.numbers import Column, printable
+from softstart.views.numbers import Table, printable
 from softstart.views.terminal import console, print_json, print_table, sentence
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def drives(name: str | None, as_json: bool) -> None:
         return
     to = console()
     table = [[key, f"{printable(one.name)}\n{printable(one.source)}"] for key, one in shipped.items()]
-    print_table(to, [Column("drive", False), Column("what it is, and its source", False)], table)
+    print_table(to, Table.of_texts(("drive", "what it is, and its source"), table))
     to.print()
     sentence(to, "A drive of your own:")
     sentence(to, "  softstart drives crane-4amtkf > mine.toml     then change the numbers in it, and")
@@ -121,8 +121,7 @@ def _show_all(found: dict[str, type[Controller]]) -> None:
         [key, printable(cls.summary), ", ".join(_sensors(cls)[2:]) or "-", printable(cls.source) or "-"]
         for key, cls in found.items()
     ]
-    headings = ("controller", "what it does", "also sees", "source")
-    print_table(to, [Column(heading, False) for heading in headings], rows)
+    print_table(to, Table.of_texts(("controller", "what it does", "also sees", "source"), rows))
     to.print()
     sentence(
         to, "All see time, the motor's encoder and its torque. Parameters of one: softstart controllers NAME"
@@ -142,7 +141,7 @@ def _show_one(name: str, cls: type[Controller]) -> None:
         return
     keys = ("name", "unit", "meaning", "default")
     rows = [[one[key] or "-" for key in keys] for one in about["parameters"]]
-    print_table(to, [Column(heading, False) for heading in ("parameter", "unit", "meaning", "default")], rows)
+    print_table(to, Table.of_texts(("parameter", "unit", "meaning", "default"), rows))
     to.print()
     sentence(to, "Set one:")
     sentence(to, f"  softstart simulate crane-4amtkf --controller {name} --param {rows[0][0]}=VALUE")

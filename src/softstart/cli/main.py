@@ -5,20 +5,28 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
+import time
+import warnings
 from collections.abc import Sequence
 from types import FrameType, TracebackType
+from typing import TextIO
 
 import click
 
 from softstart.cli.commands import cli, usage_sentence
-from softstart.errors import InputError, SimulationError
+from softstart.errors import DamagedWarning, InputError, SimulationError
 from softstart.late import late
+from softstart.processes import end_now
+from softstart.views.numbers import printable
 
 completion = late("softstart.cli.completion")
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
 REPEAT_AFTER = 0.5  # s until a stop signal that was lost is raised again
+PATIENCE = 1.3  # s from a stop signal until the process ends, whatever it is doing
+STOP = "interrupted; no incomplete file was left behind."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,15 +39,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     2
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    if arguments is None:
-        sys.excepthook = _internal_error
-        signal.signal(signal.SIGTERM, _stop)
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            signal.signal(signal.SIGINT, _stop)
-        _replace_unprintable()
+    if arguments is not None:
+        return _main(given)
+    sys.excepthook = _internal_error
+    _watch_for_stops()
+    _replace_unprintable()
+    code = _main(given)
+    if code == INTERRUPTED:
+        end_now(code)  # threads in compiled code would be waited for
+    for number in (signal.SIGINT, signal.SIGTERM):  # what is left is the interpreter's own end
+        if signal.getsignal(number) is _stop:
+            signal.signal(number, signal.SIG_DFL)
+    return code
+
+
+def _main(given: list[str]) -> int:
     try:
-        code = _run(given)
-        sys.stdout.flush()
+        with warnings.catch_warnings():
+            _show_damage()
+            code = _run(given)
+            sys.stdout.flush()
     except KeyboardInterrupt:
         return _interrupted()
     except SystemError as error:
@@ -67,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _interrupted() -> int:
     _end_repetition()
-    return _fail(["interrupted; no incomplete file was left behind."], INTERRUPTED)
+    return _fail([STOP], INTERRUPTED)
 
 
 def _run(arguments: list[str]) -> int:
@@ -84,7 +103,7 @@ def _run(arguments: list[str]) -> int:
 
 def _fail(sentences: Sequence[str], code: int) -> int:
     """Sentences on standard error, numbered if there are several."""
-    lines = [sentence.strip() for sentence in sentences]
+    lines = [printable(sentence.strip()) for sentence in sentences]
     if len(lines) == 1:
         text = f"softstart: {lines[0]}"
     else:
@@ -114,6 +133,53 @@ def _replace_unprintable() -> None:
             reconfigure(errors="replace")
 
 
+def _show_damage() -> None:
+    """Print what is said of damaged results as sentences of the command."""
+    usual = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, DamagedWarning):
+            print(f"softstart: {message}", file=sys.stderr, flush=True)
+        else:
+            usual(message, category, filename, lineno, file, line)
+
+    warnings.simplefilter("always", DamagedWarning)
+    warnings.showwarning = show
+
+
+def _watch_for_stops() -> None:
+    """Let Ctrl-C and TERM raise KeyboardInterrupt, and end the process if nothing comes of that.
+
+    Python runs its handlers between two of its own instructions: not as long as the main thread is in
+    compiled code, or waits for a thread that is. The system writes the signal's number into a pipe at once,
+    where another thread reads it.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _stop)
+    if sys.platform == "win32":  # only sockets will do there
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    threading.Thread(target=_end_in_time, args=(reader,), daemon=True).start()
+
+
+def _end_in_time(reader: int) -> None:
+    while os.read(reader, 1)[0] not in (signal.SIGTERM, signal.SIGINT):
+        pass  # the timer's
+    time.sleep(PATIENCE)
+    _fail([STOP], INTERRUPTED)
+    end_now(INTERRUPTED)
+
+
 def _stop(number: int, frame: FrameType | None) -> None:
     """Ctrl-C or TERM. Callbacks of compiled libraries lose the exception, so a timer raises it again."""
     if hasattr(signal, "setitimer"):
@@ -141,7 +207,9 @@ def _end_repetition() -> None:
 
 
 def _internal_error(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """Report a bug of softstart itself. The interpreter then exits with 1."""
+    """Report a bug of softstart itself. The interpreter then exits with 1, after Ctrl-C by its signal."""
+    if issubclass(kind, KeyboardInterrupt):
+        return
     if os.environ.get(DEBUG):
         sys.__excepthook__(kind, error, traceback)
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,7 +13,8 @@ from softstart.cli.commands import did_you_mean
 from softstart.cli.options import Decorator, Mistakes
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.quantities import to_si
+from softstart.optimal.problem import StartTime
+from softstart.quantities import to_si, values_in, whole_number
 from softstart.views.terminal import print_json
 
 if TYPE_CHECKING:
@@ -26,17 +27,6 @@ OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--ma
 KEYWORDS = ("terminal", "minimise", "method", "torque_speed", "smoothness", "workers", "scheduler")
 OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in KEYWORDS}
 OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("gaps", "inertias", "load_torques")}
-
-
-class StartTime(NamedTuple):
-    """A start time as it was asked for: in s, or as a multiple of the start time of `direct`."""
-
-    value: float
-    multiple: bool = False
-
-    def seconds(self, direct: float) -> float:
-        """The start time in s; `direct` is that of the drive under its constant starting torque."""
-        return self.value * direct if self.multiple else self.value
 
 
 # the options ---------------------------------------------------------------------------------------------
@@ -84,32 +74,11 @@ def read_choice(text: str, option: str, choices: Sequence[str]) -> Any:
     return text
 
 
-def read_start_time(text: str, option: str = "--start-time") -> StartTime:
-    """A start time in s, or a multiple of that of `direct`.
-
-    >>> read_start_time("250 ms"), read_start_time("1.2x")
-    (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
-    """
-    stripped = text.strip()
-    if stripped[-1:] in ("x", "X"):
-        value = read_positive(
-            stripped[:-1], option, "1", "a multiple of the start time of direct, as 1.2x", text
-        )
-        return StartTime(value, multiple=True)
-    return StartTime(read_positive(text, option, "s", 'a time above 0 s, as 0.3, "300 ms" or 1.2x'))
-
-
-def read_positive(text: str, option: str, unit: str, meaning: str, shown: str | None = None) -> float:
+def read_positive(text: str, option: str, unit: str, meaning: str) -> float:
     """A finite quantity above 0."""
-    given = text if shown is None else shown
-    try:
-        value = float(to_si(text, unit, name=option))
-    except InputError as error:
-        if shown is None:
-            raise
-        raise InputError(f'{option} = "{given}": give {meaning}.') from error
+    value = float(to_si(text, unit, name=option))
     if not value > 0.0:
-        raise InputError(f'{option} = "{given}": give {meaning}.')
+        raise InputError(f'{option} = "{text}": give {meaning}.')
     return value
 
 
@@ -123,7 +92,7 @@ def read_start_times(text: str) -> list[StartTime]:
     """
     option = "--start-times"
     if ":" not in text:
-        return _each(text, option, lambda part: read_start_time(part, option))
+        return _each(text, option, lambda part: StartTime.of(part, option))
     parts = [part.strip() for part in text.split(":")]
     if len(parts) != 3:
         raise InputError(f'{option} = "{text}": a range is from:to:count, as 0.25:0.5:12 or 1.02x:1.6x:12.')
@@ -131,11 +100,10 @@ def read_start_times(text: str) -> list[StartTime]:
     ends: list[StartTime] = []
     for part in parts[:2]:
         with mistakes.noted():
-            ends.append(read_start_time(part, option))
-    count = int(parts[2]) if parts[2].isascii() and parts[2].isdigit() else 0
+            ends.append(StartTime.of(part, option))
+    count = 0
     with mistakes.noted():
-        if not 1 < count <= 1000:
-            raise InputError(f'{option} = "{text}": the count is a whole number from 2 to 1000.')
+        count = whole_number(parts[2], f'{option} = "{text}": the count', 2, 1000)
     mistakes.settle()
     first, last = ends
     if first.multiple != last.multiple:
@@ -178,14 +146,9 @@ def read_corners(text: str | None) -> tuple[tuple[float, float], ...]:
 
 def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
     """Every part of a list with commas between, read; all mistakes at once."""
-    parts = [part.strip() for part in text.split(",")]
-    if not all(parts):
-        raise InputError(
-            f'{option} = "{text}": a place in the list is empty; write values with commas between.'
-        )
     mistakes = Mistakes()
     found = []
-    for part in parts:
+    for part in values_in(text, option):
         with mistakes.noted():
             found.append(read(part))
     mistakes.settle()

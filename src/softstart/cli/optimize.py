@@ -5,7 +5,6 @@ With --gaps, --inertias or --load-torques: one profile for several drives, and w
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
     OPTION_OF,
-    StartTime,
     method_option,
     named_as_options,
     no_solution_reported,
@@ -25,7 +23,6 @@ from softstart.cli.optimal_options import (
     read_corners,
     read_positive,
     read_quantities,
-    read_start_time,
     smoothness_option,
     terminal_option,
     torque_speed_option,
@@ -44,12 +41,19 @@ from softstart.cli.running import Attributed, working
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import OBJECTIVES, TERMINALS, Problem
+from softstart.optimal.problem import OBJECTIVES, TERMINALS, USUAL, Problem, StartTime
 from softstart.quantities import to_si
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
-from softstart.views.numbers import Column
-from softstart.views.terminal import console, print_json, print_lines, print_table, sentence
+from softstart.views.terminal import (
+    console,
+    print_conclusion,
+    print_figures,
+    print_json,
+    print_lines,
+    print_table,
+    sentence,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,7 +71,9 @@ else:  # no numba for a help, a wrong option or the Tab key
 @click.command(cls=Command)
 @drive_argument(default=DEFAULT_DRIVE)
 @click.option(
-    "--start-time", metavar="TIME", help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct."
+    "--start-time",
+    metavar="TIME",
+    help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct. By default 1.2x.",
 )
 @terminal_option("synchronous")
 @method_option
@@ -109,7 +115,7 @@ def optimize(
         one = read_drive(drive, settings)
     if start_time is not None:
         with mistakes.noted():
-            asked = read_start_time(start_time)
+            asked = StartTime.of(start_time, "--start-time")
     bounds = bounds_of(texts, mistakes)
     lists = (("gaps", gaps, "rad"), ("inertias", inertias, "kg*m^2"), ("load_torques", load_torques, "N*m"))
     for name, text, unit in lists:
@@ -118,25 +124,19 @@ def optimize(
     several = any(text is not None for _, text, _ in lists)
     if several:
         mistakes.sentences += not_for_several(bounds)
-    needed = start_time is None and bounds.get("minimise") != "start_time"
     if one is not None and not mistakes.sentences:
-        if needed:
-            raise InputError(_suggestion(one, bounds))
         with mistakes.noted(), named_as_options():
             Problem(
                 one,
-                None if asked is None else 1.0,  # whichever it is, it is above 0
+                None if bounds.get("minimise") == "start_time" and asked is None else 1.0,  # any above 0
                 **{name: value for name, value in bounds.items() if name != "method"},
             )
-    elif needed:
-        mistakes.sentences.append(f"{_missing(bounds)}, as --start-time 1.2x.")
     mistakes.settle()
     assert one is not None
     if several:
-        assert asked is not None
-        _optimize_for_all(one, asked, varied, as_json, out)
+        _optimize_for_all(one, asked or USUAL, varied, as_json, out)
     else:
-        _optimize_one(one, asked, bounds, as_json, out)
+        _optimize_one(one, start_time, bounds, as_json, out)
 
 
 def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, Any]:
@@ -177,35 +177,12 @@ def _weight(text: str) -> float:
     return value
 
 
-def _missing(bounds: Mapping[str, Any]) -> str:
-    aim = views.AIMS[bounds.get("minimise", "k_dyn")]
-    return (
-        f"--start-time is missing: without it the start with the least {aim} would take indefinitely long; "
-        "give one"
-    )
-
-
-def _suggestion(drive: Drive, bounds: Mapping[str, Any]) -> str:
-    """What to type instead, from what `direct` needs."""
-    with working("starting the drive ..."):
-        direct = shortest.start_time_of_direct(drive)
-    return (
-        f"{_missing(bounds)}, as --start-time 1.2x, which is {1.2 * direct:.4g} s: 1.2 times the "
-        f"{direct:.4g} s that direct needs."
-    )
-
-
 def _optimize_one(
-    drive: Drive, asked: StartTime | None, bounds: dict[str, Any], as_json: bool, out: str | None
+    drive: Drive, start_time: str | None, bounds: dict[str, Any], as_json: bool, out: str | None
 ) -> None:
     with no_solution_reported(as_json), output_folder(out) as folder:
-        with working("looking for the gentlest start ..."):
-            direct = (
-                shortest.start_time_of_direct(drive) if asked is not None and asked.multiple else math.nan
-            )
-            seconds = None if asked is None else asked.seconds(direct)
-            with named_as_options():
-                best = softstart.optimize(drive, seconds, **bounds)
+        with working("looking for the gentlest start ..."), named_as_options():
+            best = softstart.optimize(drive, start_time, **bounds)
         with working("starting the drive under the shipped controllers ..."):
             others = runs_beside(best)
         if folder is not None:
@@ -235,10 +212,8 @@ def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
     sentence(to, f"  asked  {views.question(best)}")
     sentence(to, f"  method {best.method}: {best.why}")
     to.print()
-    print_table(to, [Column("", False), Column("", False)], views.figure_rows(best), headings=False)
-    to.print()
-    sentence(to, views.comparison(best, others), "bold")
-    sentence(to, views.bound_sentence(best), "dim")
+    print_figures(to, views.figure_rows(best))
+    print_conclusion(to, [views.comparison(best, others)], [views.bound_sentence(best)])
 
 
 # one profile for several drives ---------------------------------------------------------------------------
@@ -257,8 +232,8 @@ def _optimize_for_all(
 
             with named_as_options():
                 scenarios = robust.scenarios_of(drive, **varied)
-                direct = shortest.start_time_of_direct(drive) if asked.multiple else math.nan
-                worth = robust.worth_of_contact_sensor(scenarios, asked.seconds(direct), progress=progress)
+                seconds = asked.seconds(lambda: shortest.start_time_of_direct(drive))
+                worth = robust.worth_of_contact_sensor(scenarios, seconds, progress=progress)
         if folder is not None:
             with working("drawing the figure ..."):
                 views.write_worth(worth, folder, command_line())
@@ -276,9 +251,6 @@ def _show_worth(to: Console, worth: SensorWorth) -> None:
     print_lines(to, drive_lines(blind.base))
     sentence(to, f"  asked  {views.robust_question(blind)}")
     to.print()
-    table = views.scenario_table(worth)
-    print_table(to, table.columns, table.rows, bold=[blind.worst])
-    to.print()
-    sentence(to, views.worth_conclusion(worth), "bold")
-    sentence(to, views.robust_bound_sentence(blind), "dim")
-    sentence(to, "K_dyn refers to the mean shaft torque of the first drive.", "dim")
+    print_table(to, views.scenario_table(worth), bold=[blind.worst])
+    notes = [views.robust_bound_sentence(blind), "K_dyn refers to the mean shaft torque of the first drive."]
+    print_conclusion(to, [views.worth_conclusion(worth)], notes)

@@ -18,12 +18,14 @@ from softstart.cli.completion import Keys, controllers, drive_keys, files_only, 
 from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.errors import InputError
+from softstart.input.files import refusal_of
 from softstart.plugins import CONTROLLERS, registered
-from softstart.quantities import to_si
+from softstart.quantities import to_si, whole_number
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_DRIVE = "crane-4amtkf"
+CODE = "softstart.allow_code"
 
 
 class Mistakes:
@@ -77,8 +79,24 @@ def drive_argument(default: str | None = None) -> Decorator:
 
 
 def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
-    """An option that takes one or more controllers."""
-    return click.option(name, metavar=metavar, required=required, help=text, shell_complete=controllers)
+    """An option that takes one or more controllers, and --allow-code for files of tuned gains among them."""
+    given = click.option(name, metavar=metavar, required=required, help=text, shell_complete=controllers)
+    return lambda command: given(_allow_code_option(command))
+
+
+_allow_code_option = click.option(
+    "--allow-code",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, given: context.meta.update({CODE: given}),
+    help="Let a file of tuned gains name a Python file, which then runs.",
+)
+
+
+def code_allowed() -> bool:
+    """Whether the command that runs now has --allow-code."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(CODE))
 
 
 def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
@@ -184,11 +202,7 @@ def read_count(text: str | None, option: str) -> int | None:
     >>> read_count("12", "--workers")
     12
     """
-    if text is None:
-        return None
-    if text.strip().isascii() and text.strip().isdigit() and int(text) > 0:
-        return int(text)
-    raise InputError(f'{option} = "{text}": give a whole number of 1 or more.')
+    return None if text is None else whole_number(text, option)
 
 
 def read_names(text: str | None, option: str = "--controllers") -> list[str] | None:
@@ -222,16 +236,12 @@ def check_name(name: str, option: str, several: str = "") -> str:
         raise InputError(f'{option} = "{name}": give one controller here; {remedy}.')
     if ".py" in name:
         path = Path(name[: name.index(".py") + 3])
-        if not path.is_file():
-            what = "is a directory" if path.is_dir() else "is not there"
-            raise InputError(f'{option} = "{name}": the file {path} {what}; give path/to/file.py:ClassName.')
+        if (reason := refusal_of(path)) is not None:
+            raise InputError(f'{option} = "{name}": {path}: {reason}; give path/to/file.py:ClassName.')
     elif name.lower().endswith((".toml", ".csv")):
         path = Path(name)
-        if not path.is_file():
-            what = "is a directory" if path.is_dir() else "is not there"
-            raise InputError(
-                f'{option} = "{name}": the file {path} {what}; give one that softstart tune has written.'
-            )
+        if (reason := refusal_of(path)) is not None:
+            raise InputError(f'{option} = "{name}": {reason}; give one that softstart tune has written.')
     elif name not in controller_names():
         hint = did_you_mean(name, controller_names())
         raise InputError(f'{option} = "{name}": there is no controller of this name; {hint}')
@@ -280,7 +290,7 @@ def read_changes(settings: Sequence[str]) -> dict[str, Any]:
     for key, value in _pairs(settings, "--set", form).items():
         try:
             found[key] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (RecursionError, ValueError):  # no TOML, or an integer of thousands of digits
             found[key] = value
     return found
 

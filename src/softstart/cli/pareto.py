@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,6 @@ import softstart
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
-    StartTime,
     as_option,
     method_option,
     named_as_options,
@@ -42,10 +41,10 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
-from softstart.optimal.problem import TERMINALS, Problem
+from softstart.optimal.problem import TERMINALS, Problem, StartTime
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import kept_state, output_folder
-from softstart.views.terminal import console, print_json, print_lines, print_tables, sentence
+from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -163,8 +162,7 @@ def _computed(
 
         times = None
         if asked is not None:
-            multiples = any(one.multiple for one in asked)
-            direct = shortest.start_time_of_direct(drive) if multiples else math.nan
+            direct = cache(lambda: shortest.start_time_of_direct(drive))
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return softstart.pareto(
@@ -175,7 +173,4 @@ def _computed(
 def _show(to: Console, found: softstart.Front) -> None:
     print_lines(to, drive_lines(found.drive))
     print_tables(to, views.front_tables(found))
-    to.print()
-    sentence(to, views.front_conclusion(found), "bold")
-    for note in views.footnotes(found):
-        sentence(to, note, "dim")
+    print_conclusion(to, [views.front_conclusion(found)], views.footnotes(found))

@@ -28,16 +28,24 @@ from softstart.cli.options import (
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.quantities import whole_number
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
-    command_run,
     markdown,
     output_folder,
     table_sections,
+    write_report,
     write_table,
     write_text,
 )
-from softstart.views.terminal import console, print_json, print_tables, sentence
+from softstart.views.terminal import (
+    console,
+    print_conclusion,
+    print_json,
+    print_lines,
+    print_tables,
+    sentence,
+)
 
 if TYPE_CHECKING:
     from softstart.chain import reduction, simulation
@@ -180,15 +188,11 @@ def reduce(
 def _show(found: Reduction, beside: Reduction | None, done: Sequence[Verification]) -> None:
     """The chain, its frequencies, the steps and what came out."""
     to = console()
-    for index, line in enumerate(views.chain_lines(found.chain)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, views.chain_lines(found.chain))
     print_tables(to, views.tables(found, beside, done))
     if said := views.caution(done):
         sentence(to, said, "bold")
-    to.print()
-    sentence(to, views.conclusion(found), "bold")
-    for note in views.footnotes(found):
-        sentence(to, note, "dim")
+    print_conclusion(to, [views.conclusion(found)], views.footnotes(found))
 
 
 def _write(
@@ -230,9 +234,8 @@ def _write(
         "All numbers: [frequencies.csv](frequencies.csv), [shapes.csv](shapes.csv), "
         "[holzer.csv](holzer.csv), [partial-systems.csv](partial-systems.csv), [steps.csv](steps.csv)"
         f"{starts}.",
-        f"{command_run(command)}Source: {markdown(found.chain.source) or 'none given'}.",
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    write_report(folder, parts, command, f"Source: {markdown(found.chain.source) or 'none given'}.")
 
 
 def verified(
@@ -332,8 +335,6 @@ def read_count(text: str) -> int:
 
     >>> read_count("two")
     Traceback (most recent call last):
-    softstart.errors.InputError: --to = "two": write a whole number of masses, 2 or more.
+    softstart.errors.InputError: --to = "two": give a whole number of 2 or more.
     """
-    if not text.strip().isdecimal() or int(text) < 2:
-        raise InputError(f'--to = "{text}": write a whole number of masses, 2 or more.')
-    return int(text)
+    return whole_number(text, "--to", 2)

@@ -8,7 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from softstart.cli.options import Mistakes
+from softstart.cli.options import Mistakes, code_allowed
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
@@ -124,7 +124,7 @@ def make_controllers(
         given = parameters.get(name, {})
         try:
             with Attributed(name):
-                made.append(controller.make_controller(name, given))
+                made.append(controller.make_controller(name, given, allow_code=code_allowed()))
         except InputError as error:
             mistakes.sentences += [
                 f"--param {name + '.' if prefix else ''}{s}" if s.startswith(tuple(given)) else s

@@ -37,12 +37,18 @@ else:
     "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen at."
 )
 @click.option(
-    "--token", default="", metavar="TOKEN", help="Ask everyone for this token; needed with --expose."
+    "--token", default=None, metavar="TOKEN", help="Ask everyone for this token; needed with --expose."
 )
 @click.option("--expose", is_flag=True, help="Let other machines reach the page; needs --host and --token.")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 def serve(
-    drive: str, settings: tuple[str, ...], port: int, host: str, token: str, expose: bool, no_browser: bool
+    drive: str,
+    settings: tuple[str, ...],
+    port: int,
+    host: str,
+    token: str | None,
+    expose: bool,
+    no_browser: bool,
 ) -> None:
     """Design a soft start in the browser: sliders, traces that follow, strategies side by side.
 

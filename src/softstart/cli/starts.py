@@ -35,8 +35,16 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.late import late
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
-from softstart.views.numbers import Column
-from softstart.views.terminal import console, fits, print_json, print_lines, print_table, sentence
+from softstart.views.terminal import (
+    console,
+    fits,
+    print_conclusion,
+    print_figures,
+    print_json,
+    print_lines,
+    print_table,
+    sentence,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -121,21 +129,16 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
     best = [rows.index(comparison.gentlest)]
     print_lines(to, drive_lines(comparison.drive, comparison.fitted_to))
     to.print()
-    columns, cells = starts.comparison_table(rows)
-    if fits(to, columns, cells):
-        print_table(to, columns, cells, bold=best)
+    table = starts.comparison_table(rows)
+    if fits(to, table):
+        print_table(to, table, bold=best)
     else:
-        print_table(
-            to, *starts.comparison_table(rows, starts.JUDGING), title="How gentle, how quick", bold=best
-        )
+        print_table(to, starts.comparison_table(rows, starts.JUDGING, "How gentle, how quick"), bold=best)
         to.print()
         print_table(
-            to, *starts.comparison_table(rows, starts.AT_THE_GAP), title="What happens at the gap", bold=best
+            to, starts.comparison_table(rows, starts.AT_THE_GAP, "What happens at the gap"), bold=best
         )
-    to.print()
-    sentence(to, starts.conclusion(comparison), "bold")
-    for note in starts.notes(comparison):
-        sentence(to, note, "dim")
+    print_conclusion(to, [starts.conclusion(comparison)], starts.notes(comparison))
 
 
 @click.command(cls=Command)
@@ -203,18 +206,13 @@ def simulate(
 def _show_start(to: Console, run: Run, fitted_to: Drive | None) -> None:
     print_lines(to, drive_lines(run.drive, fitted_to))
     values = ", ".join(f"{key} = {_value(value)}" for key, value in run.controller.parameters.items())
-    sentence(to, f"  under  {starts.name_of(run)}{' (' + values + ')' if values else ''}")
+    sentence(to, f"  under  {run.controller_name}{' (' + values + ')' if values else ''}")
     to.print()
     sentence(to, run.status.value, "bold")
-    print_table(to, [Column("", False), Column("", False)], starts.figure_rows(run), headings=False)
-    to.print()
-    print_table(to, *starts.stage_table(run, SHOWN), title=f"Stages{_part(len(run.stages))}")
-    to.print()
-    print_table(to, *starts.event_table(run, SHOWN), title=f"Events{_part(len(run.events))}")
-
-
-def _part(count: int) -> str:
-    return f" (the first {SHOWN} of {count}; --json and --out give all)" if count > SHOWN else ""
+    print_figures(to, starts.figure_rows(run))
+    for table in (starts.stage_table(run, SHOWN), starts.event_table(run, SHOWN)):
+        to.print()
+        print_table(to, table)
 
 
 def _value(value: object) -> str:

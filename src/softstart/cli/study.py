@@ -17,9 +17,10 @@ from softstart.cli.running import working
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
+from softstart.views import numbers
 from softstart.views.drawing import PICTURE_ENDINGS, save_figure
 from softstart.views.markdown import file_stem, output_folder, write_table
-from softstart.views.numbers import Column, printable
+from softstart.views.numbers import printable
 from softstart.views.terminal import console, print_json, print_table, sentence
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def _list(as_json: bool) -> None:
         return
     to = console()
     rows = [[one.name, one.title, ", ".join(one.pictures) or "-"] for one in found]
-    print_table(to, [Column(heading, False) for heading in HEADINGS], rows)
+    print_table(to, numbers.Table.of_texts(HEADINGS, rows))
     to.print()
     sentence(to, "Run one, with its pictures and its tables as CSV: softstart study NAME --out DIR")
     for one in broken.sentences:
@@ -117,9 +118,9 @@ def _show_table(to: Console, table: Table) -> None:
     numeric = [
         all(isinstance(row[i], int | float | None) for row in table.rows) for i in range(len(table.columns))
     ]
-    columns = [Column(name, number) for name, number in zip(table.columns, numeric, strict=True)]
+    columns = [numbers.Column(name, number) for name, number in zip(table.columns, numeric, strict=True)]
     rows = [[printable(_cell(cell)) for cell in row] for row in table.rows]
-    print_table(to, columns, rows, title=table.title)
+    print_table(to, numbers.Table(table.title, columns, rows))
 
 
 def _cell(value: Any) -> str:

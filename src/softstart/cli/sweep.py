@@ -21,6 +21,7 @@ from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
     check_name,
+    code_allowed,
     command_line,
     controller_option,
     drive_argument,
@@ -39,8 +40,10 @@ from softstart.cli.options import (
     workers_option,
 )
 from softstart.cli.running import Attributed, working
+from softstart.drive import PARAMETERS
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.quantities import values_in, whole_number
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import console, print_json
 
@@ -186,7 +189,7 @@ def _computed(
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
     with working("starting the first drive ...") as status, Attributed():
-        grid = read_axes(axes, makers.Maker(controller or "", values))
+        grid = read_axes(axes, makers.Maker(controller or "", values, code_allowed()))
         last: Progress | None = None
         shown = 0.0
 
@@ -198,7 +201,14 @@ def _computed(
                 status.update(f"{now} ...")
 
         return softstart.sweep(
-            drive, controller, grid, parameters=values, to=to, progress=progress, **asked
+            drive,
+            controller,
+            grid,
+            parameters=values,
+            to=to,
+            progress=progress,
+            allow_code=code_allowed(),
+            **asked,
         ), last
 
 
@@ -283,7 +293,7 @@ def _parameters(split: dict[str, str], maker: makers.Maker, mistakes: Mistakes) 
     found: makers.Parameters | None = None
     with mistakes.noted():
         if "controller" in split:
-            names = _listed(split["controller"])
+            names = _listed("controller", split["controller"])
             for name in names:
                 check_name(name, "--axis controller")
             found = maker.common_parameters(names)
@@ -297,7 +307,7 @@ def _read(key: str, text: str, parameters: makers.Parameters | None) -> tuple[st
     parts = [part.strip() for part in text.split(":")]
     is_range = len(parts) in (3, 4) and key != "controller" and not any(".py" in part for part in parts)
     if not is_range:
-        column = grids.read_column(key, _listed(text), parameters)
+        column = grids.read_column(key, _listed(key, text), parameters)
         return column.name, column.values
     column = grids.read_column(key, parts[:2], parameters)
     if not column.numeric:
@@ -307,9 +317,7 @@ def _read(key: str, text: str, parameters: makers.Parameters | None) -> tuple[st
 
 def _spaced(key: str, text: str, parts: Sequence[str], first: float, last: float) -> Any:
 
-    count = int(parts[2]) if parts[2].isascii() and parts[2].isdigit() else 0
-    if not 2 <= count <= MOST_VALUES:
-        raise InputError(f'{key} = "{text}": the count is a whole number from 2 to {MOST_VALUES:,}.')
+    count = whole_number(parts[2], f'{key} = "{text}": the count', 2, MOST_VALUES)
     if first == last:
         raise InputError(f'{key} = "{text}": both ends are the same; write the one value.')
     if len(parts) == 3:
@@ -321,8 +329,7 @@ def _spaced(key: str, text: str, parts: Sequence[str], first: float, last: float
     return np.geomspace(first, last, count)
 
 
-def _listed(text: str) -> list[str]:
-    parts = [part.strip() for part in text.split(",")]
-    if not all(parts):
-        raise InputError(f'"{text}": a place in the list is empty; write values with commas between.')
-    return parts
+def _listed(key: str, text: str) -> list[str]:
+    owner, name = grids.target_of(key) or ("unknown", "")
+    counts = owner == "drive" and PARAMETERS[name].limit.startswith("a whole number")
+    return values_in(text, key, whole=counts or owner in ("controller", "unknown"))

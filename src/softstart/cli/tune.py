@@ -32,7 +32,7 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.quantities import to_si
+from softstart.quantities import to_si, values_in, whole_number
 from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import console, print_json
 
@@ -194,11 +194,7 @@ def _computed(drive: Drive, controller: str, state: Path | None, asked: dict[str
 
 def _whole(name: str, text: str | None) -> dict[str, int]:
     """An option that is a whole number; how small it may be is checked where it is used."""
-    if text is None:
-        return {}
-    if not (text.strip().isascii() and text.strip().isdigit()):
-        raise InputError(f'--{name} = "{text}": give a whole number.')
-    return {name: int(text)}
+    return {} if text is None else {name: whole_number(text, f"--{name}", 0)}
 
 
 def _share(text: str) -> float:
@@ -233,10 +229,7 @@ def read_grid(text: str | None, option: str, unit: str) -> list[Any] | None:
     if text is None:
         return None
     if ":" not in text:
-        parts = [part.strip() for part in text.split(",")]
-        if not all(parts):
-            raise InputError(f'{option} = "{text}": a place in the list is empty; write values with commas.')
-        ends = _all(parts, option, unit)
+        ends = _all(values_in(text, option), option, unit)
         return [value if not ending else f"{value!r}{ending}" for value, ending in ends]
     parts = [part.strip() for part in text.split(":")]
     if len(parts) != 3:
@@ -244,9 +237,7 @@ def read_grid(text: str | None, option: str, unit: str) -> list[Any] | None:
     (first, ending), (last, other) = _all(parts[:2], option, unit)
     if ending != other:
         raise InputError(f'{option} = "{text}": give both ends as quantities, or both as the same multiples.')
-    count = int(parts[2]) if parts[2].isascii() and parts[2].isdigit() else 0
-    if not 1 < count <= LARGEST_GRID:
-        raise InputError(f'{option} = "{text}": the count is a whole number from 2 to {LARGEST_GRID}.')
+    count = whole_number(parts[2], f'{option} = "{text}": the count', 2, LARGEST_GRID)
     values = [float(f"{first + (last - first) * k / (count - 1):.12g}") for k in range(count)]
     return [value if not ending else f"{value!r}{ending}" for value in values]
 
@@ -307,7 +298,8 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str | list[str]]:
             name = names.get(key, key)
             if name in found:
                 raise InputError(f'--tolerance "{text}": {key} is given twice; keep one of the two.')
-            found[name] = [part.strip() for part in value.split(",")] if "," in value else value
+            several = "," in value or ";" in value
+            found[name] = values_in(value, f"--tolerance {key}") if several else value
     mistakes.settle()
     return found
 

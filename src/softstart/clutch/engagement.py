@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -296,7 +296,6 @@ class Engagement:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        energy = {name: getattr(self.energy, name) for name in EnergyBalance.__dataclass_fields__}
         return {
             "clutch": self.clutch.summary(),
             "law": self.law.label,
@@ -315,8 +314,8 @@ class Engagement:
             "slip_work": self.slip_work,
             "work_while_engaging": self.work_while_engaging,
             "lining_heat": self.lining_heat,
-            "energy": {**energy, "residual": self.energy.residual},
-            "phases": [dict(vars(phase)) for phase in self.phases],
+            "energy": {**asdict(self.energy), "residual": self.energy.residual},
+            "phases": [asdict(phase) for phase in self.phases],
             "events": [{"time": event.t, "event": event.name} for event in self.events],
         }
 

@@ -58,10 +58,6 @@ class State:
     wc: float = 0.0
     phiM: float = 0.0
 
-    def changed(self, **changes: float) -> State:
-        """The state with some values set exactly."""
-        return replace(self, **changes)
-
 
 @dataclass(frozen=True)
 class Mode:
@@ -208,7 +204,7 @@ def follow(clutch: Clutch, name: str, state: State, mode: Mode, M: float) -> tup
     slip, side, load, pressed = mode.slip, mode.side, mode.load, 0
     event = name
     if name == "synchronous":
-        state = state.changed(wM=clutch.drive_speed)
+        state = replace(state, wM=clutch.drive_speed)
         holds = abs(T) <= M
         slip = LOCKED if holds else -mode.slip
         event = "locked" if holds else ("overrun" if slip < 0 else "slips again")
@@ -224,14 +220,14 @@ def follow(clutch: Clutch, name: str, state: State, mode: Mode, M: float) -> tup
         side = 0
     elif name in ("contact+", "contact-"):
         side = 1 if name == "contact+" else -1
-        state = state.changed(theta=0.5 * side * clutch.gap)
+        state = replace(state, theta=0.5 * side * clutch.gap)
         event = "contact"
     elif name == "pressed":
         side, event = mode.pressed, "contact"
     elif name == "free":
         event = ""
     elif name == "load stops":
-        state = state.changed(wc=0.0, v=state.wM)
+        state = replace(state, wc=0.0, v=state.wM)
         load, pressed = 0, mode.pressed
     else:
         load = 1 if name == "load+" else -1

@@ -44,8 +44,12 @@ def value(a: Vector, u: float) -> float:
     >>> value(np.array([1.0, 2.0, 3.0]), 2.0)
     17.0
     """
+    return _horner(a.tolist(), u)
+
+
+def _horner(terms: list[float], u: float) -> float:
     found = 0.0
-    for term in a[::-1].tolist():
+    for term in reversed(terms):
         found = found * u + term
     return found
 
@@ -136,24 +140,17 @@ def _bracketed(a: Vector, low: float, high: float) -> float:
     """The one root between low and high: Newton, kept inside the bracket by halving."""
     terms = a.tolist()
     slopes = (a[1:] * np.arange(1, a.size)).tolist()
-
-    def at(numbers: list[float], u: float) -> float:
-        y = 0.0
-        for term in reversed(numbers):
-            y = y * u + term
-        return y
-
-    rising = at(terms, high) > 0.0 or at(terms, low) < 0.0
+    rising = _horner(terms, high) > 0.0 or _horner(terms, low) < 0.0
     u = 0.5 * (low + high)
     for _ in range(100):
-        y = at(terms, u)
+        y = _horner(terms, u)
         if y == 0.0:
             return u
         if (y > 0.0) == rising:
             high = u
         else:
             low = u
-        slope = at(slopes, u)
+        slope = _horner(slopes, u)
         new = u - y / slope if slope != 0.0 else low
         if not low < new < high:
             new = 0.5 * (low + high)

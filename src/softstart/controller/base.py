@@ -128,12 +128,13 @@ def parameter(
     *,
     multiples: tuple[float, float] | None = None,
     between: tuple[float, float] | None = None,
+    choices: tuple[str, ...] = (),
 ) -> Any:
     """A parameter of a controller, for use as a dataclass field.
 
     `unit` is that of a bare number, `meaning` one line, and `default` says how the value is derived from
     the drive when none is given. A `kind` other than a quantity is handed over as it is: a text (the path of
-    a file, say), or an object, which only Python can give.
+    a file, say), or an object, which only Python can give. A text may be one of `choices` only.
 
     Tuning searches a parameter within `multiples` of its default (0.2, 5.0: a fifth to five times, evenly in
     the logarithm), or `between` two values in `unit` (evenly), or both, which narrows the first.
@@ -143,7 +144,7 @@ def parameter(
         default=None,
         metadata={
             "unit": unit, "meaning": meaning, "default": default, "kind": kind,
-            "multiples": multiples, "between": between,
+            "multiples": multiples, "between": between, "choices": choices,
         },
     )  # fmt: skip
 
@@ -190,7 +191,7 @@ class Controller:
         missing = [name for name, value in given.items() if value is None]
         if not missing:
             return self
-        derived = self.defaults(drive)
+        derived = self.defaults(drive.assumed)
         return replace(self, **{name: derived[name] for name in missing if name in derived})
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
@@ -198,6 +199,7 @@ class Controller:
 
         That is `fitted(drive)` and the same drive; gains that were tuned for another drive bring that one.
         """
+        drive = drive.assumed
         return self.fitted(drive), drive
 
     @property
@@ -241,6 +243,11 @@ class PlainController(Controller, ABC):
         -------
         The answer.
         """
+
+
+def label_of(controller: Controller) -> str:
+    """The name under which a controller stands in tables: its own, or that of its class."""
+    return controller.name or type(controller).__name__
 
 
 @dataclass(frozen=True)

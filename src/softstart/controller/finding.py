@@ -14,6 +14,7 @@ from typing import Any
 
 from softstart.controller.base import Controller, Sensor
 from softstart.errors import InputError
+from softstart.input.files import refusal_of
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, load, registered
 from softstart.quantities import show, to_si
@@ -62,10 +63,14 @@ def controller_class(name: str) -> type[Controller]:
     return _checked(found, name)
 
 
-def make_controller(name: str | Controller, parameters: Mapping[str, object] | None = None) -> Controller:
+def make_controller(
+    name: str | Controller, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
+) -> Controller:
     """A controller from its name and parameters (bare SI numbers or strings with a unit).
 
-    A name that ends in .toml or .csv is a file of tuned gains (see `softstart.controller.tuned`).
+    A name that ends in .toml or .csv is a file of tuned gains (see `softstart.controller.tuned`). Such a file
+    may name an installed controller; one that names a Python file of its own would run it, and is refused
+    without `allow_code`.
 
     >>> make_controller("ramp", {"time": "120 ms"}).time
     0.12
@@ -83,7 +88,7 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             "or a Controller object."
         )
     if name.lower().endswith(GAIN_FILES):
-        return tuned.load_gains(name, parameters)
+        return tuned.load_gains(name, parameters, allow_code=allow_code)
     cls = controller_class(name)
     known = {f.name: f for f in fields(cls)}
     values: dict[str, Any] = {}
@@ -102,7 +107,8 @@ def make_controller(name: str | Controller, parameters: Mapping[str, object] | N
             continue
         try:
             unit = known[key].metadata.get("unit", "")
-            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value)
+            choices = known[key].metadata.get("choices", ())
+            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value, choices)
         except InputError as error:
             wrong.extend(error.sentences)
     missing = [
@@ -149,8 +155,10 @@ def quantity(key: str, value: object, unit: str) -> Any:
     )
 
 
-def _text(key: str, value: object) -> str:
-    """A parameter that is a text."""
+def _text(key: str, value: object, choices: tuple[str, ...] = ()) -> str:
+    """A parameter that is a text, one of the choices if there are any."""
+    if choices and value not in choices:
+        raise InputError(f"{key} = {show(value)}: write {' or '.join(map(show, choices))}.")
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, str) and value:
@@ -161,8 +169,8 @@ def _text(key: str, value: object) -> str:
 def _from_file(text: str) -> type[Controller]:
     path_text, _, class_name = text.partition(".py:")
     path = Path(path_text if path_text.endswith(".py") else path_text + ".py")
-    if not path.is_file():
-        raise InputError(f'controller = "{text}": there is no file {path}; give path/to/file.py:ClassName.')
+    if (reason := refusal_of(path)) is not None:
+        raise InputError(f'controller = "{text}": {path}: {reason}; give path/to/file.py:ClassName.')
     # named by its content: compiled steps on disk find their module again in the next process, and elsewhere
     module_name = f"softstart_loose_{path.stem}_{sha256(path.read_bytes()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(module_name, path)

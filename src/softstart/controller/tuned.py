@@ -18,14 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.controller.base import Controller, PlainController, Sensor
-from softstart.controller.finding import make_controller
+from softstart.controller.base import Controller, PlainController, Sensor, label_of
+from softstart.controller.finding import GAIN_FILES, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.input.columns import Wanted, read_columns
 from softstart.input.documents import literal, parsed
 from softstart.input.files import ABSENT, read_text
 from softstart.input.parameters import Wording
-from softstart.quantities import RefusedError
+from softstart.quantities import RefusedError, show
 
 Scale = Literal["linear", "logarithmic"]
 
@@ -183,13 +184,25 @@ def _mixed(first: Any, second: Any, share: Any, scale: Scale) -> Any:
 
 def named(controller: Controller, label: str) -> str:
     """The name of tuned gains in tables."""
-    return f"{controller.name or type(controller).__name__} ({label})"
+    return f"{label_of(controller)} ({label})"
 
 
-def load_gains(name: str, parameters: Mapping[str, object] | None = None) -> Tuned:
-    """The controller with the gains of a file. Raises InputError."""
+def load_gains(
+    name: str, parameters: Mapping[str, object] | None = None, *, allow_code: bool = False
+) -> Tuned:
+    """The controller with the gains of a file. Raises InputError, also for code without `allow_code`."""
     path = Path(name)
     saved = read_gain_file(path)
+    if saved.controller.lower().endswith(GAIN_FILES):
+        raise _wrong(
+            path, f"controller = {show(saved.controller)}: gains are those of a controller, not of a file"
+        )
+    if ".py" in saved.controller and not allow_code:
+        raise _wrong(
+            path,
+            f"it names the Python file {saved.controller[:300]}, which would run; if you trust it, add "
+            "--allow-code (in Python: make_controller(file, allow_code=True))",
+        )
     if parameters:
         raise InputError(
             f'parameters {sorted(parameters)} were given beside the tuned gains of "{path}"; '
@@ -348,8 +361,10 @@ def _read_csv(text: str, path: Path) -> ScheduleFile:
             key, _, value = line[1:].partition(":")
             notes[key.strip()] = value.strip()
     scales, fixed = _note(notes, "gains", path), _note(notes, "fixed", path)
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    cells = [_row(row, (*AXES, *scales), path) for row in rows]
+    wanted = [Wanted(("gap",), "rad"), Wanted(("load_inertia",), "kg*m^2")]
+    wanted += [Wanted((name,), "1") for name in scales]
+    columns = read_columns(text, f'controller = "{path}"', wanted, headed="names").values
+    cells = [dict(zip((*AXES, *scales), row, strict=True)) for row in np.column_stack(columns).tolist()]
     gaps = tuple(sorted({cell["gap"] for cell in cells}))
     inertias = tuple(sorted({cell["load_inertia"] for cell in cells}))
     if len(cells) != len(gaps) * len(inertias) or len({(c["gap"], c["load_inertia"]) for c in cells}) < len(
@@ -373,16 +388,6 @@ def _note(notes: Mapping[str, str], key: str, path: Path) -> dict[str, Any]:
         found = None
     if not isinstance(found, dict):
         raise _wrong(path, f'the comment line "# {key}: ..." is no JSON object, as {{"time": "linear"}}')
-    return found
-
-
-def _row(row: Mapping[str, str | None], names: Sequence[str], path: Path) -> dict[str, float]:
-    found = {}
-    for name in names:
-        try:
-            found[name] = float(row.get(name) or "")
-        except ValueError:
-            raise _wrong(path, f'{name} = "{row.get(name) or ""}": give a number in each row') from None
     return found
 
 

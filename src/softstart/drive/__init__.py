@@ -7,6 +7,14 @@
 
 from __future__ import annotations
 
-from softstart.drive.model import PARAMETERS, TABLES, ContactLaw, Drive, LoadKind, library
+from softstart.drive.model import (
+    PARAMETERS,
+    TABLES,
+    UNKNOWN_POSITIONS,
+    ContactLaw,
+    Drive,
+    LoadKind,
+    library,
+)  # fmt: skip
 
-__all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
+__all__ = ["PARAMETERS", "TABLES", "UNKNOWN_POSITIONS", "ContactLaw", "Drive", "LoadKind", "library"]

@@ -60,10 +60,24 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
             'a reactive load torque is friction and must be 0 or more; write its size, or kind "active"',
         )  # fmt: skip
     yield from both.broken(
+        "rated_torque", "rated_power", lambda torque, power: _unequal(values, torque, power),
+        "with the rated speed this is not {other}; data sheets agree within 5 %: one of the three is wrong",
+    )  # fmt: skip
+    yield from both.broken(
         "initial_load_speed", "target_speed", lambda w2, target: w2 >= target,
         "the load must start below {other}, the speed that it is to reach",
     )  # fmt: skip
+    yield from _impossible_starts(both)
     yield from _impossible_dynamics(values, parameters, wording)
+
+
+def _unequal(values: Values, torque: Value, power: Value) -> Any:
+    """Whether torque times speed is not the power, beyond what a data sheet rounds."""
+    speed = values.get("rated_speed")
+    if speed is None:
+        return False
+    with np.errstate(over="ignore"):
+        return np.abs(np.multiply(torque, speed) - power) > 0.05 * np.asarray(power)
 
 
 class _Pairs:
@@ -105,29 +119,33 @@ class _Pairs:
         return f"{number:.6g} {self.parameters[name].unit}"
 
 
+def _impossible_starts(both: _Pairs) -> Iterator[str]:
+    """Positions and brakes that do not go with the load or its speed."""
+    if both.values.get("load_kind") == "reactive" and _is(both.values.get("start_position"), "hanging"):
+        yield from both.broken(
+            "start_position", "load_kind", lambda *_: True,
+            'only an active load hangs; friction holds a reactive one where it stands, write "unknown"',
+        )  # fmt: skip
+    if both.values.get("brake") == "motor":
+        yield from both.broken(
+            "initial_motor_speed", "brake", lambda w1, _: w1 != 0.0,
+            'a motor that is held stands still; leave the speed out, or write brake "none"',
+        )  # fmt: skip
+
+
+def _is(value: object, word: str) -> bool:
+    return isinstance(value, str) and value == word
+
+
 def _impossible_dynamics(
     values: Values, parameters: Mapping[str, Parameter], wording: Wording
 ) -> Iterator[str]:
-    needed = ("motor_inertia", "load_inertia", "stiffness", "starting_torque", "load_torque")
+    needed = ("motor_inertia", "load_inertia", "starting_torque", "load_torque")
     if any(name not in values for name in needed):
         return
-    J1, J2, c, Ms, Mc = (values[name] for name in needed)
-    Omega: Any
-    if type(J1) is type(J2) is type(c) is type(Ms) is type(Mc) is float:  # the same without arrays, quickly
-        Omega = math.sqrt(c / J1 + c / J2)
-        mean = (Ms + Mc * (J1 / J2)) / (1.0 + J1 / J2)
-        if 0.0 < Omega < math.inf and 2.0 * math.pi / Omega < math.inf and mean > 0.0:
-            return
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        Omega = np.asarray(elastic_frequency(J1, J2, c))
-        period = 2.0 * np.pi / Omega
-        mean = (Ms + Mc * (J1 / J2)) / (1.0 + J1 / J2)
-    if not np.all(np.isfinite(Omega) & (Omega > 0.0) & np.isfinite(period)):
-        yield wording.sentence(
-            ", ".join(wording.label(parameters[name]) for name in needed[:3]),
-            "the elastic frequency sqrt(c (J1 + J2)/(J1 J2)) is out of all bounds; check their units",
-        )
-    elif np.any(~np.asarray(mean > 0.0) & np.asarray(Ms > Mc)):
+    J1, J2, Ms, Mc = (values[name] for name in needed)
+    mean = (Ms + Mc * (J1 / J2)) / (1.0 + J1 / J2)
+    if np.any(~np.asarray(mean > 0.0) & np.asarray(Ms > Mc)):
         yield wording.sentence(
             f"{wording.label(parameters['load_torque'])} = {show(values['load_torque'])}",
             "this load drives so hard that the mean shaft torque (Ms J2 + J1 Mc)/(J1 + J2), "

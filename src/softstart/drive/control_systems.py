@@ -154,7 +154,7 @@ def initial_state(drive: Drive) -> Vector:
     """
     _single(drive)
     mechanical = [
-        float(drive.start_position),
+        float(drive.theta0),
         float(drive.initial_motor_speed),
         0.0,
         float(drive.initial_load_speed),

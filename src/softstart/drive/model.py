@@ -5,17 +5,25 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args, overload
 
 import numpy as np
 
 from softstart.drive.checks import contradictions, elastic_frequency
+from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
-from softstart.input.parameter_set import MaybeNumbers, Numbers, ParameterSet, parameter, read_settings
+from softstart.input.parameter_set import (
+    MaybeNumbers,
+    Numbers,
+    NumbersOrWord,
+    ParameterSet,
+    parameter,
+    read_settings,
+)  # fmt: skip
 from softstart.input.parameters import Parameter, Wording
 from softstart.late import late
-from softstart.quantities import Value
+from softstart.quantities import Value, show
 
 if TYPE_CHECKING:
     import control
@@ -26,6 +34,10 @@ __all__ = ["PARAMETERS", "TABLES", "ContactLaw", "Drive", "LoadKind", "library"]
 
 LoadKind = Literal["active", "reactive"]
 ContactLaw = Literal["no-pull", "dead-zone", "modelica"]
+Position = Literal["mid-gap", "driving-flank", "opposite-flank", "hanging", "unknown"]
+Brake = Literal["none", "motor"]
+# where a start whose position is unknown may begin; the worst of them counts
+UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
 
 library = Library("softstart.drive", "a drive", "drives")
 
@@ -91,6 +103,9 @@ class Drive(ParameterSet):
     rated_speed: MaybeNumbers = parameter(
         "motor.rated_speed", "rad/s", "rated speed of the motor", '"880 rpm"', "above 0", default=None
     )
+    rated_torque: MaybeNumbers = parameter(
+        "motor.rated_torque", "N*m", "rated torque of the motor", '"23.9 N*m"', "above 0", default=None
+    )
     torque_lag: Numbers = parameter(
         "motor.torque_lag", "s", "time constant of the torque behind its demand", '"2 ms"', "0 or more",
         default=0.0,
@@ -134,10 +149,6 @@ class Drive(ParameterSet):
         "shaft.contact_law", "", "law of the shaft torque in contact", '"no-pull"',
         default="no-pull", choices=get_args(ContactLaw),
     )  # fmt: skip
-    start_position: Numbers = parameter(
-        "shaft.start_position", "rad", "twist phi1 - phi2 at the start (0 is mid-gap)", '"-0.25 rad"',
-        default=0.0, symbol="theta",
-    )  # fmt: skip
     load_inertia: Numbers = parameter(
         "load.inertia", "kg*m^2", "inertia of the load at the motor shaft", '"0.175 kg*m^2"', "above 0",
         symbol="J2",
@@ -152,15 +163,49 @@ class Drive(ParameterSet):
         "start.target_speed", "rad/s", "speed that the load is to reach", '"880 rpm"', "above 0",
         default=None, follows="rated_speed",
     )  # fmt: skip
+    start_position: NumbersOrWord = parameter(
+        "start.position", "rad", "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"',
+        default="mid-gap", choices=get_args(Position), symbol="theta", formerly="shaft.start_position",
+    )  # fmt: skip
+    brake: Brake = parameter(
+        "start.brake", "", "brake that holds the motor until its release", '"motor"',
+        default="none", choices=get_args(Brake),
+    )  # fmt: skip
+    release: NumbersOrWord = parameter(
+        "start.release", "s", "release of the brake, by torque proving or at a time", '"0.1 s"', "0 or more",
+        default="torque", choices=("torque",),
+    )  # fmt: skip
+    initial_speed: NumbersOrWord = parameter(
+        "start.initial_speed", "rad/s", "speed of motor and load at the start, or minus the target speed",
+        '"-20 rad/s"', default=0.0, choices=("reversal",),
+    )  # fmt: skip
     initial_load_speed: Numbers = parameter(
-        "start.initial_load_speed", "rad/s", "speed of the load at the start", '"0 rad/s"', default=0.0
-    )
+        "start.initial_load_speed", "rad/s", "speed of the load at the start", '"0 rad/s"',
+        default=0.0, follows="initial_speed",
+    )  # fmt: skip
     initial_motor_speed: Numbers = parameter(
-        "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"', default=0.0
-    )
+        "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"',
+        default=0.0, follows="initial_speed",
+    )  # fmt: skip
+
+    def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
+        super()._fill(given, *args, **known)
+        vars(self).update(self._derived(vars(self)))
+
+    def _derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Where and how fast the start begins, if that is not given: by brake, load and reversal."""
+        given, found = vars(self)["_given"], dict[str, Any]()
+        reversal = isinstance(values.get("initial_speed"), str)
+        if reversal and values.get("target_speed") is not None:
+            speeds = ("initial_load_speed", "initial_motor_speed")
+            found = {name: -values["target_speed"] for name in speeds if name not in given}
+        if "start_position" not in given:
+            hangs = values.get("brake") == "motor" and values.get("load_kind") == "active"
+            found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else "mid-gap"
+        return found
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
-        return contradictions(values, self.PARAMETERS, wording)
+        return contradictions({**values, **self._derived(values)}, self.PARAMETERS, wording)
 
     # ---- where drives come from --------------------------------------------------------------------------
 
@@ -301,6 +346,94 @@ class Drive(ParameterSet):
     def elastic_period(self) -> Value:
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
+
+    # ---- where the start begins --------------------------------------------------------------------------
+
+    @property
+    def theta0(self) -> Value:
+        """Twist phi1 - phi2 at the start, rad: that of `start_position` in this gap.
+
+        A load that hangs has wound up the shaft by Mc/c beyond the flank that it rests on. Raises
+        `InputError` for an unknown position, which is not one but three (`positions`).
+
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> [crane.replace(start_position=one).theta0 for one in ("opposite-flank", "mid-gap", 0.1)]
+        [-0.25, 0.0, 0.1]
+        """
+        where = self.start_position
+        if not isinstance(where, str):
+            return where
+        if where == "unknown":
+            wanted = " or ".join(map(show, UNKNOWN_POSITIONS))
+            raise InputError(
+                f"start_position = {show(where)}: this question takes one position; give {wanted}."
+            )
+        if where == "hanging":
+            angle = np.copysign(0.5 * self.gap + np.abs(self.Mc) / self.c, self.Mc)
+            return angle if angle.ndim else float(angle)
+        return {"mid-gap": 0.0, "driving-flank": 0.5, "opposite-flank": -0.5}[where] * self.gap
+
+    @property
+    def positions(self) -> Mapping[str, Self]:
+        """The drive at each position at which it may start: one, or three if that is unknown.
+
+        >>> list(Drive.load("crane-4amtkf").replace(start_position="unknown").positions)
+        ['driving-flank', 'mid-gap', 'opposite-flank']
+        """
+        where = self.start_position
+        if not isinstance(where, str) or where != "unknown":
+            return {where if isinstance(where, str) else "": self}
+        return {one: self.replace(start_position=one) for one in UNKNOWN_POSITIONS}
+
+    @property
+    def assumed(self) -> Self:
+        """The drive that controllers are set up for: where the position is unknown, the middle of the gap."""
+        unknown = len(self.positions) > 1
+        return self.replace(start_position="mid-gap") if unknown else self
+
+    @property
+    def release_time(self) -> Value:
+        """When the brake of the motor is released, s: infinite for torque proving, 0 without a brake."""
+        if self.brake == "none":
+            return 0.0
+        return math.inf if isinstance(self.release, str) else self.release
+
+    @property
+    def doubt(self) -> str:
+        """A sentence if the start begins in a state that cannot last, and nobody said that it does; or "".
+
+        >>> Drive.load("crane-4amtkf").doubt
+        ''
+        """
+        falls = self.load_kind == "active" and np.any(self.Mc != 0.0) and self.brake == "none"
+        at_rest = np.all(self.initial_load_speed == 0.0) and np.all(self.initial_motor_speed == 0.0)
+        if not falls or not at_rest or "start_position" in vars(self)["_given"]:
+            return ""
+        return (
+            "start.position is not given: the start begins in mid-gap, where nothing holds this active load; "
+            'write "hanging" (and start.brake "motor" if a brake holds the motor), or "mid-gap" if it is so.'
+        )
+
+    def with_gap(self, gap: Any, **changes: Any) -> Self:
+        """The drive with another gap, its start where it was in the gap: as `replace`, for maps and wear.
+
+        A position that is a word moves with the flanks anyway. An angle in the gap keeps its share of the
+        gap, one beyond a flank its overlap.
+
+        >>> hanging = Drive.load("crane-4amtkf").replace(start_position=0.26)
+        >>> round(hanging.with_gap(2.0).start_position, 9)
+        1.01
+        """
+        one = self.replace(gap=gap, **changes)
+        if isinstance(self.start_position, str) or "start_position" in changes:
+            return one
+        before, after = 0.5 * np.asarray(self.gap), 0.5 * np.asarray(one.gap)
+        theta = np.asarray(self.start_position)
+        overlap = np.maximum(abs(theta) - before, 0.0)
+        share = np.divide(theta, before, out=np.zeros(np.broadcast(theta, before).shape), where=before > 0.0)
+        moved = np.where(overlap > 0.0, np.copysign(after + overlap, theta), share * after)
+        moved = np.where(before == after, theta, moved)
+        return one.replace(start_position=moved if moved.ndim else float(moved))
 
     @overload
     def to_control(self, *, nonlinear: Literal[False] = False) -> control.StateSpace: ...

@@ -15,11 +15,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from softstart.errors import InputError
+from softstart.errors import MOST, InputError
 from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of
-from softstart.quantities import nearest
+from softstart.quantities import nearest, show
 
 T = TypeVar("T")
+
+MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer than anyone waits
+# a key with this many dots takes memory by their square, and no table is nested like that
+_DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
 
 __all__ = [
     "Table",
@@ -167,10 +171,18 @@ def parsed(text: str, wording: Wording, what: str, tables: Sequence[Table] = ())
     Traceback (most recent call last):
     softstart.errors.InputError: line 1, column 11, 'gap = 0.5 rad': this is not valid TOML (expected ...
     """
+    if len(text) > MOST_TEXT:
+        size = f"it has {len(text) / 1e6:.3g} million characters, and a TOML file at most {MOST_TEXT / 1e6:g}"
+        raise InputError(wording.whole(f"{size}; a long profile is read from a CSV file"))
+    if (deep := _DEEP.search(text)) is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(wording.whole(f"line {line}, {show(deep.group())}: keys are nested too deeply"))
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(_invalid(str(error), text, wording)) from None
+    except ValueError:  # of int(): what else is wrong is a TOMLDecodeError
+        raise InputError(wording.whole("a whole number in it has thousands of digits; shorten it")) from None
     except RecursionError:
         raise InputError(wording.whole(f"lists or tables are nested too deeply for {what} file")) from None
     if tables and not document:
@@ -242,13 +254,24 @@ def placed(
     go. The keys within the rows of [[tables]] are not looked at.
     """
     reader = _Reader(tables, what, wording)
-    for key, value in document.items():
+    for key, value in _renamed(document, tables).items():
         reader.take_top(key, value)
     for table in tables:
         reader.count(table)
     for parameter, value in reader.misplaced:
         reader.given.setdefault(parameter.table, {}).setdefault(parameter.key, value)
     return reader.given, reader.mistakes
+
+
+def _renamed(document: Mapping[str, Any], tables: Sequence[Table]) -> Mapping[str, Any]:
+    """The document with keys of former versions under their present names, where these are not given."""
+    for parameter in (p for table in tables for p in table.parameters if p.formerly):
+        name, _, key = parameter.formerly.rpartition(".")
+        old, new = document.get(name), document.get(parameter.table, {})
+        if isinstance(old, dict) and key in old and isinstance(new, dict) and parameter.key not in new:
+            rest = {one: value for one, value in old.items() if one != key}
+            document = {**document, name: rest, parameter.table: {**new, parameter.key: old[key]}}
+    return document
 
 
 class _Reader:
@@ -264,6 +287,9 @@ class _Reader:
 
     def take_top(self, key: str, value: object) -> None:
         """A key above the first table, or a table."""
+        if len(self.mistakes) > MOST and key not in self.top.by_key and key not in self.named:
+            self._note(key, f"{self.what} file has no such key")  # in short: it is counted, not shown
+            return
         if key in self.top.by_key:
             self.given.setdefault("", {})[key] = value
         elif key in self.named:
@@ -297,6 +323,8 @@ class _Reader:
             for key, content in value.items():
                 if key in table.by_key:
                     own[key] = content
+                elif len(self.mistakes) > MOST:
+                    self._note(key, f"[{table.name}] has no such key")
                 else:
                     self._stray(f"[{table.name}] {key} = {self.wording.show(content)}", key, content, table)
 

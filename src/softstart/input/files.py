@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from functools import cached_property
@@ -13,7 +14,7 @@ from typing import IO, Any
 from softstart.errors import InputError
 from softstart.quantities import RefusedError, nearest, show
 
-__all__ = ["ABSENT", "Library", "read_text", "text_of", "write_whole"]
+__all__ = ["ABSENT", "Library", "read_text", "refusal_of", "text_of", "write_whole"]
 
 
 class Library:
@@ -84,20 +85,44 @@ class Library:
 
 
 ABSENT, FOLDER = "there is no such file", "this is a directory"
+MOST_BYTES = 4_000_000  # 100,000 knots of a profile
+
+
+def refusal_of(path: str | os.PathLike[str]) -> str | None:
+    """Why a path is not that of an ordinary file of a reasonable size; None if it is.
+
+    >>> refusal_of("nowhere.toml")
+    'there is no such file'
+    """
+    try:
+        found = os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return ABSENT
+    except OSError as error:
+        return f"the file cannot be read ({error.strerror or error})"
+    except ValueError as error:  # a NUL in the path
+        return f"this cannot be the path of a file ({error})"
+    if stat.S_ISDIR(found.st_mode):
+        return FOLDER
+    if not stat.S_ISREG(found.st_mode):
+        return "this is no ordinary file but a pipe, a socket or a device; give a file"
+    if found.st_size > MOST_BYTES:
+        return (
+            f"the file has {found.st_size / 1e6:.3g} MB, and at most {MOST_BYTES / 1e6:g} MB are read; "
+            "give one with fewer lines"
+        )
+    return None
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
     """The text of a UTF-8 file; raises RefusedError with the reason, for callers that word the sentence."""
+    reason = refusal_of(path)
+    if reason is not None:
+        raise RefusedError(reason)
     try:
         content = Path(path).read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise RefusedError(ABSENT) from None
-    except IsADirectoryError:
-        raise RefusedError(FOLDER) from None
     except OSError as error:
         raise RefusedError(f"the file cannot be read ({error.strerror or error})") from None
-    except ValueError as error:  # a NUL in the path
-        raise RefusedError(f"this cannot be the path of a file ({error})") from None
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -36,6 +36,7 @@ __all__ = [
     "MaybeSeries",
     "Number",
     "Numbers",
+    "NumbersOrWord",
     "ParameterSet",
     "Series",
     "like",
@@ -64,6 +65,12 @@ if TYPE_CHECKING:
         def __get__(self, one: object, owner: Any) -> Value: ...
         def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
 
+    class NumbersOrWord:
+        """A float, an array, or one of the parameter's words."""
+
+        def __get__(self, one: object, owner: Any) -> Value | str: ...
+        def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
+
     class MaybeNumbers:
         """A float, an array, or None where it is not given."""
 
@@ -84,6 +91,7 @@ if TYPE_CHECKING:
 
 else:
     Number, MaybeNumber, Numbers, MaybeNumbers = float, float | None, Value, Value | None
+    NumbersOrWord = Value | str
     Series, MaybeSeries = tuple[float, ...], tuple[float, ...] | None
 
 
@@ -100,13 +108,15 @@ def parameter(
     infinite: bool = False,
     symbol: str = "",
     follows: str = "",
+    formerly: str = "",
     kw_only: bool | None = None,
 ) -> Any:
     """A field of a `ParameterSet`; `path` is `table.key` of the file, the rest as in `Parameter`."""
     table, _, key = path.rpartition(".")
     described = Parameter(
-        key, unit, meaning, example, limit, default, choices, many, infinite, symbol, follows, table
-    )
+        key, unit, meaning, example, limit, default, choices, many, infinite, symbol, follows, table,
+        formerly=formerly,
+    )  # fmt: skip
     metadata = {"parameter": described, "kw_only": kw_only}
     if default is REQUIRED:
         return dataclasses.field(metadata=metadata)
@@ -314,7 +324,8 @@ def _documented(parameters: Mapping[str, Parameter]) -> Iterable[str]:
         number = {"": "text", "1": "number"}.get(p.unit, f"number in {p.unit}")
         default = p.follows or repr(p.default)
         optional = "" if p.required else f", default {default}"
-        yield f"{p.name} : {' or '.join(map(show, p.choices)) or number}{optional}"
+        kinds = [*map(show, p.choices), number] if p.unit or not p.choices else map(show, p.choices)
+        yield f"{p.name} : {' or '.join(kinds)}{optional}"
         meaning = p.meaning[:1].upper() + p.meaning[1:]
         symbol = f" `{p.symbol}`" if p.symbol and p.symbol != p.name else ""
         limit = f"; {p.limit}" if p.limit not in ("any", "one line") else ""
@@ -362,7 +373,7 @@ def read_settings(
     >>> mistakes[0].sentence
     'gapp=1: there is no parameter "gapp"; did you mean gap?'
     """
-    by_path = {p.path: p for p in parameters.values()}
+    by_path = {path: p for p in parameters.values() for path in (p.formerly, p.path) if path}
     plain = Wording(style="path")
     given: dict[str, object] = {}
     written: dict[str, str] = {}

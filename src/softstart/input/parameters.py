@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -23,6 +24,7 @@ __all__ = [
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
 LEAST, MOST = 1e-30, 1e30
+LONGEST_LINE = 120  # letters of a name: more leave no room for the figure below it
 
 Limit = Literal[
     "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "a whole number, 0 or more", "one line"
@@ -38,6 +40,10 @@ LIMITS: dict[str, Callable[[Any], Any]] = {
 }
 
 
+# what steers a terminal, or turns the order of letters round
+_STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
 class _Required:
     def __repr__(self) -> str:
         return "REQUIRED"
@@ -51,9 +57,10 @@ class Parameter:
     """One parameter: its key in a file, its keyword in Python, and what it means.
 
     `unit` is the SI unit; a parameter without one is text, or one of `choices`. `default` is REQUIRED, a
-    value in SI, or None for "not given"; one that `follows` another parameter takes its value. A `many`
-    parameter is a list of numbers, an `infinite` one may be infinity. `example` is what to type. `table` is
-    that of the file, "" above the first one; `name` is the keyword in Python, by default the key.
+    value in SI, or None for "not given"; one that `follows` another parameter takes its value. One with a
+    unit and `choices` is a quantity or one of these words. A `many` parameter is a list of numbers, an
+    `infinite` one may be infinity. `example` is what to type. `table` is that of the file, "" above the first
+    one; `name` is the keyword in Python, by default the key; `formerly` is an older path, read as well.
     """
 
     key: str
@@ -69,6 +76,7 @@ class Parameter:
     follows: str = ""
     table: str = ""
     name: str = ""
+    formerly: str = ""
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -208,7 +216,7 @@ def read_values(
 def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> Any:
     """One value in SI, as text, or one of the choices; raises `RefusedError` with reason and remedy.
 
-    A `batch` lets arrays of any shape through, and leaves it to the caller to refuse extremes.
+    A `batch` lets arrays of any shape through.
 
     >>> read_value(Parameter("gap", "rad", "total gap", '"0.5 rad"', "0 or more"), "500 mrad")
     0.5
@@ -217,6 +225,8 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> A
     softstart.quantities.RefusedError: the kind is "active" or "reactive"; did you mean "active"?
     """
     if not parameter.unit:
+        return _read_text(parameter, value)
+    if parameter.choices and isinstance(value, str) and not any(map(str.isdigit, value)):
         return _read_text(parameter, value)
     number = parse(value, parameter.unit, infinite=parameter.infinite)
     if parameter.many:
@@ -228,14 +238,13 @@ def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> A
     limit = LIMITS.get(parameter.limit)
     if limit is not None:
         _refuse(number, limit(number), f"the {parameter.meaning} must be {parameter.limit}")
-    if not batch:
-        sizes = np.asarray(number)
-        beyond = np.isfinite(sizes) & (np.abs(sizes) > MOST)
-        if parameter.limit == "above 0":
-            beyond |= sizes < LEAST
-        size = f"its size in {parameter.unit}" if parameter.unit != "1" else "it"
-        reason = f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit"
-        _refuse(number, ~beyond, reason)
+    sizes = np.abs(number)
+    beyond = np.isfinite(sizes) & (sizes > MOST)
+    if parameter.limit == "above 0":
+        beyond |= sizes < LEAST
+    size = f"its size in {parameter.unit}" if parameter.unit != "1" else "it"
+    reason = f"{size} must be between {LEAST:g} and {MOST:g}; check number and unit"
+    _refuse(number, ~beyond, reason)
     if isinstance(number, np.ndarray):
         if parameter.many:
             return tuple(number.tolist())
@@ -261,12 +270,17 @@ def _read_text(parameter: Parameter, value: object) -> str:
             raise RefusedError(f"{what} must be text, such as {parameter.example}")
         if parameter.limit == "one line" and (empty or len(value.splitlines()) > 1):
             raise RefusedError(f"{what} must be one line of text that is not empty")
+        if parameter.limit == "one line" and len(value) > LONGEST_LINE:
+            raise RefusedError(f"{what} has {len(value)} letters, and at most {LONGEST_LINE} fit in a title")
+        if parameter.limit == "one line" and (found := _STEERING.search(value)) is not None:
+            raise RefusedError(f"{what} has the control character U+{ord(found.group()):04X}; leave it out")
         if any(0xD800 <= ord(letter) < 0xE000 for letter in value):
             raise RefusedError("this text has half a character (a lone surrogate); write it anew")
         return value
     if isinstance(value, str) and value in parameter.choices:
         return value
-    *first, last = (show(choice) for choice in parameter.choices)
+    listed = [show(choice) for choice in parameter.choices]
+    *first, last = [*listed, f"a quantity such as {parameter.example}"] if parameter.unit else listed
     reason = f"{what} is {', '.join(first)} or {last}"
     meant = nearest(value, parameter.choices) if isinstance(value, str) else None
     raise RefusedError(f"{reason}; did you mean {show(meant)}?" if meant else reason)

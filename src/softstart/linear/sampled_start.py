@@ -7,20 +7,19 @@ With an encoder the speed is still the difference of two angles over a sample, a
 from __future__ import annotations
 
 import math
-import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.controller.base import CompiledController, Controller, PlainController, Sensor, label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
-from softstart.start.engine import Recorder
+from softstart.start.engine import Recorder, plain_answer
 
 FAR = 1e9  # in target speeds: never reached
 
@@ -155,7 +154,7 @@ class SampledStart:
 
     @property
     def _name(self) -> str:
-        return f"{self.drive.name}, controller {self.controller.name or type(self.controller).__name__}"
+        return f"{self.drive.name}, controller {label_of(self.controller)}"
 
 
 def _compiled(controller: CompiledController, own: Drive) -> Step:
@@ -173,26 +172,8 @@ def _compiled(controller: CompiledController, own: Drive) -> Step:
 
 
 def _plain(controller: PlainController) -> Step:
-    name = type(controller).__name__
-
     def step(measured: Vector, state: Vector) -> Answer:
-        try:
-            answer = controller.step(Measured(*measured.tolist()), tuple(state.tolist()))
-        except (Exception, SystemExit) as error:  # the user's own code may fail in any way
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            raise SimulationError(
-                f"The start was given up: the controller {name} failed at t = "
-                f"{measured[kernel.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
-                f"({type(error).__name__}: {error})."
-            ) from error
-        try:
-            after = np.array(answer[2], dtype=np.float64).ravel()
-            slope = float(answer[3]) if len(answer) > 3 else 0.0
-            return float(answer[0]), float(answer[1]), slope, after
-        except (TypeError, IndexError, ValueError):
-            raise InputError(
-                f"controller {name}: its step answered {answer!r}; "
-                "answer with Command(torque, ask_again, state, slope)."
-            ) from None
+        torque, ask_again, after, slope = plain_answer(controller, measured, tuple(state.tolist()))
+        return torque, ask_again, slope, np.array(after, dtype=np.float64).ravel()
 
     return step

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.controller.base import Controller
+from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -132,7 +132,7 @@ class LinearView:
     @property
     def name(self) -> str:
         """The controller's name."""
-        return self.controller.name or type(self.controller).__name__
+        return label_of(self.controller)
 
     @property
     def period(self) -> float:
@@ -321,7 +321,7 @@ def linear_view(
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
     start = SampledStart.of(drive, made, fitted_to)
     run = run_until_steady(start)
-    name = start.controller.name or type(start.controller).__name__
+    name = label_of(start.controller)
     points = operating_points(start, run)
     if not points:
         return LinearView(drive, start.controller, *_no_samples(name, run))

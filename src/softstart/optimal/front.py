@@ -102,6 +102,15 @@ class FrontPoint:
         """The point of a start time for which the method failed."""
         return cls(start_time, terminal, "NOT_FOUND", why)
 
+    def proved_by(self, other: FrontPoint) -> FrontPoint:
+        """The same point with the lower bound of another one, whose starts include those of this one."""
+        return replace(
+            self,
+            k_dyn_lower_bound=other.k_dyn_lower_bound,
+            bound_kind=other.bound_kind,
+            bound_covers=other.bound_covers,
+        )
+
     def for_shorter(self, start_time: float) -> FrontPoint:
         """The point of a start time shorter than this one, where this one is infeasible already."""
         shortest = self.shortest_start_time
@@ -447,7 +456,37 @@ class _Sweep:
                 found[terminal, start_time] = point
                 if self.each is not None:
                     self.each(point)
+            found |= {(terminal, t): point for t, point in _monotone(found, terminal, chain.start_times)}
         return found
+
+
+def _monotone(
+    found: dict[tuple[Terminal, float], FrontPoint], terminal: Terminal, start_times: list[float]
+) -> Iterator[tuple[float, FrontPoint]]:
+    """The points: none above one of a shorter start time, no bound below that of a longer one.
+
+    A start may arrive early, so that it counts for every longer time as well; and what no start of a longer
+    time can do, none of a shorter one can.
+    """
+    proof, proved = FrontPoint(math.inf, terminal, "NOT_FOUND", ""), []
+    for point in (found[terminal, t] for t in start_times):
+        if point.found and (point.k_dyn_lower_bound or 0.0) >= (proof.k_dyn_lower_bound or 0.0):
+            proof = point
+        proved.append(point if point.status == "INFEASIBLE" else point.proved_by(proof))
+    gentlest: FrontPoint | None = None
+    for point in reversed(proved):
+        known = math.inf if point.k_dyn is None else point.k_dyn
+        if gentlest is None or gentlest.k_dyn is None or known <= gentlest.k_dyn:
+            gentlest = point if point.found else gentlest
+            yield point.start_time_bound, point
+        else:
+            early = replace(
+                gentlest,
+                start_time_bound=point.start_time_bound,
+                why=f"the start for {gentlest.start_time_bound:.6g} s is gentler, and may arrive early",
+                seconds=point.seconds,
+            )
+            yield point.start_time_bound, early.proved_by(point)
 
 
 class _Chain:

@@ -150,7 +150,7 @@ def _straight_up(problem: Problem) -> bool:
     return bool(
         problem.lowest_torque >= 0.0
         and drive.initial_motor_speed >= drive.initial_load_speed
-        and drive.start_position >= -0.5 * drive.gap
+        and drive.theta0 >= -0.5 * drive.gap
         and not (_reactive(problem) and drive.initial_load_speed < 0.0)
     )
 
@@ -163,13 +163,13 @@ def earliest_pull(problem: Problem) -> float:
     0.01661
     """
     drive = problem.drive
-    z0 = float(drive.start_position - 0.5 * drive.gap)
+    z0 = float(drive.theta0 - 0.5 * drive.gap)
     v0 = float(drive.initial_motor_speed - drive.initial_load_speed)
     travel = max(-z0, 0.0)
     if not _straight_up(problem):
         if _reactive(problem) or (drive.contact_law == "dead-zone" and drive.d > 0.0):
             return 0.0
-        wound_up = drive.Omega * max(-0.5 * drive.gap - drive.start_position, 0.0)
+        wound_up = drive.Omega * max(-0.5 * drive.gap - drive.theta0, 0.0)
         U = max(problem.highest_torque, -problem.lowest_torque)
         A = float(U / drive.J1 + drive.Mc / drive.J2)
         return fall_time(travel, math.hypot(v0, wound_up), A)
@@ -220,7 +220,7 @@ def momentum_shortest_time(problem: Problem) -> float:
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
     Ms, U = problem.highest_torque, max(problem.highest_torque, -problem.lowest_torque)
     aim = (J1 + J2) * problem.target
-    overlap = max(abs(float(drive.start_position)) - 0.5 * float(drive.gap), 0.0)
+    overlap = max(abs(float(drive.theta0)) - 0.5 * float(drive.gap), 0.0)
     first = earliest_pull(problem)
     moving = (aim - J1 * w1 - J2 * w2) / (Ms - Mc)  # the load never stands still
     if not _reactive(problem):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.quantities import to_si
 from softstart.start import metrics
 
 Terminal = Literal["synchronous", "steady", "reached"]
@@ -18,6 +19,50 @@ Objective = Literal["k_dyn", "heat", "start_time"]
 
 TERMINALS = get_args(Terminal)
 OBJECTIVES = get_args(Objective)
+
+
+@dataclass(frozen=True)
+class StartTime:
+    """A bound on the start time as it is asked for: `value` in s, or as a multiple of that of `direct`."""
+
+    value: float
+    multiple: bool = False
+
+    @classmethod
+    def of(cls, given: object, name: str = "start_time") -> StartTime:
+        """The bound that a number or a text stands for; InputError if it is none.
+
+        >>> StartTime.of("250 ms"), StartTime.of("1.2x")
+        (StartTime(value=0.25, multiple=False), StartTime(value=1.2, multiple=True))
+        """
+        text = given.strip() if isinstance(given, str) else ""
+        multiple = text[-1:] in ("x", "X")
+        value: Any = given
+        if text:
+            try:
+                value = to_si(text[:-1] if multiple else text, "1" if multiple else "s", name=name)
+            except InputError:
+                if not multiple and (not text.isalpha() or text == "nan"):
+                    raise  # it says what is wrong with number or unit
+                value = math.nan
+        if not _number(value) or not 0.0 < float(value) < math.inf:
+            shown = f'"{given}"' if isinstance(given, str) else repr(given)
+            raise InputError(
+                f'{name} = {shown}: give a time above 0 s, as 0.3 or "300 ms", or a multiple of the start '
+                'time of direct, as "1.2x".'
+            )
+        return cls(float(value), multiple)
+
+    def seconds(self, direct: Callable[[], float]) -> float:
+        """The bound in s; `direct` gives the start time of the drive under its constant starting torque."""
+        return self.value * direct() if self.multiple else self.value
+
+    def __str__(self) -> str:
+        """As it is typed."""
+        return f"{self.value:g}x" if self.multiple else f"{self.value:g} s"
+
+
+USUAL = StartTime(1.2, multiple=True)  # where a bound is needed and none is given
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class PulseCoastHold:
             float(drive.c),
             float(drive.Mc),
             problem.highest_torque,
-            float(drive.start_position - 0.5 * drive.gap),
+            float(drive.theta0 - 0.5 * drive.gap),
             float(drive.initial_motor_speed - drive.initial_load_speed),
             float(drive.initial_load_speed),
         )
@@ -253,7 +253,7 @@ def off_course(problem: Problem) -> str:
         return "the motor may brake"
     if drive.initial_motor_speed < drive.initial_load_speed:
         return "the load runs away from the motor at first"
-    if drive.start_position < -0.5 * drive.gap:
+    if drive.theta0 < -0.5 * drive.gap:
         return "the start is wound up against the load"
     return ""
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
@@ -15,6 +16,7 @@ from softstart.start.run import Run
 
 Method = Literal["closed-form", "lp", "collocation"]
 BoundKind = Literal["certificate", "momentum", "none"]
+DemandShape = Literal["steps", "ramps", "continuous"]
 
 
 def heat_of(run: Run, until: float) -> float:
@@ -29,6 +31,15 @@ def heat_of(run: Run, until: float) -> float:
         u = run.states_in(np.full(times.size, index), times)["u"]
         total += 0.5 * (end - start) * float(weights @ (u * u))
     return total / float(run.drive.Ms) ** 2
+
+
+def demanded(shape: DemandShape, edges: Vector, levels: Matrix) -> TorqueProfile:
+    """The demand over steps between `edges` (s), from its torque (N m) at the beginning and end of each."""
+    if shape == "steps":
+        return TorqueProfile.steps(edges, levels[:, 0])
+    if shape == "ramps":
+        return TorqueProfile(np.repeat(edges, 2)[1:-1], levels.ravel()).simplified()
+    return TorqueProfile(edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +286,7 @@ def _knots(profile: TorqueProfile) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SensorWorth:
-    """The best profile that evaluator blindly, and the best that starts its second part at the contact.
+    """The best profile without a sensor, and the best that starts its second part at the contact.
 
     `alone` holds the K_dyn that each scenario could have if it were the only one, where that was asked for.
     """

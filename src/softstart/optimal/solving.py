@@ -16,7 +16,7 @@ from softstart.optimal.certificate import certified_bound, not_certified
 from softstart.optimal.exact import check, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import Objective, Problem, Terminal
+from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
     Candidate,
     InfeasibleError,
@@ -25,7 +25,7 @@ from softstart.optimal.result import (
     Optimum,
     OptimumError,
 )
-from softstart.optimal.shortest import from_quickest, shortest_start_time, verdict_on
+from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.start.run import Run
 
 collocation = late("softstart.optimal.collocation.search")
@@ -37,7 +37,7 @@ TIGHT = 1e-5  # a bound within this share needs no other one
 
 def optimize(
     drive: Drive | str,
-    start_time: float | None = None,
+    start_time: float | str | None = None,
     *,
     terminal: Terminal = "synchronous",
     minimise: Objective = "k_dyn",
@@ -58,8 +58,9 @@ def optimize(
     ----------
     drive : Drive or str
         The drive, or the name or file of one.
-    start_time : float, optional
-        Bound on t_f, s; None only where the start time is minimised.
+    start_time : float or str, optional
+        Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
+        ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
     terminal : {"synchronous", "steady", "reached"}
         What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed.
     minimise : {"k_dyn", "heat", "start_time"}
@@ -110,8 +111,13 @@ def optimize(
     if method not in METHODS:
         raise InputError(f"method = {method!r}: choose one of {', '.join(METHODS)}.")
     corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
-    problem = Problem(drive, start_time, terminal, minimise, k_dyn, heat, corners, smoothness, base)
-    return solve(problem, method, warm)
+    usual = start_time is None and minimise != "start_time"
+    bound = USUAL if usual else None if start_time is None else StartTime.of(start_time)
+    some = None if bound is None else 1.0  # any time: what is wrong with the others is said first
+    about = Problem(drive, some, terminal, minimise, k_dyn, heat, corners, smoothness, base)
+    seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
+    best = solve(replace(about, start_time=seconds), method, warm)
+    return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
 
 
 def solve(problem: Problem, method: Choice = "auto", warm: Any = None) -> Optimum:

@@ -9,13 +9,15 @@ from typing import Any
 
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
+from softstart.input.parameters import Parameter
 from softstart.page.frames import SERVER, Screen
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import unit
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
-LATEST = 1e15  # ms, beyond any clock of a browser
+LARGEST = 1e15  # beyond any number of a message: clocks in ms, positions, values
+LONGEST_TEXT = 200  # letters in a field
 BY_PATH = {parameter.path: parameter for parameter in PARAMETERS.values()}
 
 # name, what stands before the field; the sliders are those of scales.scales_about
@@ -36,7 +38,6 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("gap", "total gap"),
         ("stiffness", "stiffness"),
         ("damping", "damping"),
-        ("start_position", "start position"),
         ("contact_law", "contact law"),
     ),
     "Load": (
@@ -46,6 +47,9 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
     ),
     "Start": (
         ("target_speed", "target speed"),
+        ("start_position", "position"),
+        ("brake", "brake"),
+        ("release", "release"),
         ("initial_load_speed", "speed before"),
     ),
 }  # fmt: skip
@@ -73,14 +77,15 @@ def groups(screen: Screen) -> list[dict[str, Any]]:
 
 def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
     parameter = PARAMETERS[name]
+    words = parameter.choices if parameter.unit else ()
     return {
         "path": parameter.path,
         "symbol": SYMBOLS.get(name, ""),
         "label": label,
-        "meaning": f"{parameter.meaning}; write for example {parameter.example}",
+        "meaning": f"{parameter.meaning}; write for example {', '.join([*words, parameter.example])}",
         "unit": unit(parameter.unit),
         "slider": slider,
-        "choices": list(parameter.choices),
+        "choices": [] if parameter.unit else list(parameter.choices),
         "words": not parameter.unit and not parameter.choices,
     }
 
@@ -118,69 +123,84 @@ class Controls:
         self._screen = screen
         self._poke = poke
         self._delay = Delay()
-        self._actions: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
-            "slide": self._slide,
-            "edit": self._edit,
-            "jump": self._jump,
-            "select": lambda message: session.select(str(message["name"])),
-            "show": lambda message: session.show(str(message["name"]), bool(message["visible"])),
-            "remove": lambda message: session.remove(str(message["name"])),
-            "keep": self._keep,
-            "leave": self._leave,
-            "hello": self._hello,
+        # by `what`: what to do, and the arguments that it needs; other messages are none of this page's
+        self._actions: Mapping[str, tuple[Callable[..., None], Mapping[str, type]]] = {
+            "slide": (self._slide, {"path": str, "position": float}),
+            "edit": (self._edit, {"path": str, "text": str}),
+            "leave": (self._leave, {"path": str}),
+            "jump": (self._jump, {"gap": float, "inertia": float}),
+            "select": (session.select, {"name": str}),
+            "show": (session.show, {"name": str, "visible": bool}),
+            "remove": (session.remove, {"name": str}),
+            "keep": (self._keep, {"kept": bool}),
+            "hello": (self._hello, {"kept": object}),
         }
 
     def take(self, message: object) -> None:
         """One message. What is wrong with it is said in the next frame, next to its field if it has one."""
         if not isinstance(message, Mapping):
             return
-        act = self._actions.get(str(message.get("what")))
-        if act is None:
+        act, kinds = self._actions.get(str(message.get("what")), (None, {}))
+        arguments = {name: message.get(name) for name in kinds}
+        if act is None or not all(_is_a(kind, arguments[name]) for name, kind in kinds.items()):
             return
-        path = str(message.get("path", ""))
-        place = path if path in BY_PATH else ""  # without a field, the message appears next to the figure
+        # without a field, the message appears next to the figure
+        place = path if (path := str(arguments.get("path"))) in BY_PATH else ""
         version = self._session.version
-        stamp = message.get("stamp")
-        if isinstance(stamp, int | float) and abs(stamp) < LATEST:
+        stamp: Any = message.get("stamp")
+        if _is_a(float, stamp):
             self._screen.stamp = float(stamp)
             self._screen.late = self._delay.of(float(stamp) / 1000.0)
         try:
-            act(message)
-        except Exception as error:  # a message may hold anything
+            act(*arguments.values())
+        except Exception as error:  # a drive may refuse anything
             self._screen.mistakes[place] = sentence_of(error)
         else:
             self._screen.mistakes.pop(place, None)
         if self._session.version == version:
             self._poke()
 
-    def _slide(self, message: Mapping[str, Any]) -> None:
-        parameter = BY_PATH[str(message["path"])]
-        scale = self._screen.scales[parameter.name]
-        self._session.set(parameter.path, scale.value(float(message["position"])))
+    def _slide(self, path: str, position: float) -> None:
+        parameter = _parameter(path)
+        scale = self._screen.scales.get(parameter.name)
+        if scale is None:
+            raise InputError(f"{path}: there is no such slider.")
+        self._session.set(path, scale.value(position))
 
-    def _edit(self, message: Mapping[str, Any]) -> None:
-        path, text = str(message["path"]), str(message["text"]).strip()
-        if path not in BY_PATH:
-            raise InputError(f'"{path}": there is no such field.')
-        if not text:
-            raise InputError(f"{path}: the field is empty; write for example {BY_PATH[path].example}.")
+    def _edit(self, path: str, text: str) -> None:
+        example = _parameter(path).example
+        if len(text) > LONGEST_TEXT:
+            raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {example}.")
+        if not text.strip():
+            raise InputError(f"{path}: the field is empty; write for example {example}.")
         self._session.set(path, " ".join(text.split()))
 
-    def _leave(self, message: Mapping[str, Any]) -> None:
+    def _leave(self, path: str) -> None:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
 
-    def _jump(self, message: Mapping[str, Any]) -> None:
-        gap, inertia = float(message["gap"]), float(message["inertia"])
+    def _jump(self, gap: float, inertia: float) -> None:
         self._session.set_all({"shaft.gap": gap, "load.inertia": inertia})
         for path in ("shaft.gap", "load.inertia"):
             self._screen.mistakes.pop(path, None)
 
-    def _hello(self, message: Mapping[str, Any]) -> None:
+    def _hello(self, kept: object) -> None:
         """A page that is loaded anew goes on with the drive that its tab has kept of this server."""
         self._screen.forget()
-        kept = message.get("kept")
         if isinstance(kept, Mapping) and kept.get("server") == SERVER:
             self._session.load(str(kept["drive"]))
 
-    def _keep(self, message: Mapping[str, Any]) -> None:
-        self._screen.kept = bool(message["kept"])
+    def _keep(self, kept: bool) -> None:
+        self._screen.kept = kept
+
+
+def _parameter(path: str) -> Parameter:
+    if path not in BY_PATH:
+        raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
+    return BY_PATH[path]
+
+
+def _is_a(kind: type, value: object) -> bool:
+    """Whether JSON holds a value of this kind; a number is neither true nor beyond all that can be meant."""
+    if kind is float:
+        return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGEST
+    return isinstance(value, kind)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
 from softstart.page.panel_parts import (
@@ -136,6 +136,8 @@ def few(sentences: Sequence[str]) -> list[str]:
     (['a.', 'b.'], ['11.', 'There are 19,988 more of them.'])
     """
     left = len(sentences) - MOST_SENTENCES
+    if left > 0 and (rest := MORE_MISTAKES.fullmatch(sentences[-1])):  # an InputError counts some itself
+        left += int(rest[1]) - 1
     return [*sentences[:MOST_SENTENCES], *([f"There are {left:,} more of them."] if left > 0 else [])]
 
 

@@ -201,7 +201,7 @@ class Screen:
     def _map_drive(self) -> Drive:
         """What of the drive a map depends on: not its gap and inertia, unless the controller is kept."""
         drive, axes = self.session.drive, self.axes
-        return drive if self.kept else drive.replace(gap=axes.gaps[0], load_inertia=axes.inertias[0])
+        return drive if self.kept else drive.with_gap(axes.gaps[0], load_inertia=axes.inertias[0])
 
     def _map_head(self) -> dict[str, Any]:
         return {
@@ -260,6 +260,8 @@ def otherwise(unit: str, value: Any) -> str:
     >>> otherwise("rad", 0.5), otherwise("rad/s", 92.15)
     ('28.6\N{DEGREE SIGN}', '880 rpm')
     """
+    if isinstance(value, str):
+        return ""
     if unit == "rad":
         return f"{math.degrees(value):.3g}\N{DEGREE SIGN}"
     if unit == "rad/s":
@@ -419,7 +421,7 @@ def k_dyn_row(
     The controller is set up for each drive, or for `nominal`, to whose mean torque K_dyn then refers. These
     are the figures of `softstart.simulate`, to the bit.
     """
-    drives = drive.replace(gap=list(gaps), load_inertia=inertia)
+    drives = drive.with_gap(list(gaps), load_inertia=inertia)
     notes = array_starts(drives, controller, fitted_to=nominal, max_events=MAP_EVENTS)
     base = np.broadcast_to(metrics.base_torque(nominal or drives), (len(gaps),))
     k: Vector = figures(notes, base)["k_dyn"][0]

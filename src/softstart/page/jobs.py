@@ -68,10 +68,6 @@ class Job:
         self._over = threading.Event()
         self._began = self._ended = 0.0
 
-    def __repr__(self) -> str:
-        """Title and state."""
-        return f"<Job: {self.title}, {self.state.name.lower()}>"
-
     @property
     def error(self) -> str:
         """Why there is no result, one sentence a line; empty where there is one, or may come."""

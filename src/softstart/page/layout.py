@@ -76,7 +76,7 @@ def build(drive: Drive) -> Session:
 
     def take(message: Any) -> None:
         if isinstance(message, dict) and message.get("what") == "drawn":
-            live.drawn(int(message.get("number") or 0))
+            live.drawn(number if isinstance(number := message.get("number"), int) else 0)
         else:
             controls.take(message)
 

@@ -11,6 +11,7 @@ from nicegui import ui
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
@@ -33,7 +34,6 @@ from softstart.page.panel_parts import (
 )
 from softstart.page.session import Session
 from softstart.start.comparison import REFERENCE
-from softstart.tuning.question import bound_of
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
@@ -156,7 +156,7 @@ def _check(text: str) -> None:
     try:
         if not text:
             raise InputError("")
-        bound_of(text)
+        StartTime.of(text)
     except InputError:
         raise InputError(
             f'Start time "{text}": give a time above 0 s, as 0.3 or 300 ms, or a multiple of that of direct, '

@@ -16,8 +16,14 @@ NAMED = 3  # parameters named in a sentence
 WORDS = ("name", "source")  # they change no result
 
 
-def sentence_of(error: BaseException) -> str:
+OWN_MISTAKE = "This did not work, and that is a mistake in softstart, not in your input ({})."
+FAILED_START = "The start was given up: the strategy failed on this drive ({})."
+
+
+def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
     """One plain sentence for an exception: nobody who uses the page sees a traceback.
+
+    `otherwise` is said of an exception that has no sentence of its own.
 
     >>> sentence_of(InputError(["gap = -1: a gap is 0 or more.", "inertia = 0: above 0."]))
     'gap = -1: a gap is 0 or more. inertia = 0: above 0.'
@@ -35,7 +41,7 @@ def sentence_of(error: BaseException) -> str:
         text = text[:LONGEST] + " ..."
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     log.debug("told the user: %s", what, exc_info=error)
-    return f"This did not work, and that is a mistake in softstart, not in your input ({what})."
+    return otherwise.format(what)
 
 
 def clipped(name: str) -> str:

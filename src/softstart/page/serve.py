@@ -18,7 +18,6 @@ import logging
 import os
 import secrets
 import socket
-import tempfile
 from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -28,6 +27,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.page.sentences import log
 
 if TYPE_CHECKING:
     import fastapi
@@ -50,6 +50,7 @@ Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
+NOISY = ("nicegui", "uvicorn", "uvicorn.error", "engineio.server", "socketio.server", "python_multipart")
 POLICY_VIOLATION = 1008
 MOST_BODY = 1 << 20  # bytes of a request: a drive file, or some messages of a browser without sockets
 POLICY = (  # nothing the page does leaves the machine, whatever is put into it
@@ -72,11 +73,11 @@ HEADERS = (
 
 @dataclass(frozen=True)
 class Address:
-    """Where to listen, and who may come: the token is empty where none is asked for."""
+    """Where to listen, and who may come: the token is None where none is asked for."""
 
     host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
-    token: str = ""
+    token: str | None = None
     expose: bool = False
 
     @property
@@ -99,19 +100,20 @@ class Address:
         wrong = []
         if not 0 <= self.port <= 65535:
             wrong.append(f"--port {self.port}: a port is a number from 0 to 65535; 0 takes a free one.")
-        if not self.token.isascii():
+        if self.token is not None and not (self.token.isascii() and self.token.isprintable()):
             wrong.append("--token: not all of it is plain letters and digits; it must stand in an address.")
-        elif self.token and len(self.token) < SHORTEST_TOKEN:
+        elif self.token is not None and len(self.token) < SHORTEST_TOKEN:
+            size = len(self.token)
+            short = f"a token of {size} characters can be guessed" if size else "the token is empty"
             wrong.append(
-                f"--token: a token of {len(self.token)} characters can be guessed; use at least "
-                f"{SHORTEST_TOKEN} letters and digits."
+                f"--token: {short}; use at least {SHORTEST_TOKEN} letters and digits, or leave --token out."
             )
         if not self.host.strip():
             wrong.append("--host: the address is empty; give one of this machine, 0.0.0.0 for all it has.")
-        elif not self.is_loopback and not (self.expose and self.token):
+        elif not self.is_loopback and not (self.expose and self.token is not None):
             lacking = " and ".join(
                 name
-                for name, given in (("--expose", self.expose), ("--token TOKEN", self.token))
+                for name, given in (("--expose", self.expose), ("--token TOKEN", self.token is not None))
                 if not given
             )
             wrong.append(
@@ -167,14 +169,15 @@ def guarded(app: App, address: Address, port: int) -> Guard:
     names = {address.host, *LOOPBACK}
     if not address.is_loopback:
         names |= {socket.gethostname(), socket.getfqdn()}
-    return Guard(app, names, address.token, exposed=not address.is_loopback, cookie=f"softstart-{port}")
+    return Guard(app, names, address.token or "", exposed=not address.is_loopback, cookie=f"softstart-{port}")
 
 
 def application(drive: Drive) -> App:
     """The ASGI application: NiceGUI with the page at `/`. One a process, since NiceGUI is one a process."""
-    # NiceGUI stores things in the folder it is started in; the page stores nothing, and this makes sure
-    os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / "softstart-stores-nothing")
-    for noisy in ("nicegui", "uvicorn", "uvicorn.error", "engineio", "socketio"):
+    # NiceGUI reads and stores things in the folder it is started in; the page stores nothing, and nobody can
+    # put anything for it to read where no file can be
+    os.environ["NICEGUI_STORAGE_PATH"] = str(Path(os.devnull) / "nothing")
+    for noisy in NOISY:
         logging.getLogger(noisy).setLevel(logging.CRITICAL)
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
@@ -208,6 +211,7 @@ def run(drive: Drive, address: Address, listener: socket.socket, ready: Callable
         log_level=logging.CRITICAL,
         access_log=False,
         ws_per_message_deflate=False,  # squeezing costs more than loopback gains
+        ws_max_size=MOST_BODY,
         timeout_graceful_shutdown=1,
         server_header=False,
         lifespan="on",
@@ -215,11 +219,18 @@ def run(drive: Drive, address: Address, listener: socket.socket, ready: Callable
 
     class Server(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            asyncio.get_running_loop().set_exception_handler(unheard)
             await super().startup(sockets=sockets)
             if not self.should_exit:
                 ready(address.url(port))
 
+    logging.captureWarnings(True)  # numbers at the edge of what floats hold are no news for the terminal
     asyncio.run(Server(config).serve(sockets=[listener]))
+
+
+def unheard(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """What nobody waits for has failed: NiceGUI was sent a message that its own script does not send."""
+    log.debug("dropped: %s", context.get("message"), exc_info=context.get("exception"))
 
 
 _FAVICON = (

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.page.sentences import sentence_of
+from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
 from softstart.start.simulation import simulate
@@ -239,7 +239,7 @@ class Session:
         try:
             run = simulate(self._drive, self._controllers[label], max_events=max_events)
         except Exception as error:  # a controller is anyone's code and may fail in any way
-            found = Strategy(label, None, sentence_of(error), time.thread_time() - began)
+            found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
             if isinstance(error, SimulationError) and max_events < MOST_EVENTS:
                 return found
         else:
@@ -303,7 +303,7 @@ class Session:
         if label not in self._controllers:
             near = nearest(label, list(self._controllers))
             hint = f"did you mean {near}?" if near else f"there are {', '.join(self._controllers)}."
-            raise InputError(f'strategy "{label}": there is no strategy of this name; {hint}')
+            raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
 
 
 def _single(drive: Drive) -> Drive:

@@ -22,7 +22,6 @@ from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.processes import Tell
 from softstart.start.simulation import simulate
-from softstart.tuning.question import bound_of
 from softstart.tuning.solving import tune
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     tell(None, "looking for the gentlest start")
     with no_solution_as_sentence():
-        best = solving.optimize(drive, seconds_of(drive, start_time), terminal=terminal)
+        best = solving.optimize(drive, start_time, terminal=terminal)
     tell(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     profile = best.profile
@@ -72,17 +71,6 @@ def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -
         ".c": text_of(lambda path: profile.to_c(path, about=about), ".c"),
     }
     return Gentlest(replace(best, warm=None), files)
-
-
-def seconds_of(drive: Drive, start_time: str) -> float:
-    """The start time in s; InputError for a text that is none.
-
-    >>> crane = Drive.load("crane-4amtkf")
-    >>> round(seconds_of(crane, "1.2x"), 4), seconds_of(crane, "300 ms")
-    (0.4482, 0.3)
-    """
-    bound = bound_of(start_time)
-    return bound.value * (shortest.start_time_of_direct(drive) if bound.kind == "direct" else 1.0)
 
 
 def curve(

@@ -35,6 +35,7 @@ from softstart.page.panel_parts import (
     table,
 )
 from softstart.page.session import Session
+from softstart.quantities import values_in
 from softstart.tuning.question import gaps_of, inertias_of
 from softstart.views.printed import fixed, unit
 
@@ -146,22 +147,16 @@ def tunable() -> list[str]:
 
 
 def grid_of(drive: Drive, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
-    """Gaps in rad and load inertias in kg m2 from texts with commas; all mistakes in one InputError.
+    """Gaps in rad and load inertias in kg m2 from lists as typed; all mistakes in one InputError.
 
-    >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1")
-    ([0.25, 1.0], [0.175])
+    >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
+    ([0.25, 1.0], [0.175, 0.35])
     """
     wrong: list[str] = []
     found: list[list[float]] = []
     for text, name, read in ((gaps, "Gaps", gaps_of), (inertias, "Load inertias", inertias_of)):
-        parts = [part.strip() for part in text.split(",")]
-        if not all(parts):
-            wrong.append(
-                f'{name} "{text}": a place is empty; write values with commas between, as 0.5x, 1x, 2x.'
-            )
-            continue
         try:
-            found.append(list(read(drive, parts, name)))
+            found.append(list(read(drive, values_in(text, name), name)))
         except InputError as error:
             wrong.extend(error.sentences)
     if not wrong and len(found[0]) * len(found[1]) > MOST_CELLS:

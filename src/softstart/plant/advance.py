@@ -10,7 +10,7 @@ from softstart.plant.layout import (
     ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT, UNSOLVED,
     Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
-from softstart.plant.modes import handle, reach_target
+from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque
 from softstart.plant.motion import motion
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import begin_span, next_event, torque_course
@@ -63,7 +63,7 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
     else:
         theta = side * (z + 0.5 * p.gap)
         if x.load != 0.0:
-            share = p.J1 * p.inv_J
+            share = p.J1 * p.inv_J if x.held == 0.0 else 1.0
             push = s * s * (0.5 * load[1] + s * load[2] / 6.0)
             if m.ue != 0.0:
                 rate = m.rate
@@ -72,7 +72,7 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
             x.w2 = load_speed(m, load, s, v)
         v *= side
     x.theta = theta
-    x.v = v
+    x.v = v if x.held == 0.0 else -x.w2
     x.u = m.ua + m.ub * s + m.ue * (1.0 - tail)
     if x.demand_slope != 0.0:
         x.demand += x.demand_slope * s
@@ -107,8 +107,12 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
         if t >= x.ask_at:
             return ASK if x.asked < p.event_cap else EVENT_LIMIT
         torque_course(p, x, m)
+        if x.held != 0.0 and (t >= p.release_at or (p.release_at == math.inf and x.u >= shaft_torque(p, x))):
+            release_motor(x, events)
         load = begin_span(p, x, m)
         until = min(x.ask_at, stop)
+        if x.held != 0.0:
+            until = min(until, p.release_at)
         if m.pending > 0.0:
             until = min(until, m.due_time[0])
         if not recording and repeats(p, x, m) and bounce(p, x, m, load, until) > 0:

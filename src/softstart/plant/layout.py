@@ -99,6 +99,7 @@ class Plant:
     torque_noise: float
     noise_seed: float
     dead_time: float
+    release_at: float  # when the motor's brake is released: 0 no brake, inf by torque proving
 
 
 class State:
@@ -122,6 +123,7 @@ class State:
     beyond: float  # +1 or -1: no torque though the flanks overlap, as a damped spring must not pull back
     load: float  # 0 stuck, +1 or -1 sign of the speed that Mc opposes; an active load has +1 always
     mask: float  # the event that has just fired, one of the masks below
+    held: float  # 1 while the brake holds the motor: w1 = 0, so v = -w2
     ask_at: float
     ask_on_gap: float
     t_end: float
@@ -143,6 +145,8 @@ class State:
     contact_torque: float
     first_peak: float
     start_time: float
+    release_time: float  # when the brake was released
+    position: float  # of an unknown one, that with the largest peak: its place in UNKNOWN_POSITIONS
     events: float
     n_segments: float
     n_events: float
@@ -187,6 +191,7 @@ class Motion:
     end_known: float  # the motion at the end of the span, once it has been evaluated
     end_z: float
     end_v: float
+    by_terms: float  # 1 once a search of this start has outlasted the bounds by energy, see `terms`
     passing: float  # when, within this contact, the load passes its target speed; NaN if it does not
     pending: float  # how many answers of the controller wait for their computing delay
     due_time: Vector  # when each of them takes effect, and what it is
@@ -211,6 +216,7 @@ class Segment:
     ue: float
     k: float
     dd: float
+    held: float
 
 
 class EventRow:
@@ -263,7 +269,7 @@ N_SEGMENT, N_EVENT, N_STAGE = size(SEGMENT), size(EVENT), size(STAGE_ROW)
 NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 
 # kinds of recorded events
-CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED = 1.0, 2.0, 3.0, 4.0, 5.0
+CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED, RELEASED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 
 # why `advance` came back
 ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL = range(8)
@@ -271,8 +277,8 @@ ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEU
 # what a span ends with
 (
     NO_EVENT, UPPER, LOWER, GRAZE_UPPER, GRAZE_LOWER, REJOIN, BACK, EXIT, SWITCH, BREAKAWAY, STOP, REACHED,
-    UNSOLVED,
-) = range(13)  # fmt: skip
+    RELEASE, UNSOLVED,
+) = range(14)  # fmt: skip
 
 # masks: the event that has just fired must not fire again at the instant at which the span begins
 NOTHING, LEFT_UPPER, LEFT_LOWER, LEFT_BEYOND, SWITCHED, BROKE_AWAY = range(6)

@@ -8,7 +8,7 @@ from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, CLOSED, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND,
     LEFT_LOWER, LEFT_UPPER, LOAD_STARTS, LOAD_STOPS, LOWER, MODELICA, NOTHING, OPENED, REACHED, REJOIN,
-    STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
+    RELEASE, RELEASED, STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
 )  # fmt: skip
 from softstart.plant.notes import end_stage, note_event, note_event_at
 
@@ -64,6 +64,14 @@ def reach_target(p: Plant, x: State, time: float, speed: float, events: Matrix) 
 
 
 @inlined
+def release_motor(x: State, events: Matrix) -> None:
+    """The brake lets the motor go."""
+    x.held = 0.0
+    x.release_time = x.time
+    note_event(x, events, RELEASED, x.u)
+
+
+@inlined
 def handle(p: Plant, x: State, m: Motion, event: int, events: Matrix, stages: Matrix) -> bool:
     """Change of mode at an event; True if the gap closed or opened."""
     half = 0.5 * p.gap
@@ -116,6 +124,8 @@ def handle(p: Plant, x: State, m: Motion, event: int, events: Matrix, stages: Ma
         else:
             x.load = math.copysign(1.0, torque)
             note_event(x, events, LOAD_STARTS, x.load)
+    elif event == RELEASE:
+        release_motor(x, events)
     elif event == REACHED:
         reach_target(p, x, x.time, x.w2, events)
     return False

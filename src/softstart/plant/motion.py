@@ -107,7 +107,10 @@ def exponential_response(m: Motion, s: float) -> Pair:
         slow = -m.w0sq / (zeta + root)
         fast = -(zeta + root)
         x = (slow + rate) * s
-        g_slow = tail * s * (math.expm1(x) / x if abs(x) > 1e-8 else 1.0 + 0.5 * x)
+        if x > 600.0:  # exp(x) would overflow, where exp(-lambda s) is long gone
+            g_slow = math.exp(slow * s) / (slow + rate)
+        else:
+            g_slow = tail * s * (math.expm1(x) / x if abs(x) > 1e-8 else 1.0 + 0.5 * x)
         x = (fast + rate) * s
         g_fast = tail * s * (math.expm1(x) / x if abs(x) > 1e-8 else 1.0 + 0.5 * x)
         half = e / (2.0 * root)

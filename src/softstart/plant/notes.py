@@ -13,6 +13,7 @@ from softstart.plant.layout import (
     ASK, EVENT, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion
+from softstart.plant.terms import ROUNDING, terms
 
 
 @inlined
@@ -51,16 +52,26 @@ def note_peak(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> int:
         return ASK
     begin = 0.0
     z, v = m.z0, m.v0
+    by_terms = m.by_terms
     while True:
-        a, jerk, _ = derivatives(m, begin, z, v, forcing_tail(m, begin))
-        slope = k * v + dd * a
-        if begin > 0.0:  # an extreme: T' changes sign here
-            slope = k * a + dd * jerk
-        sign = 1.0 if slope > 0.0 or (slope == 0.0 and k * a + dd * jerk > 0.0) else -1.0
+        if by_terms != 0.0:  # k v and dd a may cancel to their last digits
+            f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
+            slope = bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
+        else:
+            a, jerk, _ = derivatives(m, begin, z, v, forcing_tail(m, begin))
+            slope = k * v + dd * a
+            bend = k * a + dd * jerk
+            if begin > 0.0:  # an extreme: T' changes sign here
+                slope = bend
+        sign = 1.0 if slope > 0.0 or (slope == 0.0 and bend > 0.0) else -1.0
         start = RISING if begin > 0.0 else WATCH
         at = first_crossing(m, 0.0, 0.0, sign * k, sign * dd, 0.0, load, start, begin, s)
         if at < -1.0:
             return NOT_LOCATED
+        if m.by_terms != by_terms:  # it took over within this search: once more, with its signs
+            by_terms = m.by_terms
+            begin = 0.0
+            continue
         if at < 0.0 or at <= begin:
             break
         z, v = motion(m, at)
@@ -132,4 +143,5 @@ def note_segment(x: State, m: Motion, s: float, segments: Matrix) -> None:
     row.ue = m.ue
     row.k = m.k
     row.dd = m.dd
+    row.held = x.held
     x.n_segments += 1.0

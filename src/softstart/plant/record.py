@@ -32,6 +32,7 @@ def states_at(
         s = min(max(s, 0.0), row.end - row.start)
         x.side = row.side
         x.load = row.load
+        x.held = row.held
         x.theta = row.theta
         x.v = row.v
         x.phi2 = row.phi2

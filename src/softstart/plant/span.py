@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import math
 
-from softstart.plant.crossing import RISING, WATCH, first_crossing
+from softstart.plant.crossing import (
+    LOST, NO_CROSSING, RISING, ROUNDING, WATCH, bounds, first_crossing,
+)  # fmt: skip
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
-    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, STOP, SWITCH, SWITCHED, UNSOLVED, UPPER,
+    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, RELEASE, STOP, SWITCH, SWITCHED, UNSOLVED, UPPER,
     Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
+from softstart.plant.terms import MAX_STEPS
 
 
 @inlined
@@ -68,9 +71,11 @@ def begin_span(p: Plant, x: State, m: Motion) -> Septuple:
     m.passing = math.nan
     side = x.side
     stuck = x.load == 0.0
-    a = ua * p.inv_J1
-    b = ub * p.inv_J1
-    e = ue * p.inv_J1
+    held = x.held != 0.0
+    inv_J1 = 0.0 if held else p.inv_J1  # a motor that is held moves as one of infinite inertia
+    a = ua * inv_J1
+    b = ub * inv_J1
+    e = ue * inv_J1
     friction = x.load * p.Mc
     if not stuck:
         a += friction * p.inv_J2
@@ -85,20 +90,29 @@ def begin_span(p: Plant, x: State, m: Motion) -> Septuple:
             k *= 2.0
             dd = 0.0
         w0sq, w0, inverse_w0sq = p.w0sq_slip, p.w0_slip, p.inv_w0sq
-        inverse_inertia = p.inv_J1 + p.inv_J2
-        if stuck or x.doubled != 0.0:
+        inverse_inertia = inv_J1 + p.inv_J2
+        if stuck or held or x.doubled != 0.0:
             if stuck:
-                inverse_inertia = p.inv_J1
+                inverse_inertia = inv_J1
             w0sq = k * inverse_inertia
             w0 = math.sqrt(w0sq)
-            inverse_w0sq = 1.0 / w0sq
-        if dd == 0.0 and ub == 0.0 and ue == 0.0:
+            inverse_w0sq = 1.0 / w0sq if w0sq > 0.0 else 0.0
+        if dd == 0.0 and ub == 0.0 and ue == 0.0 and not held:
             m.steady = 1.0
         z0 = side * x.theta - 0.5 * p.gap
         zeta = 0.5 * dd * inverse_inertia
-        prepare(m, z0, side * x.v, k, dd, w0sq, w0, inverse_w0sq, zeta, side * a, side * b, side * e, rate)
+        if w0sq > 0.0:
+            prepare(
+                m, z0, side * x.v, k, dd, w0sq, w0, inverse_w0sq, zeta, side * a, side * b, side * e, rate
+            )
+        else:  # motor held and load stuck: the twist stays as it is
+            prepare(m, z0, side * x.v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rate)
+            m.k = k
+            m.dd = dd
     if stuck:
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if held:
+        return (x.w2, 0.0, 0.0, 0.0, side, side * p.inv_J2, -friction * p.inv_J2)
     inverse = p.inv_J
     return (
         x.w2, (ua - friction) * inverse, ub * inverse, ue * inverse,
@@ -259,8 +273,60 @@ def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: f
 
 
 @inlined
+def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
+    """When the motor torque, rising, meets the shaft torque of a motor that is held, if before `end`.
+
+    The first zero of T - u > 0, by the parabolas of `crossing`: |u''| is at most |ue|/lag^2.
+    """
+    side = x.side
+    s = 0.0
+    rate = 1.0 / p.lag if p.lag > 0.0 else 0.0
+    for _ in range(MAX_STEPS):
+        z, v = motion(m, s)
+        a, _, _ = derivatives(m, s, z, v, 0.0)
+        rest = m.ue * math.exp(-rate * s)
+        f, slope, most = -(m.ua + m.ub * s + rest), rate * rest - m.ub, abs(rest) * rate * rate
+        scale = abs(m.ua) + abs(m.ub * s) + abs(rest)
+        if side != 0.0:
+            _, b2, b3, _, _ = bounds(m, s, end, z, v, 0.0)
+            f += side * (m.k * z + m.dd * v)
+            slope += side * (m.k * v + m.dd * a)
+            most += m.k * b2 + m.dd * b3
+            scale += abs(m.k * z) + abs(m.dd * v)
+        if f <= ROUNDING * scale:
+            return s
+        root = math.sqrt(slope * slope + 2.0 * most * f)
+        if slope < 0.0:
+            step = 2.0 * f / (root - slope)
+        elif most > 0.0:
+            step = (root + slope) / most
+        else:
+            return NO_CROSSING
+        if s + step >= end:
+            return NO_CROSSING
+        if s + step <= s:
+            return s
+        s += step
+    return LOST
+
+
+@inlined
 def next_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The event that ends this span and when, at most `horizon` from now."""
+    event, s = event_of_the_shaft(p, x, m, load, horizon)
+    if x.held != 0.0 and p.release_at == math.inf and event != UNSOLVED:
+        at = release_event(p, x, m, s)
+        if at < -1.0:
+            return UNSOLVED, 0.0
+        if at >= 0.0:
+            m.last_v = math.nan
+            return RELEASE, at
+    return event, s
+
+
+@inlined
+def event_of_the_shaft(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
+    """The earliest event of flanks and load."""
     if x.side == 0.0:
         event, s = flank_event(p, x, m, load, horizon)
         other, at = load_event_open(p, x, load)

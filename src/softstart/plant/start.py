@@ -43,6 +43,8 @@ def first_state(p: Plant, x: State, until: float, events: Matrix) -> None:
     x.w2 = p.w2_0
     x.t_end = until
     x.start_time = math.nan
+    x.release_time = math.nan
+    x.held = 1.0 if p.release_at > 0.0 else 0.0
     x.first_contact = math.nan
     x.stage_2_end = math.nan
     x.impact_speed = math.nan
@@ -174,6 +176,7 @@ def _starts(  # type: ignore[no-untyped-def]
             for j in range(N_X):
                 x[j] = 0.0
             motion.memo_v = math.nan
+            motion.by_terms = 0.0
             motion.pending = 0.0
             first_state(plant, now, until[i if until.shape[0] > 1 else 0], events)
             now.ask_on_gap = 1.0 if on_gap else 0.0

@@ -29,7 +29,7 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     """One row of p for each start of the drive (one row for a scalar drive).
 
     Without `time_limit` a start that never reaches its target speed is given up after a hundred times
-    the duration of a stiff drive's start plus a hundred elastic periods.
+    the duration of a stiff drive's start plus a hundred elastic periods, counted from a brake's release.
     """
     shape = drive.shape
     count = math.prod(shape)
@@ -54,7 +54,8 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     p["encoder_phase"] = column(drive.encoder_phase)
     p["torque_noise"], p["noise_seed"] = column(drive.torque_noise), column(drive.noise_seed)
     p["dead_time"] = column(drive.computing_delay)
-    p["theta_0"] = column(drive.start_position)
+    p["theta_0"] = column(drive.theta0)
+    p["release_at"] = column(drive.release_time)
     p["w1_0"] = column(drive.initial_motor_speed)
     p["w2_0"] = column(drive.initial_load_speed)
     w0sq = c * (1.0 / J1 + 1.0 / J2)
@@ -63,7 +64,8 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     lag = column(drive.torque_lag)
     p["lag"] = np.where(lag > 1e-12 * p["period"], lag, 0.0)
     stiff = (J1 + J2) * (target + np.abs(p["w2_0"]) + np.abs(p["w1_0"])) / (Ms - Mc)
-    p["time_limit"] = 100.0 * (stiff + p["period"]) if time_limit is None else time_limit
+    held = np.where(p["release_at"] < math.inf, p["release_at"], 0.0)
+    p["time_limit"] = 100.0 * (stiff + p["period"]) + held if time_limit is None else time_limit
     p["event_cap"] = max_events
     p["inv_J1"], p["inv_J2"], p["inv_J"] = 1.0 / J1, 1.0 / J2, 1.0 / (J1 + J2)
     p["w0sq_slip"], p["inv_w0sq"], p["w0_slip"] = w0sq, 1.0 / w0sq, np.sqrt(w0sq)

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from softstart.controller.base import label_of
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
-from softstart.reporting.strategies import Means, label_of, means_of
+from softstart.reporting.strategies import Means, means_of
 from softstart.start.comparison import REFERENCE, Row
 from softstart.views.printed import digits, fixed, percent, short
 

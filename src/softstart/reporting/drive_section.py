@@ -8,12 +8,13 @@ the starting torque, Ms/c, and the gap, from a least length on that their labels
 from __future__ import annotations
 
 import math
-from html import escape
+from functools import partial
 
 from softstart.drive import PARAMETERS, Drive
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.resolution import rated_torque
 from softstart.start import metrics
+from softstart.views import chain_schemes
 from softstart.views.printed import MINUS, RPM, digits, short, unit
 
 HIDDEN = ("name", "source", "noise_seed", "encoder_phase")
@@ -24,6 +25,9 @@ _LETTER = 0.62  # of the size of a font: width of a letter, amply
 _APART = 22.0  # px between labels
 _INK, _GREY, _ORANGE, _BLUE = "#222222", "#666666", "#B34D00", "#00598C"
 _FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
+_text = partial(chain_schemes.text, size=14, colour=_INK)
+_line = partial(chain_schemes.line, colour=_INK, width=2)
+_polyline = partial(chain_schemes.polyline, colour=_INK, width=2)
 
 
 def drive_section(drive: Drive, figures: Figures) -> Html:
@@ -54,7 +58,9 @@ def _data(drive: Drive) -> Html:
             continue
         text = short(value) if isinstance(value, float) else str(value)
         other = ""
-        if parameter.unit == "rad/s":
+        if isinstance(value, str):
+            pass
+        elif parameter.unit == "rad/s":
             other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif parameter.unit == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
@@ -63,7 +69,7 @@ def _data(drive: Drive) -> Html:
                 parameter.meaning,
                 parameter.symbol,
                 text,
-                unit(parameter.unit).replace(" ", "\N{NO-BREAK SPACE}"),
+                "" if isinstance(value, str) else unit(parameter.unit).replace(" ", "\N{NO-BREAK SPACE}"),
                 other,
             ]
         )
@@ -115,10 +121,10 @@ def scheme(drive: Drive, prefix: str) -> Html:
     if gap > 0.0:
         label = f"gap {gap:.4g} rad".replace("-", MINUS)
         room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
-        parts += _claw(x, room, opening, float(drive.start_position) / gap, label)
+        parts += _claw(x, room, opening, float(drive.assumed.theta0) / gap, label)
         x += room
     else:
-        parts.append(_line(x, x + 60.0))
+        parts.append(_line(x, _AXIS, x + 60.0, _AXIS))
         parts.append(_text(x + 30.0, _AXIS - 14.0, "no gap"))
         x += 60.0
     parts += _disc(x, high2, "#E3EFE0", "J2", "load", f"{short(J2)} kg m²")
@@ -166,7 +172,7 @@ def _shaft(x: float, length: float, coil: float, c: float, damper: str) -> list[
             _polyline([(left, _AXIS), (left, low), (middle - 6.0, low)]),
             _polyline([(middle + 14.0, low - 12.0), (middle - 14.0, low - 12.0), (middle - 14.0, low + 12.0),
                        (middle + 14.0, low + 12.0)]),
-            _bar(middle - 6.0, low - 9.0, low + 9.0, 4),
+            _line(middle - 6.0, low - 9.0, middle - 6.0, low + 9.0, width=4),
             _polyline([(middle - 6.0, low), (right, low), (right, _AXIS)]),
             _text(middle, low + 32.0, damper),
         ]  # fmt: skip
@@ -181,16 +187,13 @@ def _claw(start: float, room: float, opening: float, place: float, label: str) -
     top, flank = _AXIS - 44.0, _AXIS + 34.0
     return [
         _polyline([(start + room, _AXIS), (right, _AXIS)]),
-        _polyline(
-            [(right, flank), (right, top), (left, top), (left, flank)], broken=(_AXIS - 10.0, _AXIS + 10.0)
-        ),
-        _line(start - 24.0, middle),
-        _bar(middle, _AXIS - 28.0, _AXIS + 28.0, 6),
-        f'<line x1="{left:.1f}" y1="{flank + 14}" x2="{right:.1f}" y2="{flank + 14}" stroke="{_GREY}"/>',
-        *(
-            f'<line x1="{at:.1f}" y1="{flank + 6}" x2="{at:.1f}" y2="{flank + 22}" stroke="{_GREY}"/>'
-            for at in (left, right)
-        ),
+        # the left flank leaves room for the shaft that passes it
+        _polyline([(right, flank), (right, top), (left, top), (left, _AXIS - 10.0)]),
+        _polyline([(left, _AXIS + 10.0), (left, flank)]),
+        _line(start - 24.0, _AXIS, middle, _AXIS),
+        _line(middle, _AXIS - 28.0, middle, _AXIS + 28.0, width=6),
+        _line(left, flank + 14.0, right, flank + 14.0, colour=_GREY, width=1),
+        *(_line(at, flank + 6.0, at, flank + 22.0, colour=_GREY, width=1) for at in (left, right)),
         _text(0.5 * (left + right), flank + 40.0, label),
     ]
 
@@ -202,47 +205,17 @@ def _torque(x: float, symbol: str, value: str, colour: str, *, left: bool) -> li
         start, end = end, start
     arc = f"M {x:.1f} {start} A 42 42 0 0 1 {x:.1f} {end}"
     head = [(x + bend * 9.0, end + tip * 6.0), (x, end), (x + bend * -3.0, end + tip * 12.0)]
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in head)
     at = x + bend * 24.0
     return [
         f'<path d="{arc}" fill="none" stroke="{colour}" stroke-width="2.5"/>',
-        f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2.5"/>',
+        _polyline(head, colour=colour, width=2.5),
         _text(at, _AXIS + 5.0, symbol, colour=colour, anchor="end" if left else "start"),
         _text(
-            x + (12.0 if left else 0.0), _AXIS + 62.0, value, 12, colour, anchor="end" if left else "start"
+            x + (12.0 if left else 0.0),
+            _AXIS + 62.0,
+            value,
+            size=12,
+            colour=colour,
+            anchor="end" if left else "start",
         ),
     ]
-
-
-def _line(left: float, right: float) -> str:
-    return (
-        f'<line x1="{left:.1f}" y1="{_AXIS}" x2="{right:.1f}" y2="{_AXIS}" stroke="{_INK}" stroke-width="2"/>'
-    )
-
-
-def _bar(x: float, top: float, bottom: float, width: int) -> str:
-    ends = f'x1="{x:.1f}" y1="{top}" x2="{x:.1f}" y2="{bottom}"'
-    return f'<line {ends} stroke="{_INK}" stroke-width="{width}"/>'
-
-
-def _polyline(points: list[tuple[float, float]], broken: tuple[float, float] | None = None) -> str:
-    """A line through points; `broken`: its last piece leaves out these heights, where another part passes."""
-    runs = [points]
-    if broken is not None:
-        (x, y0), (_, y1) = points[-2:]
-        runs = [[*points[:-1], (x, broken[0])], [(x, broken[1]), (x, y1)]]
-        assert y0 < broken[0] < broken[1] < y1
-    return "".join(
-        f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in run)}" fill="none" stroke="{_INK}" '
-        'stroke-width="2"/>'
-        for run in runs
-    )
-
-
-def _text(
-    x: float, y: float, label_text: str, size: int = 14, colour: str = _INK, *, anchor: str = "middle"
-) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}" fill="{colour}">'
-        f"{escape(label_text)}</text>"
-    )

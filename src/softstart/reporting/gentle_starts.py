@@ -14,6 +14,7 @@ from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase
+from softstart.optimal.robust.guesses import crossing_time, offspring
 from softstart.start.simulation import simulate
 
 SEED = 0  # the same question has the same answer
@@ -89,9 +90,7 @@ class _Search:
         self.until = until
         self.low, self.high = float(drive.minimum_torque), float(min(drive.Ms, drive.maximum_torque))
         self.period = float(drive.elastic_period)
-        travel = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
-        late = float(drive.torque_lag) + self.high / float(drive.torque_rate)
-        self.crossing = math.sqrt(2.0 * travel * float(drive.J1) / self.high) + late  # of the gap, s
+        self.crossing = crossing_time(drive, self.high)
         self.evaluator = Evaluator([drive], longest)
         # a stand-in whose levels and edges can be told from each other
         self.parameters = ProfileParameters(self.staircase(np.full(N_NUMBERS, 0.55)), drive)
@@ -119,7 +118,7 @@ class _Search:
             last = last if since else float(costs.min())
             if self.over or since > STALLED:
                 break
-            tried = self._offspring(here, costs)
+            tried = offspring(self.random, here, costs)
             new = self._cost(*self._figures(tried), start_time)
             gain = new < costs
             here[gain], costs[gain] = tried[gain], new[gain]
@@ -148,20 +147,6 @@ class _Search:
         )
         hold = self.high * np.clip(0.25 + 0.8 * numbers[:, HOLD], 0.0, 1.0)
         return np.column_stack([full, level, full, again, hold, edges])
-
-    def _offspring(self, here: Matrix, costs: Vector) -> Matrix:
-        """One new member for each."""
-        random, count = self.random, here.shape[0]
-        first, second = random.integers(count, size=(2, count))
-        better = np.argsort(costs)[random.integers(max(count // 8, 2), size=count)]
-        weight = random.uniform(0.4, 0.9, (count, 1))
-        tried = here + weight * (here[better] - here) + weight * (here[first] - here[second])
-        keep = random.random(tried.shape) > 0.7
-        keep[np.arange(count), random.integers(N_NUMBERS, size=count)] = False
-        tried = np.where(keep, here, tried)
-        outside = (tried < 0.0) | (tried > 1.0)
-        made: Matrix = np.where(outside, random.random(tried.shape), tried)
-        return made
 
     def _figures(self, numbers: Matrix) -> tuple[Vector, Vector]:
         """Peak (N m, inf where the start was given up) and start time (s, NaN where there is none)."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
@@ -25,9 +26,9 @@ from softstart.processes import Tell as WorkerTell
 from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
-from softstart.reporting.strategies import GREY, SMALL, WIDE, label_of, name_in_figure, ordered
+from softstart.reporting.strategies import GREY, SMALL, WIDE, name_in_figure, ordered
 from softstart.start.comparison import REFERENCE, Row
-from softstart.views.drawing import COLOURS, DASHES, drawing, name_points, new_figure
+from softstart.views.drawing import COLOURS, DASHES, MARKERS, drawing, name_points, new_figure, plain_ticks
 from softstart.views.printed import digits, fixed, listed, percent, short
 
 if TYPE_CHECKING:
@@ -418,7 +419,7 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
             )  # fmt: skip
         for index, one in enumerate(placed):
             best = one is choice.recommended or one is choice.ordinary
-            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], "osD^vPX*"[index % 8],
+            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], MARKERS[index % 8],
                       ms=8 if best else 6.5, mfc=COLOURS[(index + 1) % 8] if best else "white", mew=1.6,
                       color=COLOURS[(index + 1) % 8], zorder=4)  # fmt: skip
         axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
@@ -449,7 +450,5 @@ def _within(limit: Limit, left: float, right: float, most: float) -> tuple[Any, 
 
 def _logarithmic(axes: Axes, low: float, high: float) -> None:
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
-    axes.yaxis.set_major_formatter(ticker.FuncFormatter(lambda k, _: f"{k:g}"))
-    axes.yaxis.set_minor_locator(ticker.NullLocator())
+    plain_ticks(axes.yaxis, ticker.LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
     axes.set_ylim(0.8 * low, 1.2 * high)

@@ -114,11 +114,13 @@ class Resolution:
 
 
 def rated_torque(drive: Drive) -> tuple[float, str]:
-    """What 100 % means, N m, and what that is: rated power/rated speed, else the starting torque.
+    """What 100 % means, N m, and what that is: the rated torque or power/speed, else the starting torque.
 
     >>> round(rated_torque(Drive.load("crane-4amtkf"))[0], 2)
     23.87
     """
+    if drive.rated_torque is not None:
+        return float(drive.rated_torque), "rated torque"
     if drive.rated_power is not None and drive.rated_speed is not None:
         return float(drive.rated_power / drive.rated_speed), "rated torque"
     return float(drive.Ms), "starting torque"

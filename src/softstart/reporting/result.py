@@ -14,6 +14,7 @@ from typing import Any
 
 from softstart import __version__
 from softstart.controller import Controller, make_controller
+from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
@@ -23,7 +24,6 @@ from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import Sheet, make_sheet
-from softstart.reporting.strategies import label_of
 from softstart.start.comparison import REFERENCE, Comparison, Row, compared, make_controllers
 from softstart.start.simulation import simulate
 

@@ -17,7 +17,7 @@ from softstart.reporting.markup import Figures, Html, html, tag
 from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
-from softstart.views.drawing import drawing, new_figure
+from softstart.views.drawing import drawing, new_figure, plain_ticks
 from softstart.views.printed import digits, fixed, short
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     """The map of a controller that was set up for `drive`."""
     gaps, inertias = axes_of(drive)
     shape = len(gaps), len(inertias)
-    many = drive.replace(gap=np.array(gaps)[:, None], load_inertia=np.array(inertias)[None, :])
+    many = drive.with_gap(np.array(gaps)[:, None], load_inertia=np.array(inertias)[None, :])
     notes = array_starts(many, controller, fitted_to=drive)
     found = figures(notes, metrics.base_torque(drive))
     time = np.asarray(found["start_time"][0], dtype=np.float64).reshape(shape)
@@ -192,9 +192,7 @@ def _worst(one: RobustnessMap) -> str:
 
 def _plain_ticks(bar: Any, low: float, high: float) -> None:
     ticks = [float(f"{v:.2g}") for v in np.geomspace(low, high, 6)]
-    bar.ax.yaxis.set_major_locator(ticker.FixedLocator([v for v in ticks if low <= v <= high]))
-    bar.ax.yaxis.set_minor_locator(ticker.NullLocator())
-    bar.ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    plain_ticks(bar.ax.yaxis, ticker.FixedLocator([v for v in ticks if low <= v <= high]))
     bar.ax.tick_params(labelsize=SMALL - 0.5)
 
 

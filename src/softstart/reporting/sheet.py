@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from softstart.controller import CompiledController, Controller
+from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
-from softstart.reporting.strategies import ORDINARY, kind_of, label_of
+from softstart.reporting.strategies import ORDINARY, kind_of
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.run import Run

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.controller import Controller, Sensor
+from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.start import metrics
@@ -58,11 +59,6 @@ def kind_of(controller: Controller) -> str:
     """The name of the strategy behind a controller, tuned or not."""
     inner = getattr(controller, "controller", controller)
     return str(type(inner).name or type(inner).__name__)
-
-
-def label_of(controller: Controller) -> str:
-    """The name under which a controller stands in tables."""
-    return controller.name or type(controller).__name__
 
 
 def means_of(controller: Controller) -> Means:

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart import stages
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.plant import layout as at
@@ -65,10 +65,7 @@ def simulate_many(
     listed = list(drives) if isinstance(drives, Sequence) else []
     if not listed or not all(isinstance(drive, Drive) and drive.shape == () for drive in listed):
         raise InputError("drive: give one Drive, a Drive with array fields, or a list of Drives, not empty.")
-    rows = []
-    for drive in listed:
-        ready, own = controller.set_up(fitted_to or drive)
-        rows.append(_starts(ready, own, plant_vector(drive, time_limit, max_events), until))
+    rows = [array_starts(drive, controller, until, fitted_to, time_limit, max_events) for drive in listed]
     return _label_list(listed, np.concatenate(rows), until, base)
 
 
@@ -91,6 +88,12 @@ def array_starts(
     >>> notes[:, at.PEAK].round(2).tolist()
     [164.81, 257.18]
     """
+    if len(drive.positions) > 1:
+        told = fitted_to or drive.assumed
+        return worst_of(
+            [array_starts(one, controller, until, told, time_limit, max_events)
+             for one in drive.positions.values()]
+        )  # fmt: skip
     p = plant_vector(drive, time_limit, max_events)
     if not isinstance(controller, PlainController):
         ready, own = controller.set_up(fitted_to or drive)
@@ -103,6 +106,29 @@ def array_starts(
         ready, own = controller.set_up(other or one)
         rows.append(_starts(ready, own, p[i : i + 1], until))
     return np.concatenate(rows)
+
+
+def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
+    """Of the same starts from several positions the worst, figure by figure.
+
+    They are the notes of the position with the largest |T|, or of one whose start could not be finished, with
+    the latest start time, the hardest impact, and the largest |T| of a first contact.
+    """
+    every, rows = np.stack(notes), np.arange(notes[0].shape[0])
+    broken = np.array(
+        [[not status_of(int(s), True, False).finished for s in one[:, at.STATUS]] for one in every]
+    )
+    broken |= every[:, :, at.HELD] != 0.0
+    which = np.argmax(np.where(broken, np.inf, np.abs(every[:, :, at.PEAK])), axis=0)
+    worst: at.Matrix = every[which, rows]
+    worst[:, at.POSITION] = which + 1.0
+    worst[:, at.START_TIME] = np.max(every[:, :, at.START_TIME], axis=0)
+    worst[:, at.IMPACT_SPEED] = np.fmax.reduce(every[:, :, at.IMPACT_SPEED], axis=0)
+    first = np.where(np.isnan(every[:, :, at.STAGE_2_END]), -1.0, np.abs(every[:, :, at.FIRST_PEAK]))
+    hardest = every[np.argmax(first, axis=0), rows]
+    for column in (at.FIRST_PEAK, at.STAGE_2_END):
+        worst[:, column] = hardest[:, column]
+    return worst
 
 
 def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | None) -> at.Matrix:
@@ -149,8 +175,10 @@ def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[s
     could not be finished have NaN.
     """
     reached = ~np.isnan(results[:, at.START_TIME])
-    ended, which = np.unique(2 * results[:, at.STATUS].astype(np.int64) + reached, return_inverse=True)
-    kinds = [status_of(code // 2, bool(code % 2), until is not None) for code in ended.tolist()]
+    held = results[:, at.HELD] != 0.0
+    codes = 4 * results[:, at.STATUS].astype(np.int64) + 2 * held + reached
+    ended, which = np.unique(codes, return_inverse=True)
+    kinds = [status_of(c // 4, bool(c % 2), until is not None, bool(c & 2)) for c in ended.tolist()]
     good = np.array([kind.finished for kind in kinds])[which]
 
     def kept(values: Any) -> Any:
@@ -171,6 +199,11 @@ def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[s
     }
     for name, column, unit, meaning in _COLUMNS:
         found[name] = (kept(results[:, column]), unit, meaning)
+    if not np.all(np.isnan(results[:, at.RELEASE_TIME])):
+        found["release_time"] = (kept(results[:, at.RELEASE_TIME]), "s", "when the brake was released")
+    if np.any(results[:, at.POSITION]):
+        names = np.array(["", *UNKNOWN_POSITIONS])[results[:, at.POSITION].astype(np.int64)]
+        found["position"] = (names, "", "position with the largest |T|, of those that are possible")
     found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return found
 

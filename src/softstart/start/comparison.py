@@ -208,7 +208,7 @@ def k_dyn_worn_gap(
     drive: Drive, controller: Controller, until: float | None = None, fitted_to: Drive | None = None
 ) -> float:
     """K_dyn of a controller set up for `drive` at 4 times its gap; NaN where that start fails."""
-    return _k_dyn_changed(drive, drive.replace(gap=WORN_GAP * drive.gap), controller, until, fitted_to)
+    return _k_dyn_changed(drive, drive.with_gap(WORN_GAP * drive.gap), controller, until, fitted_to)
 
 
 def k_dyn_light_load(

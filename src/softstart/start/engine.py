@@ -99,9 +99,7 @@ def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: flo
             recorder.grow()
         elif reason == at.ASK:
             recorder.measure()
-            torque, ask_again, state, slope = _answer(
-                controller, recorder.measured, state, recorder.x[at.TIME]
-            )
+            torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
             taken: int = kernel.obey(recorder.p, recorder.x, recorder.m, torque, ask_again, slope)
             if taken != at.ASK:
                 return taken
@@ -109,17 +107,18 @@ def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: flo
             return reason
 
 
-def _answer(
-    controller: PlainController, measured: at.Vector, state: tuple[float, ...], time: float
+def plain_answer(
+    controller: PlainController, measured: at.Vector, state: tuple[float, ...]
 ) -> tuple[float, float, tuple[float, ...], float]:
-    """What a plain controller answers at `time`: torque, when to be asked again, its state, slope."""
+    """What a plain controller answers: torque, when to be asked again, its state, slope."""
     try:
         answer = controller.step(Measured(*measured.tolist()), state)
     except (Exception, SystemExit) as error:  # the user's own code may fail in any way
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(
             f"The start was given up: the controller {type(controller).__name__} failed at "
-            f"t = {time:.6g} s in {place.filename}, line {place.lineno} ({type(error).__name__}: {error})."
+            f"t = {measured[kernel.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
+            f"({type(error).__name__}: {error})."
         ) from error
     try:
         slope = float(answer[3]) if len(answer) > 3 else 0.0
@@ -155,7 +154,7 @@ def _time(name: str, value: object, remedy: str) -> float | None:
 
 def ended(x: at.Vector, reason: int, until: float | None, max_events: int, start: str) -> Status:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
-    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None)
+    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None, x[at.HELD] != 0.0)
     if status.finished:
         return status
     remedy = ""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
@@ -31,6 +32,7 @@ EVENT_NAMES = {
     at.LOAD_STARTS: "load starts",
     at.LOAD_STOPS: "load stops",
     at.TARGET_REACHED: "target speed reached",
+    at.RELEASED: "brake released",
 }
 PLOT_POINTS = 1500
 
@@ -216,6 +218,12 @@ class Run(BaseRun):
         Parameters of the drive as the kernel has them, and its state and figures at the end.
     segments, event_rows, stage_rows : array of two dimensions
         Records of the kernel: a row for each span, event and stage.
+    position : str
+        Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
+        with the largest |T|, to which traces, events and stages belong.
+    positions : mapping of str to Run
+        The starts from each position, if it is unknown. Then K_dyn, impact speed, start and settling time are
+        the largest among them.
 
     Examples
     --------
@@ -242,6 +250,7 @@ class Run(BaseRun):
     segments: at.Matrix
     event_rows: at.Matrix
     stage_rows: at.Matrix
+    positions: Mapping[str, Run] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line that says what came out.
@@ -266,14 +275,42 @@ class Run(BaseRun):
         return float(self.final[at.PEAK_TIME])
 
     @property
+    def position(self) -> str:
+        """Where the start begins, of an unknown position the worst for the shaft; "" for an angle."""
+        if self.positions:
+            return max(self.positions, key=lambda name: self.positions[name].peak_torque)
+        return next(iter(self.drive.positions))
+
+    def _worst(self, figure: Callable[[Run], float], worst: Any = np.maximum) -> float:
+        """A figure of this start, or the largest of those from each position."""
+        runs = self.positions.values() or (self,)
+        return float(worst.reduce([figure(run) for run in runs]))
+
+    @property
+    def start_time(self) -> float:
+        """First instant at which the load has its target speed, s; NaN if it never has.
+
+        Counted from the command of the start, so that it includes what the torque takes to release a brake.
+        """
+        return self._worst(lambda run: float(run.final[at.START_TIME]))
+
+    @property
+    def release_time(self) -> float:
+        """When the brake was released, s; NaN without a brake, or if it was not."""
+        return float(self.final[at.RELEASE_TIME])
+
+    @property
     def k_dyn_first_contact(self) -> float:
         """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one.
 
         Where the run ends within stage 2 it is the one so far. A start in contact begins with stage 2.
         """
-        if math.isnan(self.final[at.STAGE_2_END]):
-            return math.nan
-        return float(metrics.k_dyn(self.final[at.FIRST_PEAK], self.base))
+
+        def own(run: Run) -> float:
+            ended = not math.isnan(run.final[at.STAGE_2_END])
+            return float(metrics.k_dyn(run.final[at.FIRST_PEAK], self.base)) if ended else math.nan
+
+        return self._worst(own, np.fmax)
 
     @property
     def first_contact(self) -> float:
@@ -283,7 +320,7 @@ class Run(BaseRun):
     @property
     def impact_speed(self) -> float:
         """Speed at which the flanks first meet, rad/s: dw12 of [G](10)."""
-        return float(self.final[at.IMPACT_SPEED])
+        return self._worst(lambda run: float(run.final[at.IMPACT_SPEED]), np.fmax)
 
     @property
     def torque_at_contact(self) -> float:
@@ -386,7 +423,7 @@ class Run(BaseRun):
         Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
         torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant.
         """
-        return metrics.settling_time(self, band)
+        return self._worst(lambda run: metrics.settling_time(run, band))
 
     @cached_property
     def energy(self) -> metrics.Energy:
@@ -419,4 +456,21 @@ class Run(BaseRun):
             "settling_time": self.settling_time(),
             "energy": asdict(self.energy),
             "end_time": self.end_time,
+            **({} if self.drive.brake == "none" else {"release_time": self.release_time}),
+            **({"positions": self._by_position()} if self.positions else {}),
         }
+
+    def _by_position(self) -> dict[str, Any]:
+        """K_dyn and start time from each position, and which is the worst for the shaft."""
+        each = {
+            name: {"k_dyn": run.k_dyn, "start_time": run.start_time} for name, run in self.positions.items()
+        }
+        return {"worst": self.position, **each}
+
+
+def worst_run(drive: Drive, runs: Mapping[str, Run]) -> Run:
+    """The start of a drive whose position is unknown, from those of each position."""
+    hardest = max(runs.values(), key=lambda run: run.peak_torque)
+    statuses = [run.status for run in runs.values()]
+    status = next((one for one in statuses if one is not Status.REACHED), Status.REACHED)
+    return replace(hardest, drive=drive, status=status, positions=dict(runs))

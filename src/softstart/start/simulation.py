@@ -12,7 +12,7 @@ from softstart.errors import InputError
 from softstart.plant.vector import plant_vector
 from softstart.start.batch import simulate_many
 from softstart.start.engine import MAX_EVENTS, Recorder, check_limits, ended, run_one
-from softstart.start.run import Run
+from softstart.start.run import Run, worst_run
 
 if TYPE_CHECKING:
     import xarray
@@ -56,7 +56,8 @@ def simulate(
     """Simulate the start of a drive under a controller, exactly.
 
     Between two events the motion is a closed form; events are located to machine precision. There is no
-    step size and no output grid.
+    step size and no output grid. A drive whose start position is unknown is started from both flanks and from
+    mid-gap by the same controller, which is not told where; every figure is the worst of the three.
 
     Parameters
     ----------
@@ -114,6 +115,23 @@ def simulate(
         _check_other(name, other, drive)
     if not isinstance(drive, Drive) or drive.shape != ():
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
+    if len(drive.positions) > 1:
+        told, counted = fitted_to or drive.assumed, base or drive
+        return worst_run(
+            drive,
+            {
+                name: simulate(
+                    one,
+                    made,
+                    until,
+                    fitted_to=told,
+                    base=counted,
+                    time_limit=time_limit,
+                    max_events=max_events,
+                )
+                for name, one in drive.positions.items()
+            },
+        )
     fitted, own = made.set_up(fitted_to or drive)
     p = plant_vector(drive, time_limit, max_events)[0]
     recorder = Recorder(p, int(fitted.sensors))

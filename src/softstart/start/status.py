@@ -12,8 +12,8 @@ class Status(Enum):
 
     Attributes
     ----------
-    REACHED, STOPPED_EARLY, NOT_REACHED : the run went to its end and its figures are valid; `finished` is
-        True.
+    REACHED, STOPPED_EARLY, NOT_REACHED, NOT_RELEASED : the run went to its end and its figures are
+        valid; `finished` is True.
     TOO_MANY_EVENTS, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL : the start could not be finished: an
         error for a single start, NaN in every figure in a batch.
 
@@ -22,7 +22,7 @@ class Status(Enum):
     >>> Status.REACHED.value
     'The load reached its target speed.'
     >>> [status.name for status in Status if status.finished]
-    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED']
+    ['REACHED', 'STOPPED_EARLY', 'NOT_REACHED', 'NOT_RELEASED']
 
     References
     ----------
@@ -43,6 +43,10 @@ class Status(Enum):
         "The start was given up: more than 16 answers of the controller are on their way at once; shorten "
         "the drive's computing_delay, or sample less often."
     )
+    NOT_RELEASED = (
+        "The run ended with the motor still held by its brake: the motor torque did not reach the shaft "
+        "torque, or the release time lies later."
+    )
 
     @property
     def finished(self) -> bool:
@@ -50,7 +54,7 @@ class Status(Enum):
         return self in _FINISHED
 
 
-_FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED})
+_FINISHED = frozenset({Status.REACHED, Status.STOPPED_EARLY, Status.NOT_REACHED, Status.NOT_RELEASED})
 _BROKEN = {
     at.EVENT_LIMIT: Status.TOO_MANY_EVENTS,
     at.NOT_LOCATED: Status.NOT_LOCATED,
@@ -60,10 +64,12 @@ _BROKEN = {
 }
 
 
-def status_of(reason: int, reached: bool, asked_for_end: bool) -> Status:
-    """The status from the kernel's reason for coming back."""
+def status_of(reason: int, reached: bool, asked_for_end: bool, held: bool = False) -> Status:
+    """The status from the kernel's reason for coming back; `held` if the brake was not released."""
     if reason in _BROKEN:
         return _BROKEN[reason]
+    if held:
+        return Status.NOT_RELEASED
     if reached:
         return Status.REACHED
     return Status.STOPPED_EARLY if asked_for_end else Status.NOT_REACHED

@@ -48,6 +48,7 @@ def sweep(
     scheduler: str | None = None,
     time_limit: float | None = None,
     progress: Told | None = None,
+    allow_code: bool = False,
 ) -> xarray.Dataset:
     """Simulate every start of a grid; each figure is the same to the bit as that of `simulate`.
 
@@ -84,6 +85,8 @@ def sweep(
         Address of a dask scheduler whose workers compute instead.
     progress : callable, optional
         Called with a `Progress` at the beginning and after each chunk.
+    allow_code : bool
+        Whether a file of tuned gains may name a Python file, which then runs.
 
     Returns
     -------
@@ -112,7 +115,7 @@ def sweep(
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)
-    maker = _maker(controller, parameters)
+    maker = _maker(controller, parameters, allow_code)
     axes = _checked(drive, maker, grid, until, time_limit, fitted_to, base, figures)
     question = Question(
         drive, maker, tuple(dict.fromkeys(figures)), _time(until), fitted_to, base, _time(time_limit)
@@ -185,10 +188,10 @@ def _described(task: Task) -> str:
     return f"chunk {task.number} of the sweep"
 
 
-def _maker(controller: object, parameters: Mapping[str, object] | None) -> Maker:
+def _maker(controller: object, parameters: Mapping[str, object] | None, allow_code: bool) -> Maker:
     given = dict(parameters or {})
     if controller is None:
-        return Maker("", given)
+        return Maker("", given, allow_code)
     if isinstance(controller, Controller):
         if given:
             raise InputError(
@@ -200,7 +203,7 @@ def _maker(controller: object, parameters: Mapping[str, object] | None) -> Maker
             f"controller = {controller!r}: a controller is a name, path/to/file.py:ClassName, or a "
             "Controller object."
         )
-    return Maker(with_whole_path(controller), given)
+    return Maker(with_whole_path(controller), given, allow_code)
 
 
 def _checked(

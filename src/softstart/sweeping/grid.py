@@ -22,7 +22,7 @@ from softstart.sweeping.maker import Maker, Parameters
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"
-_BY_PATH = {p.path: p.name for p in PARAMETERS.values()}
+_BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,8 @@ def _of_drive(key: str, name: str, values: object) -> Column:
         raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
     wording = Wording(written={name: key})
     try:
-        if parameter.choices:
+        words = [value for value in list(values) if isinstance(value, str) and value in parameter.choices]  # type: ignore[call-overload]
+        if parameter.choices and (words or not parameter.unit):
             texts = _texts(key, values)
             for text in texts:
                 try:

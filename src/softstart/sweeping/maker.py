@@ -45,6 +45,7 @@ class Maker:
 
     given: str | Controller = ""
     values: Mapping[str, object] = field(default_factory=dict)
+    allow_code: bool = False  # of files of tuned gains
 
     @property
     def shown(self) -> str:
@@ -57,11 +58,11 @@ class Maker:
         """The controller with further parameters, which may be arrays; `name` where it is from an axis."""
         if isinstance(self.given, Controller):
             return replace(self.given, **more) if more else self.given
-        return make_controller(name or self.given, {**self.values, **more})
+        return make_controller(name or self.given, {**self.values, **more}, allow_code=self.allow_code)
 
     def parameters(self) -> Parameters:
         """Those of its class."""
-        found = _parameters_of(_class_of(self.given), self.shown)
+        found = _parameters_of(self._class_of(self.given), self.shown)
         found.fixed = tuple(self.values)
         return found
 
@@ -71,7 +72,7 @@ class Maker:
         tables = []
         for name in names:
             try:
-                tables.append(_parameters_of(_class_of(name), name))
+                tables.append(_parameters_of(self._class_of(name), name))
             except InputError as error:
                 wrong.extend(error.sentences)
         if wrong:
@@ -89,6 +90,11 @@ class Maker:
         if len(tables) > 1:
             shared.lacking = f"not all of {', '.join(names)} have this parameter"
         return shared
+
+    def _class_of(self, given: str | Controller) -> type[Controller]:
+        if isinstance(given, str) and not given.lower().endswith(GAIN_FILES):
+            return controller_class(given)
+        return type(make_controller(given, allow_code=self.allow_code))
 
     def about(self) -> Any:
         """What it is, as plain data: two makers of the same data make controllers that answer alike."""
@@ -129,12 +135,6 @@ def _split(name: str) -> tuple[Path | None, str]:
         return Path(name), ""
     end = name.index(".py") + 3 if ".py" in name else 0
     return (Path(name[:end]), name[end:]) if end else (None, name)
-
-
-def _class_of(given: str | Controller) -> type[Controller]:
-    if isinstance(given, str) and not given.lower().endswith(GAIN_FILES):
-        return controller_class(given)
-    return type(make_controller(given))
 
 
 def _parameters_of(cls: type[Controller], shown: str) -> Parameters:

@@ -13,6 +13,7 @@ from softstart import __version__
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.start.status import Status
+from softstart.store import fresh_folder
 from softstart.sweeping.grid import Axis, Plan
 from softstart.sweeping.starts import Block, Question, known_figures
 
@@ -145,16 +146,14 @@ def write_netcdf(
     path: Path, results: xarray.Dataset, plan: Plan, axes: tuple[Axis, ...], question: Question
 ) -> None:
     """Write the results; the memory needed is that of one chunk of one variable."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        _write(beside, results, plan, axes, question)
-        beside.replace(path)
+        with fresh_folder(path.parent) as stage:
+            _write(stage / path.name, results, plan, axes, question)
+            (stage / path.name).replace(path)
     except OSError as error:
         raise InputError(
             f"netcdf = {path}: the file could not be written ({error.strerror or error}); give another one."
         ) from None
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def _write(

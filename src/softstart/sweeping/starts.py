@@ -33,7 +33,9 @@ def known_figures() -> dict[str, tuple[str, str]]:
     >>> known_figures()["start_time"]
     ('s', 'first instant at which the load has its target speed')
     """
-    found = figures(np.zeros((1, at.N_X)), 1.0)
+    notes = np.zeros((1, at.N_X))
+    notes[:, at.RELEASE_TIME] = np.nan
+    found = figures(notes, 1.0)
     return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
 
 
@@ -88,7 +90,8 @@ def compute(task: Task) -> Block:
             parameters[column.field] = values
         else:
             controller = values
-    drive = question.drive.replace(**changes)
+    swept = any(column.field == "gap" for axis in task.axes for column in axis.columns)
+    drive = question.drive.with_gap(**changes) if swept else question.drive.replace(**changes)
     notes = _notes(question, drive, parameters, controller)
     base = np.broadcast_to(metrics.base_torque(question.base or drive), (count,))
     found = figures(notes, base, question.until)

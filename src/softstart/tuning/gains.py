@@ -25,7 +25,7 @@ from softstart.tuning.work import (
     set_values,
 )
 
-STARTS_A_CALL, LARGEST_BLOCK = 600, 12
+STARTS_A_CALL, LARGEST_BLOCK = 600, 12  # handed to a worker at a time; the answer does not depend on it
 TURNS = 3  # times that each cell asks its neighbours
 SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
@@ -155,7 +155,6 @@ def _settled(workers: Workers, places: Vector, restart_costs: Vector) -> Schedul
 
 
 WIDER = 2  # times the population of a cell: a worst case over many starts is rougher than one start
-STARTS_A_CALL = 600  # handed to a worker at a time, whatever their number: the answer does not depend on it
 
 
 @dataclass(frozen=True, eq=False)

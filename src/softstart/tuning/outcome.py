@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from softstart import __version__
+from softstart.arrays import plain_fields
 from softstart.controller.tuned import (
     Gain,
     GainSchedule,
@@ -69,20 +70,8 @@ class RobustSet:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
-        return {
-            "parameters": self.parameters,
-            "gains": self.gains,
-            "defaults": self.defaults,
-            "worst": self.worst,
-            "worst_default": self.worst_default,
-            "feasible": self.feasible,
-            "excess": self.excess,
-            "agreement": self.agreement,
-            "restarts": self.restarts,
-            "spread": self.spread,
-            "kept_default": self.kept_default,
-            "cells": table_of(self.cells),
-        }
+        found = plain_fields(self, "excess_default", "cells", "controller")
+        return {**found, "feasible": self.feasible, "cells": table_of(self.cells)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
@@ -15,12 +14,14 @@ import numpy as np
 
 from softstart import __version__
 from softstart.controller import Controller, make_controller
+from softstart.controller.base import label_of
 from softstart.controller.tuned import Tuned
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
+from softstart.optimal.problem import StartTime
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import nearest, to_si
-from softstart.tuning.ranges import Range, check_number
+from softstart.tuning.ranges import Range, latin
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
 
@@ -48,20 +49,8 @@ def bound_of(start_time: object) -> Bound:
     """
     if start_time is None:
         return Bound("defaults")
-    meaning = 'a time above 0 s, as 0.3 or "300 ms", or a multiple of the start time of direct, as "1.2x"'
-    kind: Literal["direct", "seconds"] = "seconds"
-    value: object = start_time
-    if isinstance(start_time, str):
-        multiple = re.fullmatch(r"\s*(.*?)\s*[xX]\s*", start_time)
-        kind = "direct" if multiple else "seconds"
-        text = multiple[1] if multiple else start_time
-        try:
-            value = to_si(text, "1" if multiple else "s", name="start_time")
-        except InputError:
-            raise InputError(f'start_time = "{start_time}": give {meaning}.') from None
-        if not float(value) > 0.0:
-            raise InputError(f'start_time = "{start_time}": give {meaning}.')
-    return Bound(kind, check_number("start_time", value, 0.0, math.inf, meaning))
+    asked = StartTime.of(start_time)
+    return Bound("direct" if asked.multiple else "seconds", asked.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +90,7 @@ class Question:
     def drive_of(self, cell: int) -> Drive:
         """The drive of a cell, as it is."""
         gap, inertia = self.cells[cell]
-        return self.drive.replace(gap=gap, load_inertia=inertia)
+        return self.drive.with_gap(gap, load_inertia=inertia)
 
     def neighbours(self, cell: int) -> tuple[int, ...]:
         """The cells beside a cell on the grid."""
@@ -164,8 +153,7 @@ class Recipe:
     @property
     def label(self) -> str:
         """How the controller is called."""
-        made = self.make()
-        return made.name or type(made).__name__
+        return label_of(self.make())
 
 
 def recipe_of(controller: str | Controller, parameters: Mapping[str, object] | None = None) -> Recipe:
@@ -342,10 +330,8 @@ def _levels(name: str, given: Any) -> list[Level]:
 def _sampled(levels: dict[str, list[Level]], seed: int, count: int) -> list[Scenario]:
     """A Latin hypercube between the levels of each parameter; lists of values are drawn from."""
     rng = np.random.default_rng([seed, 1])
-    strata = rng.permuted(np.tile(np.arange(count), (len(levels), 1)), axis=1).T
-    points = (strata + rng.random(strata.shape)) / count
     found = []
-    for point in points:
+    for point in latin(rng, count, len(levels)):
         scenario = {}
         for (name, ends), share in zip(levels.items(), point, strict=True):
             if ends[0].factor == 0.0:

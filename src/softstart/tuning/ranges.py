@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.controller import Controller
+from softstart.controller.base import Controller, label_of
 from softstart.errors import InputError
 from softstart.quantities import nearest, to_si
 
@@ -106,7 +106,7 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     >>> [one.text() for one in ranges_of(make_controller("ramp"), {"time": ("50 ms", "0.3 s")})]
     ['0.05 to 0.3 s']
     """
-    what = controller.name or type(controller).__name__
+    what = label_of(controller)
     known = {f.name: f for f in fields(controller)}
     if free is None:
         given = {f.name for f in fields(controller) if getattr(controller, f.name) is not None}
@@ -208,3 +208,10 @@ def check_number(name: str, value: object, low: float, high: float, meaning: str
         if math.isfinite(number) and low < number <= high:
             return number
     raise InputError(f"{name} = {value!r}: give {meaning}.")
+
+
+def latin(rng: np.random.Generator, count: int, size: int) -> Vector:
+    """A Latin hypercube in the unit box: each place, one a row, in a stratum of its own along every axis."""
+    strata = rng.permuted(np.tile(np.arange(count), (size, 1)), axis=1).T
+    places: Vector = (strata + rng.random(strata.shape)) / count
+    return places

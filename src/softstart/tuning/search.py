@@ -15,11 +15,13 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from softstart.arrays import Vector
+from softstart.tuning.ranges import latin
 
 Cost = Callable[[Vector], Vector]  # places, one a row, to their costs
 
 CONVERGED = 1e-4  # standard deviation of the population's costs, over their mean
 FIRST_STEP, LAST_STEP = 0.08, 2e-4
+AGREES = 0.01  # of the best: within this share of it searches agree
 POLLS = 1.5  # of the polish, at most, for each generation of the search
 
 
@@ -31,9 +33,7 @@ class Found(NamedTuple):
     tried: int
 
 
-def search(
-    cost: Cost, seeds: Any, random: tuple[int, ...], population: int, generations: int, polished: bool = True
-) -> Found:
+def search(cost: Cost, seeds: Any, random: tuple[int, ...], population: int, generations: int) -> Found:
     """The least cost in the unit box, by scipy's differential evolution over whole generations at a time.
 
     `seeds` (one a row) belong to the first population, the others fill the box as a Latin hypercube; `random`
@@ -48,7 +48,7 @@ def search(
     size = first.shape[1]
     # at least as many fresh places as seeds, however many seeds there are
     fresh = max(population - len(first), population // 2, 5)
-    start = np.concatenate([first, _latin(rng, fresh, size)])
+    start = np.concatenate([first, latin(rng, fresh, size)])
     best = Found(first[0], np.inf, 0)
 
     def costs(columns: Vector) -> Vector:
@@ -68,8 +68,6 @@ def search(
         costs, [(0.0, 1.0)] * size, init=start, maxiter=generations, tol=CONVERGED, seed=rng,
         polish=False, vectorized=True, updating="deferred",
     )  # fmt: skip
-    if not polished:
-        return best
     after = polish(cost, best.place, best.cost, (*random, 1), generations)
     return after._replace(tried=best.tried + after.tried)
 
@@ -108,14 +106,7 @@ def polish(
     return Found(place, known, tried)
 
 
-def _latin(rng: np.random.Generator, count: int, size: int) -> Vector:
-    """Latin hypercube: each place in a row and a column of its own."""
-    strata = rng.permuted(np.tile(np.arange(count), (size, 1)), axis=1).T
-    latin: Vector = (strata + rng.random(strata.shape)) / count
-    return latin
-
-
-def agreement(costs: Any, best: float, within: float = 0.01) -> tuple[int, float]:
+def agreement(costs: Any, best: float) -> tuple[int, float]:
     """How many of several searches came within 1 % of the best, and how far apart they are over the best.
 
     >>> agreement([1.0, 1.005, 1.2], 1.0)
@@ -123,7 +114,7 @@ def agreement(costs: Any, best: float, within: float = 0.01) -> tuple[int, float
     """
     values = np.asarray(costs, dtype=np.float64)
     scale = abs(best) or 1.0
-    near = int(np.sum(values <= best + within * scale))
+    near = int(np.sum(values <= best + AGREES * scale))
     return near, float(f"{(values.max() - min(best, values.min())) / scale:.12g}")
 
 

@@ -68,7 +68,7 @@ class Trials:
         self.fields = self._fields()
         bases = [metrics.base_torque(question.base or question.drive_of(i)) for i in range(len(gaps))]
         self.base_torque = np.array(bases, dtype=np.float64)
-        self.own_defaults = self._defaults(question.drive.replace(gap=gaps, load_inertia=inertias), len(gaps))
+        self.own_defaults = self._defaults(question.drive.with_gap(gaps, load_inertia=inertias), len(gaps))
         self.nominal_defaults = {
             name: float(value[0]) for name, value in self._defaults(question.drive, 1).items()
         }
@@ -143,12 +143,12 @@ class Trials:
         judged = self._judged(values, which, own=True)
         return Judged(judged.metric[:, 0], judged.start_time[:, 0])
 
-    def of_set(self, values: Values, count: int = 1) -> Judged:
+    def of_set(self, values: Values) -> Judged:
         """Candidates for all cells, set up for the nominal drive. Axes: candidate, cell, scenario.
 
-        `count` is their number where there are no values, that is, for the defaults.
+        Without values it is one, the defaults.
         """
-        count = max((np.size(value) for value in values.values()), default=count)
+        count = max((np.size(value) for value in values.values()), default=1)
         return self._judged(values, np.tile(np.arange(self.gap.size), (count, 1)), own=False)
 
     def _judged(self, values: Values, which: Cells, own: bool) -> Judged:
@@ -205,7 +205,7 @@ class Trials:
         gap, inertia = self.gap[which[:, 0]], self.load_inertia[which[:, 0]]
         if not own:
             gap, inertia = np.full_like(gap, drive.gap), np.full_like(inertia, drive.load_inertia)
-        return drive.replace(gap=gap, load_inertia=inertia)
+        return drive.with_gap(gap, load_inertia=inertia)
 
     def _starting(self, which: Cells) -> Drive:
         """The drives that start."""
@@ -256,7 +256,7 @@ def _candidate() -> Iterator[None]:
 
 
 def _changed(drive: Drive, fields: Mapping[str, Any]) -> Drive:
-    return drive.replace(**fields)
+    return drive.with_gap(**fields) if "gap" in fields else drive.replace(**fields)
 
 
 def single(controller: Controller, values: Values) -> Controller:

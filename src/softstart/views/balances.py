@@ -10,7 +10,17 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.balancing.gas import MeasuredCycle
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.views.drawing import COLOURS, DASHES, GREY, SMALL, drawing, new_figure
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    SMALL,
+    drawing,
+    entitle,
+    head,
+    legend_above,
+    new_figure,
+)
 from softstart.views.numbers import NOTHING, Table, column_of, number, printable, short
 
 if TYPE_CHECKING:
@@ -196,10 +206,6 @@ def _title(found: Balance, what: str) -> str:
     return f"{found.engine.name}: {what}{assumed}"
 
 
-def _below(axes: Axes, columns: int) -> None:
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1)
-
-
 def torque_figure(found: Balance) -> Any:
     """Torque over the crank angle at the tuning speed with its first order, and the orders as bars."""
     engine, w = found.engine, found.tuning_speed
@@ -217,13 +223,11 @@ def torque_figure(found: Balance) -> Any:
         torque.plot(degrees, wave, color=COLOURS[6], ls=DASHES[3], lw=1.8, label="mean and first order")
         torque.set_xticks(np.arange(0.0, 721.0, 90.0))
         torque.set_xlim(0.0, 720.0)
-        torque.set_xlabel("crank angle, deg")
-        torque.set_ylabel("torque on the crank, N m")
-        torque.set_title(f"mean {mean:.1f} N m", loc="left", fontsize=SMALL)
-        _below(torque, 4)
+        head(torque, f"mean {mean:.1f} N m", "torque on the crank, N m", "crank angle, deg")
+        legend_above(torque, 4)
         _bars(bars, found)
         what = f"reaction torque at {w / RPM:.0f} rpm, load {found.load:g}"
-        figure.suptitle(_title(found, what), x=0.01, ha="left", fontsize=11)
+        entitle(figure, _title(found, what))
     return figure
 
 
@@ -257,7 +261,7 @@ def _bars(axes: Axes, found: Balance) -> None:
     axes.set_xlabel("order of the crank speed")
     axes.set_ylabel("amplitude, N m")
     axes.grid(False, axis="x")
-    _below(axes, 3)
+    legend_above(axes, 3)
 
 
 def residual_figure(found: Balance) -> Any:
@@ -280,7 +284,7 @@ def residual_figure(found: Balance) -> Any:
             axes.axvline(found.tuning_speed / RPM, color=GREY, lw=0.9, ls=":")
         force.set_xlabel("crank speed, rpm     (dotted: tuning speed)")
         force.set_xlim(rpm[0], rpm[-1])
-        figure.suptitle(_title(found, f"what is left, load {found.load:g}"), x=0.01, ha="left", fontsize=11)
+        entitle(figure, _title(found, f"what is left, load {found.load:g}"))
         handles, labels = moment.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
@@ -300,7 +304,7 @@ def _arms(axes: Axes, found: Balance) -> None:
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(lambda value, place: f"{value:g}")
     axes.set_ylabel("height |h| of the shafts\nfrom the crank, mm")
-    _below(axes, 1)
+    legend_above(axes, 1)
 
 
 def _forces(axes: Axes, found: Balance) -> None:
@@ -312,7 +316,7 @@ def _forces(axes: Axes, found: Balance) -> None:
         colour, dash = STYLES[one.name]
         label = "any designed shafts" if one.height is not None else one.name
         axes.plot(rpm, 1e-3 * one.all_forces, color=colour, ls=dash, label=label)
-    _below(axes, 3)
+    legend_above(axes, 3)
     axes.set_ylabel("largest force\non the housing, kN")
     axes.set_ylim(bottom=0.0)
 

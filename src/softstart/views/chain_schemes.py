@@ -16,8 +16,6 @@ from itertools import pairwise
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import Vibration, natural_vibration
 
-__all__ = ["scheme_svg"]
-
 _AXIS, _TALLEST, _THICK = 215.0, 150.0, 16.0  # px: height of the shaft axis, tallest disc, thickness of discs
 _SHORTEST, _SPRING, _GAP, _LEAST_GAP = 44.0, 420.0, 90.0, 3.0  # px: springs, and what all gaps share
 _LETTER, _LINE = 6.6, 14.0  # px: about what a letter takes in a line of size 12, and a line
@@ -49,7 +47,7 @@ def scheme_svg(chain: Chain) -> str:
         middles.append(middle)
         bottom = _AXIS + 0.5 * _TALLEST
         tops.append(_AXIS - 0.5 * float(tall[k]) - 8.0)
-        parts.append(_text(middle, bottom + 18.0, _number(float(arrays.J[k])), size=11))
+        parts.append(text(middle, bottom + 18.0, _number(float(arrays.J[k])), size=11))
         if k == arrays.motor and chain.motor is not None:
             parts += _arrow(middle, bottom + 30.0, "motor", _RED)
         if arrays.Mc[k] != 0.0:
@@ -61,15 +59,15 @@ def scheme_svg(chain: Chain) -> str:
     names, right = _names([mass.name for mass in chain.masses], middles, tops)
     parts += names
     width = max(x + 110.0, right + 10.0, 1010.0)
-    heading = [_text(24.0, 30.0, chain.name, 16, anchor="start")]
+    heading = [text(24.0, 30.0, chain.name, 16, anchor="start")]
     if chain.assumed:
         said = f"assumed: {chain.assumed}"
         folded = textwrap.wrap(said, int((width - 48.0) / _LETTER), max_lines=2, placeholder=" ...")
         heading += [
-            _text(24.0, 49.0 + _LINE * i, line, 12, _GREY, anchor="start", whole=said)
+            text(24.0, 49.0 + _LINE * i, line, 12, _GREY, anchor="start", whole=said)
             for i, line in enumerate(folded)
         ]
-    foot = [_text(24.0, 523.0 + 15.0 * i, line, 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)]
+    foot = [text(24.0, 523.0 + 15.0 * i, line, 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="550" '
         f'viewBox="0 0 {width:.0f} 550" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
@@ -89,12 +87,12 @@ def _names(names: Sequence[str], middles: Sequence[float], tops: Sequence[float]
     if len(names) <= 6 and not meet and places[0][0] > places[0][1] + 4.0:
         for name, lines, x, y in zip(names, folded, middles, tops, strict=True):
             for i, line in enumerate(reversed(lines)):
-                parts.append(_text(x, y - _LINE * i, line, whole=name))
+                parts.append(text(x, y - _LINE * i, line, whole=name))
         return parts, max(x + half for x, half in places)
     right = 0.0
     for name, lines, x, y in zip(names, folded, middles, tops, strict=True):
         said = _cut(" + ".join(lines if len(lines) < 3 else (lines[0], "...", lines[-1])))
-        parts.append(_text(x, y, said, slanted=True, whole=name))
+        parts.append(text(x, y, said, slanted=True, whole=name))
         right = max(right, x + 0.82 * _LETTER * len(said))
     return parts, right
 
@@ -128,7 +126,7 @@ def _shaft(parts: list[str], x: float, chain: Chain, arrays: ChainArrays, k: int
     if geared and shaft.side == "after":
         x = _gear(parts, x, shaft.ratio, shaft.efficiency)
     if arrays.rigid[k]:
-        parts.append(_line(x, _AXIS, x + _SHORTEST, _AXIS, width=5.0))
+        parts.append(line(x, _AXIS, x + _SHORTEST, _AXIS, width=5.0))
         x += _SHORTEST
         labels.append("rigid")
     else:
@@ -143,7 +141,7 @@ def _shaft(parts: list[str], x: float, chain: Chain, arrays: ChainArrays, k: int
         x = _gear(parts, x, shaft.ratio, shaft.efficiency)
     for i, label in enumerate(labels):
         colour = _RED if label.startswith("gap") else _INK
-        parts.append(_text(0.5 * (start + x), _AXIS + 26.0 + 14.0 * i, label, size=10, colour=colour))
+        parts.append(text(0.5 * (start + x), _AXIS + 26.0 + 14.0 * i, label, size=10, colour=colour))
     return x
 
 
@@ -153,8 +151,7 @@ def _spring(parts: list[str], x: float, length: float) -> float:
     points = [(x, _AXIS), (x + lead, _AXIS)]
     points += [(x + lead + (j + 0.5) * step, _AXIS + (7.0 if j % 2 else -7.0)) for j in range(2 * turns)]
     points += [(x + length - lead, _AXIS), (x + length, _AXIS)]
-    drawn = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
-    parts.append(f'<polyline points="{drawn}" fill="none" stroke="{_INK}" stroke-width="1.4"/>')
+    parts.append(polyline(points))
     return x + length
 
 
@@ -163,10 +160,9 @@ def _jaws(parts: list[str], x: float, opening: float) -> float:
     claw, high, low = 5.0, _AXIS - 14.0, _AXIS + 5.0
     right = x + opening + claw
     middle, end = 0.5 * (x + right), right + 6.0
-    stops = f"{x:.1f},{low} {x:.1f},{high} {right:.1f},{high} {right:.1f},{low}"
-    stem = f"{middle:.1f},{low - 4.0} {middle:.1f},{_AXIS + 12.0} {end:.1f},{_AXIS + 12.0} {end:.1f},{_AXIS}"
-    parts.append(f'<polyline points="{stops}" fill="none" stroke="{_RED}" stroke-width="1.8"/>')
-    parts.append(f'<polyline points="{stem}" fill="none" stroke="{_INK}" stroke-width="1.4"/>')
+    stem = [(middle, low - 4.0), (middle, _AXIS + 12.0), (end, _AXIS + 12.0), (end, _AXIS)]
+    parts.append(polyline([(x, low), (x, high), (right, high), (right, low)], colour=_RED, width=1.8))
+    parts.append(polyline(stem))
     box = f'x="{middle - 0.5 * claw:.1f}" y="{high + 4.0}" width="{claw}" height="{low - high - 4.0}"'
     parts.append(f'<rect {box} fill="{_INK}"/>')
     return end
@@ -176,17 +172,17 @@ def _gear(parts: list[str], x: float, ratio: float, efficiency: float) -> float:
     """Two wheels in mesh, seen from the side, the ratio of their heights that of the gear (within limits)."""
     shown = min(max(ratio, 0.25), 4.0)
     first, second = 40.0 / (1.0 + shown), 40.0 * shown / (1.0 + shown)
-    parts.append(_line(x, _AXIS, x + 8.0, _AXIS))
+    parts.append(line(x, _AXIS, x + 8.0, _AXIS))
     wheels = ((x + 6.0, _AXIS - 0.5 * first, first), (x + 14.0, _AXIS - 0.5 * second, second))
     for left, top, high in wheels:
         parts.append(
             f'<rect x="{left:.1f}" y="{top:.1f}" width="7" height="{high:.1f}" fill="white" stroke="{_BLUE}" '
             'stroke-width="1.6" stroke-dasharray="2.5 1.5"/>'
         )
-    parts.append(_text(x + 13.5, _AXIS + 56.0, f"{_number(ratio)} : 1", size=10, colour=_BLUE))
+    parts.append(text(x + 13.5, _AXIS + 56.0, f"{_number(ratio)} : 1", size=10, colour=_BLUE))
     if efficiency < 1.0:
-        parts.append(_text(x + 13.5, _AXIS + 69.0, f"η {efficiency:.3g}", size=10, colour=_BLUE))
-    parts.append(_line(x + 21.0, _AXIS, x + 27.0, _AXIS))
+        parts.append(text(x + 13.5, _AXIS + 69.0, f"η {efficiency:.3g}", size=10, colour=_BLUE))
+    parts.append(line(x + 21.0, _AXIS, x + 27.0, _AXIS))
     return x + 27.0
 
 
@@ -194,38 +190,46 @@ def _shape(vibration: Vibration, middles: list[float]) -> list[str]:
     """The first elastic shape over the row, with its nodes."""
     shape = vibration.shape[1]
     heights = [_SHAPE - _SWING * float(a) for a in shape]
-    parts = [_line(middles[0], _SHAPE, middles[-1], _SHAPE, colour=_GREY, width=0.8)]
+    parts = [line(middles[0], _SHAPE, middles[-1], _SHAPE, colour=_GREY, width=0.8)]
     for (xa, ya), (xb, yb) in pairwise(zip(middles, heights, strict=True)):
-        parts.append(_line(xa, ya, xb, yb, colour=_BLUE, width=2.0))
+        parts.append(line(xa, ya, xb, yb, colour=_BLUE, width=2.0))
     for x, y in zip(middles, heights, strict=True):
-        parts.append(_line(x, _SHAPE, x, y, colour=_GREY, width=0.6))
+        parts.append(line(x, _SHAPE, x, y, colour=_GREY, width=0.6))
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{_BLUE}"/>')
     for node in vibration.nodes[1]:
         x = middles[node.shaft] + node.share * (middles[node.shaft + 1] - middles[node.shaft])
         parts.append(
             f'<circle cx="{x:.1f}" cy="{_SHAPE}" r="4.5" fill="white" stroke="{_RED}" stroke-width="2"/>'
         )
-        parts.append(_text(x, _SHAPE + 20.0, "node", size=10, colour=_RED))
+        parts.append(text(x, _SHAPE + 20.0, "node", size=10, colour=_RED))
     said = f"first elastic shape, {_number(float(vibration.frequency[1]))} Hz, gaps closed"
-    parts.append(_text(middles[0], _SHAPE + 72.0, said, size=12, colour=_BLUE, anchor="start"))
+    parts.append(text(middles[0], _SHAPE + 72.0, said, size=12, colour=_BLUE, anchor="start"))
     return parts
 
 
 def _arrow(x: float, y: float, said: str, colour: str) -> list[str]:
     head = f'<path d="M {x - 7:.1f} {y + 9:.1f} A 9 9 0 1 1 {x + 7:.1f} {y + 9:.1f}" fill="none" '
     tip = f'<path d="M {x + 7:.1f} {y + 9:.1f} l 1 -8 l -7 4 z" fill="{colour}"/>'
-    return [f'{head}stroke="{colour}" stroke-width="1.8"/>', tip, _text(x, y + 24.0, said, 11, colour)]
+    return [f'{head}stroke="{colour}" stroke-width="1.8"/>', tip, text(x, y + 24.0, said, 11, colour)]
 
 
-def _line(xa: float, ya: float, xb: float, yb: float, *, colour: str = _INK, width: float = 1.4) -> str:
+def polyline(points: Sequence[tuple[float, float]], *, colour: str = _INK, width: float = 1.4) -> str:
+    """A line through points in px."""
+    drawn = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
+    return f'<polyline points="{drawn}" fill="none" stroke="{colour}" stroke-width="{width}"/>'
+
+
+def line(xa: float, ya: float, xb: float, yb: float, *, colour: str = _INK, width: float = 1.4) -> str:
+    """A straight line; px."""
     ends = f'x1="{xa:.1f}" y1="{ya:.1f}" x2="{xb:.1f}" y2="{yb:.1f}"'
     return f'<line {ends} stroke="{colour}" stroke-width="{width}"/>'
 
 
-def _text(
+def text(
     x: float, y: float, said: str, size: int = 12, colour: str = _INK, *, anchor: str = "middle",
     slanted: bool = False, whole: str = "",
 ) -> str:  # fmt: skip
+    """A text at (x, y) in px; `whole` is shown where the pointer rests on it, if it was cut."""
     turn = f' transform="rotate(-35 {x:.1f} {y:.1f})"' if slanted else ""
     where = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{"start" if slanted else anchor}"'
     title = f"<title>{escape(whole)}</title>" if whole and whole != said else ""

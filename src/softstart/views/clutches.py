@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.views.drawing import COLOURS, DASHES, GREY, SMALL, drawing, new_figure
-from softstart.views.numbers import NOTHING, Table, column_of, number, printable, short
+from softstart.views.drawing import COLOURS, DASHES, GREY, MARKERS, drawing, entitle, head, new_figure
+from softstart.views.numbers import NOTHING, Column, Table, column_of, number, printable, short
 
 if TYPE_CHECKING:
     from softstart.clutch import Clutch, Engagement, EngagementFront
 
-MARKERS = "osD^vPX*"
+MOST_EVENTS = 12
 STATUS = {"LOCKED": "The clutch has locked.", "SLIPS": "The clutch slips at the end of the run."}
 
 
@@ -36,32 +36,25 @@ def clutch_lines(clutch: Clutch) -> list[str]:
     ]
 
 
-def figure_rows(run: Engagement) -> list[list[str]]:
+def figures_table(run: Engagement) -> Table:
     """The figures of an engagement, with unit and meaning."""
     rows = [
         ["peak torque", short(run.peak_torque), "N m", f"shaft, at {short(run.peak_time)} s"],
         ["", short(run.peak_ratio), "", "times the mean torque while the clutch slips"],
-        [
-            "  while slipping",
-            short(run.slip_peak_torque),
-            "N m",
-            f"up to the lock-up, at {short(run.slip_peak_time)} s",
-        ],
+        ["  while slipping", short(run.slip_peak_torque), "N m",
+         f"up to the lock-up, at {short(run.slip_peak_time)} s"],
         ["  behind it", _or_dash(run.locked_peak_torque), "N m", "after the lock-up"],
         ["slip time", _or_dash(run.slip_time), "s", "first lock-up"],
         ["friction work", short(run.friction_work), "J", "all slip"],
-        [
-            "  up to the lock-up",
-            short(run.slip_work),
-            "J",
-            f"{short(run.work_while_engaging)} J of it while engaging",
-        ],
-    ]
+        ["  up to the lock-up", short(run.slip_work), "J",
+         f"{short(run.work_while_engaging)} J of it while engaging"],
+    ]  # fmt: skip
     if not math.isnan(run.lining_heat):
         rows.append(["lining heat", short(run.lining_heat), "J/m2", "friction work on the lining area"])
     energy = run.energy
     rows.append(["work of the drive", short(energy.drive), "J", f"balance closed to {energy.residual:.0e}"])
-    return rows
+    columns = [Column("figure", False), Column("value"), Column("unit", False), Column("meaning", False)]
+    return Table("", columns, rows)
 
 
 def _or_dash(value: float) -> str:
@@ -73,10 +66,10 @@ def status(run: Engagement) -> str:
     return STATUS[run.status] + " " + _again(run)
 
 
-def events(run: Engagement, most: int = 12) -> str:
+def events(run: Engagement) -> str:
     """The first events in one sentence."""
-    first = ", ".join(f"{event.name} at {short(event.t)} s" for event in run.events[:most])
-    more = len(run.events) - most
+    first = ", ".join(f"{event.name} at {short(event.t)} s" for event in run.events[:MOST_EVENTS])
+    more = len(run.events) - MOST_EVENTS
     return f"Events: {first}{f', and {more} more' if more > 0 else ''}."
 
 
@@ -154,15 +147,12 @@ def engagement_figure(
         torque.axhline(clutch.mean_torque / size, color=GREY, lw=0.8, ls=":")
         speed.axhline(clutch.drive_speed, color=GREY, lw=0.8, ls=":")
         friction.set_ylabel(f"friction torque, {name}")
-        torque.set_ylabel(f"shaft torque, {name}")
-        torque.set_title("points: peaks; dotted: mean while the clutch slips", loc="left", fontsize=SMALL)
-        speed.set_ylabel("speed, rad/s")
-        speed.set_title("clutch side; dotted: load, driving side, end of slip", loc="left", fontsize=SMALL)
-        speed.set_xlabel("time, s")
+        head(torque, "points: peaks; dotted: mean while the clutch slips", f"shaft torque, {name}")
+        head(speed, "clutch side; dotted: load, driving side, end of slip", "speed, rad/s", "time, s")
         speed.set_xlim(0.0, max(run.end_time for run in runs))
         friction.set_ylim(bottom=0.0)
         friction.legend(loc="lower right", handlelength=3.2)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        entitle(figure, title)
     return figure
 
 
@@ -201,9 +191,7 @@ def front_figure(fronts: Sequence[EngagementFront], unit: tuple[float, str] = (1
                 M = np.append(point.torques, point.torques[-1]) / size
                 panel.plot(t, M, color=COLOURS[number + 2], ls=DASHES[number], lw=1.3,
                            label=f"peak {point.peak_torque / size:.4g} {name}")  # fmt: skip
-            panel.set_title(f"laws, {one.law_class}", loc="left", fontsize=SMALL)
-            panel.set_xlabel("time, s")
-            panel.set_ylabel(f"friction torque, {name}")
+            head(panel, f"laws, {one.law_class}", f"friction torque, {name}", "time, s")
             panel.legend(loc="lower right", fontsize=8)
         for index, law in enumerate(fronts[0].laws):
             front.plot(
@@ -211,11 +199,10 @@ def front_figure(fronts: Sequence[EngagementFront], unit: tuple[float, str] = (1
                 mfc="none", mew=1.6, color=COLOURS[index + 3], label=law.name,
             )  # fmt: skip
         front.axvline(fronts[0].clutch.mean_torque / size, color=GREY, lw=0.8, ls=":")
-        front.set_xlabel(f"peak of the shaft torque, {name}     (dotted: none lower)")
-        front.set_ylabel(f"friction work, {work}")
-        front.set_title("least work; wide dots: bound", loc="left", fontsize=SMALL)
+        across = f"peak of the shaft torque, {name}     (dotted: none lower)"
+        head(front, "least work; wide dots: bound", f"friction work, {work}", across)
         front.legend(loc="center right", fontsize=8)
-        figure.suptitle(fronts[0].clutch.name, x=0.01, ha="left", fontsize=11)
+        entitle(figure, fronts[0].clutch.name)
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -18,18 +19,21 @@ from softstart.late import late
 if TYPE_CHECKING:
     import matplotlib as mpl
     import matplotlib.figure as mpl_figure
+    from matplotlib import ticker
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from softstart.start.run import Run
 else:
     mpl, mpl_figure = late("matplotlib"), late("matplotlib.figure")
+    ticker = late("matplotlib.ticker")
 
 # Okabe-Ito: told apart by colour-blind readers and in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0, (8, 2)))
 GREY, SMALL = "#666666", 9.5
 GAP_SHADE = "#E8ECEF"
+MARKERS = "osD^vPX*"
 
 PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
@@ -62,7 +66,9 @@ STYLE: dict[str, Any] = {
 def drawing() -> Iterator[None]:
     """Softstart's look, without touching the caller's settings or needing a screen."""
     settings: Any = STYLE
-    with mpl.rc_context(settings):
+    with mpl.rc_context(settings), warnings.catch_warnings():
+        # a drive may be named in any script: what the font lacks is drawn as a box
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         yield
 
 
@@ -85,6 +91,31 @@ def save_figure(figure: mpl_figure.Figure, folder: Path, stem: str) -> list[Path
     return written
 
 
+def entitle(figure: Figure, text: str) -> None:
+    """A title over all panels, on the left."""
+    figure.suptitle(text, x=0.01, ha="left", fontsize=11)
+
+
+def head(axes: Axes, title: str, up: str, across: str = "") -> None:
+    """A small title on the left of a panel, and what its axes show."""
+    axes.set_title(title, loc="left", fontsize=SMALL)
+    axes.set_ylabel(up)
+    if across:
+        axes.set_xlabel(across)
+
+
+def legend_above(axes: Axes, columns: int, **options: Any) -> None:
+    """A legend of one row at the right, beside the title of a panel."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, **options)
+
+
+def plain_ticks(axis: Any, locator: Any) -> None:
+    """Numbers as they are, not as powers, on a logarithmic axis."""
+    axis.set_major_locator(locator)
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(ticker.NullLocator())
+
+
 def shade_open_gap(axes: Axes, run: Run) -> None:
     """Grey where the gap is open."""
     for stage in run.stages:
@@ -101,7 +132,8 @@ def name_points(figure: Figure, axes: Axes, named: Sequence[tuple[str, float, fl
     Points in one place share a label, of one line each. The layout of the figure is settled and fixed by
     this: call it last.
     """
-    figure.draw_without_rendering()
+    with drawing():
+        figure.draw_without_rendering()
     figure.set_layout_engine("none")
     points = _together([(text, x, y, axes.transData.transform((x, y))) for text, x, y in named])
     spots = [spot for *_, spot in points]

@@ -7,6 +7,14 @@ import math
 from softstart.drive import PARAMETERS, Drive
 from softstart.views.numbers import printable, short
 
+POSITIONS = {
+    "driving-flank": "on the driving flank",
+    "mid-gap": "in the middle of the gap",
+    "opposite-flank": "on the opposite flank",
+    "hanging": "with the load hanging in the wound-up shaft",
+    "unknown": "at an unknown position in the gap: the worst of both flanks and the middle counts",
+}
+
 
 def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
     """The drive in a few lines: its name, the parameters that matter, and under which laws it starts.
@@ -16,8 +24,17 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
     extra = []
     if drive.d:
         extra.append(f"d = {short(float(drive.d))} N m s/rad")
-    if drive.start_position:
-        extra.append(f"starts at twist {short(float(drive.start_position))} rad")
+    if isinstance(drive.start_position, str):
+        if drive.start_position != "mid-gap":
+            extra.append(f"starts {POSITIONS[drive.start_position]}")
+    elif drive.theta0:
+        extra.append(f"starts at twist {short(float(drive.theta0))} rad")
+    if drive.brake == "motor":
+        proving = isinstance(drive.release, str)
+        until = (
+            "its torque has reached the shaft torque" if proving else f"{short(float(drive.release_time))} s"
+        )
+        extra.append(f"the brake holds the motor until {until}")
     if drive.torque_lag:
         extra.append(f"torque lag {short(float(drive.torque_lag))} s")
     if math.isfinite(float(drive.torque_rate)):
@@ -38,6 +55,7 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
         f"  load   J2 = {short(float(drive.J2))} kg m2, Mc = {short(float(drive.Mc))} N m, {drive.load_kind}",
         f"  start  to {short(float(drive.target_speed))} rad/s ({rpm:.4g} rpm)",
         *(["  also   " + ", ".join(extra)] if extra else []),
+        *([f"  note   {drive.doubt}"] if drive.doubt else []),
         *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to is not None else []),
     ]
 

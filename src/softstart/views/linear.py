@@ -10,7 +10,7 @@ import numpy as np
 
 from softstart.linear.limit_cycles import Outside, frequency_grid
 from softstart.linear.systems import at_points, frequencies, poles
-from softstart.views.drawing import COLOURS, DASHES, GREY, SMALL, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
 
 if TYPE_CHECKING:
@@ -182,14 +182,8 @@ def linear_figure(view: LinearView) -> Any:
         _mark_elastic((size, phase), float(view.drive.Omega))
         _nyquist(plane, L, view.margins)
         _harmonic_balance(gap, view, view.outside)
-        figure.suptitle(f"{view.drive.name}: loop of {view.name} in contact", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{view.drive.name}: loop of {view.name} in contact")
     return figure
-
-
-def _headed(axes: Axes, title: str, across: str, up: str) -> None:
-    axes.set_title(title, loc="left", fontsize=SMALL)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
 
 
 def _mark_elastic(panels: tuple[Axes, ...], Omega: float) -> None:
@@ -209,7 +203,7 @@ def _magnitude(axes: Axes, w: Any, L: Any, m: Margins) -> None:
     top = float(np.quantile(np.abs(L), 0.98))
     axes.set_ylim(max(DEEPEST, 0.5 * float(np.abs(L).min())), min(max(10.0, 3.0 * top), HIGHEST))
     axes.set_xlim(w[0], w[-1])
-    _headed(axes, f"gain margin {gain_text(m)}", "frequency, rad/s", "|L|")
+    head(axes, f"gain margin {gain_text(m)}", "|L|", "frequency, rad/s")
 
 
 def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
@@ -228,10 +222,8 @@ def _phase(axes: Axes, w: Any, L: Any, m: Margins) -> None:
     axes.set_yticks(range(-180, 181, 60))
     axes.set_ylim(-190.0, 190.0)
     axes.set_xlim(w[0], w[-1])
-    _headed(
-        axes, f"phase margin {phase_text(m)}, delay margin {delay_text(m)}", "frequency, rad/s",
-        "phase of L, degrees",
-    )  # fmt: skip
+    title = f"phase margin {phase_text(m)}, delay margin {delay_text(m)}"
+    head(axes, title, "phase of L, degrees", "frequency, rad/s")
 
 
 def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
@@ -247,7 +239,7 @@ def _nyquist(axes: Axes, L: Any, m: Margins) -> None:
     axes.set_xlim(-WIDEST, WIDEST)
     axes.set_ylim(-0.8 * WIDEST, 0.8 * WIDEST)
     axes.legend(loc="upper right")
-    _headed(axes, f"Nyquist diagram; sensitivity at most {m.sensitivity_peak:.3g}", "Re L", "Im L")
+    head(axes, f"Nyquist diagram; sensitivity at most {m.sensitivity_peak:.3g}", "Im L", "Re L")
 
 
 def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
@@ -268,7 +260,7 @@ def _harmonic_balance(axes: Axes, view: LinearView, outside: Outside) -> None:
     axes.legend(loc="lower left")
     count = len(view.cycles)
     predicted = "no limit cycle" if count == 0 else f"{count} limit cycle{'s' * (count > 1)}"
-    _headed(axes, f"Gap as describing function n: {predicted} predicted", "Re M", "Im M")
+    head(axes, f"Gap as describing function n: {predicted} predicted", "Im M", "Re M")
 
 
 def _n(outside: Outside, frequency: float) -> float:

@@ -6,13 +6,12 @@ Everything is made ready beside the folder and then put in place, or nothing is.
 from __future__ import annotations
 
 import csv
+import math
 import os
 import platform
-import shutil
 import sys
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,8 +19,9 @@ from softstart import __version__
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.files import write_whole
+from softstart.store import fresh_folder
 from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import Table
+from softstart.views.numbers import Column, Table
 
 FITTED_TO = "fitted-to.toml"
 
@@ -38,12 +38,13 @@ def output_folder(asked: str | None) -> Iterator[Path | None]:
         yield None
         return
     target = Path(asked)
-    stage = _stage(asked, target)
-    try:
+    with ExitStack() as stack:
+        try:
+            stage = stack.enter_context(fresh_folder(_home(asked, target), target, *target.parents))
+        except OSError as error:
+            raise _refused(asked, f"nothing can be written there ({error.strerror or error})") from None
         yield stage
         _put_in_place(asked, stage, target)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -55,6 +56,22 @@ def write_table(path: Path, columns: Sequence[str], rows: Sequence[Sequence[obje
         writer.writerows(rows)
 
     write_whole(path, write)
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
+    """Rows with the same keys as CSV; no file where there are none."""
+    if rows:
+        write_table(path, list(rows[0]), [list(row.values()) for row in rows])
+
+
+def write_columns(path: Path, columns: Mapping[str, Sequence[object]]) -> None:
+    """Columns by their headings as CSV; NaN as an empty cell."""
+    rows = zip(*columns.values(), strict=True)
+    write_table(path, list(columns), [[None if _is_nan(cell) else cell for cell in row] for row in rows])
+
+
+def _is_nan(cell: object) -> bool:
+    return isinstance(cell, float) and math.isnan(cell)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -82,23 +99,20 @@ def _refused(asked: str, reason: str) -> InputError:
     return InputError(f'--out = "{asked}": {reason}; give a folder that you may write to.')
 
 
-def _stage(asked: str, target: Path) -> Path:
-    """A fresh hidden folder on the same disk: in DIR if it is there, else in the nearest folder above it."""
+def _home(asked: str, target: Path) -> Path:
+    """DIR if it is there, else the nearest folder above it."""
     if not asked.strip():
         raise _refused(asked, "the name of the folder is empty")
     if "\0" in asked:
         raise _refused(asked.replace("\0", "\\0"), "this cannot be the path of a folder")
-    try:
-        home = target
-        while not home.exists() and home != home.parent:
-            if home.is_symlink():
-                raise _refused(asked, f"{home} is a link that leads nowhere")
-            home = home.parent
-        if not home.is_dir():
-            raise _refused(asked, f"{home} is a file, not a folder")
-        return Path(tempfile.mkdtemp(prefix=".softstart-", suffix=".part", dir=home))
-    except OSError as error:
-        raise _refused(asked, f"nothing can be written there ({error.strerror or error})") from None
+    home = target
+    while not home.exists() and home != home.parent:
+        if home.is_symlink():
+            raise _refused(asked, f"{home} is a link that leads nowhere")
+        home = home.parent
+    if not home.is_dir():
+        raise _refused(asked, f"{home} is a file, not a folder")
+    return home
 
 
 def _put_in_place(asked: str, stage: Path, target: Path) -> None:
@@ -168,27 +182,21 @@ def markdown(text: str) -> str:
     return flat.replace("\\", "\\\\").replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
 
 
-def markdown_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], numbers_from: int | None = None
-) -> str:
-    """A table in Markdown; columns from `numbers_from` on are set to the right."""
-    first = len(headings) if numbers_from is None else numbers_from
-    rule = ["---" if index < first else "---:" for index in range(len(headings))]
-    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *rows))
+def markdown_table(table: Table) -> str:
+    """A table without its title; numbers are set to the right."""
+    headings = [column.heading for column in table.columns]
+    rule = ["---:" if column.number else "---" for column in table.columns]
+    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
 
 
 def table_sections(tables: Sequence[Table]) -> list[str]:
     """Titles and tables in Markdown, without empty tables."""
-    return [
-        part for table in tables if table.rows for part in (f"## {markdown(table.title)}", plain_table(table))
-    ]
+    return [part for one in tables if one.rows for part in (f"## {markdown(one.title)}", markdown_table(one))]
 
 
-def plain_table(table: Table) -> str:
-    """A table in Markdown without its title; numbers are set to the right."""
-    headings = [" ".join(column.heading.split()) for column in table.columns]
-    rule = ["---:" if column.number else "---" for column in table.columns]
-    return "\n".join(f"| {' | '.join(map(markdown, cells))} |" for cells in (headings, rule, *table.rows))
+def figure_table(rows: Sequence[Sequence[str]]) -> str:
+    """Figures in Markdown, each a name and its value."""
+    return markdown_table(Table("", [Column("figure", False), Column("value")], rows))
 
 
 def drive_table(drive: Drive) -> str:
@@ -198,36 +206,43 @@ def drive_table(drive: Drive) -> str:
         value = getattr(drive, parameter.name)
         if value is not None and value != "" and parameter.name != "name":
             shown = f"{value:.10g}" if isinstance(value, float) else str(value)
-            unit = "" if parameter.unit == "1" else parameter.unit
+            unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
             rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
-    return markdown_table(["key", "symbol", "value", "unit", "meaning"], rows)
+    return markdown_table(Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows))
 
 
-def write_fitted_to(fitted_to: Drive | None, folder: Path) -> None:
-    """The drive for which the controllers are set up, beside the one that runs."""
-    if fitted_to is not None:
-        write_text(folder / FITTED_TO, fitted_to.to_toml())
-
-
-def command_run(command: str) -> str:
-    """What was run, by which version: the beginning of a report's last section."""
-    return (
+def write_report(folder: Path, parts: Sequence[str], command: str, about: str) -> None:
+    """report.md; its last section says what was run, by which version, and what `about` adds on the input."""
+    ending = (
         "## Where this comes from\n\n"
         f"softstart {__version__}, Python {platform.python_version()}, with the command\n\n"
-        f"```sh\n{command}\n```\n\n"
+        f"```sh\n{command}\n```\n\n{about}"
     )
+    write_text(folder / "report.md", "\n\n".join([*parts, ending]) + "\n")
 
 
-def provenance(drive: Drive, command: str, fitted_to: Drive | None = None, one: bool = True) -> str:
-    """What was run, by what, on which input: enough to do it again. `one`: no parameter of it is varied."""
-    other, shown = "", drive if one else None
+def write_drive_report(
+    folder: Path,
+    parts: Sequence[str],
+    drive: Drive,
+    command: str,
+    fitted_to: Drive | None = None,
+    *,
+    behind: Sequence[str] = (),
+    one: bool = True,
+) -> None:
+    """report.md about a drive, whose data stand between `parts` and `behind`, and the files of the drives.
+
+    `fitted_to` is the drive for which the controllers are set up, if another; `one`: no parameter is varied.
+    """
+    write_text(folder / "drive.toml", drive.to_toml())
+    about = (
+        f"on the drive of [drive.toml](drive.toml), which holds all changes:\n\n```toml\n{drive.to_toml()}```"
+    )
     if fitted_to is not None:
-        other = (
-            f"\n\nThe {markdown(controllers_set_up(shown, fitted_to))}. That drive is in "
+        write_text(folder / FITTED_TO, fitted_to.to_toml())
+        about += (
+            f"\n\nThe {markdown(controllers_set_up(drive if one else None, fitted_to))}. That drive is in "
             f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
         )
-    return (
-        f"{command_run(command)}"
-        "on the drive of [drive.toml](drive.toml), which holds all changes:\n\n"
-        f"```toml\n{drive.to_toml()}```{other}"
-    )
+    write_report(folder, [*parts, "## The drive", drive_table(drive), *behind], command, about)

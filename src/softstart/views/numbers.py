@@ -25,13 +25,18 @@ class Table(NamedTuple):
 
     title: str
     columns: list[Column]
-    rows: list[list[str]]
+    rows: Sequence[Sequence[str]]
 
     @classmethod
     def of(cls, title: str, cells: Mapping[str, Sequence[str]], texts: Sequence[str] = ()) -> Table:
         """From the cells below each heading; columns named in `texts` hold text, the others numbers."""
         columns = [Column(heading, heading not in texts) for heading in cells]
         return cls(title, columns, [list(row) for row in zip(*cells.values(), strict=True)])
+
+    @classmethod
+    def of_texts(cls, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+        """Rows of text, without a title."""
+        return cls("", [Column(heading, False) for heading in headings], rows)
 
 
 def number(value: float | None, decimals: int) -> str:
@@ -51,16 +56,35 @@ def number(value: float | None, decimals: int) -> str:
 def column_of(values: Sequence[float | None], digits: int = 4) -> list[str]:
     """Numbers of one column: as many decimals for all, `digits` significant ones in the largest.
 
+    A cell that would be left with less than two significant digits has three of its own; what is a millionth
+    of the largest, and below 1e-7, is rounding and 0.
+
     >>> column_of([0.36774, 0.0166, float("nan")]), column_of([164.83, 62.0]), column_of([2e-7, 1e-9])
     (['0.3677', '0.0166', '-'], ['164.8', '62.0'], ['2.000e-07', '1.000e-09'])
+    >>> column_of([251.3, 0.01984, 0.02213, 3e-17])
+    ['251.3', '0.0198', '0.0221', '0.0']
     """
     finite = [abs(v) for v in values if v is not None and math.isfinite(v) and v != 0.0]
     if not finite:
         return [number(v, 0) for v in values]
-    order = math.floor(math.log10(max(finite)))
+    largest = max(finite)
+    order = math.floor(math.log10(largest))
     if not -4 <= order <= 6:
         return [NOTHING if v is None or math.isnan(v) else f"{v:.{digits - 1}e}" for v in values]
-    return [number(v, max(0, digits - 1 - order)) for v in values]
+    noise = min(1e-6 * largest, 1e-7)
+    return [_cell(v, max(0, digits - 1 - order), noise) for v in values]
+
+
+def _cell(value: float | None, decimals: int, noise: float) -> str:
+    if value is None or not noise < abs(value) < 10.0 ** (1 - decimals):
+        return number(value, decimals)
+    own = math.floor(math.log10(abs(value)))
+    return number(value, max(decimals, 2 - own)) if own >= -4 else f"{value:.2e}"
+
+
+def first_of(count: int, shown: int) -> str:
+    """What the title of a table says where it shows only the first rows; else nothing."""
+    return f" (the first {shown} of {count}; --json and --out give all)" if count > shown else ""
 
 
 def short(value: float) -> str:

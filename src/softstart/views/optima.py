@@ -18,23 +18,26 @@ from softstart.views.drawing import (
     COLOURS,
     DASHES,
     GREY,
+    MARKERS,
     SMALL,
     drawing,
+    entitle,
+    head,
+    legend_above,
     name_points,
     new_figure,
+    plain_ticks,
     save_figure,
     shade_open_gap,
 )
 from softstart.views.markdown import (
-    drive_table,
+    figure_table,
     markdown,
     markdown_table,
-    provenance,
-    write_table,
-    write_text,
+    write_drive_report,
+    write_rows,
 )
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
-from softstart.views.starts import name_of
 
 if TYPE_CHECKING:
     from matplotlib import ticker
@@ -44,7 +47,6 @@ else:
 
 AIMS = {"k_dyn": "K_dyn", "heat": "heat", "start_time": "start time"}
 REPLAY = "softstart simulate drive.toml --controller profile --param file=profile.csv"
-MARKERS = "osD^vPX*"
 TALL = 4.0  # largest over smallest K_dyn from which on the axis is logarithmic
 TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 
@@ -54,7 +56,7 @@ TICKS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0,
 
 def controller_summary(run: Run) -> dict[str, Any]:
     """The figures of a controller that matter beside an optimum."""
-    return {"controller": name_of(run), "k_dyn": run.k_dyn, "start_time": run.start_time}
+    return {"controller": run.controller_name, "k_dyn": run.k_dyn, "start_time": run.start_time}
 
 
 def figure_rows(best: Optimum) -> list[list[str]]:
@@ -100,18 +102,19 @@ def comparison(best: Optimum, others: Sequence[Run]) -> str:
     """The optimum beside `direct` and beside the gentlest shipped controller."""
     text = f"K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
     reaching = [run for run in others if not math.isnan(run.start_time)]
-    direct = next((run for run in reaching if name_of(run) == "direct"), None)
+    direct = next((run for run in reaching if run.controller_name == "direct"), None)
     if direct is not None:
         text += f"; direct has {direct.k_dyn:.3f} in {direct.start_time:.4g} s"
     quick = [run for run in reaching if run.start_time <= best.end_time * (1.0 + 1e-9) and run is not direct]
     if quick:
         gentlest = min(quick, key=lambda run: run.k_dyn)
-        text += f"; the gentlest shipped controller as quick, {name_of(gentlest)}, has {gentlest.k_dyn:.3f}"
+        name = gentlest.controller_name
+        text += f"; the gentlest shipped controller as quick, {name}, has {gentlest.k_dyn:.3f}"
     elif reaching:
         gentlest = min(reaching, key=lambda run: run.k_dyn)
         text += (
             "; no other shipped controller is as quick, the gentlest of all, "
-            f"{name_of(gentlest)}, has {gentlest.k_dyn:.3f} in {gentlest.start_time:.4g} s"
+            f"{gentlest.controller_name}, has {gentlest.k_dyn:.3f} in {gentlest.start_time:.4g} s"
         )
     return text + "."
 
@@ -142,24 +145,12 @@ def optimum_figure(best: Optimum) -> Any:
         twist.set_xlim(0.0, run.end_time)
         aim = {"k_dyn": "K_dyn", "start_time": "start time"}.get(best.problem.minimise, best.problem.minimise)
         asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
-        figure.suptitle(f"{run.drive.name}: {asked}", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{run.drive.name}: {asked}")
     return figure
 
 
 def _legend(axes: Axes, columns: int) -> None:
-    axes.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=columns,
-        borderaxespad=0.1,
-        columnspacing=1.2,
-        handlelength=1.8,
-    )
-
-
-def _headed(axes: Axes, title: str, unit: str) -> None:
-    axes.set_title(title, loc="left", fontsize=SMALL)
-    axes.set_ylabel(unit)
+    legend_above(axes, columns, columnspacing=1.2, handlelength=1.8)
 
 
 def _motor_torque(axes: Axes, best: Optimum) -> None:
@@ -177,7 +168,7 @@ def _motor_torque(axes: Axes, best: Optimum) -> None:
     axes.plot(knots_t, knots_u, color=COLOURS[6], lw=0.9, ls=DASHES[3], label="demand")
     low, high = float(np.min(run.u)), float(np.max(run.u))
     least, most = problem.lowest_torque, problem.highest_torque
-    _headed(axes, f"motor torque {low:.4g} to {high:.4g} of {least:.4g} to {most:.4g} N m", "N m")
+    head(axes, f"motor torque {low:.4g} to {high:.4g} of {least:.4g} to {most:.4g} N m", "N m")
     axes.margins(y=0.08)
     _legend(axes, 4)
 
@@ -207,7 +198,7 @@ def _shaft_torque(axes: Axes, best: Optimum) -> None:
     title = f"K_dyn {best.k_dyn:.4f}"
     if best.bound.kind != "none":
         title += f", at least {best.bound.k_dyn:.4f}"
-    _headed(axes, title, "N m")
+    head(axes, title, "N m")
     _legend(axes, 5)
 
 
@@ -220,7 +211,7 @@ def _speeds(axes: Axes, best: Optimum) -> None:
     if problem.start_time is not None:
         title += f", {problem.start_time:.4f} s allowed"
         axes.axvline(problem.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="allowed")
-    _headed(axes, title, "rad/s")
+    head(axes, title, "rad/s")
     _legend(axes, 4)
 
 
@@ -232,7 +223,7 @@ def _twist(axes: Axes, best: Optimum) -> None:
         axes.axhline(flank, color="#444444", lw=0.8, ls=DASHES[1], label="flanks" if flank == half else None)
     contacts = "1 contact" if run.contacts == 1 else f"{run.contacts} contacts"
     at = "" if math.isnan(run.first_contact) else f", first at {run.first_contact:.4f} s"
-    _headed(axes, contacts + at, "rad")
+    head(axes, contacts + at, "rad")
     _legend(axes, 2)
 
 
@@ -245,17 +236,19 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     best.profile.to_c(folder / "profile.c")
     best.run.to_csv(folder / "trace-optimum.csv")
     summary = {key: value for key, value in best.summary().items() if key not in ("profile", "seconds")}
-    write_table(folder / "figures.csv", list(summary), [list(summary.values())])
+    write_rows(folder / "figures.csv", [summary])
     rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
-    beside = [
-        [name_of(run), number(run.k_dyn, 4), number(run.start_time, 5)]
-        for run in sorted(others, key=lambda run: run.k_dyn)
-    ]
+    others = sorted(others, key=lambda run: run.k_dyn)
+    beside = {
+        "strategy": [run.controller_name for run in others],
+        "K_dyn": [number(run.k_dyn, 4) for run in others],
+        "start time s": [number(run.start_time, 5) for run in others],
+    }
     parts = [
         f"# {markdown(drive.name)}: optimal start",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
         markdown(comparison(best, others)),
-        markdown_table(["figure", "value"], rows, numbers_from=1),
+        figure_table(rows),
         markdown(bound_sentence(best)),
         "![optimum](optimum.svg)",
         "## The profile",
@@ -263,9 +256,9 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{REPLAY}\n```\n\n"
         "Traces of the start: [trace-optimum.csv](trace-optimum.csv).",
         "## The controllers on this drive",
-        markdown_table(["strategy", "K_dyn", "start time s"], beside, numbers_from=1),
+        markdown_table(Table.of("", beside, ("strategy",))),
     ]
-    _write_report(parts, drive, folder, command)
+    write_drive_report(folder, parts, drive, command)
 
 
 # a front ----------------------------------------------------------------------------------------------------
@@ -412,9 +405,7 @@ def _scale(axes: Axes, values: Sequence[float]) -> None:
         axes.set_ylim(0.0, 1.08 * high)
     else:
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(ticker.FixedLocator(list(TICKS)))
-        axes.yaxis.set_major_formatter(ticker.FuncFormatter(lambda k, _: f"{k:g}"))
-        axes.yaxis.set_minor_locator(ticker.NullLocator())
+        plain_ticks(axes.yaxis, ticker.FixedLocator(list(TICKS)))
         axes.set_ylim(0.85 * low, 1.15 * high)
     axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
     axes.margins(x=0.04)
@@ -432,13 +423,13 @@ def write_front(front: Front, folder: Path, command: str) -> None:
     ]
     for title, table in zip(("The curve", "The controllers"), front_tables(front), strict=True):
         if table.rows:
-            parts += [f"## {title}", _markdown(table, numbers_from=1)]
+            parts += [f"## {title}", markdown_table(table)]
     parts += [
         *map(markdown, footnotes(front)),
         "All numbers with their digits: [pareto.csv](pareto.csv). Points with their torque profiles, from "
         "which the same command goes on: [pareto.jsonl](pareto.jsonl).",
     ]
-    _write_report(parts, front.drive, folder, command)
+    write_drive_report(folder, parts, front.drive, command)
 
 
 # one profile for several drives -----------------------------------------------------------------------------
@@ -512,7 +503,7 @@ def worth_figure(worth: SensorWorth) -> Any:
         axes[1, 0].set_ylabel("shaft torque T, N m")
         handles, labels = axes[1, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(labels)))
-        figure.suptitle(f"{worth.blind.base.name}: one profile for all", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{worth.blind.base.name}: one profile for all")
     return figure
 
 
@@ -541,7 +532,7 @@ def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
         f"# {markdown(base.name)}: one profile for {len(worth.blind.scenarios)} drives",
         f"Start time at most {worth.blind.start_time:.6g} s, terminal reached. "
         f"{markdown(worth_conclusion(worth))}",
-        _markdown(scenario_table(worth), numbers_from=0),
+        markdown_table(scenario_table(worth)),
         markdown(robust_bound_sentence(worth.blind)),
         "![contact-sensor](contact-sensor.svg)",
         "Without a sensor: [profile-blind.toml](profile-blind.toml), [profile-blind.csv](profile-blind.csv), "
@@ -549,16 +540,4 @@ def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:
         "[profile-reacting.toml](profile-reacting.toml). Traces of each drive, in the order of the table: "
         "trace-blind-1.csv and so on.",
     ]
-    _write_report(parts, base, folder, command)
-
-
-def _markdown(table: Table, numbers_from: int) -> str:
-    headings = [" ".join(column.heading.split()) for column in table.columns]
-    return markdown_table(headings, table.rows, numbers_from)
-
-
-def _write_report(parts: Sequence[str], drive: Drive, folder: Path, command: str) -> None:
-    """drive.toml, and report.md with what ends every report."""
-    write_text(folder / "drive.toml", drive.to_toml())
-    ending = ["## The drive", drive_table(drive), provenance(drive, command)]
-    write_text(folder / "report.md", "\n\n".join([*parts, *ending]) + "\n")
+    write_drive_report(folder, parts, base, command)

@@ -10,32 +10,36 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from softstart.drive import Drive
 from softstart.start.comparison import Comparison, Row
 from softstart.start.run import Run
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, save_figure, shade_open_gap
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    MARKERS,
+    drawing,
+    entitle,
+    head,
+    legend_above,
+    new_figure,
+    save_figure,
+    shade_open_gap,
+)
 from softstart.views.markdown import (
-    drive_table,
+    figure_table,
     file_stem,
     markdown,
     markdown_table,
-    provenance,
-    write_fitted_to,
+    write_drive_report,
+    write_rows,
     write_table,
-    write_text,
 )
-from softstart.views.numbers import Column, column_of, number, short
+from softstart.views.numbers import Table, column_of, first_of, number, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Cells = list[list[str]]  # of a table, row by row
-
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "value")
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
-
-
-def name_of(run: Run) -> str:
-    """The controller's name, or that of its class."""
-    return run.controller.name or type(run.controller).__name__
 
 
 # one start -----------------------------------------------------------------------------------------------
@@ -60,6 +64,11 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}"],
         ["contacts", str(run.contacts)],
         ["end of the run", with_unit(run.end_time, "s")],
+        *([] if run.drive.brake == "none" else [["brake released", with_unit(run.release_time, "s")]]),
+        *(
+            [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
+            for name, one in run.positions.items()
+        ),
     ]
 
 
@@ -88,11 +97,9 @@ def run_figure(run: Run) -> Any:
         twist.plot(run.t, run.theta, color=COLOURS[2])
         for flank in (half, -half):
             twist.axhline(flank, color="#444444", lw=0.8, ls="--")
-        twist.set_title("twist phi1 - phi2, flanks dashed", loc="left", fontsize=9.5)
-        twist.set_ylabel("rad")
-        twist.set_xlabel("time, s     (grey: gap open)")
+        head(twist, "twist phi1 - phi2, flanks dashed", "rad", "time, s     (grey: gap open)")
         twist.set_xlim(0.0, run.end_time)
-        figure.suptitle(f"{run.drive.name}: {name_of(run)}", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{run.drive.name}: {run.controller_name}")
     return figure
 
 
@@ -100,25 +107,21 @@ def _torques(axes: Axes, run: Run) -> None:
     axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
     axes.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
     if run.k_dyn > 0.0:
-        axes.axhline(run.peak_torque / run.k_dyn, color="#666666", lw=0.8, ls=":", label="K_dyn = 1")
+        axes.axhline(run.peak_torque / run.k_dyn, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
         axes.plot([run.peak_time], [_signed_peak(run)], "o", ms=4, color=COLOURS[0])
-    axes.set_title(f"K_dyn = {run.k_dyn:.3f}", loc="left", fontsize=9.5)
-    axes.set_ylabel("torque, N m")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
+    head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
+    legend_above(axes, 3)
 
 
 def _speeds(axes: Axes, run: Run) -> None:
     axes.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
     axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
-    axes.axhline(float(run.drive.target_speed), color="#666666", lw=0.8, ls=":", label="target")
+    axes.axhline(float(run.drive.target_speed), color=GREY, lw=0.8, ls=":", label="target")
     reached = run.start_time == run.start_time
     if reached:
-        axes.axvline(run.start_time, color="#666666", lw=0.8, ls=":")
-    axes.set_title(
-        f"start time {run.start_time:.4f} s" if reached else run.status.value, loc="left", fontsize=9.5
-    )
-    axes.set_ylabel("speed, rad/s")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
+        axes.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
+    head(axes, f"start time {run.start_time:.4f} s" if reached else run.status.value, "speed, rad/s")
+    legend_above(axes, 3)
 
 
 def _signed_peak(run: Run) -> float:
@@ -126,49 +129,44 @@ def _signed_peak(run: Run) -> float:
     return stage.peak_torque
 
 
-def stage_table(run: Run, most: int) -> tuple[list[Column], Cells]:
-    """The first stages as a table: columns, and cells as text."""
+def stage_table(run: Run, most: int) -> Table:
+    """The first stages."""
     stages = run.stages[:most]
-    numbers = zip(
+    cells = (
+        [str(stage.number) for stage in stages],
+        [SIDES[stage.side] for stage in stages],
         column_of([stage.start for stage in stages], 5),
         column_of([stage.duration for stage in stages]),
         column_of([stage.peak_torque for stage in stages], 5),
         column_of([stage.peak_time for stage in stages], 5),
-        strict=True,
     )
-    cells = [[str(stage.number), SIDES[stage.side], *row] for stage, row in zip(stages, numbers, strict=True)]
-    return [Column(heading, heading != "gap") for heading in STAGE_COLUMNS], cells
+    title = f"Stages{first_of(len(run.stages), most)}"
+    return Table.of(title, dict(zip(STAGE_COLUMNS, cells, strict=True)), ("gap",))
 
 
-def event_table(run: Run, most: int) -> tuple[list[Column], Cells]:
-    """The first events as a table: time and what happened."""
+def event_table(run: Run, most: int) -> Table:
+    """The first events: time and what happened."""
     events = run.events[:most]
-    times = column_of([event.time for event in events], 6)
-    cells = [[time, event.kind] for time, event in zip(times, events, strict=True)]
-    return [Column("time s"), Column("event", False)], cells
+    cells = {"time s": column_of([one.time for one in events], 6), "event": [one.kind for one in events]}
+    return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event",))
 
 
 def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
     """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
-    stem = file_stem(name_of(run))
+    stem = file_stem(run.controller_name)
     _write_run(run, folder, stem)
-    write_text(folder / "drive.toml", run.drive.to_toml())
-    write_fitted_to(fitted_to, folder)
     write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
     write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
-    write_table(folder / "figures.csv", list(summary), [list(summary.values())])
+    write_rows(folder / "figures.csv", [summary])
     parts = [
         f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
         run.status.value,
-        markdown_table(["figure", "value"], figure_rows(run), numbers_from=1),
+        figure_table(figure_rows(run)),
         _strategy(run, stem),
         "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
-        "## The drive",
-        drive_table(run.drive),
-        provenance(run.drive, command, fitted_to),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    write_drive_report(folder, parts, run.drive, command, fitted_to)
 
 
 def _write_run(run: Run, folder: Path, stem: str) -> None:
@@ -224,29 +222,28 @@ AT_THE_GAP = (
 
 
 def comparison_table(
-    rows: Sequence[Row], figures: Sequence[Figure] = (*JUDGING, *AT_THE_GAP)
-) -> tuple[list[Column], Cells]:
-    """The strategies and these figures of them as a table: columns, and cells as text."""
-    texts = [[name_of(row.run) for row in rows]]
+    rows: Sequence[Row], figures: Sequence[Figure] = (*JUDGING, *AT_THE_GAP), title: str = ""
+) -> Table:
+    """The strategies and these figures of them."""
+    cells = {"strategy": [row.run.controller_name for row in rows]}
     for figure in figures:
         values = [figure.of(row) for row in rows]
         if figure.decimals is None:
-            texts.append(column_of(values, figure.digits))
+            cells[figure.heading] = column_of(values, figure.digits)
         else:
-            texts.append([number(value, figure.decimals) for value in values])
-    columns = [Column("strategy", False), *(Column(figure.heading) for figure in figures)]
-    return columns, [list(row) for row in zip(*texts, strict=True)]
+            cells[figure.heading] = [number(value, figure.decimals) for value in values]
+    return Table.of(title, cells, ("strategy",))
 
 
 def conclusion(comparison: Comparison) -> str:
     """Which strategy is the gentlest, and what it costs in time."""
     best = comparison.gentlest
     others = [row for row in comparison.rows if row is not best]
-    k, name = best.run.k_dyn, name_of(best.run)
+    k, name = best.run.k_dyn, best.run.controller_name
     if math.isnan(best.run.start_time):
         return f"None reaches the target speed within the run; the gentlest so far is {name}, K_dyn {k:.3f}."
     said = f"Gentlest: {name}, K_dyn {k:.3f}"
-    direct = next((row for row in others if name_of(row.run) == "direct"), None)
+    direct = next((row for row in others if row.run.controller_name == "direct"), None)
     if direct is not None:
         said += f" against {direct.run.k_dyn:.3f} of direct"
     lost = best.time_lost
@@ -272,8 +269,16 @@ def notes(comparison: Comparison) -> list[str]:
         f"K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or "
         "the load inertia 0.4 times as large."
     ]
+    worst = [f"{row.run.controller_name} {row.run.position}" for row in comparison.rows if row.run.positions]
+    if worst:
+        found.append(
+            "The start position is unknown: each figure is the worst of both flanks and mid-gap. "
+            f"K_dyn is largest from: {', '.join(worst)}."
+        )
+    if comparison.drive.brake == "motor":
+        found.append("Times count from the command, so that they include the release of the brake.")
     found += [
-        f"{name_of(row.run)}: {row.run.status.value}"
+        f"{row.run.controller_name}: {row.run.status.value}"
         for row in comparison.rows
         if math.isnan(row.run.start_time)
     ]
@@ -292,30 +297,29 @@ def comparison_figure(runs: Sequence[Run], title: str) -> Any:
             panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
             panel.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
             panel.set_title(
-                f"{name_of(run)}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
+                f"{run.controller_name}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
                 loc="left",
                 fontsize=9.5,
                 pad=3,
             )
             panel.set_ylabel("N m")
             if index == 0:
-                panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
+                legend_above(panel, 2)
         axes[-1, 0].set_xlabel("time, s     (grey: gap open)")
         axes[-1, 0].set_xlim(0.0, longest)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        entitle(figure, title)
     return figure
 
 
 def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> Any:
     """K_dyn against start time, one point a strategy: (name, start time in s, K_dyn)."""
-    markers = "osD^vPX*"
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 4.6))
         for index, (name, time, k) in enumerate(points):
             axes.plot(
                 [time],
                 [k],
-                markers[index % 8],
+                MARKERS[index % 8],
                 ms=9,
                 mfc="none",
                 mew=2.0,
@@ -323,7 +327,7 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
                 label=name,
                 clip_on=False,
             )
-        axes.axhline(1.0, color="#666666", lw=0.8, ls=":")
+        axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
         axes.set_xlabel("start time, s")
         axes.set_ylabel("K_dyn")
         axes.set_ylim(bottom=0.0)
@@ -340,7 +344,7 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
     name = comparison.drive.name
     pictures = {"comparison": comparison_figure(runs, name)}
     points = [
-        (name_of(r.run), r.run.start_time, r.run.k_dyn) for r in rows if r.run.start_time == r.run.start_time
+        (run.controller_name, run.start_time, run.k_dyn) for run in runs if not math.isnan(run.start_time)
     ]
     if points:
         pictures["trade-off"] = trade_off_figure(points, name)
@@ -348,27 +352,20 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
         save_figure(figure, folder, stem)
     stems: list[str] = []
     for row in rows:
-        stems.append(file_stem(name_of(row.run), stems))
+        stems.append(file_stem(row.run.controller_name, stems))
         _write_run(row.run, folder, stems[-1])
 
     summaries = [row.summary() for row in rows]
     keys = [key for key in summaries[0] if key not in ("parameters", "status_text")]
-    write_text(folder / "drive.toml", comparison.drive.to_toml())
-    write_fitted_to(comparison.fitted_to, folder)
     write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
 
-    columns, cells = comparison_table(rows)
-    headings = [" ".join(column.heading.split()) for column in columns]
     parts = [
         f"# {markdown(name)}: soft-start strategies compared",
         conclusion(comparison),
-        markdown_table(headings, cells, numbers_from=1),
+        markdown_table(comparison_table(rows)),
         *notes(comparison),
         *(f"![{stem}]({stem}.svg)" for stem in pictures),
-        "## The drive",
-        drive_table(comparison.drive),
-        "## The strategies",
-        *(_strategy(run, stem) for run, stem in zip(runs, stems, strict=True)),
-        provenance(comparison.drive, command, comparison.fitted_to),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    each = (_strategy(run, stem) for run, stem in zip(runs, stems, strict=True))
+    behind = ["## The strategies", *each]
+    write_drive_report(folder, parts, comparison.drive, command, comparison.fitted_to, behind=behind)

@@ -13,19 +13,33 @@ from softstart.drive import PARAMETERS
 from softstart.late import late
 from softstart.start.status import Status
 from softstart.sweeping.summary import plan_of
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, save_figure
+from softstart.views.drawing import (
+    COLOURS,
+    DASHES,
+    GREY,
+    SMALL,
+    drawing,
+    entitle,
+    new_figure,
+    plain_ticks,
+    save_figure,
+)
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import (
-    drive_table,
     markdown,
-    markdown_table,
-    provenance,
-    write_fitted_to,
+    table_sections,
+    write_columns,
+    write_drive_report,
     write_table,
-    write_text,
 )
-from softstart.views.numbers import Column, column_of, number
-from softstart.views.terminal import fits, print_table, sentence
+from softstart.views.numbers import Table, column_of, number
+from softstart.views.terminal import (
+    fits,
+    print_conclusion,
+    print_lines,
+    print_tables,
+    sentence,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -128,7 +142,7 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
             panel.set_visible(False)
         for panel, (title, values) in zip(axes.flat, parts, strict=False):
             drawn = _map(panel, x, y, values[np.ix_(*orders)], scale)
-            panel.set_title(title, loc="left", fontsize=9.5)
+            panel.set_title(title, loc="left", fontsize=SMALL)
             for axis, values_of, set_scale in (("x", x, panel.set_xscale), ("y", y, panel.set_yscale)):
                 if _geometric(values_of):
                     set_scale("log")
@@ -142,7 +156,7 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
         if logarithmic:
             _plain_ticks(bar.ax.yaxis)
         note = "   (grey: no figure)" if any(np.isnan(values).any() for _, values in parts) else ""
-        figure.suptitle(f"{_title(results)}: {_label(results, name)}{note}", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{_title(results)}: {_label(results, name)}{note}")
     return figure
 
 
@@ -194,7 +208,7 @@ def _curves(results: xarray.Dataset, name: str, along: str, parts: list[Part]) -
             axes.set_xscale("log")
             _plain_ticks(axes.xaxis)
         if name == "k_dyn":
-            axes.axhline(1.0, color="#666666", lw=0.8, ls=":")
+            axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel(_label(results, along))
         axes.set_ylabel(_label(results, name))
@@ -214,9 +228,7 @@ def _geometric(values: Any) -> bool:
 
 def _plain_ticks(axis: Any) -> None:
     """Numbers as they are, at 1, 2 and 5 of each decade."""
-    axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(ticker.NullLocator())
+    plain_ticks(axis, ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
 
 
 def _title(results: xarray.Dataset) -> str:
@@ -274,8 +286,8 @@ def cell_rows(results: xarray.Dataset) -> Iterator[dict[str, Any]]:
         yield dict(zip(columns, row, strict=True))
 
 
-def cell_table(results: xarray.Dataset, to: Console | None = None) -> tuple[list[str], list[list[str]], int]:
-    """Headings with units, rows, and how many columns from the left are axes.
+def cell_table(results: xarray.Dataset, to: Console | None = None) -> Table:
+    """Each start; headings with units.
 
     Figures without a place on the screen are left out from the right. The status is among them only where
     not every start reached its target speed.
@@ -293,13 +305,14 @@ def cell_table(results: xarray.Dataset, to: Console | None = None) -> tuple[list
     if any(name != Status.REACHED.name for name in ended):
         headings.insert(axes + 1, STATUS)
         cells.insert(axes + 1, [name.lower().replace("_", " ") for name in ended])
-    while to is not None and len(cells) > axes + 2:
-        rows = [list(row) for row in zip(*cells, strict=True)]
-        if fits(to, [Column(heading) for heading in headings], rows):
-            break
+    texts = [
+        name for name, column in zip(headings, cells, strict=True) if any(c[:1].isalpha() for c in column)
+    ]
+    while True:
+        table = Table.of("Each start", dict(zip(headings, cells, strict=False)), texts)
+        if to is None or len(headings) <= axes + 2 or fits(to, table):
+            return table
         headings.pop()
-        cells.pop()
-    return headings, [list(row) for row in zip(*cells, strict=True)], axes
 
 
 def write_cells(results: xarray.Dataset, folder: Path) -> bool:
@@ -307,9 +320,7 @@ def write_cells(results: xarray.Dataset, folder: Path) -> bool:
     if results[STATUS].size > MOST_WRITTEN:
         return False
     columns = cell_columns(results)
-    headings = [_with_unit(results, name, " [", "]") for name in columns]
-    rows = zip(*columns.values(), strict=True)
-    write_table(folder / FILE, headings, [[_cell(value) for value in row] for row in rows])
+    write_columns(folder / FILE, {_with_unit(results, key, " [", "]"): c for key, c in columns.items()})
     return True
 
 
@@ -327,11 +338,6 @@ def _with_unit(results: xarray.Dataset, name: str, before: str, after: str = "")
     return shown if unit in ("", "1") else f"{shown}{before}{unit}{after}"
 
 
-def _cell(value: Any) -> Any:
-    """A figure that a start does not have is an empty cell."""
-    return None if isinstance(value, float) and math.isnan(value) else value
-
-
 def axis_summary(results: xarray.Dataset) -> dict[str, dict[str, Any]]:
     """The axes as plain data: how many values, from where to where or which."""
     found: dict[str, dict[str, Any]] = {}
@@ -346,19 +352,19 @@ def axis_summary(results: xarray.Dataset) -> dict[str, dict[str, Any]]:
     return found
 
 
-def axis_columns(results: xarray.Dataset) -> dict[str, list[str]]:
-    """The table of the axes."""
+def axis_table(results: xarray.Dataset) -> Table:
+    """The axes."""
     columns: dict[str, list[str]] = {"axis": [], "values": [], "from": [], "to": [], "unit": []}
     for name, about in axis_summary(results).items():
         ends = [f"{about[end]:.6g}" if end in about else "-" for end in ("from", "to")]
         unit = about["unit"] or ", ".join(about.get("values", ()))
         for column, cell in zip(columns.values(), (name, f"{about['count']:,}", *ends, unit), strict=True):
             column.append(cell)
-    return columns
+    return Table.of("The grid", columns, ("axis", "unit"))
 
 
-def figure_columns(results: xarray.Dataset, summary: Summary) -> dict[str, list[str]]:
-    """The table of the figures."""
+def figures_table(results: xarray.Dataset, summary: Summary) -> Table:
+    """The figures over all starts."""
     names = list(summary.spreads)
     rows = [
         column_of([spread.least, *spread.quantiles.values(), spread.most], 5)
@@ -367,11 +373,12 @@ def figure_columns(results: xarray.Dataset, summary: Summary) -> dict[str, list[
     headings = ["least", "5 %", "median", "95 %", "most"]
     cells = zip(*rows, strict=True)
     units = [str(results[name].attrs.get("units", "")) for name in names]
-    return {
+    columns = {
         "figure": names,
         "unit": ["" if unit == "1" else unit for unit in units],
-        **{heading: list(column) for heading, column in zip(headings, cells, strict=True)},
+        **dict(zip(headings, cells, strict=False)),
     }
+    return Table.of("Over all starts", columns, ("figure", "unit"))
 
 
 def conclusion(results: xarray.Dataset, summary: Summary) -> str:
@@ -423,33 +430,18 @@ def show(
     last: Progress | None,
 ) -> None:
     """Print everything."""
-    for index, line in enumerate(drive_lines(drive)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, drive_lines(drive))
     if fitted_to is not None:
         sentence(to, f"  {controllers_set_up(None, fitted_to)}")
-    for title, columns, texts in (
-        ("The grid", axis_columns(results), ("axis", "unit")),
-        ("Over all starts", figure_columns(results, summary), ("figure", "unit")),
-    ):
-        rows = [list(row) for row in zip(*columns.values(), strict=True)]
-        if rows:
-            to.print()
-            print_table(to, [Column(name, name not in texts) for name in columns], rows, title=title)
-    if summary.starts <= MOST_SHOWN:
-        headings, cells, _ = cell_table(results, to)
-        to.print()
-        print_table(to, [Column(name, _numbers(cells, i)) for i, name in enumerate(headings)], cells,
-                    title="Each start")  # fmt: skip
-    to.print()
-    sentence(to, conclusion(results, summary), "bold")
-    for note in (*endings(summary), pace(last)):
-        if note:
-            sentence(to, note, "dim")
+    print_tables(to, _tables(results, summary, to))
+    notes = (*endings(summary), pace(last))
+    print_conclusion(to, [conclusion(results, summary)], [note for note in notes if note])
 
 
-def _numbers(cells: list[list[str]], column: int) -> bool:
-    """Whether a column holds numbers, which are set to the right."""
-    return not any(row[column][:1].isalpha() for row in cells)
+def _tables(results: xarray.Dataset, summary: Summary, to: Console | None = None) -> list[Table]:
+    """The grid, the figures over all starts, and the starts where they are few."""
+    each = [cell_table(results, to)] if summary.starts <= MOST_SHOWN else []
+    return [axis_table(results), figures_table(results, summary), *each]
 
 
 OPEN = """\
@@ -472,12 +464,10 @@ def write_sweep(
     picture = sweep_figure(results, summary.judged) if summary.judged else None
     if picture is not None:
         save_figure(picture, folder, "sweep")
-    write_text(folder / "drive.toml", drive.to_toml())
-    write_fitted_to(fitted_to, folder)
-    rows = []
-    for name, spread in summary.spreads.items():
-        unit = results[name].attrs.get("units", "")
-        rows.append([name, unit, *spread.summary().values()])
+    rows = [
+        [name, results[name].attrs.get("units", ""), *spread.summary().values()]
+        for name, spread in summary.spreads.items()
+    ]
     headings = list(next(iter(summary.spreads.values())).summary()) if rows else []
     write_table(folder / "sweep.csv", ["figure", "unit", *headings], rows)
     parts = [
@@ -485,24 +475,12 @@ def write_sweep(
         markdown(conclusion(results, summary)),
         *map(markdown, endings(summary)),
         *(["![sweep](sweep.svg)"] if picture is not None else []),
+        *table_sections(_tables(results, summary)),
     ]
-    for title, columns in (
-        ("The grid", axis_columns(results)),
-        ("Over all starts", figure_columns(results, summary)),
-    ):
-        cells = [list(row) for row in zip(*columns.values(), strict=True)]
-        parts += [f"## {title}", markdown_table(list(columns), cells)] if cells else []
-    if summary.starts <= MOST_SHOWN:
-        headings, cells, axes = cell_table(results)
-        headings = [" ".join(heading.split()) for heading in headings]
-        parts += ["## Each start", markdown_table(headings, cells, numbers_from=axes)]
     written = f", each start in [{FILE}]({FILE})" if write_cells(results, folder) else ""
     parts += [
         f"All numbers with their digits: [sweep.csv](sweep.csv){written}. Every start is in the folder "
         "`sweep.zarr`:",
         OPEN,
-        "## The drive",
-        drive_table(drive),
-        provenance(drive, command, fitted_to, one=False),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    write_drive_report(folder, parts, drive, command, fitted_to, one=False)

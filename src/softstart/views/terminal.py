@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from softstart.late import late
-from softstart.views.numbers import Column, Table, plain, printable
+from softstart.views.numbers import Table, plain, printable
 
 if TYPE_CHECKING:
     import rich.console as rich_console
@@ -47,15 +47,10 @@ def print_json(data: Any) -> None:
 
 
 def print_table(
-    to: rich_console.Console,
-    columns: Sequence[Column],
-    rows: Sequence[Sequence[str]],
-    *,
-    title: str = "",
-    bold: Sequence[int] = (),
-    headings: bool = True,
+    to: rich_console.Console, shown: Table, *, bold: Sequence[int] = (), headings: bool = True
 ) -> None:
     """A table; rows numbered in `bold` stand out on a terminal. Text is wrapped, numbers are never cut."""
+    title, columns, rows = shown
     framed = to.is_terminal and not to.options.ascii_only
     table = rich_table.Table(
         box=box.SIMPLE_HEAD if framed else None,
@@ -99,13 +94,13 @@ def print_tables(to: rich_console.Console, tables: Sequence[Table]) -> None:
     for table in tables:
         if table.rows:
             to.print()
-            print_table(to, table.columns, table.rows, title=table.title)
+            print_table(to, table)
 
 
-def fits(to: rich_console.Console, columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> bool:
+def fits(to: rich_console.Console, table: Table) -> bool:
     """Whether a table has room as it is."""
-    widths = [column.width([row[i] for row in rows]) for i, column in enumerate(columns)]
-    return sum(widths) + GUTTER * (len(columns) - 1) <= to.width
+    widths = [column.width([row[i] for row in table.rows]) for i, column in enumerate(table.columns)]
+    return sum(widths) + GUTTER * (len(widths) - 1) <= to.width
 
 
 def sentence(to: rich_console.Console, text: str, style: str = "") -> None:
@@ -120,3 +115,17 @@ def print_lines(to: rich_console.Console, lines: Sequence[str]) -> None:
     """Paragraphs of which the first one is a title."""
     for index, line in enumerate(lines):
         sentence(to, line, "bold" if index == 0 else "")
+
+
+def print_figures(to: rich_console.Console, rows: Sequence[Sequence[str]]) -> None:
+    """Figures, each a name and its value."""
+    print_table(to, Table.of_texts(("", ""), rows), headings=False)
+
+
+def print_conclusion(to: rich_console.Console, found: Sequence[str], notes: Sequence[str]) -> None:
+    """What came out, and below it the notes."""
+    to.print()
+    for text in found:
+        sentence(to, text, "bold")
+    for note in notes:
+        sentence(to, note, "dim")

@@ -10,18 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.errors import InputError
-from softstart.views.drawing import drawing, new_figure, save_figure
+from softstart.views.drawing import drawing, entitle, new_figure, save_figure
 from softstart.views.drives import drive_lines
-from softstart.views.markdown import (
-    drive_table,
-    markdown,
-    markdown_table,
-    provenance,
-    write_table,
-    write_text,
-)
-from softstart.views.numbers import Column, column_of, short
-from softstart.views.terminal import fits, print_table, sentence
+from softstart.views.markdown import markdown, markdown_table, write_columns, write_drive_report
+from softstart.views.numbers import Table, column_of, first_of, short
+from softstart.views.terminal import fits, print_conclusion, print_lines, print_tables, sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,25 +49,27 @@ def gain_maps(tuning: Tuning) -> Any:
 
 
 def metric_maps(tuning: Tuning) -> Any:
-    """The metric with the defaults, tuned, and how many searches agree."""
-    table, name, said = _schedule(tuning), tuning.metric, _symbol(tuning)
-    maps = [
-        (f"{name}_default", f"{said}, defaults", ""),
-        (name, f"{said}, tuned for each cell", ""),
-        ("start_time" if "start_time" in table else name, "start time, tuned", "s"),
-    ]
-    return _maps(tuning, table, maps, "each cell tuned by itself", together=2)
+    """The metric with the defaults, tuned, and the start time."""
+    return _beside_defaults(
+        tuning, _schedule(tuning), "tuned for each cell", "tuned", "each cell tuned by itself"
+    )
 
 
 def robust_maps(tuning: Tuning) -> Any:
     """The metric of one set of gains, and of the defaults of the nominal drive."""
-    table, name, said = tuning._robust().cells, tuning.metric, _symbol(tuning)
+    table = tuning._robust().cells
+    return _beside_defaults(tuning, table, "one set for all", "one set", "set up for the nominal drive")
+
+
+def _beside_defaults(tuning: Tuning, table: Dataset, gains: str, short_name: str, title: str) -> Any:
+    """The metric with the defaults and with these gains in one scale of colours, and the start time."""
+    name, symbol = tuning.metric, _symbol(tuning)
     maps = [
-        (f"{name}_default", f"{said}, defaults", ""),
-        (name, f"{said}, one set for all", ""),
-        ("start_time" if "start_time" in table else name, "start time, one set", "s"),
+        (f"{name}_default", f"{symbol}, defaults", ""),
+        (name, f"{symbol}, {gains}", ""),
+        ("start_time" if "start_time" in table else name, f"start time, {short_name}", "s"),
     ]
-    return _maps(tuning, table, maps, "set up for the nominal drive", together=2)
+    return _maps(tuning, table, maps, title, together=2)
 
 
 def price_maps(tuning: Tuning) -> Any:
@@ -106,7 +101,10 @@ def _maps(
     tuning: Tuning, table: Dataset, maps: list[tuple[str, str, str]], title: str, together: int = 0
 ) -> Any:
     """Maps side by side; the first `together` share one scale of colours."""
-    rows, columns = len(tuning.question.gaps), len(tuning.question.load_inertias)
+    gaps, inertias = (
+        [f"{value:.3g}" for value in axis] for axis in (tuning.question.gaps, tuning.question.load_inertias)
+    )
+    rows, columns = len(gaps), len(inertias)
     across = min(ACROSS, len(maps))
     down = math.ceil(len(maps) / across)
     width, height = max(FEWEST[0], 1.2 + CELL * columns), max(FEWEST[1], 0.9 + ROW * rows)
@@ -117,12 +115,12 @@ def _maps(
             values = np.asarray(table[name], dtype=np.float64)
             limits = _limits(shared if index < together else [values])
             panel = axes[index // across, index % across]
-            _map(panel, tuning, values, limits)
+            timed = "in_time" in table and name in (tuning.metric, "start_time")
+            late = ~np.asarray(table["in_time"], dtype=bool) if timed else None
+            draw_cells(panel, values, _texts(values), limits, inertias, gaps, late)
             panel.set_title(
                 heading + (f", {unit}" if unit not in ("", "1") else ""), loc="left", fontsize=SMALL
             )
-            if "in_time" in table and name in (tuning.metric, "start_time"):
-                _cross_out(panel, ~np.asarray(table["in_time"], dtype=bool))
         for index in range(len(maps), down * across):
             axes[index // across, index % across].set_axis_off()
         for panel in axes[:, 0]:
@@ -130,7 +128,7 @@ def _maps(
         for index in range(len(maps)):
             if index + across >= len(maps):
                 axes[index // across, index % across].set_xlabel("load inertia J2, kg m2")
-        figure.suptitle(f"{tuning.drive.name}: {tuning.controller}, {title}", x=0.01, ha="left", fontsize=11)
+        entitle(figure, f"{tuning.drive.name}: {tuning.controller}, {title}")
     return figure
 
 
@@ -147,19 +145,27 @@ def _limits(values: list[Any]) -> tuple[float, float]:
     )
 
 
-def _map(axes: Axes, tuning: Tuning, values: Any, limits: tuple[float, float]) -> None:
-    """One map, wide gaps at the top; every cell says its number."""
+def draw_cells(
+    axes: Axes,
+    values: Any,
+    texts: Sequence[Sequence[str]],
+    limits: tuple[float, float],
+    columns: Sequence[str],
+    rows: Sequence[str],
+    late: Any = None,
+) -> None:
+    """A map, the first row at the bottom: each cell shows its text, and is struck out where it is `late`."""
     low, high = limits
     axes.grid(False)
     axes.imshow(values, cmap=MAP, vmin=low, vmax=high, origin="lower", aspect="auto")
-    texts = _texts(values)
     for (i, j), value in np.ndenumerate(values):
         share = (value - low) / (high - low) if math.isfinite(value) else 1.0
         colour = "#000000" if share > LIGHT else "#FFFFFF"
         axes.text(j, i, texts[i][j], ha="center", va="center", color=colour, fontsize=SMALL - 1.0)
-    question = tuning.question
-    axes.set_xticks(range(len(question.load_inertias)), [f"{v:.3g}" for v in question.load_inertias])
-    axes.set_yticks(range(len(question.gaps)), [f"{v:.3g}" for v in question.gaps])
+        if late is not None and late[i, j]:
+            axes.plot([j - 0.5, j + 0.5], [i - 0.5, i + 0.5], color="#D55E00", lw=1.2)
+    axes.set_xticks(range(len(columns)), columns)
+    axes.set_yticks(range(len(rows)), rows)
     axes.tick_params(length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)
@@ -171,12 +177,6 @@ def _texts(values: Any) -> list[list[str]]:
     largest = float(finite.max()) if finite.size else 0.0
     decimals = 2 if largest <= 0.0 else min(max(2 - math.floor(math.log10(largest)), 0), 6)
     return [[f"{v:.{decimals}f}" if math.isfinite(v) else "-" for v in row] for row in values.tolist()]
-
-
-def _cross_out(axes: Axes, late: Any) -> None:
-    """A line through the cells whose start time is beyond its bound."""
-    for i, j in np.argwhere(late):
-        axes.plot([j - 0.5, j + 0.5], [i - 0.5, i + 0.5], color="#D55E00", lw=1.2)
 
 
 SHOWN = 24  # cells shown; files and JSON hold all
@@ -196,16 +196,17 @@ def question(tuning: Tuning) -> str:
     by = "worst case" if q.quantile == 1.0 else f"quantile {q.quantile:g}"
     over = f", {by} of {len(q.scenarios)} scenarios a cell" if len(q.scenarios) > 1 else ""
     return (
-        f"{tuning.controller}: {_said(tuning)} made small, start time {q.bound.text()}, {len(q.gaps)} gaps x "
-        f"{len(q.load_inertias)} load inertias{over}. Tuned: {ranges}."
+        f"{tuning.controller}: {_metric(tuning)} made small, start time {q.bound.text()}, "
+        f"{len(q.gaps)} gaps x {len(q.load_inertias)} load inertias{over}. Tuned: {ranges}."
     )
 
 
-def _said(tuning: Tuning) -> str:
+def _metric(tuning: Tuning) -> str:
+    """The metric in words."""
     return NAMES.get(tuning.metric, tuning.metric)
 
 
-def cell_columns(tuning: Tuning) -> dict[str, list[str]]:
+def cell_table(tuning: Tuning) -> Table:
     """The schedule, one row a cell."""
     table = tuning.schedule
     assert table is not None
@@ -218,36 +219,43 @@ def cell_columns(tuning: Tuning) -> dict[str, list[str]]:
         unit = f"\n{one.unit.replace('*', ' ')}" if one.unit not in ("", "1") else ""
         columns[one.name.replace("_", " ") + unit] = column_of(_flat(table[one.name]))
     columns |= {
-        f"{_said(tuning)}\ndefault": column_of(_flat(table[f"{tuning.metric}_default"])),
-        f"{_said(tuning)}\ntuned": column_of(_flat(table[tuning.metric])),
+        f"{_metric(tuning)}\ndefault": column_of(_flat(table[f"{tuning.metric}_default"])),
+        f"{_metric(tuning)}\ntuned": column_of(_flat(table[tuning.metric])),
         "start\ntime s": column_of(_flat(table["start_time" if "start_time" in table else tuning.metric])),
         "at most\ns": column_of(_flat(table["start_time_bound"])),
         "in\ntime": ["yes" if good else "no" for good in _flat(table["in_time"])],
         "searches\nagree": [f"{n} of {tuning.question.restarts}" for n in _flat(table["agreement"])],
     }
-    return columns
+    return Table.of(f"Gains for each cell{first_of(len(tuning.question.cells), SHOWN)}", columns)
 
 
-def set_columns(tuning: Tuning) -> dict[str, list[str]]:
+def set_table(tuning: Tuning) -> Table:
     """The robust set, one row a parameter."""
     found = tuning.robust
     assert found is not None
     units = {one.name: one.unit for one in tuning.question.ranges}
-    return {
+    columns = {
         "parameter": list(found.gains),
         "default": [short(found.defaults[name]) for name in found.gains],
         "robust": [short(value) for value in found.gains.values()],
         "unit": ["" if units[name] == "1" else units[name].replace("*", " ") for name in found.gains],
     }
+    return Table.of("One set for all", columns, ("parameter", "unit"))
 
 
-def map_columns(tuning: Tuning, table: Any, name: str) -> dict[str, list[str]]:
+def map_table(tuning: Tuning, title: str, table: Any, name: str) -> Table:
     """A figure over the grid, one row a gap."""
     values = np.asarray(table[name], dtype=np.float64)
     columns = {"gap rad": [short(gap) for gap in tuning.question.gaps]}
     for j, inertia in enumerate(tuning.question.load_inertias):
         columns[f"J2 {inertia:.4g}"] = column_of(values[:, j].tolist())
-    return columns
+    return Table.of(title, columns)
+
+
+def _set_map(tuning: Tuning) -> Table:
+    """The metric of the robust set over the grid."""
+    assert tuning.robust is not None
+    return map_table(tuning, f"{_metric(tuning)} with this set", tuning.robust.cells, tuning.metric)
 
 
 def _flat(values: Any) -> list[Any]:
@@ -270,12 +278,12 @@ def _between(values: Any, digits: int = 3) -> str:
 
 def conclusions(tuning: Tuning) -> list[str]:
     """What tuning for each cell brings, what one set does, and what robustness costs."""
-    name, said, told = tuning.metric, _said(tuning), []
+    name, metric, found = tuning.metric, _metric(tuning), list[str]()
     if tuning.schedule is not None:
         table = tuning.schedule
         late = int((~table["in_time"]).sum())
-        told.append(
-            f"Gains for each cell: {said} {_between(table[name])}, with the defaults "
+        found.append(
+            f"Gains for each cell: {metric} {_between(table[name])}, with the defaults "
             f"{_between(table[f'{name}_default'])}"
             + (
                 f"; {late} of {table['in_time'].size} cells start later than allowed."
@@ -287,95 +295,86 @@ def conclusions(tuning: Tuning) -> list[str]:
         one = tuning.robust
         kind = "at most" if tuning.question.quantile == 1.0 else f"quantile {tuning.question.quantile:g}"
         late_text = "all in time" if one.feasible else f"{100 * one.excess:.1f} % later than allowed"
-        told.append(
-            f"One set for all: {said} {kind} {one.worst:.3f}, with the defaults of the nominal drive "
+        found.append(
+            f"One set for all: {metric} {kind} {one.worst:.3f}, with the defaults of the nominal drive "
             f"{one.worst_default:.3f}; {late_text}; {one.agreement} of {one.restarts} searches agree."
         )
     price = tuning.price
     if price is not None and "robust_over_schedule" in price:
-        told.append(
-            f"One set over gains for each cell: {_between(price['robust_over_schedule'])} times the {said}."
+        found.append(
+            f"One set over gains for each cell: {_between(price['robust_over_schedule'])} times the {metric}."
         )
     for side, words in (("schedule", "Gains for each cell"), ("robust", "One set")):
         if price is not None and f"{side}_over_optimum" in price:
             ratio = price[f"{side}_over_optimum"]
             missing = int(ratio.isnull().sum())
-            told.append(
+            found.append(
                 f"{words} over the certified optimum within the same time: {_between(ratio)} times"
                 + (f" ({missing} of {ratio.size} cells without an optimum)." if missing else ".")
             )
-    return told
+    return found
 
 
 def notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how sure the search is."""
-    told = []
+    found = []
     if tuning.schedule is not None:
         q, table = tuning.question, tuning.schedule
         sure = int((table["agreement"] == q.restarts).sum())
-        told.append(
+        found.append(
             f"Searches agree: within 1 % of the best; all {q.restarts} do in {sure} of {len(q.cells)} cells."
         )
         if bool(table["kept_default"].any()):
-            told.append(f"In {int(table['kept_default'].sum())} cells the defaults were best.")
+            found.append(f"In {int(table['kept_default'].sum())} cells the defaults were best.")
         if not bool(table["in_time"].all()):
-            told.append("Cells that are not in time have the least delay that was found.")
+            found.append("Cells that are not in time have the least delay that was found.")
         if tuning.between is not None:
-            told.append(
-                f"Half way between the cells, with interpolated gains: {_said(tuning)} "
+            found.append(
+                f"Half way between the cells, with interpolated gains: {_metric(tuning)} "
                 f"{_between(tuning.between[tuning.metric])}, up to "
                 f"{100 * float(tuning.between['excess'].max()):.1f} % beyond the bound on the start time."
             )
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
-        told.append(
+        found.append(
             "Optimum: the cell's drive, its motor without lag, dead time and noise; terminal reached."
         )
-    told.append(f"{tuning.starts:,} starts.")
-    return told
+    found.append(f"{tuning.starts:,} starts.")
+    return found
 
 
 def show(to: Console, tuning: Tuning) -> None:
     """All of it on a terminal or in a pipe."""
-    for index, line in enumerate(drive_lines(tuning.drive)):
-        sentence(to, line, "bold" if index == 0 else "")
+    print_lines(to, drive_lines(tuning.drive))
     to.print()
     sentence(to, question(tuning))
     if tuning.schedule is not None:
-        columns = cell_columns(tuning)
-        count = len(tuning.question.cells)
-        part = f" (the first {SHOWN} of {count}; --json and --out give all)" if count > SHOWN else ""
-        _table(to, f"Gains for each cell{part}", columns)
+        _print(to, cell_table(tuning))
     if tuning.robust is not None:
-        _table(to, "One set for all", set_columns(tuning), texts=("parameter", "unit"))
-        _table(to, f"{_said(tuning)} with this set", map_columns(tuning, tuning.robust.cells, tuning.metric))
+        _print(to, set_table(tuning))
+        _print(to, _set_map(tuning))
     if tuning.price is not None and "robust_over_schedule" in tuning.price:
-        _table(to, "Price of robustness: one set over gains for each cell",
-               map_columns(tuning, tuning.price, "robust_over_schedule"))  # fmt: skip
-    to.print()
-    for told in conclusions(tuning):
-        sentence(to, told, "bold")
-    for note in notes(tuning):
-        sentence(to, note, "dim")
+        title = "Price of robustness: one set over gains for each cell"
+        _print(to, map_table(tuning, title, tuning.price, "robust_over_schedule"))
+    print_conclusion(to, conclusions(tuning), notes(tuning))
 
 
-def _table(to: Console, title: str, columns: dict[str, list[str]], texts: Sequence[str] = ()) -> None:
-    """A table, in two where there is no room for one."""
-    headings = [Column(name, name not in texts) for name in columns]
-    rows = [list(row)[: len(headings)] for row in zip(*columns.values(), strict=True)][:SHOWN]
-    to.print()
-    if fits(to, headings, rows) or len(headings) < 6:
-        print_table(to, headings, rows, title=title)
+def _print(to: Console, table: Table) -> None:
+    """The first rows of a table, in two where there is no room for one."""
+    title, columns, rows = table._replace(rows=table.rows[:SHOWN])
+    if fits(to, table) or len(columns) < 6:
+        print_tables(to, [Table(title, columns, rows)])
         return
-    split = len(headings) - 6 if len(headings) > 8 else len(headings) // 2 + 1
-    print_table(to, headings[:split], [row[:split] for row in rows], title=title)
-    to.print()
-    second = [*headings[:2], *headings[split:]]
-    print_table(to, second, [[*row[:2], *row[split:]] for row in rows], title=f"{title}, continued")
+    split = len(columns) - 6 if len(columns) > 8 else len(columns) // 2 + 1
+    second = Table(
+        f"{title}, continued",
+        [*columns[:2], *columns[split:]],
+        [[*row[:2], *row[split:]] for row in rows],
+    )
+    print_tables(to, [Table(title, columns[:split], [row[:split] for row in rows]), second])
 
 
 def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
     """Everything about a tuning, but its saved state."""
-    write_text(folder / "drive.toml", tuning.drive.to_toml())
     parts = [
         f"# {markdown(tuning.drive.name)}: {markdown(tuning.controller)} tuned",
         markdown(question(tuning)),
@@ -389,7 +388,7 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
         parts += [
             "## Gains for each cell",
             "![gains](gains.svg)\n\n![metric](metric.svg)",
-            _markdown(cell_columns(tuning)),
+            markdown_table(cell_table(tuning)),
             _play("schedule.toml", "with the gap and load inertia that the drive declares")
             + "The same gains, with all figures of each cell: [schedule.csv](schedule.csv).",
         ]
@@ -403,8 +402,8 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
         parts += [
             "## One set for all",
             "![robust](robust.svg)",
-            _markdown(set_columns(tuning)),
-            _markdown(map_columns(tuning, tuning.robust.cells, tuning.metric)),
+            markdown_table(set_table(tuning)),
+            markdown_table(_set_map(tuning)),
             _play("robust.toml", "set up for the nominal drive, whatever drive starts")
             + "Each cell: [robust-cells.csv](robust-cells.csv).",
         ]
@@ -416,11 +415,8 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
         "## Notes",
         *map(markdown, notes(tuning)),
         "Finished parts, from which the same command goes on: [tuning.jsonl](tuning.jsonl).",
-        "## The drive",
-        drive_table(tuning.drive),
-        provenance(tuning.drive, command),
     ]
-    write_text(folder / "report.md", "\n\n".join(parts) + "\n")
+    write_drive_report(folder, parts, tuning.drive, command)
 
 
 def _play(file: str, how: str) -> str:
@@ -430,21 +426,8 @@ def _play(file: str, how: str) -> str:
     )
 
 
-def _markdown(columns: dict[str, list[str]]) -> str:
-    headings = [" ".join(heading.split()) for heading in columns]
-    return markdown_table(
-        headings, [list(row) for row in zip(*columns.values(), strict=True)], numbers_from=1
-    )
-
-
 def _write_cells(path: Path, table: Dataset) -> None:
     """One row a cell, all figures."""
     gaps, inertias = np.meshgrid(table["gap"], table["load_inertia"], indexing="ij")
-    columns: dict[str, Any] = {"gap": gaps.ravel(), "load_inertia": inertias.ravel()}
-    columns |= {str(name): np.asarray(values).ravel() for name, values in table.items()}
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    write_table(path, list(columns), [[_cell(value) for value in row] for row in rows])
-
-
-def _cell(value: Any) -> Any:
-    return None if isinstance(value, float) and math.isnan(value) else value
+    columns = {"gap": gaps, "load_inertia": inertias} | {str(name): one for name, one in table.items()}
+    write_columns(path, {name: _flat(values) for name, values in columns.items()})

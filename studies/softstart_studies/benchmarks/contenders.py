@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import platform
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 from softstart.arrays import Vector
+from softstart.study import Table
 from softstart_studies.benchmarks.problem import Problem
 
 
@@ -91,3 +95,14 @@ def make(name: str, problem: Problem) -> Contender:
     entry = ENTRIES[name]
     made: Contender = getattr(import_module(f"{HOME}.{entry.module}"), entry.cls)(problem)
     return made
+
+
+def condition_table(rows: Sequence[tuple[str, object]], libraries: Sequence[str]) -> Table:
+    """What the figures mean, and under which conditions they were measured."""
+    machine = [
+        ("processors of the machine", os.cpu_count()),
+        ("machine", f"{platform.machine()}, {platform.system()}"),
+        ("python", platform.python_version()),
+        *((name, version_of(name) or "not installed") for name in libraries),
+    ]
+    return Table("Conditions", ("what", "value"), [*rows, *machine])

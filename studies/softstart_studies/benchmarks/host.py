@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 from softstart.arrays import Vector
+from softstart.errors import SimulationError
+from softstart.processes import DiedError, Worker
 from softstart_studies.benchmarks.contenders import Contender, make
 from softstart_studies.benchmarks.problem import Problem, gaps
 
@@ -83,3 +87,61 @@ class Here:
 
     def close(self) -> None:
         """Nothing to be done."""
+
+
+# what Worker does for BLAS and numba, for jax
+ONE_THREAD = {
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "JAX_PLATFORMS": "cpu",
+}
+HERE = Here()  # of the process
+
+
+class Child:
+    """A host whose work is done by a process of its own."""
+
+    def __init__(self) -> None:
+        self.worker = Worker()
+        self.worker.run(bind_to_one_processor)
+
+    def prepare(self, name: str, problem: Problem, starts: int) -> float:
+        """Make ready for so many starts; seconds of the first pass, imports and compiling included."""
+        return float(self._ask("prepare", name, problem, starts))
+
+    def timed(self, name: str, problem: Problem, starts: int) -> Timed:
+        """One pass over `gaps(starts)`."""
+        answer: Timed = self._ask("timed", name, problem, starts)
+        return answer
+
+    def forget(self) -> None:
+        """Let go of all that was made ready."""
+        self._ask("forget")
+
+    def memory(self) -> float | None:
+        """Largest resident memory of the child so far, MiB."""
+        answer: float | None = self._ask("memory")
+        return answer
+
+    def close(self) -> None:
+        """End the child."""
+        self.worker.end()
+
+    def _ask(self, verb: str, *arguments: object) -> Any:
+        try:
+            return self.worker.run(_answer, verb, *arguments)
+        except DiedError as death:
+            raise SimulationError(f"benchmark: the process of a contender ended: {death}.") from None
+        except Exception as error:  # a contender's package may fail in any way
+            text = " ".join(f"{type(error).__name__}: {error}".split())
+            raise SimulationError(f"benchmark: a contender failed: {text}.") from error
+
+
+def _answer(verb: str, *arguments: object) -> object:
+    return getattr(HERE, verb)(*arguments)
+
+
+def bind_to_one_processor() -> None:
+    """One processor where the system offers that, so that no library's thread pool has more; one thread."""
+    os.environ.update(ONE_THREAD)
+    if sys.platform == "linux":
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

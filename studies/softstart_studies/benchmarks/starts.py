@@ -2,22 +2,71 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
-from softstart.study import Progress, Study, StudyResult, Table
+from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
+from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.benchmarks import contenders
-from softstart_studies.benchmarks.child import Child
 from softstart_studies.benchmarks.contenders import ENTRIES
-from softstart_studies.benchmarks.contest import Duel, Outcome, fight, rounded
-from softstart_studies.benchmarks.host import Host
-from softstart_studies.benchmarks.picture import ratio_figure
+from softstart_studies.benchmarks.contest import Duel, Outcome, fight, rounded, shown
+from softstart_studies.benchmarks.host import Child, Host
 from softstart_studies.benchmarks.problem import crane_problem
-from softstart_studies.benchmarks.verdicts import MANY, claims
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+MANY = 20_000.0  # times LSODA, for a batch without sampling
+MILLION = 1e6  # starts/s on one core
+AGREEMENT = 1e-6  # in K_dyn, where nothing is sampled
+
+
+def claims(outcomes: Sequence[Outcome]) -> list[Claim]:
+    """One claim for each kind of duel that has been fought."""
+    kernel = [one for one in outcomes if one.duel.ours == "kernel" and one.duel.peer == "lsoda"]
+    sampled = [one for one in outcomes if one.duel.peer == "lsoda-sampled"]
+    single = [one for one in outcomes if one.duel.ours.startswith("run") and one.duel.peer == "lsoda"]
+    staged = [one for one in outcomes if one.duel.peer in {"lsoda", "lsoda-restarted"}]
+    found = []
+    if kernel:
+        found.append(_ratio_claim("In a batch, constant and staged torque", kernel))
+        rates = [one.our_rate for one in kernel]
+        millions = ", ".join(f"{one.duel.strategy} {one.our_rate / 1e6:.2f}" for one in kernel)
+        found.append(
+            Claim(
+                "One core makes at least 1 million starts a second with constant and staged torque.",
+                Verdict.of(*(rate >= MILLION for rate in rates)),
+                f"Million starts/s: {millions}.",
+            )
+        )
+    if sampled:
+        found.append(_ratio_claim("In a batch, a ramp sampled at 1 kHz", sampled))
+    if single:
+        found.append(_ratio_claim("One simulate call with its full Run", single))
+    if staged:
+        apart = [one.k_dyn_difference for one in staged]
+        found.append(
+            Claim(
+                "LSODA at rtol 1e-8 has the same K_dyn within 1e-6.",
+                Verdict.of(*(value <= AGREEMENT for value in apart)),
+                f"Largest difference: {max(apart):.1e}.",
+            )
+        )
+    return found
+
+
+def _ratio_claim(what: str, outcomes: Sequence[Outcome]) -> Claim:
+    wanted = max(one.duel.wanted or 0.0 for one in outcomes)
+    ratios = ", ".join(f"{one.duel.strategy} ({one.duel.ours}) {shown(one.ratio)}" for one in outcomes)
+    return Claim(
+        f"{what}: at least {wanted:,.0f} times as many starts a second as LSODA with located events.",
+        Verdict.of(*(one.ratio >= (one.duel.wanted or 0.0) for one in outcomes)),
+        f"Ratio: {ratios}.",
+    )
+
 
 __all__ = ["BenchmarkStarts"]
 
@@ -140,19 +189,55 @@ def _process_table(
 
 
 def _condition_table(passes: int, outcomes: Sequence[Outcome]) -> Table:
-    libraries = ("numpy", "scipy", "numba", "control", "jax", "diffrax")
-    versions = {name: contenders.version_of(name) or "not installed" for name in libraries}
     clock = max((abs(one.wall_ratio / one.ratio - 1.0) for one in outcomes), default=0.0)
     rows = [
         ("rates", "starts a second of processor time, medians of the passes"),
         ("ratios by the clock instead", f"differ by {clock:.1%} at most"),
         ("memory", "largest of the whole process, interpreter and libraries included"),
         ("first pass", "imports and compiling included; not in the rates"),
-        ("processors of the machine", os.cpu_count()),
-        ("machine", f"{platform.machine()}, {platform.system()}"),
         ("processors and threads used", "one, one"),
         ("passes, in turns", passes),
-        ("python", platform.python_version()),
-        *versions.items(),
     ]
-    return Table("Conditions", ("what", "value"), rows)
+    return contenders.condition_table(rows, ("numpy", "scipy", "numba", "control", "jax", "diffrax"))
+
+
+SHORT = {
+    "kernel": "kernel, batch",
+    "batch": "simulate, batch",
+    "run": "simulate, Run",
+    "run-traces": "simulate, Run with traces",
+    "lsoda": "LSODA",
+    "lsoda-restarted": "LSODA, each stage",
+    "lsoda-sampled": "LSODA, each sample",
+    "control": "control, defaults",
+    "control-tight": "control, 1e-8",
+    "diffrax": "diffrax, vmapped batch",
+}
+
+
+def ratio_figure(outcomes: Sequence[Outcome]) -> Figure:
+    """One bar a row of the table, coloured by peer; a black tick where a ratio was wanted."""
+    packages = list(dict.fromkeys(ENTRIES[one.duel.peer].package for one in outcomes))
+    with drawing():
+        figure, axes = new_figure(1, 1, (8.0, 1.4 + 0.42 * len(outcomes)))
+        for place, one in enumerate(outcomes):
+            package = ENTRIES[one.duel.peer].package
+            axes.barh(place, one.ratio, height=0.66, left=0.0, color=COLOURS[packages.index(package)])
+            # at the right edge, where no bar and no tick can cross it
+            axes.annotate(
+                shown(one.ratio), (1.0, place), xycoords=("axes fraction", "data"), ha="right", va="center"
+            )
+            if one.duel.wanted is not None:
+                axes.plot([one.duel.wanted] * 2, [place - 0.42, place + 0.42], color="black", lw=1.8)
+        axes.set_xscale("log")
+        wanted = [one.duel.wanted or 1.0 for one in outcomes]
+        axes.set_xlim(1.0, 10.0 * max([1.0, *wanted, *(one.ratio for one in outcomes)]))
+        axes.set_yticks(range(len(outcomes)))
+        axes.set_yticklabels(
+            [f"{one.duel.strategy}:  {SHORT[one.duel.ours]} : {SHORT[one.duel.peer]}" for one in outcomes]
+        )
+        axes.invert_yaxis()
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel("starts/s of softstart : starts/s of the peer     (black tick: wanted)")
+        axes.set_title("Same starts, same end, one core, in one run", loc="left")
+    return cast("Figure", figure)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from softstart.input.files import write_whole
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.paper_b import convergence, over_speed, pictures, printed, sensitivity, verdicts
+from softstart_studies.paper_b import convergence, over_speed, printed, sensitivity, verdicts
 from softstart_studies.paper_b.vaz import VAZ, balanced
 
 __all__ = ["PaperB"]
@@ -43,7 +43,7 @@ class PaperB(Study):
         progress("varying what is assumed")
         tables = (
             printed.table(),
-            over_speed.courses_table(found),
+            over_speed.curves_table(found),
             over_speed.designs_table(found),
             over_speed.loads_table(),
             sensitivity.table(),
@@ -51,11 +51,11 @@ class PaperB(Study):
         )
         claims = verdicts.claims(found)
         progress("drawing")
-        course = over_speed.course(found)
+        curves = over_speed.curves(found)
         drawn = found.figures()
         figures = (
-            pictures.figure_2(course),
-            pictures.figure_3(course),
+            over_speed.figure_2(curves),
+            over_speed.figure_3(curves),
             drawn["torque"],
             drawn["residual"],
             drawn["forces"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from softstart.balancing import Balance
 from softstart.balancing.design import arm, free_force
 from softstart.balancing.engine import moment_harmonic
 from softstart.study import Table
-from softstart_studies.paper_b.vaz import LOADS, MOMENTS, RPM, SPEEDS, VAZ
+from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, legend_above, new_figure
+from softstart_studies.paper_b.vaz import LOADS, MOMENTS, RPM, SPEEDS, TUNING, VAZ
 
 
 @dataclass(frozen=True)
-class Course:
+class Curves:
     """First orders over the speed in rpm, amplitudes in N m, and the moment of the shafts with h fixed."""
 
     rpm: Vector
@@ -27,11 +29,11 @@ class Course:
     shafts: Vector
 
 
-def course(found: Balance) -> Course:
+def curves(found: Balance) -> Curves:
     """The curves of figures 2 and 3 at full load.
 
     >>> from softstart_studies.paper_b.vaz import balanced
-    >>> one = course(balanced())
+    >>> one = curves(balanced())
     >>> bool(abs(one.sine - one.shafts).min() < 1e-9)
     True
     """
@@ -41,7 +43,7 @@ def course(found: Balance) -> Course:
     fixed = found.residual("fixed-h")
     assert fixed.height is not None
     both = gas + inertia
-    return Course(
+    return Curves(
         speeds / RPM,
         np.abs(gas),
         np.abs(inertia),
@@ -51,9 +53,9 @@ def course(found: Balance) -> Course:
     )
 
 
-def courses_table(found: Balance) -> Table:
+def curves_table(found: Balance) -> Table:
     """Figures 2 and 3 in numbers."""
-    one = course(found)
+    one = curves(found)
     rows = []
     for n in SPEEDS.tolist():
         i = int(np.argmin(np.abs(one.rpm - n)))
@@ -138,3 +140,50 @@ def spread(values: Vector) -> float:
     100.0
     """
     return float(100.0 * np.ptp(values) / math.fsum(values) * len(values))
+
+
+TOP = 440.0  # N m
+
+
+def figure_2(curves: Curves) -> Any:
+    """Balancing moment against the reaction torque of first order."""
+    with drawing():
+        figure, axes = _over_speed(
+            curves, 4.8, "What fig. 2 of [B] shows: VAZ-11113, full load, with assumed values"
+        )
+        axes.plot(curves.rpm, curves.both, color=COLOURS[6], label="reaction torque, first order (model)")
+        axes.plot(curves.rpm, curves.sine, color=COLOURS[2], ls=DASHES[2], label="its sine (model)")
+        axes.plot(
+            curves.rpm, curves.shafts, color=COLOURS[0], label="$M_b(n)$ of the shafts, h fixed (model)"
+        )
+        for index, (reading, moment) in enumerate(MOMENTS):
+            label = f"$M_b(n)$ by (5), read with {reading} (printed)"
+            style = {"color": COLOURS[1 + 2 * index], "ls": DASHES[1 + 2 * index]}
+            axes.plot(curves.rpm, moment * curves.rpm**2, label=label, **style)
+        axes.set_ylim(0.0, TOP)
+        axes.set_ylabel("moment of first order, N m")
+        axes.legend(loc="upper left")
+    return figure
+
+
+def figure_3(curves: Curves) -> Any:
+    """Gas and inertia of first order over the speed."""
+    with drawing():
+        figure, axes = _over_speed(curves, 4.4, "What fig. 3 of [B] shows: VAZ-11113, full load")
+        axes.plot(curves.rpm, curves.both, color=COLOURS[6], label="both")
+        axes.plot(curves.rpm, curves.gas, color=COLOURS[1], ls=DASHES[1], label="gas")
+        axes.plot(curves.rpm, curves.inertia, color=COLOURS[2], ls=DASHES[2], label="inertia")
+        axes.set_ylim(bottom=0.0)
+        axes.set_ylabel("torque of first order, N m")
+        legend_above(axes, 3)
+    return figure
+
+
+def _over_speed(curves: Curves, height: float, title: str) -> Any:
+    """A figure and its axes over the speed, with the tuning speed."""
+    figure, axes = new_figure(1, 1, (8.0, height))
+    axes.axvline(TUNING, color=GREY, lw=0.9, ls=":")
+    axes.set_xlim(curves.rpm[0], curves.rpm[-1])
+    axes.set_xlabel("crank speed, rpm     (dotted: tuning speed)")
+    axes.set_title(title, loc="left")
+    return figure, axes

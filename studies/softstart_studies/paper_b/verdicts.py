@@ -136,18 +136,18 @@ def formula_5() -> Claim:
 
 def speed_dependence(found: Balance) -> Claim:
     """How gas and inertia depend on the speed."""
-    course = over_speed.course(found)
-    spread = over_speed.spread(course.gas)
+    curves = over_speed.curves(found)
+    spread = over_speed.spread(curves.gas)
     light = abs(VAZ.gas_harmonics(TUNING * RPM, 0.0)[2])
     full = abs(VAZ.gas_harmonics(TUNING * RPM, 1.0)[2])
     return Claim(
         "Inertia and balancing moments grow with n^2, the gas moment hardly depends on n.",
         Verdict.PARTLY if spread > 5.0 or light < 0.5 * full else Verdict.CONFIRMED,
-        f"The first two exactly. The gas moment of first order is {course.gas.min():.0f} to "
-        f"{course.gas.max():.0f} "
+        f"The first two exactly. The gas moment of first order is {curves.gas.min():.0f} to "
+        f"{curves.gas.max():.0f} "
         f"N m over the speeds at full load (the assumed torque curve), {spread:.0f} % of its mean, while "
         "that of "
-        f"inertia grows from {course.inertia.min():.1f} to {course.inertia.max():.1f}; but it depends on "
+        f"inertia grows from {curves.inertia.min():.1f} to {curves.inertia.max():.1f}; but it depends on "
         "the load: "
         f"{full:.0f} N m at full load, {light:.0f} at load 0 (4500 rpm).",
     )

@@ -18,6 +18,9 @@ ONE_SENTENCE = {
             "report, serve, drives, controllers, study and completion"
         ],
     ),
+    "command by its subject": (["chain"], ['"chain"', "did you mean softstart reduce?"]),
+    "command by a controller": (["shaper"], ["did you mean softstart simulate DRIVE --controller shaped?"]),
+    "command by what it finds": (["gains"], ["did you mean softstart tune?"]),
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
     "unknown option before a command": (["--verion"], ["did you mean --version?"]),
     "unknown short option": (["compare", "-z"], ["no option -z"]),
@@ -80,8 +83,8 @@ ONE_SENTENCE = {
         ["--param ramp.tim = 1", "time"],
     ),
     # controllers in files
-    "no such file": ([*START, "gone.py:Good"], ["gone.py is not there"]),
-    "folder as file": ([*START, "folder.py"], ["folder.py is not there"]),
+    "no such file": ([*START, "gone.py:Good"], ["gone.py: there is no such file"]),
+    "folder as file": ([*START, "folder.py"], ["folder.py: there is no such file"]),
     "no such class": ([*START, "own.py:God"], ["no class God", "Good"]),
     "which class": ([*START, "own.py"], ["say which class"]),
     "file without classes": ([*START, "nothing.py"], ["say which class"]),

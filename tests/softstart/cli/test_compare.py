@@ -179,7 +179,9 @@ def test_the_same_command_writes_the_same_report(run, place):
 
 def test_numbers_of_a_column_read_alike():
     assert column_of([0.0, 0.0]) == ["0", "0"]
-    assert column_of([12345.6, 1.0]) == ["12346", "1"]
+    assert column_of([12345.6, 1.0]) == ["12346", "1.00"]
+    assert column_of([1500.0, 0.019831, -0.020617, 2e-9]) == ["1500", "0.0198", "-0.0206", "0"]
+    assert column_of([1e6, 3.2e-5]) == ["1000000", "3.20e-05"]
     assert column_of([1e-9, float("inf"), None]) == ["1.000e-09", "inf", "-"]
     assert number(None, 3) == "-"
     assert number(float("-inf"), 3) == "-inf"

@@ -70,7 +70,7 @@ def test_a_folder_without_rights(tmp_path, monkeypatch):
     def refuse(**options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("softstart.views.markdown.tempfile.mkdtemp", refuse)
+    monkeypatch.setattr("softstart.store.tempfile.mkdtemp", refuse)
     with pytest.raises(InputError, match="Permission denied"), output_folder(str(tmp_path / "x")):
         pass
 

@@ -123,14 +123,17 @@ def test_other_aims_and_bounds(run):
     assert tighter["k_dyn"] > 1.2
 
 
-def test_missing_start_time_is_suggested(run, nothing_left):
-    code, out, err = run("optimize", *SIXTY)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
+def test_without_a_start_time_it_is_a_multiple_of_direct_and_says_so(run):
+    """The same in Python, which takes the same words for a start time."""
+    summary = json.loads(run("optimize", *SIXTY, "--json").out)
     direct = simulate(CRANE, "direct").start_time
-    for words in ("--start-time is missing", "--start-time 1.2x", f"{1.2 * direct:.4g} s", f"{direct:.4g} s"):
-        assert words in err
-    nothing_left()
+    assert summary["start_time_bound"] == 1.2 * direct
+    assert summary["why"].endswith("no start time given: 1.2x that of direct")
+    best = optimize(CRANE)
+    assert (best.k_dyn, best.why) == (summary["k_dyn"], summary["why"])
+    assert optimize(CRANE, "1.2x").k_dyn == best.k_dyn
+    assert "given" not in optimize(CRANE, "1.2x").why
+    assert optimize(CRANE, "300 ms").problem.start_time == 0.3
 
 
 ONE_SENTENCE = {
@@ -179,7 +182,6 @@ def test_all_mistakes_are_told_at_once(run, nothing_left):
     assert (code, out) == (2, "")
     for words in (
         "starting_torque", "--terminal", "--method", "--max-heat", "--smoothness", "--torque-speed",
-        "--start-time is missing",
     ):  # fmt: skip
         assert words in err
     assert err.splitlines()[0].endswith("things are wrong:")
@@ -233,7 +235,7 @@ def test_a_gap_that_no_drive_has(run, nothing_left):
 
 
 @pytest.mark.slow
-def test_one_profile_for_two_gaps(run, place):
+def test_one_profile_for_two_gaps(run, place, small_search):
     code, out, err = run(
         "optimize", *SIXTY, "--start-time", "0.32", "--gaps", "0.4 rad", "--json", "--out", "both"
     )

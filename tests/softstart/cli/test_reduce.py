@@ -177,3 +177,10 @@ def test_a_parameter_of_a_controller_to_verify(run):
     (one,) = json.loads(done.out)["verified"]
     assert one["chain"]["parameters"]["time"] == 0.3
     assert one["gear_losses"] > 0.0
+
+
+def test_an_integer_of_five_thousand_digits_is_refused(run):
+    code, out, err = run("reduce", "--set", f"mass[1].inertia=1{'0' * 5000}")
+    assert (code, out) == (2, "")
+    assert "it must be finite" in err
+    assert len(err) < 400

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -42,8 +43,23 @@ CLEANS_UP = """
         os.kill(os.getpid(), signal.{name})
         time.sleep(1)
     finally:
-        time.sleep(1.2)  # longer than it takes until a stop is repeated
+        time.sleep(0.8)  # longer than it takes until a stop is repeated
         print("clean", file=sys.stderr)
+"""
+STUCK = """
+    import ctypes
+    from pathlib import Path
+    from softstart.processes import Worker
+    from softstart.store import Target, fresh_folder
+    worker = Worker()
+    with Target("to", Path("kept"), "test").locked(), fresh_folder(Path(".")):
+        print(worker.pid, sorted(path.name for path in Path(".").iterdir()), file=sys.stderr, flush=True)
+        os.kill(os.getpid(), signal.{name})
+        for _ in range(3):  # as compiled code does: no instruction of Python in between
+            try:
+                ctypes.CDLL(None).sleep(20)
+            except KeyboardInterrupt:
+                pass
 """
 
 
@@ -66,7 +82,51 @@ def test_a_stop_that_was_lost_is_repeated(work: str, name: str) -> None:
     assert done.stderr == "softstart: interrupted; no incomplete file was left behind.\n"
 
 
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_what_does_not_stop_is_ended_with_all_that_it_has_begun(tmp_path, monkeypatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = ended(STUCK, name)
+    began, sentence = done.stderr.splitlines()
+    assert ".kept.lock" in began
+    assert began.count(".part") == 1
+    assert (done.returncode, sentence) == (130, "softstart: interrupted; no incomplete file was left behind.")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(began.split()[0]), 0)
+
+
 def test_what_cleans_up_is_not_stopped_again() -> None:
     done = ended(CLEANS_UP, "SIGINT")
     assert done.returncode == 130
     assert done.stderr.startswith("clean\n")
+
+
+@pytest.mark.parametrize(
+    ("code", "out"),
+    [
+        (
+            "class Finder:\n"
+            "    def find_spec(self, name, *others):\n"
+            "        if name == 'click':\n"
+            "            os.kill(os.getpid(), signal.SIGINT)\n"
+            "sys.meta_path.insert(0, Finder())\n"
+            "from softstart.cli import main\n",
+            "",
+        ),
+        (
+            "from softstart.cli import main\n"
+            "sys.argv[1:] = ['drives', '--json']\n"
+            "main()\n"
+            "sys.argv[1:] = []\n"
+            "os.kill(os.getpid(), signal.SIGINT)\n",
+            "{",
+        ),
+    ],
+)
+def test_before_and_after_the_command_there_is_no_traceback_either(code: str, out: str) -> None:
+    begin = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    done = subprocess.run(
+        [sys.executable, "-c", begin + code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
+    assert done.stdout.lstrip().startswith(out)

@@ -182,7 +182,7 @@ ONE_SENTENCE = {
     "hole": (("--controller", "ramp", "--axis", "gap=1,,2"), ["a place in the list is empty"]),
     "range of names": (("--controller", "ramp", "--axis", "load.kind=active:reactive:2"), ["commas between"]),
     "twice": (("--controller", "ramp", *GAP, "--axis", "gap=2"), ["by its other name"]),
-    "impossible": (("--controller", "ramp", "--axis", "load.torque=5,70"), ["load_torque = 70 N*m"]),
+    "impossible": (("--controller", "ramp", "--axis", "load.torque=5, 70"), ["load_torque = 70 N*m"]),
     "param": ((*GAP, "--controller", "ramp", "--param", "tme=1"), ["tme", "did you mean"]),
     "workers": ((*GAP, "--controller", "ramp", "--workers", "two"), ['--workers = "two"']),
     "chunk": ((*GAP, "--controller", "ramp", "--chunk", "0"), ['--chunk = "0"']),

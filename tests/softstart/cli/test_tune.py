@@ -194,7 +194,7 @@ ONE_SENTENCE = {
     "controller": (["--controller", "rmp"], ["did you mean ramp?"]),
     "controllers": (["--controller", "ramp,shaped"], ["give one controller", "once for each"]),
     "gains": (["--controller", "good.toml"], ["no tuned gains"]),
-    "missing gains": (["--controller", "not.toml"], ["is not there"]),
+    "missing gains": (["--controller", "not.toml"], ["there is no such file"]),
     "nothing to tune": (["--controller", "direct"], ["no parameter to tune", "as --free torque=0.5x:2x."]),
     "a free one without a range": (
         ["--controller", "direct", "--free", "torque"],

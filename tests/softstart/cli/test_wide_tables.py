@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softstart.views.numbers import Column
+from softstart.views.numbers import Column, Table
 from softstart.views.terminal import console, print_table
 
 
@@ -10,7 +10,7 @@ def test_a_wide_table_keeps_its_names(capsys) -> None:
     columns = [Column("law", False), *(Column(f"a heading of thirty letters, {i}") for i in range(5))]
     to = console()
     before = to.width
-    print_table(to, columns, [["linear", *"12345"], ["exponential", *"67890"]])
+    print_table(to, Table("", columns, [["linear", *"12345"], ["exponential", *"67890"]]))
     shown = capsys.readouterr().out
     assert shown.splitlines()[0].startswith("law")
     assert "linear" in shown

@@ -1,6 +1,10 @@
 """Everything that can be wrong with the file of a drive: one sentence a mistake, with file, table and key."""
 
+import json
+import os
 import re
+import time
+from pathlib import Path
 
 import pytest
 
@@ -44,12 +48,12 @@ TOML = [
     ("[load]", "[load", "line ", "not valid TOML"),
     ("[load]", "[[load]]", 'load = [{"inertia": 0.175', "one table, not a list of tables"),
     ("[load]", "[shaft]", "line ", "not valid TOML"),
-    ("[load]", "[brake]\ntorque = 3\n[load]", "[brake]: ", "its tables are [motor], [shaft], "),
+    ("[load]", "[clutch]\ntorque = 3\n[load]", "[clutch]: ", "its tables are [motor], [shaft], "),
     ("[motor]", "gap = 0.5\n[motor]", "gap = 0.5: ", "gap belongs below [shaft]"),
     ("[motor]", "load_kind = 'active'\n[motor]", 'load_kind = "active": ', "written kind, below [load]"),
     ("[motor]", "nam = 'x'\n[motor]", 'nam = "x": ', "did you mean name?"),
     ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, [motor], [shaft]"),
-    ("[motor]", "brake = 3\n[motor]", "brake = 3: ", "has no key brake"),
+    ("[motor]", "clutch = 3\n[motor]", "clutch = 3: ", "has no key clutch"),
 ]  # fmt: skip
 
 
@@ -176,6 +180,67 @@ def test_a_read_that_fails_is_a_sentence(tmp_path, monkeypatch, sentences):
     def refuse(self):
         raise PermissionError(13, "Permission denied")
 
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text("")
     monkeypatch.setattr("pathlib.Path.read_bytes", refuse)
     (sentence,) = sentences(lambda: Drive.load("mine.toml"))
     assert sentence == '"mine.toml": the file cannot be read (Permission denied).'
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes with names")
+@pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
+def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, sentences, kind):
+    path = tmp_path / "mine.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with path.open("wb") as stream:
+            stream.truncate(3 * 2**30)
+    (sentence,) = sentences(lambda: Drive.load(path))
+    assert ("MB are read" if kind == "huge" else "no ordinary file") in sentence
+
+
+HUGE = {
+    "a key of 60,000 parts": (".".join(["a"] * 60_000) + " = 1", "nested too deeply"),
+    "a table of 60,000 parts": ("[" + ".".join(["a"] * 60_000) + "]", "nested too deeply"),
+    "an integer of 5,000 digits": (f"name = 1{'0' * 5000}", "thousands of digits"),
+    "a million numbers": ("x = [" + "0," * 1_000_000 + "]", "at most 1"),
+    "nested tables": ("name = " + "{a=" * 100 + "1" + "}" * 100, "the name of the drive must be text"),
+}
+
+
+@pytest.mark.parametrize("kind", HUGE)
+def test_a_huge_document_is_refused_in_one_short_sentence(sentences, kind):
+    text, says = HUGE[kind]
+    begun = time.process_time()
+    said = sentences(lambda: Drive.from_toml(text))
+    assert time.process_time() - begun < 2.0
+    assert says in said[0]
+    assert max(map(len, said)) < 500
+
+
+def test_twenty_thousand_unknown_keys_are_counted_and_not_listed(sentences):
+    text = "\n".join(f"key{i} = {i}" for i in range(20_000))
+    begun = time.process_time()
+    said = sentences(lambda: Drive.from_toml(text))
+    assert time.process_time() - begun < 5.0
+    assert len(said) <= 32
+    assert re.fullmatch(r"(\d+) more things are wrong\.", said[-1])
+    assert 19_970 <= int(said[-1].split()[0]) <= 19_990
+    assert sum(map(len, said)) < 20_000
+
+
+@pytest.mark.parametrize("name", ["a\tb", "\x1b[2J", "\x00", "\u202eevird"])
+def test_a_name_that_steers_the_terminal_is_refused(sentences, name):
+    text = Drive.load("crane-4amtkf").replace(name="here").to_toml().replace('"here"', json.dumps(name))
+    (sentence,) = sentences(lambda: Drive.from_toml(text))
+    assert "has the control character U+" in sentence
+
+
+def test_a_name_has_room_above_a_figure(sentences):
+    crane = Drive.load("crane-4amtkf")
+    assert crane.replace(name="x" * 120).name == "x" * 120
+    (sentence,) = sentences(lambda: crane.replace(name="x" * 121))
+    assert "121 letters, and at most 120" in sentence

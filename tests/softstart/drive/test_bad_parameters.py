@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError
+from softstart.reporting.resolution import rated_torque
 
 GOOD = {
     "motor_inertia": 0.035,
@@ -92,7 +94,8 @@ PYTHON = [
     ("inertia", 1, "inertia = 1: ", "did you mean motor_inertia or load_inertia?"),
     ("Load_Kind", "active", 'Load_Kind = "active": ', "did you mean load_kind?"),
     ("colour", "red", 'colour = "red": ', "the names are name, source, motor_inertia"),
-    ("motor_inertia", 1e-320, "motor_inertia, load_inertia, stiffness: ", "elastic frequency"),
+    ("motor_inertia", 1e-320, "motor_inertia = 1e-320: ", "must be between 1e-30 and 1e+30"),
+    ("stiffness", 5e-324, "stiffness = 5e-324: ", "must be between 1e-30 and 1e+30"),
 ]  # fmt: skip
 
 
@@ -171,3 +174,29 @@ def test_one_sentence_from_a_setting(setting, subject, reason, sentences):
 def test_a_setting_twice(sentences):
     (sentence,) = sentences(lambda: Drive(**GOOD).with_settings(["shaft.gap=1", "gap=2"]))
     assert sentence == "gap=2: it was set before (shaft.gap=1); keep one of the two."
+
+
+def test_rated_torque_power_and_speed_agree_within_what_a_data_sheet_rounds():
+    crane = Drive.load("crane-4amtkf")  # 2.2 kW at 880 rpm, 23.87 N m
+    assert crane.replace(rated_torque="24 N*m").rated_torque == 24.0
+    assert crane.replace(rated_power=None, rated_torque=30).rated_torque == 30.0
+    assert crane.replace(rated_torque=[23.0, 24.0]).shape == (2,)
+    with pytest.raises(InputError, match=r"rated_torque = 30 N\*m: with the rated speed .* 2200 W"):
+        crane.replace(rated_torque=30)
+    with pytest.raises(InputError, match=r"rated_torque\[1\] = 30 N\*m"):
+        crane.replace(rated_torque=[23.0, 30.0])
+
+
+def test_the_rated_torque_of_a_data_sheet_is_what_inverters_count_in():
+    crane = Drive.load("crane-4amtkf")
+    assert rated_torque(crane.replace(rated_torque=24)) == (24.0, "rated torque")
+    assert rated_torque(crane.replace(rated_power=None, rated_torque=30)) == (30.0, "rated torque")
+    assert rated_torque(crane.replace(rated_power=None)) == (62.0, "starting torque")
+
+
+@pytest.mark.parametrize("name", [name for name, p in PARAMETERS.items() if p.unit])
+def test_no_number_of_a_drive_is_beyond_what_physics_can_square(name):
+    crane = Drive.load("crane-4amtkf")
+    for huge in (1e308, -1e308, [0.5, 1e300]):
+        with pytest.raises(InputError):
+            crane.replace(**{name: huge})

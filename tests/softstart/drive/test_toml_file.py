@@ -14,6 +14,9 @@ positive = st.floats(1e-6, 1e6)
 angle = st.floats(-1e3, 1e3)
 
 
+plain = st.characters(exclude_categories=["Cc", "Cf", "Cs"])
+
+
 @st.composite
 def drives(draw):
     def maybe(name, values):
@@ -31,7 +34,7 @@ def drives(draw):
         load_torque=load,
         starting_torque=load * draw(st.floats(1.01, 10)),
         target_speed=draw(positive),
-        **maybe("name", st.text(min_size=1).filter(lambda s: len(s.splitlines()) == 1 and s.strip())),
+        **maybe("name", st.text(plain, min_size=1).filter(lambda s: len(s.splitlines()) == 1 and s.strip())),
         **maybe("source", st.text()),
         **maybe("minimum_torque", st.floats(-1e6, 0)),
         **maybe("torque_rate", st.just(math.inf) | positive),

@@ -184,8 +184,8 @@ def entered(rng: np.random.Generator, drive: Drive) -> tuple[float, Vector] | No
         *rng.choice([0.0, float(drive.Ms), float(drive.Ms) * rng.random()], 3).tolist(),
     ]
     times = np.concatenate([[0.0], np.cumsum(quick * 10 ** rng.uniform(-1.0, 0.2, len(levels)))])
-    if float(drive.start_position) >= 0.5 * float(drive.gap) and drive.load_kind == "active":
-        z, v = drive.start_position - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
+    if float(drive.theta0) >= 0.5 * float(drive.gap) and drive.load_kind == "active":
+        z, v = drive.theta0 - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
         return 0.0, np.array([z, v, drive.initial_load_speed, 0.0, 1.0], dtype=np.float64)
     run = replay(drive, TorqueProfile.steps(times, levels), float(times[-1]) + 40.0 * quick)
     reactive = drive.load_kind == "reactive"

@@ -57,7 +57,7 @@ def march(drive: Drive, profile: TorqueProfile, end: float) -> March:
     knots = [t for t in np.unique(profile.time) if t < end] + [end]
     y = np.array(
         [
-            drive.start_position - half,
+            drive.theta0 - half,
             drive.initial_motor_speed - drive.initial_load_speed,
             drive.initial_load_speed,
             0.0,

@@ -8,7 +8,14 @@ import pytest
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import ready_controller_names
-from softstart.optimal.front import ControllerPoint, FrontPoint, default_start_times, even_start_times, pareto
+from softstart.optimal.front import (
+    ControllerPoint,
+    FrontPoint,
+    _monotone,
+    default_start_times,
+    even_start_times,
+    pareto,
+)
 from softstart.optimal.problem import Problem
 from softstart.optimal.shortest import shortest_start_time
 from softstart.optimal.solving import optimize
@@ -42,6 +49,36 @@ def test_each_point_is_the_optimum_of_its_start_time(front):
     assert front.points[-1].k_dyn == pytest.approx(alone.k_dyn, rel=1e-6)
     k = [point.k_dyn for point in front.points]
     assert k == sorted(k, reverse=True)
+
+
+def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
+    """By construction K_dyn never rises with the time allowed, nor does its bound."""
+
+    def point(t: float, k_dyn: float | None, bound: float) -> FrontPoint:
+        if k_dyn is None:
+            return FrontPoint(t, "reached", "NOT_FOUND", "the method failed")
+        return FrontPoint(t, "reached", "OPTIMAL", "", k_dyn, bound, f"of {t}", start_time=t, time=(0.0, t))
+
+    found = {
+        ("reached", one.start_time_bound): one
+        for one in (
+            FrontPoint(0.1, "reached", "INFEASIBLE", ""),
+            point(0.2, 3.0, 2.5),
+            point(0.3, 3.5, 2.6),
+            point(0.4, None, 0.0),
+            point(0.5, 2.8, 2.4),
+            point(0.6, 2.9, 2.0),
+        )
+    }
+    made = dict(_monotone(found, "reached", sorted((t for _, t in found), reverse=True)))
+    points = [made[t] for t in sorted(made)]
+    assert [p.k_dyn for p in points] == [None, 3.0, 3.0, 3.0, 2.8, 2.8]
+    assert [p.k_dyn_lower_bound for p in points[1:]] == [2.6, 2.6, 2.4, 2.4, 2.0]
+    assert [p.start_time for p in points[1:]] == [0.2, 0.2, 0.2, 0.5, 0.5]
+    assert points[0] is found["reached", 0.1]
+    assert points[2].why == "the start for 0.2 s is gentler, and may arrive early"
+    assert points[3].status == "OPTIMAL"
+    assert all(p.k_dyn >= p.k_dyn_lower_bound for p in points[1:])
 
 
 def test_controllers_are_judged_at_their_own_start_time(front):
@@ -105,6 +142,7 @@ def test_a_sweep_that_was_stopped_goes_on_where_it_was(tmp_path, front):
     assert "0.29 s" in again[0]
     by_time = {point.start_time_bound: point for point in second.points}
     for record in before:
+        assert record.pop("sha256")
         assert by_time[record["start_time_bound"]] == FrontPoint.of_record(record)  # its computing time too
 
     pareto(CRANE, TIMES, **options, progress=again.append)
@@ -145,13 +183,17 @@ def test_points_of_other_inputs_are_refused_and_kept(tmp_path, kept_point, chang
 
 
 @pytest.mark.parametrize(
-    "text", ["not json\n", "[1]\n", '{"k_dyn": 1}\n', '{"inputs": {}, "key": ""}\n{"a": 1}\n']
+    ("text", "says"),
+    [
+        ("not json\n", "this file holds something else than a limit curve; name another file"),
+        ("[1]\n", "this file holds something else than a limit curve; name another file"),
+        ('{"k_dyn": 1}\n', "this file holds something else than a limit curve; name another file"),
+        ('{"inputs": {}, "key": ""}\n{"a": 1}\n', "no checksum or a wrong one: this file was damaged"),
+    ],
 )
-def test_a_file_that_holds_something_else_is_refused(tmp_path, text):
+def test_a_file_that_holds_something_else_is_refused(tmp_path, text, says):
     (tmp_path / "notes").write_text(text)
-    with pytest.raises(
-        InputError, match="this file holds something else than a limit curve; name another file"
-    ):
+    with pytest.raises(InputError, match=says):
         pareto(CRANE, [0.3], controllers=[], save_to=tmp_path / "notes")
     assert (tmp_path / "notes").read_text() == text
     assert [path.name for path in tmp_path.iterdir()] == ["notes"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.optimize import linprog
 from softstart import Drive, TorqueProfile
 from softstart.arrays import Vector
 from softstart.optimal.exact import replay
+from softstart.optimal.lp import ideal
 from softstart.optimal.lp.motion import (
     Contact,
     Entry,
@@ -22,6 +24,7 @@ from softstart.optimal.lp.motion import (
     no_ideal,
 )
 from softstart.optimal.problem import Problem
+from softstart.optimal.shortest import shortest_start_time
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 DAMPED = (0.0, 0.1, 3.0, 6.5564, 20.0, 500.0)  # N m s/rad; 6.5564 is nearly critical
@@ -269,3 +272,19 @@ def test_where_the_start_is_no_linear_problem_the_reason_is_given() -> None:
         assert words in no_ideal(Problem(CRANE.replace(**given), 0.5))
     assert no_ideal(Problem(CRANE, 0.5)) == ""
     assert isinstance(entry_of(Problem(CRANE.replace(start_position=0.26), 0.5)), FromContact)
+
+
+def test_more_time_never_makes_a_start_harder() -> None:
+    """The start may take less than it is allowed: drawn out, a contact this hard would open the gap again."""
+    drive = Drive(
+        motor_inertia=0.121, starting_torque=60.0, stiffness=8706.0, gap=0.669, load_inertia=0.0433,
+        load_torque=10.23, target_speed=22.6,
+    )  # fmt: skip
+    shortest = shortest_start_time(Problem(drive, 1.0, "reached"))
+    peaks = []
+    for share in (1.06, 1.35, 1.6):
+        found = ideal.search(Problem(drive, share * shortest, "reached"))
+        assert found is not None
+        assert found.end_time <= share * shortest * (1.0 + 1e-12)
+        peaks.append(found.P)
+    assert all(later <= sooner * (1.0 + 2e-4) for sooner, later in pairwise(peaks)), peaks

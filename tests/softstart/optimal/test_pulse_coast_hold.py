@@ -41,7 +41,7 @@ def integrated(drive: Drive, t1: float) -> tuple[float, float, float]:
         return float(y[0])
 
     closing.terminal, closing.direction = True, 1.0  # type: ignore[attr-defined]
-    y = np.array([drive.start_position - half, drive.initial_load_speed, drive.initial_motor_speed])
+    y = np.array([drive.theta0 - half, drive.initial_load_speed, drive.initial_motor_speed])
     tight = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
     now = 0.0
     for u, until in ((drive.Ms, t1), (0.0, t1 + 10.0)):
@@ -262,7 +262,7 @@ def test_it_is_quick() -> None:
     solve(problem)
     quickest = math.inf
     for _ in range(20):
-        began = time.perf_counter()
+        began = time.process_time()
         solve(problem)
-        quickest = min(quickest, time.perf_counter() - began)
+        quickest = min(quickest, time.process_time() - began)
     assert quickest < 0.01

@@ -7,7 +7,6 @@ coast, hold: K_dyn 0.90924724 (the same for `reached`: below 1 the torque limit 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from tests.oracle import integrate
 from softstart import Drive, simulate
 from softstart.controller import make_controller
 from softstart.optimal.result import InfeasibleError, RobustOptimum, SensorWorth, Verdict
-from softstart.optimal.robust import guesses, optimize_robust, solving
+from softstart.optimal.robust import optimize_robust, solving
 from softstart.optimal.robust.solving import reached
 from softstart.profile import TorqueProfile
 from softstart.start.metrics import base_torque
@@ -30,19 +29,6 @@ SEARCH = 0.005  # relative: what the search may miss
 
 def solved(*gaps: float) -> RobustOptimum:
     return optimize_robust([CRANE.replace(gap=gap) for gap in gaps], START_TIME, base=CRANE)
-
-
-@pytest.fixture(scope="module")
-def small_search() -> Iterator[None]:
-    """Fewer starts: enough where the question has one good local optimum or its quality is not the claim."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(guesses, "PULSES", 3)
-        patch.setattr(guesses, "COASTS", 2)
-        patch.setattr(guesses, "COASTS_REACTING", 2)
-        patch.setattr(solving, "EVOLUTIONS", ((3, 0),))
-        patch.setattr(solving, "PURSUED", 2)
-        patch.setattr(solving, "FINE", 60)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +52,7 @@ def optima(alone: RobustOptimum, nested: list[RobustOptimum], worth: SensorWorth
     return [alone, *nested, worth.reacting]
 
 
+@pytest.mark.slow  # with the optima that all tests of this file share
 def test_one_scenario_is_the_single_optimum(alone: RobustOptimum) -> None:
     assert alone.k_dyn == pytest.approx(ALONE, rel=SEARCH)
     assert alone.k_dyn >= ALONE * (1.0 - 1e-7)  # nothing is better than the best

@@ -295,3 +295,22 @@ def test_no_message_whatever_kills_the_page(message):
     frame = screen.first()
     json.dumps(frame, allow_nan=False)
     assert frame["figure"]["k_dyn"] is not None
+    assert "mistake in softstart" not in str(frame["mistakes"])
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"position": "wide"}, {"position": True}, {"position": 1e300}, {"path": ["shaft.gap"]}]
+)
+def test_a_message_that_the_page_does_not_send_is_dropped(wrong):
+    session = Session(controllers=["direct"])
+    pokes: list[int] = []
+    screen = Screen(session)
+    controls = Controls(session, screen, lambda: pokes.append(1))
+    controls.take({"what": "slide", "path": "shaft.gap", "position": 200, **wrong})
+    assert (pokes, screen.mistakes, session.version) == ([], {}, 0)
+
+
+def test_a_text_too_long_for_a_field_is_not_read_and_not_repeated():
+    controls, screen = controls_of(Session(controllers=["direct"]))
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "1" * 100_000})
+    assert screen.mistakes["shaft.gap"].startswith("shaft.gap: the text has more than 200 letters")

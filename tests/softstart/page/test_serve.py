@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from pathlib import Path
 
 import pytest
 
@@ -188,6 +189,9 @@ def test_answers_forbid_the_browser_to_ask_anyone_else():
         ({"host": "192.168.1.7", "token": TOKEN}, "add --expose,"),
         ({"host": "evil.example"}, "--expose"),
         ({"token": "short"}, "guessed"),
+        ({"token": ""}, "the token is empty; use at least 16"),  # not as if none were asked for
+        ({"host": "0.0.0.0", "expose": True, "token": ""}, "the token is empty"),
+        ({"token": "a" * 20 + "\n"}, "plain letters"),
         ({"token": "\N{CYRILLIC SMALL LETTER SHA}" * 20}, "plain letters"),
         ({"host": "", "expose": True, "token": TOKEN}, "is empty; give one"),  # it would be all of them
         ({"port": 99999}, "0 to 65535"),
@@ -234,6 +238,25 @@ def test_without_nicegui_the_remedy_is_told(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "pip install 'softstart[ui]'" in done.stderr
+
+
+def test_an_empty_token_is_refused():
+    done = run_serve("--token", "", "--no-browser", timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--token: the token is empty" in done.stderr
+
+
+@pytest.mark.skipif(not __import__("importlib.util").util.find_spec("nicegui"), reason="needs NiceGUI")
+def test_the_web_framework_reads_and_stores_nothing_that_others_could_plant():
+    """A pipe under a known name in the folder for temporary files made the server wait indefinitely."""
+    code = (
+        "from softstart import Drive; from softstart.page import serve;"
+        "serve.application(Drive.load('crane-4amtkf')); from nicegui import app; print(app.storage.path)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    folder = Path(done.stdout.strip())
+    with pytest.raises(OSError, match=r"Not a directory|File exists"):
+        folder.mkdir(parents=True)
 
 
 @pytest.mark.skipif(not __import__("importlib.util").util.find_spec("nicegui"), reason="needs NiceGUI")

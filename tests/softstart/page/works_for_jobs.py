@@ -26,7 +26,7 @@ def endless(started: str, *, tell: Any) -> None:
     """Never ends, does not listen to requests to end, and has begun another process that does neither."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
-    tell(None, "for ever")
+    tell(None, "without an end")
     tell.part((os.getpid(), other.pid))
     Path(started).write_text(f"{os.getpid()} {other.pid}", encoding="utf-8")
     while True:

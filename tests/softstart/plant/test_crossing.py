@@ -13,6 +13,7 @@ from softstart.plant import layout as at
 from softstart.plant.crossing import NO_CROSSING, RISING, WATCH, bounds, first_crossing, load_speed
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 from softstart.plant.steady import largest_gain, steady_target
+from softstart.plant.terms import terms
 
 NO_LOAD = (0.0,) * 7
 
@@ -41,10 +42,14 @@ def weights(largest: float) -> st.SearchStrategy[float]:
     return st.one_of(st.just(0.0), st.floats(1e-6, largest), st.floats(-largest, -1e-6))
 
 
+@pytest.mark.parametrize("by_terms", [0.0, 1.0])
 @settings(max_examples=300, deadline=None)
 @given(SWINGS, st.floats(0.0, 1.0), weights(2.0), weights(1.0), weights(0.2))
-def test_against_a_fine_grid(m: np.ndarray, above: float, alpha: float, beta: float, gamma: float) -> None:
+def test_against_a_fine_grid(
+    by_terms: float, m: np.ndarray, above: float, alpha: float, beta: float, gamma: float
+) -> None:
     end = 4.0
+    m.by_terms = by_terms
 
     def f(s: float) -> float:
         z, v = motion(m, s)
@@ -81,9 +86,32 @@ def test_bounds_hold_to_the_end_of_the_span(m: np.ndarray, s: float) -> None:
             assert abs(value) <= limit * (1 + 1e-9) + 1e-9
 
 
-def test_a_pair_of_crossings_a_millionth_apart_is_seen() -> None:
+@settings(max_examples=300, deadline=None)
+@given(SWINGS, st.floats(0.0, 3.0), st.floats(0.0, 1.0), weights(2.0), weights(1.0), weights(0.2))
+def test_the_least_curvature_of_the_terms_is_least(
+    m: np.ndarray, s: float, window: float, alpha: float, beta: float, gamma: float
+) -> None:
+    """f'' by the equation of motion, at 40 instants of the window, is nowhere below what `terms` says."""
+    lowest = terms(m, 0.5, alpha, beta, gamma, 0.0, NO_LOAD, s, s + window)[3]
+    for later in np.linspace(s, s + window, 40):
+        z, v = motion(m, later)
+        a, jerk, snap = derivatives(m, later, z, v, forcing_tail(m, later))
+        f, slope, curve = terms(m, 0.5, alpha, beta, gamma, 0.0, NO_LOAD, later, s + window)[:3]
+        # the equation of motion cancels: 2 zeta v + w0^2 z against the forcing
+        swing = (abs(m.A) + abs(m.B) * 4.0 + abs(m.E) + m.w0sq * abs(z) + m.zeta * abs(v)) * 1e-13
+        stiff = 1.0 + m.rate + m.zeta + m.w0sq
+        assert f == pytest.approx(0.5 + alpha * z + beta * v + gamma * a, rel=1e-9, abs=swing * stiff)
+        assert slope == pytest.approx(alpha * v + beta * a + gamma * jerk, rel=1e-9, abs=swing * stiff**2)
+        exact = alpha * a + beta * jerk + gamma * snap
+        assert curve == pytest.approx(exact, rel=1e-9, abs=swing * stiff**3)
+        assert lowest <= curve + 1e-12 * abs(curve) + 1e-12
+
+
+@pytest.mark.parametrize("by_terms", [0.0, 1.0])
+def test_a_pair_of_crossings_a_millionth_apart_is_seen(by_terms: float) -> None:
     """z = cos(s) dips below its threshold for a moment only: a grid or a sign test would miss it."""
     m = swing(1.0, 0.0, 1.0, 0.0, (0.0, 0.0, 0.0), 1.0)
+    m.by_terms = by_terms
     for dip in (1e-3, 1e-6, 1e-10):
         s = first_crossing(m, 1.0 - dip, 1.0, 0.0, 0.0, 0.0, NO_LOAD, WATCH, 0.0, 6.0)
         assert s == pytest.approx(math.acos(-1.0 + dip), rel=1e-7)

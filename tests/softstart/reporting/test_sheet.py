@@ -40,7 +40,7 @@ def test_rounded_values_are_multiples_and_their_figures_those_of_simulate(name):
     assert sheet.rounded.k_dyn == again.k_dyn
     assert sheet.rounded.start_time == again.start_time
     assert sheet.exact.k_dyn == simulate(drive, name).k_dyn
-    assert {one.name for one in sheet.settings if one.step is None} <= {"period", "shaper"}
+    assert {one.name for one in sheet.settings if one.step is None} <= {"period", "shaper", "raise_at"}
 
 
 def test_worst_case_is_the_worst_of_all_half_steps():

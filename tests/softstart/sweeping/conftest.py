@@ -56,11 +56,7 @@ class Sweeping:
     def finished(folder: Path) -> dict[str, int]:
         """The finished chunks, and when each was written."""
         home = folder / "status" / "c"
-        return {
-            str(path.relative_to(home)): path.stat().st_mtime_ns
-            for path in home.rglob("*")
-            if path.is_file() and path.name.isdigit()
-        }
+        return {str(path.relative_to(home)): path.stat().st_mtime_ns for path in home.rglob("*.sha256")}
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
         """Until so many chunks are finished."""

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
 from softstart import Drive, InputError, sweep
+from softstart.errors import DamagedWarning
 from softstart.sweeping.store import open_folder, target_of
 
 from .conftest import alive, children
@@ -83,6 +88,121 @@ def test_it_is_a_zarr_folder_that_says_what_is_missing(tmp_path):
     memory = sweep(CRANE, "ramp", GRID, **OPTIONS)
     assert whole.drop_attrs().identical(memory.drop_attrs())
     assert open_folder(tmp_path / "a").status.attrs["flag_meanings"] == memory.status.attrs["flag_meanings"]
+
+
+@pytest.fixture(scope="module")
+def pristine(tmp_path_factory):
+    """A finished sweep of three chunks, which no test changes."""
+    folder = tmp_path_factory.mktemp("sweeps") / "a"
+    sweep(CRANE, "ramp", GRID, to=folder, **OPTIONS)
+    return folder
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def swap(path):
+    other = path.parent.parent / "1" / "0"
+    content, others = path.read_bytes(), other.read_bytes()
+    path.write_bytes(others)
+    other.write_bytes(content)
+
+
+def in_the_way(path):
+    shutil.rmtree(path.parent)
+    path.parent.write_text("a file")
+
+
+def as_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def as_pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+DAMAGES = [flip, swap, in_the_way, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9),
+           lambda path: path.write_bytes(path.read_bytes() + b"more")]  # fmt: skip
+
+
+CHUNKS = ["k_dyn/c/0/0", "status/c/0/0", "status/c/0/0.sha256"]
+CASES = [  # exchanging the two chunks of status changes nothing: they are the same
+    (name, damage) for name in CHUNKS for damage in DAMAGES if (name, damage) != ("status/c/0/0", swap)
+]
+
+
+@pytest.mark.parametrize(("name", "damage"), CASES)
+def test_a_damaged_chunk_is_named_and_alone_computed_again(pristine, tmp_path, name, damage):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    if damage is swap and name.endswith("sha256"):
+        seals = [folder / f"status/c/{k}/0.sha256" for k in (0, 1)]
+        a, b = (seal.read_bytes() for seal in seals)
+        seals[0].write_bytes(b)
+        seals[1].write_bytes(a)
+    else:
+        damage(folder / name)
+    lost = 2 if damage is swap else 1
+    told = []
+    with warnings.catch_warnings(record=True, action="always") as sentences:
+        again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+    assert (told[0].before, told[-1].done) == (6 - 2 * lost, 6)
+    assert again.identical(open_folder(pristine))
+    without_seal = damage in (Path.unlink, as_folder) and name.endswith("sha256")
+    if not without_seal and not (damage is in_the_way and name.startswith("status")):
+        assert len(sentences) == 1  # a chunk that has no seal was never finished
+        assert sentences[0].category is DamagedWarning
+        assert name in str(sentences[0].message)
+    told.clear()
+    sweep(CRANE, "ramp", GRID, to=folder, progress=told.append)
+    assert [now.before for now in told] == [6]
+    assert {p.relative_to(folder) for p in folder.rglob("*")} == {
+        p.relative_to(pristine) for p in pristine.rglob("*")
+    }
+
+
+@pytest.mark.parametrize("damage", [flip, as_folder, as_pipe, Path.unlink, lambda path: os.truncate(path, 9)])
+def test_damaged_descriptions_are_mended(pristine, tmp_path, damage):
+    files = ("zarr.json", "k_dyn/zarr.json", "status/zarr.json", "gap/c/0", "status/softstart.json")
+    for number, name in enumerate(files):
+        folder = Path(shutil.copytree(pristine, tmp_path / str(number)))
+        damage(folder / name)
+        told = []
+        with pytest.warns(DamagedWarning, match=f"{name} is damaged"):
+            again = sweep(CRANE, "ramp", GRID, to=folder, progress=told.append, **OPTIONS)
+        assert [now.before for now in told] == [6]
+        assert again.identical(open_folder(pristine))
+        assert {
+            path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+        } == {path.relative_to(pristine): path.read_bytes() for path in pristine.rglob("*") if path.is_file()}
+
+
+def test_without_its_manifest_another_sweep_is_refused(pristine, tmp_path):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    (folder / "status" / "softstart.json").unlink()  # as written by an older softstart
+    with pytest.raises(
+        InputError, match="was damaged, or written by an older softstart; give another folder"
+    ):
+        sweep(CRANE, "s-curve", GRID, to=folder, **OPTIONS)
+
+
+def test_other_readers_notice_a_flipped_bit_too(pristine, tmp_path):
+    folder = Path(shutil.copytree(pristine, tmp_path / "a"))
+    flip(folder / "k_dyn" / "c" / "1" / "0")
+    with pytest.raises(ValueError, match="checksum"):
+        xarray.open_zarr(folder).k_dyn.load()
+
+
+def test_a_folder_that_was_deleted_leaves_no_memory(tmp_path):
+    sweep(CRANE, "ramp", GRID, to=tmp_path / "a", **OPTIONS)
+    shutil.rmtree(tmp_path / "a")
+    other = {"gap": [0.5, 1.0, 2.0, 4.0]}
+    found = sweep(CRANE, "ramp", other, to=tmp_path / "a", workers=1)
+    assert found.drop_attrs().identical(sweep(CRANE, "ramp", other).drop_attrs())
 
 
 @pytest.mark.parametrize(

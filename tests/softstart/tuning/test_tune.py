@@ -40,6 +40,7 @@ def test_most_controllers_can_be_tuned():
 # item 1: nowhere worse than the defaults ------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TUNABLE)
 def test_tuned_per_cell_is_never_worse_than_the_defaults(name):
     tuned = tune(CRANE, name, **GRID, **(SMALL | {"restarts": 1}))

@@ -16,8 +16,8 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.optimal.problem import Problem
+from softstart.optimal.result import DemandShape
 
-DemandShape = Literal["steps", "ramps", "continuous"]
 End = Literal["free", "contact", "load stops", "breakaway", "softer", "terminal", "lowest demand"]
 
 
@@ -82,15 +82,15 @@ def programs(problem: Problem) -> list[Program]:
     drive: Any = problem.drive
     reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
     half, v = 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
-    touching = drive.start_position > half or (drive.start_position == half and v >= 0.0)
-    if drive.gap == 0.0 and drive.start_position == 0.0 and v < 0.0:
+    touching = drive.theta0 > half or (drive.theta0 == half and v >= 0.0)
+    if drive.gap == 0.0 and drive.theta0 == 0.0 and v < 0.0:
         raise InputError(
             f"initial_motor_speed = {drive.initial_motor_speed:g} rad/s: without a gap the shaft would be "
             "pulled backward at once; begin with the motor as fast as the load, or faster."
         )
-    if drive.start_position < -half or (drive.start_position == -half and v < 0.0):
+    if drive.theta0 < -half or (drive.theta0 == -half and v < 0.0):
         raise InputError(
-            f"start_position = {drive.start_position:g} rad: this start begins on the far flank, so "
+            f"start_position = {drive.theta0:g} rad: this start begins on the far flank, so "
             "there would be two contacts; begin within the gap."
         )
     if reactive and drive.initial_load_speed < 0.0 and touching:
@@ -117,7 +117,7 @@ def _orders(problem: Problem, reactive: bool, touching: bool) -> list[tuple[list
     drive: Any = problem.drive
     w2, half = drive.initial_load_speed, 0.5 * drive.gap
     v = drive.initial_motor_speed - w2
-    overlap = max(0.0, drive.start_position - half)
+    overlap = max(0.0, drive.theta0 - half)
     stuck = Phase("stuck in contact", True, 0, 1, "breakaway")
     moving = Phase("gap", False, 1, 2, "contact")
     resting = Phase("gap", False, 0, 2, "contact")
@@ -130,7 +130,7 @@ def _orders(problem: Problem, reactive: bool, touching: bool) -> list[tuple[list
     if touching:
         return [([stuck] if w2 == 0.0 and torque <= drive.Mc else [], False)]
     at_rest: list[tuple[list[Phase], bool]] = [([resting, stuck], False)]
-    travel = max(0.0, half - drive.start_position)
+    travel = max(0.0, half - drive.theta0)
     fastest = math.sqrt(2.0 * problem.highest_torque / drive.J1 * travel) + abs(drive.initial_motor_speed)
     if drive.d * fastest > drive.Mc:
         at_rest.append(([resting], True))
@@ -232,7 +232,7 @@ def numbers(problem: Problem, beyond: float = BEYOND) -> Numbers:
     drive: Any = problem.drive
     units = Units(time_unit(problem), float(drive.Ms), problem.target)
     inertia = units.torque * units.time / units.speed
-    z0 = drive.start_position - 0.5 * drive.gap
+    z0 = drive.theta0 - 0.5 * drive.gap
     values = {
         "J1": drive.J1 / inertia,
         "J2": drive.J2 / inertia,

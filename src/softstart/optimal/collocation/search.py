@@ -35,7 +35,7 @@ from softstart.optimal.collocation.transcription import (
 )
 from softstart.optimal.exact import replay
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import Candidate, NotConverged, heat_of
+from softstart.optimal.result import Candidate, NotConverged, demanded, heat_of
 from softstart.profile import TorqueProfile
 
 QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "error_on_fail": False}
@@ -199,15 +199,7 @@ def claim(problem: Problem, solution: Solution) -> Claim:
         "heat": heat * units.time,
         "start_time": end,
     }[problem.minimise]
-    return Claim(_profile(program.demand, edges, levels), end, edges, levels, peak * units.torque, value)
-
-
-def _profile(shape: str, edges: Vector, levels: Vector) -> TorqueProfile:
-    if shape == "steps":
-        return TorqueProfile.steps(edges, levels[:, 0])
-    if shape == "ramps":
-        return TorqueProfile(np.repeat(edges, 2)[1:-1], levels.ravel()).simplified()
-    return TorqueProfile(edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
+    return Claim(demanded(program.demand, edges, levels), end, edges, levels, peak * units.torque, value)
 
 
 def replayed(problem: Problem, own: Claim) -> Replayed:

@@ -135,7 +135,6 @@ class Piece(NamedTuple):
     function: Any  # (beginning, inner, node, demand before, after, h, peak, parameters) -> (values, heat)
     lower: Vector
     upper: Vector
-    names: tuple[str, ...]
 
 
 @lru_cache(maxsize=64)
@@ -193,7 +192,6 @@ def interval_piece(program: Program, phase: Phase, kept: float, on_border: bool)
         ca.Function("interval", inputs, [ca.vertcat(*(row.value for row in rows)), heat]),
         np.array([row.lower for row in rows]),
         np.array([row.upper for row in rows]),
-        tuple(row.name for row in rows),
     )
 
 
@@ -235,7 +233,6 @@ class Transcribed:
     limits: Any  # parameters -> (lbx, ubx, lbg, ubg)
     readout: Any  # (variables, parameters) -> (durations, peak, heat, points, demands)
     slots: tuple[Slot, ...]
-    row_names: tuple[str, ...]
 
 
 class _Writer:
@@ -251,7 +248,6 @@ class _Writer:
         self.slots: list[Slot] = []
         self.values: list[SX] = []
         self.limits: list[tuple[Any, Any]] = []
-        self.names: list[str] = []
         self.peak = self.variable(Slot("peak", 0, 0.0), 0.0, self.p.largest_peak)
         self.heat: SX = 0.0
         self.roughness: SX = 0.0
@@ -272,7 +268,6 @@ class _Writer:
             n = condition.value.shape[0]
             self.values.append(condition.value)
             self.limits.append((np.full(n, condition.lower), np.full(n, condition.upper)))
-            self.names += [condition.name] * n
 
     def demand(self, arc: int, share: float) -> SX:
         return self.variable(Slot("demand", arc, share), self.p.lowest, self.p.highest)
@@ -348,7 +343,6 @@ class _Writer:
         values, heat = piece.function(x, inner, node, before, after, h, self.peak, self.p.own)
         self.values.append(values)
         self.limits.append((piece.lower, piece.upper))
-        self.names += piece.names
         if arc < program.start_arcs:
             self.heat += heat
             if program.smooth:
@@ -376,7 +370,7 @@ class _Writer:
             self.ask(statement.at_most("heat", self.heat, self.p.most_heat))
 
     def tail(self, phase: Phase, x: SX, demand: SX) -> None:
-        """T after the last arc is linear in the state there: rows of coefficients, see tail.py."""
+        """T after the last arc is linear in the state there: rows of coefficients, see `tail_rows`."""
         p = self.p
         here = self.state(x, demand)
         wanted = p.lowest
@@ -414,7 +408,6 @@ class _Writer:
             ca.Function("limits", [p.vector], bounds),
             ca.Function("readout", [x, p.vector], read),
             tuple(self.slots),
-            tuple(self.names),
         )
 
 

@@ -59,6 +59,10 @@ COARSE, MIDDLE = 40, 80  # steps of the grid: to find the entry, to refine it
 REFINEMENT = Refinement(most=400, mending=3, narrowing=0.4)
 EXCESS = 1e-4  # relative: T above P between the checks by more counts
 SCANNED, LOCAL_MINIMA = 20, 3
+SOONER = (0.985, 0.95, 0.9, 0.83, 0.75, 0.66, 0.56, 0.46, 0.36, 0.27, 0.19, 0.13, 0.09, 0.06)  # of the end
+LESS = 0.95  # of the time
+RISING, STEEP = 2, 1.03  # so many ends in a row with P so many times the least: no shorter one is tried
+NEAR = (0.0, 0.3, 0.6, 0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of te of another end, from the earliest on
 SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
 
 
@@ -87,22 +91,17 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The optimum at fixed (te, t_f): peak P in N m, entry speed v, torques u between the `edges`."""
+    """The optimum at fixed (te, t_f): peak P in N m, entry speed v, torques `levels` between the `edges`."""
 
     te: float
     end_time: float
     P: float
     v: float
     edges: Vector
-    u: Vector
+    levels: Vector
     x: Vector  # all variables of the program
     multipliers: Multipliers
     program: ContactProgram = field(repr=False)
-
-    @property
-    def levels(self) -> Vector:
-        """Torque of each step, N m."""
-        return self.u
 
     @cached_property
     def broken(self) -> Marks:
@@ -379,7 +378,7 @@ def solve(problem: Problem) -> Candidate | None:
     if best is None:
         return None
     profile = assemble(problem, best)
-    return Candidate(profile, best.end_time, best.P / problem.base_torque, "lp", f"{best.u.size} steps")
+    return Candidate(profile, best.end_time, best.P / problem.base_torque, "lp", f"{best.levels.size} steps")
 
 
 def not_linear(problem: Problem) -> str:
@@ -396,24 +395,72 @@ def search(problem: Problem) -> Answer | None:
     latest = float(problem.start_time)
     best = _best_entry(problem, entry, latest, COARSE)
     if best is None:
-        if greatest_speed(problem, entry, latest, MIDDLE, math.nan)[0] < problem.target:
-            return None
-        # hardly enough time: the torque has no room for a coarse grid
-        best = _best_entry(problem, entry, latest, MIDDLE)
-    if best is None or _sooner(problem, best) < best.P * (1.0 - 1e-4):
-        best = _best_end(problem, entry, latest) or best  # more time does not help, or does not fit
-    if best is None:
+        speed, te = greatest_speed(problem, entry, latest, MIDDLE, math.nan)
+        if speed >= problem.target:  # hardly enough time: the torque has no room for a coarse grid
+            best = _best_entry(problem, entry, latest, MIDDLE)
+        elif greatest_speed(problem, entry, LESS * latest, MIDDLE, te)[0] < speed:
+            return None  # time is short; else a start that ends sooner keeps the gap closed more easily
+    best = _sooner(problem, entry, latest, best)
+    return None if best is None else _refined(problem, entry, best)
+
+
+def _sooner(problem: Problem, entry: Entry, latest: float, best: Answer | None) -> Answer | None:
+    """The best start that ends at `latest` or before: a hard contact may leave no use for more time.
+
+    Ends are tried from `latest` on downward, each with entries near the one of the end before, until time
+    is so short that P only rises.
+    """
+    found: dict[float, Answer | None] = {latest: best}
+    near, shorter = best, 0
+
+    def peak_at(end: float) -> float:
+        if end not in found:
+            found[end] = (
+                _near_entry(problem, entry, end, near) if near else _best_entry(problem, entry, end, COARSE)
+            )
+        return _peak(found[end])
+
+    least = _peak(best)
+    for share in SOONER:
+        if shorter == RISING:
+            break
+        P = peak_at(share * latest)
+        near = found[share * latest] or near
+        shorter = shorter + 1 if math.isfinite(least) and least * STEEP < P else 0
+        least = min(least, P)
+    if not math.isfinite(least):
         return None
-    return _refined(problem, entry, best)
+    ends = sorted(found)
+    i = min(range(len(ends)), key=lambda k: _peak(found[ends[k]]))
+    if ends[i] < latest:
+        near = found[ends[i]]
+        golden(peak_at, ends[max(i - 1, 0)], ends[min(i + 1, len(ends) - 1)], 1e-3 * latest)
+    return found[min(found, key=lambda end: _peak(found[end]))]
 
 
-def _sooner(problem: Problem, best: Answer) -> float:
-    """P with the same entry and a little less time, N m."""
-    tau = 0.95 * best.end_time - best.te
-    if tau <= 0.0:
-        return math.inf
-    grid = contact_grid(Contact.of(problem.drive), tau, COARSE)
-    return _peak(ContactProgram(problem, tau, grid).solve(best.te))
+def _near_entry(problem: Problem, entry: Entry, end: float, near: Answer) -> Answer | None:
+    """The best start to `end` with an entry near that of another end."""
+    contact = Contact.of(problem.drive)
+    answers: dict[float, Answer | None] = {}
+
+    def peak_at(te: float) -> float:
+        if te not in answers:
+            tau = end - te
+            grid = contact_grid(contact, tau, COARSE) if tau > 0.0 else None
+            answers[te] = None if grid is None else ContactProgram(problem, tau, grid).solve(te)
+        return _peak(answers[te])
+
+    last = min(entry.latest, end)
+    if not entry.earliest < last:
+        peak_at(entry.earliest)
+    else:
+        around = entry.earliest + (near.te - entry.earliest) * np.array(NEAR)
+        tried = np.unique(np.clip(around, entry.earliest, last))
+        i = int(np.argmin([peak_at(te) for te in tried.tolist()]))
+        if math.isfinite(peak_at(float(tried[i]))):
+            low, high = float(tried[max(i - 1, 0)]), float(tried[min(i + 1, tried.size - 1)])
+            golden(peak_at, low, high, 0.05 * (high - low))
+    return answers[min(answers, key=lambda te: _peak(answers[te]))]
 
 
 def _peak(answer: Answer | None) -> float:
@@ -524,24 +571,6 @@ def greatest_speed(
     return -known[te], te
 
 
-def _best_end(problem: Problem, entry: Entry, latest: float) -> Answer | None:
-    """The best end before `latest`: where more time does not help, or does not fit."""
-    found: dict[float, Answer | None] = {}
-
-    def peak_at(end: float) -> float:
-        found[end] = _best_entry(problem, entry, end, COARSE)
-        return _peak(found[end])
-
-    for share in np.linspace(1.0, 0.05, 20):
-        peak_at(latest * float(share))
-    ends = sorted(found)
-    i = min(range(len(ends)), key=lambda k: (_peak(found[ends[k]]), ends[k]))
-    if not math.isfinite(_peak(found[ends[i]])):
-        return None
-    golden(peak_at, ends[max(i - 1, 0)], ends[min(i + 1, len(ends) - 1)], 1e-3 * latest)
-    return found[min(found, key=lambda end: (_peak(found[end]), end))]
-
-
 def golden(value: Callable[[float], float], low: float, high: float, width: float) -> None:
     """Golden-section search; `value` keeps the values it has computed."""
     ratio = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -598,7 +627,7 @@ def assemble(problem: Problem, answer: Answer) -> TorqueProfile:
     pieces = entry_of(problem).pieces(answer.te, answer.v)
     lengths = [max(duration, 0.0) for duration, _ in pieces] + np.diff(answer.edges).tolist()
     levels = [torque for _, torque in pieces] + np.clip(
-        answer.u, problem.lowest_torque, problem.highest_torque
+        answer.levels, problem.lowest_torque, problem.highest_torque
     ).tolist()
     times = np.concatenate([[0.0], np.cumsum(lengths)])
     return TorqueProfile.steps(times, levels)

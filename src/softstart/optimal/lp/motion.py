@@ -301,7 +301,7 @@ def no_ideal(problem: Problem) -> str:
         return "a damped shaft moves a reactive load at an overlap that depends on the speed"
     if reactive and (drive.initial_load_speed != 0.0 or drive.initial_motor_speed != 0.0):
         return "a reactive load that moves before the contact"
-    position, half = float(drive.start_position), 0.5 * float(drive.gap)
+    position, half = float(drive.theta0), 0.5 * float(drive.gap)
     if abs(position) > half and (
         position < 0.0 or (reactive and float(drive.c) * _overlap(drive) > float(drive.Mc))
     ):
@@ -310,13 +310,13 @@ def no_ideal(problem: Problem) -> str:
 
 
 def _overlap(drive: Drive) -> float:
-    return float(max(drive.start_position - 0.5 * drive.gap, 0.0))
+    return float(max(drive.theta0 - 0.5 * drive.gap, 0.0))
 
 
 def entry_of(problem: Problem) -> Entry:
     """The entry into moving contact of a problem for which `no_ideal` gives no reason."""
     drive = problem.drive
-    travel = max(float(0.5 * drive.gap - drive.start_position), 0.0)
+    travel = max(float(0.5 * drive.gap - drive.theta0), 0.0)
     J1, J2, c, Mc, w1, w2 = (
         float(value)
         for value in (

@@ -48,6 +48,7 @@ from softstart.optimal.lp.rows import (
     split,
 )
 from softstart.optimal.problem import Problem
+from softstart.optimal.result import DemandShape, demanded
 from softstart.profile import TorqueProfile
 
 Z, V, W2, U, R, SLOPE, ONE = range(7)
@@ -55,13 +56,12 @@ STATES = 4
 TAIL_STEPS, TAIL_POINTS = (
     12,
     96,
-)  # after t_f: steps while the demand falls, checks where the motor holds or coasts
+)  # after t_f: steps while the demand falls, checks of T
 SETTLED = 8.0  # lags, after which the torque follows its demand to 0.03 %
 BELOW_CURVE = 3e-5  # of U, by which the torque stays below its curve where it is checked
 EXCESS = 1e-4  # relative: T above P between the checks by more counts
 
 Kind = Literal["gap", "resting", "stuck", "contact"]  # resting: a gap with the load at rest; stuck: wound up
-Shape = Literal["steps", "ramps", "continuous"]
 Grid = tuple[tuple[Kind, Vector], ...]  # phases in order, each with the edges of its steps as shares of it
 
 
@@ -113,15 +113,10 @@ class WholeAnswer:
     def profile(self, problem: Problem) -> TorqueProfile:
         """The demand up to t_f, exactly within the limits of the torque."""
         levels = np.clip(self.demand, problem.lowest_torque, problem.highest_torque)
-        shape = demand_shape(problem)
-        if shape == "steps":
-            return TorqueProfile.steps(self.edges, levels[:, 0])
-        if shape == "ramps":
-            return TorqueProfile(np.repeat(self.edges, 2)[1:-1], levels.ravel()).simplified()
-        return TorqueProfile(self.edges, np.concatenate([levels[:1, 0], levels[:, 1]])).simplified()
+        return demanded(demand_shape(problem), self.edges, levels)
 
 
-def demand_shape(problem: Problem) -> Shape:
+def demand_shape(problem: Problem) -> DemandShape:
     """Which demands the plant follows exactly."""
     if math.isfinite(problem.drive.torque_rate):
         return "continuous"
@@ -132,9 +127,6 @@ def phase_ends(grid: Grid, at: Instants) -> list[float]:
     """When the phases of a grid begin and end, s."""
     ends = {"gap": at.tc, "resting": at.tc, "stuck": at.tb, "contact": at.end}
     return [0.0, *(ends[kind] for kind, _ in grid)]
-
-
-Z, V, W2, U, R, SLOPE, ONE = range(7)
 
 
 class WholeProgram:
@@ -418,7 +410,7 @@ class WholeProgram:
         drive: Any = self.problem.drive
         bounds = np.tile([-np.inf, np.inf], (self.columns, 1))
         start = [
-            drive.start_position - 0.5 * drive.gap,
+            drive.theta0 - 0.5 * drive.gap,
             drive.initial_motor_speed - drive.initial_load_speed,
             drive.initial_load_speed,
             0.0,

@@ -33,7 +33,7 @@ SCANNED, WINDINGS = 14, 4  # instants of the contact, and durations of the windi
 LONGEST_WINDING = 6.0  # times the one under full torque
 ENOUGH = 5e-6  # relative: other instants that lower P by less end the search
 LATER = (1.05, 1.3)  # times an end
-SOONER = (0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # ends that are tried, as shares of the latest
+SOONER = (0.93, 0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # shares of an end that are tried
 TRIALS = 25  # of better instants
 FINEST = 1e-7  # of t_f, to which they are found
 LOCAL_MINIMA = 3
@@ -55,13 +55,13 @@ def _no_phases(drive: Any) -> str:
     reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
     if drive.contact_law == "modelica" and drive.d > 0.0:
         return "the damped modelica law is not linear in contact"
-    if drive.start_position < -half or (drive.start_position == -half and v0 < 0.0):
+    if drive.theta0 < -half or (drive.theta0 == -half and v0 < 0.0):
         return "the start begins on the far flank"
-    if drive.start_position >= half and v0 < 0.0:
+    if drive.theta0 >= half and v0 < 0.0:
         return "the flanks part at once"
-    if reactive and (drive.initial_load_speed != 0.0 or (drive.start_position >= half and v0 != 0.0)):
+    if reactive and (drive.initial_load_speed != 0.0 or (drive.theta0 >= half and v0 != 0.0)):
         return "a reactive load that moves before the contact"
-    if reactive and drive.c * (drive.start_position - half) > drive.Mc:
+    if reactive and drive.c * (drive.theta0 - half) > drive.Mc:
         return "the start is wound up against the load"
     return ""
 
@@ -79,7 +79,7 @@ def phase_orders(problem: Problem) -> Iterator[PhaseOrder]:
     """The orders of phases that a start may have."""
     drive: Any = problem.drive
     reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
-    touching = drive.start_position >= 0.5 * drive.gap
+    touching = drive.theta0 >= 0.5 * drive.gap
     tc, tb = _under_full_torque(problem)
     if not reactive:
         yield PhaseOrder(("contact",) if touching else ("gap", "contact"), tc, tc)
@@ -95,7 +95,7 @@ def _under_full_torque(problem: Problem) -> tuple[float, float]:
     """Contact and breakaway on the exact plant under the largest torque, s; inf: they never come."""
     drive: Any = problem.drive
     full = TorqueProfile([0.0], [problem.highest_torque])
-    touching = drive.start_position >= 0.5 * drive.gap
+    touching = drive.theta0 >= 0.5 * drive.gap
     reactive = drive.load_kind == "reactive" and drive.Mc > 0.0
     until = 2.0 * math.pi / drive.Omega + 2.0 * math.sqrt(drive.gap * drive.J1 / problem.highest_torque)
     for _ in range(DOUBLINGS):
@@ -130,6 +130,7 @@ def search(problem: Problem) -> WholeAnswer | None:
     latest = float(problem.start_time)
     orders = list(phase_orders(problem))
     found = [(order, best) for order in orders if (best := _coarse(problem, order, latest)) is not None]
+    found = [(order, _sooner(problem, order, latest, best)) for order, best in found]
     for share in SOONER:  # with all that time the gap could not close only once
         if found or any(_too_late(problem, order, latest) for order in orders):
             break
@@ -151,6 +152,20 @@ def _coarse(problem: Problem, order: PhaseOrder, latest: float) -> WholeAnswer |
         if best is not None:
             return best
     return None
+
+
+def _sooner(problem: Problem, order: PhaseOrder, latest: float, best: WholeAnswer) -> WholeAnswer:
+    """The best answer known, or a better one that ends sooner: more time may be of no use."""
+    trials = _Timings(problem, order, latest, COARSE)
+    winding = best.at.tb - best.at.tc if trials.winds else 0.0
+    answers = [best]
+    for share in SOONER:
+        at = trials.timing(best.at.tb, winding, share * best.at.end)
+        if at[0] < at[2] and math.isfinite(trials.peak(at)):
+            answers.append(trials.moved(at, 0.1 * at[2]) or best)
+        elif len(answers) > 1:
+            break
+    return min(answers, key=lambda one: one.P)
 
 
 def _too_late(problem: Problem, order: PhaseOrder, latest: float) -> bool:

@@ -53,14 +53,6 @@ class Step:
     predicted_gain: float
 
 
-def merit(peak: float, late: float, staircase: Staircase, start_time: float, rules: Rules) -> float:
-    """What a descent brings down, N m: the peak with prices, or the latest start time; `late` in s."""
-    if rules.aim == "quick":
-        return (late + start_time) / start_time * rules.span
-    steps = sum(float(np.abs(np.diff(part.levels)).sum()) for part in staircase.parts)
-    return max(peak, rules.floor) + PRICE * rules.span * max(late, 0.0) / start_time + rules.calm * steps
-
-
 def free_edges(staircase: Staircase, rules: Rules) -> Indices:
     """Which edges may move: those at which the torque steps."""
     if not rules.edges:
@@ -309,7 +301,13 @@ def _trajectories(
 
 
 def _merit(point: Point, evaluator: Evaluator, rules: Rules) -> float:
-    return merit(point.peak, point.late, point.staircase, evaluator.start_time, rules)
+    """What a descent brings down, N m: the peak with prices, or the latest start time."""
+    start_time = evaluator.start_time
+    if rules.aim == "quick":
+        return (point.late + start_time) / start_time * rules.span
+    steps = sum(float(np.abs(np.diff(part.levels)).sum()) for part in point.staircase.parts)
+    late = PRICE * rules.span * max(point.late, 0.0) / start_time
+    return max(point.peak, rules.floor) + late + rules.calm * steps
 
 
 def _rank(point: Point, evaluator: Evaluator, rules: Rules) -> tuple[float, float]:

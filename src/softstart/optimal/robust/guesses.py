@@ -35,7 +35,7 @@ class Family:
     def __init__(self, evaluator: Evaluator, low: float, high: float, react: bool) -> None:
         self.evaluator, self.low, self.high, self.react = evaluator, low, high, react
         self.period = max(float(drive.elastic_period) for drive in evaluator.drives)
-        self.crossing = max(_crossing(drive, high) for drive in evaluator.drives)
+        self.crossing = max(crossing_time(drive, high) for drive in evaluator.drives)
         # a stand-in with four edges far apart, so that its unknowns can be distinguished
         self.parameters = ProfileParameters(
             self._staircase(self._unknowns(np.full((1, N_NUMBERS), 0.55))[0]), evaluator.drives[0]
@@ -89,9 +89,9 @@ class Family:
         return Staircase(np.concatenate([zero, unknowns[6:7]]), unknowns[:2].copy(), contact)
 
 
-def _crossing(drive: Drive, high: float) -> float:
+def crossing_time(drive: Drive, high: float) -> float:
     """How long the motor takes through the gap at its highest torque, s, with what its torque is late by."""
-    travel = max(0.5 * float(drive.gap) - float(drive.start_position), 0.0)
+    travel = max(0.5 * float(drive.gap) - float(drive.theta0), 0.0)
     delay = float(drive.torque_lag) + high / float(drive.torque_rate)
     return math.sqrt(2.0 * travel * float(drive.J1) / high) + delay
 
@@ -119,6 +119,20 @@ def quickness(evaluator: Evaluator) -> Callable[[Figures], Vector]:
         return worst
 
     return cost
+
+
+def offspring(random: np.random.Generator, here: Matrix, costs: Vector) -> Matrix:
+    """One new member for each of a population in the unit box, by differential evolution."""
+    count, size = here.shape
+    first, second = random.integers(count, size=(2, count))
+    better = np.argsort(costs)[random.integers(max(count // 8, 2), size=count)]
+    weight = random.uniform(0.4, 0.9, (count, 1))
+    tried = here + weight * (here[better] - here) + weight * (here[first] - here[second])
+    keep = random.random(tried.shape) > 0.7
+    keep[np.arange(count), random.integers(size, size=count)] = False
+    tried = np.where(keep, here, tried)
+    made: Matrix = np.where((tried < 0.0) | (tried > 1.0), random.random(tried.shape), tried)
+    return made
 
 
 class Evolution:
@@ -167,16 +181,8 @@ class Evolution:
         random = np.random.default_rng(seed)
         here = random.random((MEMBERS, self.size))
         costs = cost(self.evaluator.figures(self.parameters, self.unknowns(here)))
-        rows = np.arange(MEMBERS)
         for _ in range(ROUNDS):
-            first, second = random.integers(MEMBERS, size=(2, MEMBERS))
-            better = np.argsort(costs)[random.integers(max(MEMBERS // 8, 2), size=MEMBERS)]
-            weight = random.uniform(0.4, 0.9, (MEMBERS, 1))
-            tried = here + weight * (here[better] - here) + weight * (here[first] - here[second])
-            keep = random.random(tried.shape) > 0.7
-            keep[rows, random.integers(self.size, size=MEMBERS)] = False
-            tried = np.where(keep, here, tried)
-            tried = np.where((tried < 0.0) | (tried > 1.0), random.random(tried.shape), tried)
+            tried = offspring(random, here, costs)
             new = cost(self.evaluator.figures(self.parameters, self.unknowns(tried)))
             gain = new < costs
             here[gain], costs[gain] = tried[gain], new[gain]

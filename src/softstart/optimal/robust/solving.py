@@ -63,7 +63,7 @@ def scenarios_of(
     ]
     found = [drive]
     for gap, load_inertia, load_torque in itertools.product(*axes):
-        one = drive.replace(gap=gap, load_inertia=load_inertia, load_torque=load_torque)
+        one = drive.with_gap(gap, load_inertia=load_inertia, load_torque=load_torque)
         if one not in found:
             found.append(one)
     return tuple(found)

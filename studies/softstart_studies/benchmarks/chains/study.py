@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
+from softstart_studies.benchmarks.contenders import condition_table
 from softstart_studies.benchmarks.contest import rounded
 
 __all__ = ["BenchmarkChains", "Case", "cases"]
@@ -135,19 +135,18 @@ class BenchmarkChains(Study):
             )  # fmt: skip
         least = min(one.ratio for one in found)
         closer = max(one.tight for one in found)
-        conditions = [
+        conditions: list[tuple[str, object]] = [
             (
                 "lsoda",
                 "solve_ivp, rtol = atol = 1e-8, a right-hand side for each mode, restarted at each event",
             ),
             ("softstart", f"{__version__}: simulate_chain with its record; events, peaks and states located"),
             ("passes, in turns; medians", self.passes),
-            ("machine", f"{platform.machine()}, {platform.system()}, python {platform.python_version()}"),
         ]
         return StudyResult(
             tables=(
                 Table("One start of a chain, processor time", COLUMNS, rows),
-                Table("Conditions", ("what", "value"), conditions),
+                condition_table(conditions, ("numpy", "scipy", "numba")),
             ),
             claims=(
                 Claim(

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from softstart.study import Progress, Study, StudyResult, Table
-from softstart_studies.benchmarks.contenders import version_of
+from softstart.views.drawing import COLOURS, drawing, new_figure
+from softstart_studies.benchmarks.contenders import condition_table
 from softstart_studies.benchmarks.contest import rounded
 from softstart_studies.benchmarks.optima import entries
 from softstart_studies.benchmarks.optima.entries import ENTRIES, MISSING, lines_of_code
 from softstart_studies.benchmarks.optima.judge import judge
-from softstart_studies.benchmarks.optima.picture import optima_figure
 from softstart_studies.benchmarks.optima.task import START_TIMES, Task, crane_task
 from softstart_studies.benchmarks.optima.verdicts import Outcome, claims, fastest
 from softstart_studies.benchmarks.optima.worker import Work, work_apart
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 __all__ = ["BenchmarkOptima"]
 
@@ -158,16 +160,40 @@ def _guess_table(guessed: Sequence[Outcome]) -> Table:
 
 
 def _condition_table(repetitions: int) -> Table:
-    libraries = ("numpy", "scipy", "casadi", "rockit-meco", "openmdao", "dymos", "gekko")
     rows = [
         ("K_dyn", "of the whole re-simulated run to an elastic period after t_f"),
         ("seconds", "of the clock; cpu: of processor time, child processes included; ratios are of these"),
         ("lines of code", "of the contender's file: not blank, no comment, no docstring; imports included"),
         ("processors and threads used", "one, one"),
         ("repetitions after the first", f"{repetitions}, fewer where they take long"),
-        ("processors of the machine", os.cpu_count()),
-        ("machine", f"{platform.machine()}, {platform.system()}"),
-        ("python", platform.python_version()),
-        *((name, version_of(name) or "not installed") for name in libraries),
     ]
-    return Table("Conditions", ("what", "value"), rows)
+    libraries = ("numpy", "scipy", "casadi", "rockit-meco", "openmdao", "dymos", "gekko")
+    return condition_table(rows, libraries)
+
+
+def optima_figure(outcomes: Sequence[Outcome]) -> Figure:
+    """K_dyn over computing time, a panel a start time, by package; hollow where a condition breaks."""
+    from matplotlib.ticker import LogLocator
+
+    tasks = list(dict.fromkeys(one.task for one in outcomes))
+    packages = list(dict.fromkeys(entry.package for entry in ENTRIES.values()))
+    with drawing():
+        figure, grid = new_figure(1, max(1, len(tasks)), (5.2 * max(1, len(tasks)), 4.2), squeeze=False)
+        for axes, task in zip(grid[0], tasks, strict=False):
+            for one in outcomes:
+                if one.task != task or one.judged is None:
+                    continue
+                colour = COLOURS[packages.index(ENTRIES[one.name].package)]
+                place = (one.seconds, one.judged.k_dyn)
+                axes.plot(*place, "o", color=colour, markerfacecolor=colour if one.kept else "white")
+                axes.annotate(one.name, place, (5, 4), textcoords="offset points", color=colour)
+            axes.set_xscale("log")
+            for formatter in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+                formatter(lambda seconds, _: f"{seconds:g}")
+            axes.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+            axes.ticklabel_format(axis="y", useOffset=False)
+            axes.margins(x=0.25, y=0.12)
+            axes.set_xlabel("computing time, s")
+            axes.set_title(f"start within {task.start_time:g} s", loc="left")
+        grid[0][0].set_ylabel("$K_{dyn}$ re-simulated (hollow: a condition is not kept)")
+    return cast("Figure", figure)

@@ -90,7 +90,7 @@ def _lowest(outcomes: Sequence[Outcome], peers: Sequence[Outcome]) -> Claim | No
     aside = f" Lower, but breaking a condition: {', '.join(cheating)}." if cheating else ""
     return Claim(
         "No peer's torque has a smaller K_dyn than softstart's, re-simulated, within 0.1 %.",
-        _verdict(held),
+        Verdict.of(*held),
         f"Least K_dyn: {'; '.join(said)}.{aside}",
     )
 
@@ -111,7 +111,7 @@ def _faster(outcomes: Sequence[Outcome], peers: Sequence[Outcome]) -> Claim | No
         return None
     return Claim(
         "softstart's fastest method takes less time than any peer.",
-        _verdict(held),
+        Verdict.of(*held),
         f"Processor time to that of softstart's fastest method: {', '.join(said)}.",
     )
 
@@ -129,7 +129,7 @@ def _honest(peers: Sequence[Outcome]) -> Claim | None:
     far = [text for text, value in apart.items() if value > AGREEMENT]
     return Claim(
         "Each peer's claimed K_dyn agrees with its exact re-simulation within 1 %.",
-        _verdict([value <= AGREEMENT for value in apart.values()]),
+        Verdict.of(*(value <= AGREEMENT for value in apart.values())),
         f"Claimed less re-simulated, more than 1 %: {', '.join(far) or 'none'} (of {len(apart)} answers).",
     )
 
@@ -144,7 +144,7 @@ def _trap(outcomes: Sequence[Outcome], guesses: Sequence[Outcome]) -> Claim | No
     worst = f", the worst {max(off):.2f} times it" if off else ""
     return Claim(
         "Written as one phase, the problem is missed by more than 1 % from every guess of the torque.",
-        _verdict([one not in found for one, _ in measured]),
+        Verdict.of(*(one not in found for one, _ in measured)),
         f"Of {len(measured)} guesses {len(found)} come within 1 % of the optimum and meet all conditions, "
         f"{len(off)} do not{worst}, {none} end without a solution.",
     )
@@ -157,14 +157,3 @@ def _times(ratio: float) -> str:
     ('0.51', '6,490')
     """
     return shown(ratio) if ratio >= 10.0 else f"{ratio:.2g}"
-
-
-def _verdict(held: Sequence[bool]) -> Verdict:
-    """Confirmed if all held, refuted if none did.
-
-    >>> _verdict([True, False])
-    <Verdict.PARTLY: 'partly'>
-    """
-    if all(held):
-        return Verdict.CONFIRMED
-    return Verdict.PARTLY if any(held) else Verdict.REFUTED

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-import pickle
-import subprocess
-import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from softstart_studies.benchmarks.child import ONE_THREAD, bind_to_one_processor
+from softstart.processes import DiedError, Worker
+from softstart_studies.benchmarks.host import bind_to_one_processor
 from softstart_studies.benchmarks.optima.entries import ENTRIES, solve
 from softstart_studies.benchmarks.optima.task import Answer, Task
 
-COMMAND = "from softstart_studies.benchmarks.optima.worker import main; main()"
 PATIENCE = 600.0  # s, for all of a contender's work on one task
 ENOUGH = 20.0  # s, after which no further repetition is begun
 
@@ -85,33 +83,27 @@ def sentence(error: BaseException) -> str:
 
 def work_apart(name: str, task: Task, repetitions: int, options: Mapping[str, Any]) -> Work:
     """The same in a process of its own, in a folder of its own: some packages leave files behind."""
-    with tempfile.TemporaryDirectory(prefix="softstart-") as folder:
-        # the output goes into a file, not a pipe: whatever a library prints must not get into the answer
-        answers = os.path.join(folder, "answer")
-        try:
-            ended = subprocess.run(
-                [sys.executable, "-W", "ignore", "-c", COMMAND],
-                input=pickle.dumps((name, task, repetitions, dict(options), answers)),
-                capture_output=True,
-                env={**os.environ, **ONE_THREAD, "OPENMDAO_REPORTS": "0"},
-                cwd=folder,
-                timeout=PATIENCE,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            return Work(None, f"no answer within {PATIENCE:g} s")
-        if ended.returncode != 0 or not os.path.exists(answers):
-            said = ended.stderr.decode(errors="replace").strip().splitlines()[-1:]
-            return Work(None, f"its process ended: {said[0] if said else 'without a word'}")
-        with open(answers, "rb") as file:
-            found: Work = pickle.load(file)
-        return found
+    worker = Worker(quiet=True)
+    try:
+        with tempfile.TemporaryDirectory(prefix="softstart-") as folder:
+            worker.submit(_in_folder, folder, name, task, repetitions, dict(options))
+            message = worker.receive(PATIENCE)
+            if message is None:
+                return Work(None, f"no answer within {PATIENCE:g} s")
+            if message.kind == "error":
+                return Work(None, f"it failed: {sentence(message.content[0])}")
+            found: Work = message.content
+            return found
+    except DiedError as death:
+        return Work(None, f"its process ended: {death}")
+    finally:
+        worker.end()
 
 
-def main() -> None:
-    """The process."""
+def _in_folder(folder: str, *arguments: Any) -> Work:
+    """In the process: nothing that a package prints, warns of or writes gets anywhere else."""
     bind_to_one_processor()
-    name, task, repetitions, options, answers = pickle.load(sys.stdin.buffer)
-    found = work(name, task, repetitions, options)
-    with open(answers, "wb") as file:
-        pickle.dump(found, file)
+    os.environ["OPENMDAO_REPORTS"] = "0"
+    os.chdir(folder)
+    warnings.simplefilter("ignore")
+    return work(*arguments)

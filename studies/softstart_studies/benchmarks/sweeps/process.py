@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from softstart.errors import SimulationError
+from softstart.sweeping.store import SEAL
 
 SOFTSTART = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
 GLANCE = 0.02  # s, between looks at the finished chunks
@@ -68,13 +71,8 @@ def begun(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
 
 
 def finished(results: Path) -> dict[str, int]:
-    """The finished chunks in a folder of results, and when each was written."""
-    home = results / "status" / "c"
-    return {
-        str(path.relative_to(home)): path.stat().st_mtime_ns
-        for path in home.rglob("*")
-        if path.name.isdigit() and path.is_file()
-    }
+    """The finished chunks in a folder of results, and when each was written: those that have their seal."""
+    return {str(path.relative_to(results)): path.stat().st_mtime_ns for path in results.rglob(f"*{SEAL}")}
 
 
 def _last_words(child: subprocess.Popen[bytes]) -> str:
@@ -104,3 +102,47 @@ def _memory_of_tree(root: int) -> float:
         except (OSError, ValueError):
             continue
     return pages * PAGE / 2**20
+
+
+PATIENCE = 60.0  # s, for the scheduler to say where it is
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Where the scheduler is, and its workers."""
+
+    address: str
+    workers: tuple[subprocess.Popen[bytes], ...]
+
+
+@contextmanager
+def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
+    """A scheduler with so many workers of one thread each, gone at the end of the block."""
+    made: list[subprocess.Popen[bytes]] = []
+
+    def dask(*arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", *arguments, "--dashboard-address", "127.0.0.1:0"]
+        made.append(
+            subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        )
+        return made[-1]
+
+    try:
+        dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", "scheduler.json")
+        address = _address(folder / "scheduler.json")
+        options = ("--nthreads", "1", "--no-nanny", "--local-directory", "work")
+        yield Cluster(address, tuple(dask("worker", address, *options) for _ in range(workers)))
+    finally:
+        for process in made:
+            process.kill()
+            process.wait()
+
+
+def _address(path: Path) -> str:
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        try:
+            return str(json.loads(path.read_text())["address"])
+        except (OSError, ValueError):
+            time.sleep(0.05)
+    raise SimulationError("benchmark: the dask scheduler did not start.")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import signal
 import tempfile
 import time
@@ -14,20 +12,84 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from softstart.errors import SimulationError
-from softstart.study import Progress, Study, StudyResult, Table
+from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.sweeping.store import open_folder
 from softstart.sweeping.summary import plan_of
-from softstart_studies.benchmarks.contenders import version_of
+from softstart_studies.benchmarks.contenders import condition_table, version_of
 from softstart_studies.benchmarks.contest import rounded
 from softstart_studies.benchmarks.lsoda import peak_torque, sampled_plan
 from softstart_studies.benchmarks.sweeps import process
-from softstart_studies.benchmarks.sweeps.cluster import cluster
-from softstart_studies.benchmarks.sweeps.process import Ended
+from softstart_studies.benchmarks.sweeps.process import Ended, cluster
 from softstart_studies.benchmarks.sweeps.task import Task, sample
-from softstart_studies.benchmarks.sweeps.verdicts import Found, claims
 
 if TYPE_CHECKING:
     import xarray
+
+
+TIMES = 100.0  # LSODA
+MEMORY = 2048.0  # MiB
+AGREEMENT = 1e-4  # in K_dyn, of sampled starts
+
+
+@dataclass(frozen=True)
+class Found:
+    """Starts, starts/s and core of both, largest difference in K_dyn, MiB, and whether the bits agree."""
+
+    starts: int
+    rate: float
+    peer_rate: float
+    apart: float
+    memory: float | None
+    resumed: bool
+    kept: bool
+    on_cluster: bool | None
+
+
+def claims(found: Found) -> list[Claim]:
+    """One claim for everything that was tried.
+
+    >>> [claim.verdict.value for claim in claims(Found(1000, 2e4, 10.0, 1e-6, 700.0, True, True, None))]
+    ['confirmed', 'confirmed', 'confirmed', 'confirmed']
+    """
+    ratio = found.rate / found.peer_rate
+    made = [
+        Claim(
+            f"A sweep makes at least {TIMES:.0f} times as many sampled starts a second and core as LSODA.",
+            Verdict.of(ratio >= TIMES),
+            f"{found.rate:,.0f} against {found.peer_rate:.3g} starts/s: {ratio:,.0f} times.",
+        ),
+        Claim(
+            f"Both have the same K_dyn within {AGREEMENT:g}.",
+            Verdict.of(found.apart <= AGREEMENT),
+            f"Largest difference: {found.apart:.1e}.",
+        ),
+    ]
+    if found.memory is not None:
+        made.append(
+            Claim(
+                "All processes of a sweep together stay below 2 GiB.",
+                Verdict.of(found.memory < MEMORY),
+                f"At most {found.memory:,.0f} MiB with {found.starts:,} starts.",
+            )
+        )
+    made.append(
+        Claim(
+            "Killed twice and begun again, a sweep has the same bits and makes no finished chunk anew.",
+            Verdict.of(found.resumed and found.kept),
+            f"Bits {'agree' if found.resumed else 'differ'}; finished chunks were "
+            f"{'kept' if found.kept else 'made anew'}.",
+        )
+    )
+    if found.on_cluster is not None:
+        made.append(
+            Claim(
+                "On two dask workers, of which one is killed, a sweep has the same bits.",
+                Verdict.of(found.on_cluster),
+                f"Bits {'agree' if found.on_cluster else 'differ'}.",
+            )
+        )
+    return made
+
 
 __all__ = ["BenchmarkSweeps"]
 
@@ -205,7 +267,6 @@ def _rate_table(found: Found, peer: Peer) -> Table:
 
 
 def _condition_table(task: Task, workers: int, chunks: int) -> Table:
-    libraries = ("numpy", "scipy", "numba", "xarray", "zarr", "distributed")
     rows = [
         ("grid", " x ".join(map(str, task.shape)) + " (gap, load inertia, stiffness, ramp time)"),
         ("chunks", chunks),
@@ -213,9 +274,5 @@ def _condition_table(task: Task, workers: int, chunks: int) -> Table:
         ("memory", "most at any time, resident, summed over all processes; shared pages count in each"),
         ("LSODA", "scipy solve_ivp, rtol 1e-8, located events, restarted at each sample; a plain loop"),
         ("processes", workers),
-        ("processors of the machine", os.cpu_count()),
-        ("machine", f"{platform.machine()}, {platform.system()}"),
-        ("python", platform.python_version()),
-        *((name, version_of(name) or "not installed") for name in libraries),
     ]
-    return Table("Conditions", ("what", "value"), rows)
+    return condition_table(rows, ("numpy", "scipy", "numba", "xarray", "zarr", "distributed"))

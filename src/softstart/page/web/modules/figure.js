@@ -3,9 +3,9 @@ import { element, fixed, significant } from "./numbers.js";
 
 const FACTS = [
   ["start_time", "start time", "s", (f) => fixed(f.start_time, 4)],
-  ["time_lost", "lost to direct", "s", (f) => fixed(f.time_lost, 4)],
+  ["time_lost", "after direct", "s", (f) => fixed(f.time_lost, 4)],
   ["peak_torque", "peak torque", "N m", (f) => significant(f.peak_torque, 5)],
-  ["base", "K = 1 at", "N m", (f) => significant(f.base, 5)],
+  ["base", "mean torque", "N m", (f) => significant(f.base, 5)],
   ["impact_speed", "first impact", "rad/s", (f) => significant(f.impact_speed, 4)],
   ["contacts", "contacts", "", (f) => (f.contacts ?? "\u2013").toString()],
 ];

@@ -1,4 +1,5 @@
-// Strategies side by side: one is selected, any may be drawn; the order changes only when a heading is pressed.
+// Strategies side by side: one is selected, any may be drawn. The gentlest is first once all are known; then the
+// order changes only when a heading is pressed.
 import { element, fixed, significant } from "./numbers.js";
 
 // key, heading, its index, the text of a cell, what it is
@@ -8,7 +9,7 @@ const COLUMNS = [
   ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3), "K when wear has made the gap four times as wide, and the controller is as it was"],
   ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
   ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
-  ["time_lost", "lost, s", "", (row) => fixed(row.time_lost, 4), "Start time over that of direct"],
+  ["time_lost", "later, s", "", (row) => fixed(row.time_lost, 4), "How much later than with direct the load has its target speed"],
 ];
 
 export class Table {
@@ -16,7 +17,7 @@ export class Table {
     this.theme = theme;
     this.say = say;
     this.lines = new Map();
-    this.by = "";
+    this.by = "k_dyn";
     this.asked = -1; // stamp of what was selected last
     this.body = element("tbody");
     const heads = COLUMNS.map(([key, text, sub, , meaning]) => {
@@ -68,7 +69,8 @@ export class Table {
   }
 
   arrange(state) {
-    const wanted = `${this.by}|${state.order.join("|")}`;
+    const known = state.order.every((name) => state.rows.has(name));
+    const wanted = `${known && this.by}|${state.order.join("|")}`;
     if (this.sorted === wanted) return;
     this.sorted = wanted;
     for (const [name, line] of this.lines) {

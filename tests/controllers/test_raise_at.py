@@ -1,0 +1,93 @@
+"""The strategies of [G] that raise their torque at the peak of stage 2, (14), or at its end, (15).
+
+`python -m tests.controllers.test_raise_at` prints the whole map: gaps, inertias, positions, damping, lag.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softstart import Drive, InputError, simulate, stages
+from softstart.arrays import Vector
+from softstart.controller import make_controller
+from softstart_controllers.acceleration_delay import AccelerationDelay
+from softstart_controllers.reduced import closing_speed, delay_of
+from softstart_controllers.reduced_two_stage import ReducedTwoStage
+
+CRANE = Drive.load("crane-4amtkf")
+NAMES = ("reduced-two-stage", "acceleration-delay")
+GAPS, INERTIAS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0), (0.4, 1.0, 2.0, 5.0, 10.0, 20.0)  # rad; over J1
+POSITIONS = ("mid-gap", "driving-flank", "opposite-flank", "hanging")
+
+
+def cell(name: str, where: str, damping: float, lag: float, kind: str) -> tuple[Vector, Vector]:
+    """K_dyn and start time over gaps and inertias: by how much `peak` is above `end`."""
+    gap, inertia = (grid.ravel() for grid in np.meshgrid(GAPS, INERTIAS, indexing="ij"))
+    J2 = inertia * CRANE.J1
+    drives = CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind, start_position=where)
+    drives = drives.replace(damping=2.0 * damping * drives.c / drives.Omega)
+    peak, end = (simulate(drives, make_controller(name, {"raise_at": at})) for at in ("peak", "end"))
+    return (peak.k_dyn - end.k_dyn).values, (peak.start_time - end.start_time).values
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_crane(name: str) -> None:
+    """Gentler and faster, from the same measurement."""
+    end, peak = (simulate(CRANE, make_controller(name, {"raise_at": at})) for at in ("end", "peak"))
+    assert (round(end.k_dyn, 3), round(end.start_time, 4)) == (2.387, 0.4033)
+    assert peak.k_dyn < 1.3
+    assert round(peak.start_time, 3) == 0.392
+    assert peak.contacts == 1
+
+
+def test_the_delays_are_those_of_g() -> None:
+    for r in (0.25, 0.5):
+        nominal = stages.method_2(r, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
+        mean = stages.mean_shaft_torque(62 * r, 0.035, 0.175, 7.16)
+        peak = stages.time_of_peak(mean, closing_speed(CRANE, 62 * r), 368.465, CRANE.Omega)
+        assert delay_of(CRANE, 62 * r, "end") == pytest.approx(nominal.contact_duration, rel=1e-12)
+        assert delay_of(CRANE, 62 * r, "peak") == pytest.approx(peak, rel=1e-12)
+
+
+def test_the_torque_is_raised_at_the_located_peak() -> None:
+    run = simulate(CRANE, ReducedTwoStage(torque=15.5, raise_at="peak"))
+    raised = run.segments[run.segments[:, 9] == 62.0][0, 0]
+    assert float(run.at(raised)["v"]) == pytest.approx(0.0, abs=1e-9)  # T' = c v
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_peak_is_never_harder_over_a_map(name: str) -> None:
+    for where, damping, kind in itertools.product(POSITIONS, (0.0, 0.1), ("active", "reactive")):
+        if (where, kind) != ("hanging", "reactive"):
+            worse, _ = cell(name, where, damping, 0.004, kind)
+            assert worse.max() < 1e-6, (where, damping, kind)
+
+
+@pytest.mark.parametrize("make", [ReducedTwoStage, AccelerationDelay])
+def test_another_word_is_refused(make: Any) -> None:
+    with pytest.raises(InputError, match='write "peak" or "end"'):
+        make(raise_at="top")
+    with pytest.raises(InputError, match='write "peak" or "end"'):
+        make_controller(make.name, {"raise_at": "top"})
+
+
+def print_map() -> None:
+    """Every combination, one line each."""
+    print("strategy, position, damping ratio, lag, load: peak over end in K_dyn (least, mean, most), time")
+    for name, where, damping, lag, kind in itertools.product(
+        NAMES, POSITIONS, (0.0, 0.02, 0.1, 0.3), (0.0, 0.004), ("active", "reactive")
+    ):
+        if (where, kind) != ("hanging", "reactive"):
+            k, time = cell(name, where, damping, lag, kind)
+            print(
+                f"{name}, {where}, {damping:g}, {lag:g} s, {kind}: {k.min():+.3f}, {k.mean():+.3f}, "
+                f"{k.max():+.4f}; slower in {np.sum(time > 1e-6)} of {time.size}, at most {time.max():+.4f} s"
+            )
+
+
+if __name__ == "__main__":
+    print_map()

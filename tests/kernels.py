@@ -1,0 +1,105 @@
+"""The kernels that the tests need, compiled once and before the first test, by all workers together.
+
+From an empty cache every worker would compile all of them. They are parts here: a worker takes the first one
+that nobody has taken and whose needs are compiled, until none is left. Files in a folder that the workers of
+a run share say what is taken and what is compiled. Commands say on standard error that they compile, which
+tests of their output would trip over.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from pathlib import Path
+
+PATIENCE = 900.0  # s that a worker waits for another one which compiles
+
+
+def drive() -> None:
+    """The loop of starts, which everything else needs."""
+    import_module("softstart.plant.start")
+
+
+def controllers() -> None:
+    """Every controller in a single start and in a batch."""
+    from softstart import Drive, TorqueProfile, simulate
+    from softstart.controller import make_controller, ready_controller_names
+
+    crane = Drive.load("crane-4amtkf")
+    profile = make_controller("profile", {"profile": TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 40.0])})
+    for controller in (profile, *map(make_controller, ready_controller_names())):
+        assert simulate(crane, controller).energy.residual < 1e-6
+        simulate(crane.replace(gap=[0.5, 2.0]), controller)
+
+
+def plain() -> None:
+    """A controller that is called from Python."""
+    from softstart import Drive, simulate
+    from softstart.controller import CompiledController, make_controller
+
+    crane, direct = Drive.load("crane-4amtkf"), make_controller("direct")
+    assert isinstance(direct, CompiledController)
+    twin = direct.as_plain(crane)
+    assert simulate(crane, twin).k_dyn == simulate(crane, "direct").k_dyn
+    simulate(crane.replace(gap=[0.5, 2.0]), twin)
+
+
+def chain() -> None:
+    """Starts of a chain."""
+    from softstart import Chain, simulate_chain
+
+    assert simulate_chain(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
+
+
+def robust() -> None:
+    """Optima over several drives."""
+    from softstart import Drive, optimize_robust
+
+    crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    assert optimize_robust([crane], 0.3).k_dyn < 1.0
+
+
+# what must be compiled before, and what compiles it; the longest are taken first
+PARTS: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
+    "drive": ((), drive),
+    "chain": (("drive",), chain),
+    "controllers": (("drive",), controllers),
+    "robust": (("controllers",), robust),
+    "plain": (("controllers",), plain),
+}
+
+
+def compile_all() -> None:
+    """All parts, in this process alone."""
+    for name in PARTS:
+        PARTS[name][1]()
+
+
+def compile_together(folder: Path) -> None:
+    """All parts, with the other workers that are given the same folder; returns when none is left."""
+    until = time.monotonic() + PATIENCE
+    while not done(folder, PARTS) and time.monotonic() < until:
+        ready = (name for name, (needs, _) in PARTS.items() if done(folder, needs))
+        name = next((name for name in ready if take(folder, name)), "")
+        if not name:
+            time.sleep(0.1)
+            continue
+        try:
+            PARTS[name][1]()
+        finally:
+            (folder / f"{name}.done").touch()
+
+
+def done(folder: Path, names: Iterable[str]) -> bool:
+    """Whether these parts are compiled."""
+    return all((folder / f"{name}.done").exists() for name in names)
+
+
+def take(folder: Path, name: str) -> bool:
+    """Whether this worker is the first to ask for this part."""
+    try:
+        (folder / f"{name}.taken").touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True
