@@ -9,17 +9,17 @@ are assumed, and named so in every output.
 
 # %%
 # The printed formulas and the model, over the speed of the crank:
-from softstart_studies.paper_b import over_speed, pictures
+from softstart_studies.paper_b import over_speed
 from softstart_studies.paper_b.vaz import balanced
 
 found = balanced()
-course = over_speed.course(found)
-figure = pictures.figure_2(course)
+curves = over_speed.curves(found)
+figure = over_speed.figure_2(curves)
 figure.set_label("Figure 2 of [B]: first order of the reaction torque over the speed of the crank.")
 
 # %%
 # Gas and inertia apart:
-second = pictures.figure_3(course)
+second = over_speed.figure_3(curves)
 second.set_label("Figure 3 of [B]: first order of the torque of gas, of inertia, and of both.")
 
 # %%
