@@ -147,13 +147,16 @@ def shipped() -> str:
     from softstart import Drive
     from softstart.drive import library
 
-    lines = ["| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | source |"]
-    lines += ["|---|--:|--:|--:|--:|--:|---|---|"]
+    lines = [
+        "| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | starts from | source |"
+    ]
+    lines += ["|---|--:|--:|--:|--:|--:|---|---|---|"]
     for name in library.names():
         d = Drive.load(name)
         load = f"{d.Mc:g} N m, {d.load_kind}"
+        held = ", motor held by its brake" if d.brake == "motor" else ""
         lines.append(
-            f"| `{name}` | {d.J1:g} | {d.J2:g} | {d.c:g} | {d.gap:g} | {d.Ms:g} | {load} "
+            f"| `{name}` | {d.J1:g} | {d.J2:g} | {d.c:g} | {d.gap:g} | {d.Ms:g} | {load} | {d.start_position}{held} "
             f"| {prose(cell(d.source))} |"
         )
     return "\n".join(lines) + "\n"

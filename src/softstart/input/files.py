@@ -21,7 +21,7 @@ class Library:
     """The TOML files in the folder `library` of a package; `what` and `plural` as "a clutch", "clutches".
 
     >>> drives = Library("softstart.drive", "a drive", "drives")
-    >>> drives.names()[0], drives.find("crane-4amtkf")[1]
+    >>> drives.names()[1], drives.find("crane-4amtkf")[1]
     ('crane-4amtkf', 'crane-4amtkf')
     >>> print(drives.text("crane-4amtkf").splitlines()[0])
     # The crane drive of [G] with J2 = 5 J1 and a gap of 0.5 rad.

@@ -1,6 +1,7 @@
 """Drives from files and back, and the shipped ones."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -73,10 +74,13 @@ def test_a_shipped_name_goes_before_a_file_of_that_name(tmp_path, monkeypatch):
 
 def test_the_shipped_drives():
     assert library.names() == (
+        "conveyor-11kw",
         "crane-4amtkf",
         "crane-4amtkf-light",
         "crane-4amtkf-light-worn",
         "crane-4amtkf-worn",
+        "hoist-15kw",
+        "long-travel-3kw",
         "nordin-servo-60kw",
         "servo-axis-small",
     )
@@ -87,6 +91,23 @@ def test_the_shipped_drives():
         assert drive.target_speed == drive.rated_speed
         assert library.text(name).startswith("# ")
         assert Drive.from_toml(drive.to_toml()) == drive
+
+
+@pytest.mark.parametrize("name", ["hoist-15kw", "conveyor-11kw", "long-travel-3kw"])
+def test_a_shipped_drive_is_what_its_comment_says(name):
+    """Elastic frequency, damping ratio and time to its speed, from the parameters; each value with its source."""
+    drive, text = Drive.load(name), library.text(name)
+    said = re.search(r"frequency ([\d.]+) Hz, damping ratio (\d+) %;.* in ([\d.]+) s\.", text)
+    assert said is not None
+    ratio = drive.d * (1 / drive.J1 + 1 / drive.J2) / (2 * drive.Omega)
+    rigid = drive.target_speed * (drive.J1 + drive.J2) / (drive.Ms - drive.Mc)
+    for number, value in zip(said.groups(), (drive.Omega / (2 * math.pi), 100 * ratio, rigid), strict=True):
+        decimals = len(number.partition(".")[2])
+        assert round(value, decimals) == float(number)
+    quantities = [line for line in text.splitlines() if re.match(r"\w+ = \"\d", line)]
+    for line in quantities:
+        if not line.startswith("target_speed"):
+            assert re.search(r"# (plate|computed|typical|data sheet)", line), line
 
 
 @pytest.mark.parametrize(
