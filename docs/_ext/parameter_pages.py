@@ -156,8 +156,8 @@ def shipped() -> str:
         load = f"{d.Mc:g} N m, {d.load_kind}"
         held = ", motor held by its brake" if d.brake == "motor" else ""
         lines.append(
-            f"| `{name}` | {d.J1:g} | {d.J2:g} | {d.c:g} | {d.gap:g} | {d.Ms:g} | {load} | {d.start_position}{held} "
-            f"| {prose(cell(d.source))} |"
+            f"| `{name}` | {d.J1:g} | {d.J2:g} | {d.c:g} | {d.gap:g} | {d.Ms:g} | {load} "
+            f"| {d.start_position}{held} | {prose(cell(d.source))} |"
         )
     return "\n".join(lines) + "\n"
 

@@ -95,7 +95,7 @@ def test_the_shipped_drives():
 
 @pytest.mark.parametrize("name", ["hoist-15kw", "conveyor-11kw", "long-travel-3kw"])
 def test_a_shipped_drive_is_what_its_comment_says(name):
-    """Elastic frequency, damping ratio and time to its speed, from the parameters; each value with its source."""
+    """Elastic frequency, damping ratio and time to its speed, computed; each value with its source."""
     drive, text = Drive.load(name), library.text(name)
     said = re.search(r"frequency ([\d.]+) Hz, damping ratio (\d+) %;.* in ([\d.]+) s\.", text)
     assert said is not None
