@@ -113,6 +113,8 @@ inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
 minute = 60 * second = min
 hour = 3600 * second = h
+day = 86400 * second
+year = 31557600 * second
 tonne = 1e6 * gram = t
 pound = 453.59237 * gram = lb
 degree = 0.017453292519943295 * radian = deg = °
@@ -135,8 +137,8 @@ metric_horsepower = 735.49875 * watt = PS
 
 # Spellings that are offered for an unknown one.
 _USUAL = """
-m mm cm in ft kg g lb t s ms min h rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf Nm kNm mNm
-J kJ W kW MW hp PS Pa kPa MPa bar mbar
+m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf Nm
+kNm mNm J kJ W kW MW hp PS Pa kPa MPa bar mbar
 """
 
 _SYMBOLS = str.maketrans(

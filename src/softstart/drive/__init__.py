@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from softstart.drive.limits import LIMIT_TABLES, Fatigue, Limits
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
@@ -17,4 +18,7 @@ from softstart.drive.model import (
     library,
 )  # fmt: skip
 
-__all__ = ["PARAMETERS", "TABLES", "UNKNOWN_POSITIONS", "ContactLaw", "Drive", "LoadKind", "library"]
+__all__ = [
+    "LIMIT_TABLES", "PARAMETERS", "TABLES", "UNKNOWN_POSITIONS", "ContactLaw", "Drive", "Fatigue", "Limits",
+    "LoadKind", "library",
+]  # fmt: skip

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args,
 import numpy as np
 
 from softstart.drive.checks import contradictions, elastic_frequency
+from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
 from softstart.input.parameter_set import (
     MaybeNumbers,
+    MaybeSeries,
     Numbers,
     NumbersOrWord,
     ParameterSet,
@@ -188,6 +190,33 @@ class Drive(ParameterSet):
         default=0.0, follows="initial_speed",
     )  # fmt: skip
 
+    permissible_torque: MaybeNumbers = parameter(
+        "limits.shaft_torque", "N*m", "permissible peak of the shaft torque", '"130 N*m"', "above 0",
+        default=None,
+    )  # fmt: skip
+    permissible_start_time: MaybeNumbers = parameter(
+        "limits.start_time", "s", "longest permissible start time", '"1.5 s"', "above 0", default=None
+    )
+    starts_per_hour: MaybeNumbers = parameter(
+        "limits.starts_per_hour", "1", "number of starts in an hour of operation", "60", "above 0",
+        default=None,
+    )  # fmt: skip
+    required_life: MaybeNumbers = parameter(
+        "limits.life", "s", "time of operation that the shaft line must last", '"20000 h"', "above 0",
+        default=None,
+    )  # fmt: skip
+    fatigue_slope: MaybeNumbers = parameter(
+        "limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6", "above 0", default=None
+    )
+    fatigue_torque: MaybeSeries = parameter(
+        "limits.fatigue.torque", "N*m", "torque of the points of the S-N curve", '"90 N*m"', "above 0",
+        default=None, many=True,
+    )  # fmt: skip
+    fatigue_cycles: MaybeSeries = parameter(
+        "limits.fatigue.cycles", "1", "number of cycles at the points of the S-N curve", "2e6", "above 0",
+        default=None, many=True,
+    )  # fmt: skip
+
     def _fill(self, given: Mapping[str, object], *args: Any, **known: Any) -> None:
         super()._fill(given, *args, **known)
         vars(self).update(self._derived(vars(self)))
@@ -205,7 +234,8 @@ class Drive(ParameterSet):
         return found
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
-        return contradictions({**values, **self._derived(values)}, self.PARAMETERS, wording)
+        yield from contradictions({**values, **self._derived(values)}, self.PARAMETERS, wording)
+        yield from contradicting_limits(values, self.PARAMETERS, wording)
 
     # ---- where drives come from --------------------------------------------------------------------------
 
@@ -346,6 +376,15 @@ class Drive(ParameterSet):
     def elastic_period(self) -> Value:
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
+
+    @property
+    def limits(self) -> Limits:
+        """What the machine withstands and must do; empty where the file has no table `[limits]`.
+
+        >>> Drive.load("crane-4amtkf").replace(permissible_torque="130 N*m").limits.shaft_torque
+        130.0
+        """
+        return limits_of(vars(self))
 
     # ---- where the start begins --------------------------------------------------------------------------
 

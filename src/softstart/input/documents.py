@@ -321,7 +321,10 @@ class _Reader:
         else:
             own = self.given.setdefault(table.name, {})
             for key, content in value.items():
-                if key in table.by_key:
+                inner = self.named.get(f"{table.name}.{key}")
+                if inner is not None:
+                    self._take_table(inner, content)
+                elif key in table.by_key:
                     own[key] = content
                 elif len(self.mistakes) > MOST:
                     self._note(key, f"[{table.name}] has no such key")

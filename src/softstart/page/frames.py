@@ -238,6 +238,9 @@ def fields(drive: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
         value = getattr(drive, name)
         if name == "source" or value is None:
             continue
+        if isinstance(value, tuple):
+            shown[parameter.path] = ["; ".join(map(written, value)), None, ""]
+            continue
         text = value if isinstance(value, str) else written(float(value))
         scale = scales.get(name)
         position = scale.position(float(value)) if scale else None

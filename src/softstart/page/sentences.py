@@ -90,4 +90,5 @@ def _value(parameter: Parameter, value: Any) -> str:
     if isinstance(value, str):
         return value
     unit = "" if parameter.unit in ("", "1") else " " + parameter.unit.replace("*", " ").replace("^", "")
-    return f"{float(value):.6g}{unit}"
+    values = value if isinstance(value, tuple) else (value,)
+    return f"{', '.join(f'{float(one):.6g}' for one in values)}{unit}"

@@ -56,7 +56,8 @@ def _data(drive: Drive) -> Html:
         value = getattr(drive, parameter.name)
         if value is None or value == "" or parameter.name in HIDDEN:
             continue
-        text = short(value) if isinstance(value, float) else str(value)
+        values = value if isinstance(value, tuple) else (value,)
+        text = ", ".join(short(one) if isinstance(one, float) else str(one) for one in values)
         other = ""
         if isinstance(value, str):
             pass

@@ -235,6 +235,6 @@ def _label_list(
     coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
     for name in PARAMETERS:
         values = [getattr(drive, name) for drive in drives]
-        if name != "name" and any(value != values[0] for value in values):
+        if name != "name" and not PARAMETERS[name].many and any(value != values[0] for value in values):
             coordinates[name] = (("start",), values)
     return xarray.Dataset(data, coords=coordinates)

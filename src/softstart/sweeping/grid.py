@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from softstart.controller.finding import quantity
-from softstart.drive import PARAMETERS
+from softstart.drive import LIMIT_TABLES, PARAMETERS
 from softstart.errors import InputError
 from softstart.input.parameter_set import meant_by
 from softstart.input.parameters import Wording, read_value
@@ -190,7 +190,7 @@ def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: list[str]) -> Para
 
 def _of_drive(key: str, name: str, values: object) -> Column:
     parameter = PARAMETERS[name]
-    if not parameter.unit and not parameter.choices:
+    if (not parameter.unit and not parameter.choices) or parameter.table in LIMIT_TABLES:
         raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
     wording = Wording(written={name: key})
     try:

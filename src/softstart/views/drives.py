@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import LIMIT_TABLES, PARAMETERS, Drive
 from softstart.views.numbers import printable, short
 
 POSITIONS = {
@@ -71,7 +71,8 @@ def controllers_set_up(drive: Drive | None, fitted_to: Drive) -> str:
     found = []
     for parameter in PARAMETERS.values() if drive is not None else ():
         there, here = getattr(fitted_to, parameter.name), getattr(drive, parameter.name)
-        if parameter.name not in ("name", "source") and there != here:
+        changes = parameter.name not in ("name", "source") and parameter.table not in LIMIT_TABLES
+        if changes and there != here:
             shown = [_set(value) for value in (there, here)]
             found.append(f"{parameter.path} {shown[0]} there, {shown[1]} here")
     most = 6

@@ -205,7 +205,8 @@ def drive_table(drive: Drive) -> str:
     for parameter in PARAMETERS.values():
         value = getattr(drive, parameter.name)
         if value is not None and value != "" and parameter.name != "name":
-            shown = f"{value:.10g}" if isinstance(value, float) else str(value)
+            values = value if isinstance(value, tuple) else (value,)
+            shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
             unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
             rows.append([parameter.path, parameter.symbol, shown, unit, parameter.meaning])
     return markdown_table(Table.of_texts(("key", "symbol", "value", "unit", "meaning"), rows))

@@ -1,0 +1,138 @@
+"""What a machine withstands and must do: the table `[limits]` of a drive file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from softstart.input.parameters import Parameter, Wording
+
+__all__ = ["LIMIT_TABLES", "Fatigue", "Limits", "contradicting_limits", "limits_of"]
+
+LIMIT_TABLES = ("limits", "limits.fatigue")  # what stands there changes no start
+
+
+@dataclass(frozen=True)
+class Fatigue:
+    """How many cycles of a torque the shaft line withstands.
+
+    Attributes
+    ----------
+    slope : float or None
+        Exponent m of the S-N curve N = cycles (torque/T)^m; None where `points` give the curve.
+    points : tuple of (float, float)
+        Torque, N m at the motor shaft, and cycles to failure: the reference of the curve with `slope`, or
+        two and more points of an S-N curve, the largest torque first. Empty where only the slope is known,
+        so that lives can be compared but not computed.
+    """
+
+    slope: float | None
+    points: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of a drive (`drive.limits`); None where a limit is not given.
+
+    Attributes
+    ----------
+    shaft_torque : float or None
+        Permissible peak of the shaft torque, N m at the motor shaft.
+    start_time : float or None
+        Longest start time, s.
+    starts_per_hour : float or None
+        Starts in each hour of `life`.
+    life : float or None
+        Time that the shaft line must last, s.
+    fatigue : Fatigue or None
+        What it withstands.
+    """
+
+    shaft_torque: float | None = None
+    start_time: float | None = None
+    starts_per_hour: float | None = None
+    life: float | None = None
+    fatigue: Fatigue | None = None
+
+    @property
+    def starts(self) -> float | None:
+        """Starts that the shaft line must last: `starts_per_hour` times `life`.
+
+        >>> Limits(starts_per_hour=60.0, life=3600.0 * 20000.0).starts
+        1200000.0
+        """
+        if self.life is None or self.starts_per_hour is None:
+            return None
+        return self.starts_per_hour * self.life / 3600.0
+
+    def __bool__(self) -> bool:
+        """Whether a start can pass or fail: there is a limit of torque, time or life."""
+        return any(one is not None for one in (self.shaft_torque, self.start_time, self.life))
+
+
+def limits_of(values: Mapping[str, Any]) -> Limits:
+    """The limits among the values of a drive."""
+    slope, torques, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
+    points = tuple(sorted(zip(torques or (), cycles or (), strict=True), reverse=True))
+    fatigue = Fatigue(slope, points) if slope is not None or points else None
+    return Limits(
+        values.get("permissible_torque"), values.get("permissible_start_time"),
+        values.get("starts_per_hour"), values.get("required_life"), fatigue,
+    )  # fmt: skip
+
+
+def contradicting_limits(
+    values: Mapping[str, Any], parameters: Mapping[str, Parameter], wording: Wording
+) -> Iterator[str]:
+    """A sentence for limits that contradict one another or the load; `values` holds those that are valid."""
+
+    def name(key: str) -> str:
+        return wording.label(parameters[key])
+
+    def wrong(key: str, reason: str) -> str:
+        value = values[key]
+        value = value[0] if isinstance(value, tuple) and len(value) == 1 else value
+        return wording.sentence(f"{name(key)} = {wording.show(value)}", reason)
+
+    most, load = values.get("permissible_torque"), values.get("load_torque")
+    if most is not None and load is not None and np.any(np.abs(load) >= most):
+        reason = (
+            f"at constant speed the shaft already carries {name('load_torque')} = {wording.show(load)} N*m"
+        )
+        yield wrong("permissible_torque", f"{reason}; give the permissible peak, at the motor shaft")
+    time, starts = values.get("permissible_start_time"), values.get("starts_per_hour")
+    if time is not None and starts is not None and np.any(np.multiply(time, starts) > 3600.0):
+        each = f"{name('permissible_start_time')} = {wording.show(time)} s"
+        yield wrong(
+            "starts_per_hour", f"so many starts of {each} take more than an hour; lower one of the two"
+        )
+    if values.get("required_life") is not None and starts is None:
+        yield wording.missing(parameters["starts_per_hour"])
+    yield from _contradicting_curve(values, name, wrong)
+
+
+def _contradicting_curve(values: Mapping[str, Any], name: Any, wrong: Any) -> Iterator[str]:
+    """The same for the S-N curve."""
+    slope, torque, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
+    if torque is None or cycles is None:
+        for key, other in (("fatigue_torque", "fatigue_cycles"), ("fatigue_cycles", "fatigue_torque")):
+            if values.get(key) is not None:
+                yield wrong(key, f"an S-N curve has torque and cycles; give {name(other)} as well")
+        return
+    if len(torque) != len(cycles):
+        yield wrong("fatigue_cycles", f"there are {len(cycles)} for {len(torque)} values of "
+                    f"{name('fatigue_torque')}; give one for each")  # fmt: skip
+    elif len(torque) == 1 and slope is None:
+        yield wrong("fatigue_torque", f"one point is no curve; give {name('fatigue_slope')}, or more points")
+    elif len(torque) > 1 and slope is not None:
+        yield wrong("fatigue_slope", "the points of the S-N curve give its slopes; leave out the slope, or "
+                    "all points but one")  # fmt: skip
+    else:
+        points = sorted(zip(torque, cycles, strict=True), reverse=True)
+        if any(a[0] == b[0] or a[1] >= b[1] for a, b in pairwise(points)):
+            yield wrong("fatigue_cycles", "a smaller torque must be withstood for more cycles, in each of "
+                        f"the points; sort them as {name('fatigue_torque')}")  # fmt: skip
