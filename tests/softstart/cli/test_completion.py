@@ -82,8 +82,11 @@ def test_every_key_that_is_offered_can_be_set():
     drive = Drive.load("crane-4amtkf")
     for parameter in PARAMETERS.values():
         value = parameter.example.strip('"')
-        needed = {"required_life": ("starts_per_hour",), "fatigue_torque": ("fatigue_slope", "fatigue_cycles"),
-                  "fatigue_cycles": ("fatigue_slope", "fatigue_torque")}.get(parameter.name, ())  # fmt: skip
+        needed = {
+            "required_life": ("starts_per_hour",),
+            "fatigue_torque": ("fatigue_slope", "fatigue_cycles"),
+            "fatigue_cycles": ("fatigue_slope", "fatigue_torque"),
+        }.get(parameter.name, ())
         also = [f"{PARAMETERS[name].path}={PARAMETERS[name].example}" for name in needed]
         changed = drive.with_settings([f"{parameter.path}={value}", *also])
         assert changed.name == (value if parameter.name == "name" else drive.name)

@@ -19,6 +19,7 @@ from softstart.sweeping.store import SEAL
 SOFTSTART = (sys.executable, "-c", "import sys; from softstart.cli import main; sys.exit(main())")
 GLANCE = 0.02  # s, between looks at the finished chunks
 WEIGHED = 0.25  # s, between looks at the memory, which take some processor time themselves
+ENDS = 5.0  # s, until a command that was asked to end has ended
 PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 
@@ -34,19 +35,19 @@ class Ended:
 def run(arguments: Sequence[str]) -> Ended:
     """A command to its end; SimulationError with its last words if it fails."""
     begin = time.perf_counter()
-    child = begun(arguments)
     memory = weighed = 0.0
-    while True:
-        pid, code, used = os.wait4(child.pid, os.WNOHANG)
-        if pid:
-            break
-        if (now := time.monotonic()) - weighed > WEIGHED:
-            weighed = now
-            memory = max(memory, _memory_of_tree(child.pid))
-        time.sleep(GLANCE)
-    wall = time.perf_counter() - begin
-    child.returncode = os.waitstatus_to_exitcode(code)
-    said = _last_words(child)
+    with begun(arguments) as child:
+        while True:
+            pid, code, used = os.wait4(child.pid, os.WNOHANG)
+            if pid:
+                break
+            if (now := time.monotonic()) - weighed > WEIGHED:
+                weighed = now
+                memory = max(memory, _memory_of_tree(child.pid))
+            time.sleep(GLANCE)
+        wall = time.perf_counter() - begin
+        child.returncode = os.waitstatus_to_exitcode(code)
+        said = _last_words(child)
     if child.returncode:
         raise SimulationError(f"benchmark: softstart sweep ended with {child.returncode}: {said}")
     return Ended(wall, used.ru_utime + used.ru_stime, memory or None)
@@ -54,20 +55,31 @@ def run(arguments: Sequence[str]) -> Ended:
 
 def killed_at(arguments: Sequence[str], results: Path, chunks: int) -> dict[str, int]:
     """Begin a command, kill it once so many chunks are finished; the finished ones with their times."""
-    child = begun(arguments)
-    while len(finished(results)) < chunks:
-        if child.poll() is not None:
-            raise SimulationError(f"benchmark: softstart sweep ended too early: {_last_words(child)}")
-        time.sleep(GLANCE)
-    child.send_signal(signal.SIGKILL)
-    child.wait()
-    _last_words(child)
+    with begun(arguments) as child:
+        while len(finished(results)) < chunks:
+            if child.poll() is not None:
+                raise SimulationError(f"benchmark: softstart sweep ended too early: {_last_words(child)}")
+            time.sleep(GLANCE)
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        _last_words(child)
     return finished(results)
 
 
-def begun(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
-    """A command that runs."""
-    return subprocess.Popen([*SOFTSTART, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+@contextmanager
+def begun(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
+    """A command that runs; it has ended after the block, and writes into no folder that is removed then."""
+    child = subprocess.Popen([*SOFTSTART, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    try:
+        yield child
+    finally:
+        if child.poll() is None:
+            child.terminate()  # it ends its own workers
+            try:
+                child.wait(ENDS)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
 
 
 def finished(results: Path) -> dict[str, int]:

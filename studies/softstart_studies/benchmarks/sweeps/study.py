@@ -195,13 +195,15 @@ class BenchmarkSweeps(Study):
             results = home / "cluster" / RESULTS
             arguments = self._arguments(home / "cluster", "--scheduler", made.address)
             begin = time.perf_counter()
-            child = process.begun(arguments)
-            while len(process.finished(results)) < round(KILLED_AT[0] * self._chunks()):
-                if child.poll() is not None:
-                    raise SimulationError("benchmark: the sweep on dask ended before a worker was killed.")
-                time.sleep(0.01)
-            made.workers[0].send_signal(signal.SIGKILL)
-            _, said = child.communicate()
+            with process.begun(arguments) as child:
+                while len(process.finished(results)) < round(KILLED_AT[0] * self._chunks()):
+                    if child.poll() is not None:
+                        raise SimulationError(
+                            "benchmark: the sweep on dask ended before a worker was killed."
+                        )
+                    time.sleep(0.01)
+                made.workers[0].send_signal(signal.SIGKILL)
+                _, said = child.communicate()
             if child.returncode:
                 raise SimulationError(
                     f"benchmark: the sweep on dask failed: {said.decode(errors='replace')[-300:]}"
