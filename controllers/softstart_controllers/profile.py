@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Sensor, compiled_step, parameter
 from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, inlined, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -104,8 +104,9 @@ class Profile(CompiledController):
 
         u(t) = u_k + (u_k+1 - u_k) (t - t_k)/(t_k+1 - t_k)    t_k <= t < t_k+1
 
-    played exactly, then the last torque is held; beyond the torque limits of the drive it is cut off. With a
-    sample `period` each sample holds the mean of the cut profile until the next one: its impulse is kept.
+    played exactly, then the last torque is held; beyond the torque limits of the drive that runs it is cut
+    off. With a sample `period` each sample holds the mean of the profile until the next one: its impulse is
+    kept within these limits.
     A profile with `after_contact` needs a sensor of the contact: at the first closing of the gap (with a
     period, at the first sample from then on) its second profile takes over, on a clock that starts there.
 
@@ -177,45 +178,12 @@ class Profile(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(period, knots, knots after contact, room, times, torques, times, torques)."""
-        limits = stack(drive, drive.minimum_torque, drive.maximum_torque).reshape(-1, 2)
-        pairs, which = np.unique(limits, axis=0, return_inverse=True)
         period = float(self.period or 0.0)
-        made = [self._tables(float(low), float(high), period) for low, high in pairs]
-        room, room_after = (max(tables[i].shape[1] for tables in made) for i in range(2))
-        rows = np.array(
-            [
-                [
-                    period,
-                    first.shape[1],
-                    second.shape[1],
-                    room,
-                    *_padded(first, room),
-                    *_padded(second, room_after),
-                ]
-                for first, second in made
-            ]
-        )
-        if len(rows) == 1:
-            return np.broadcast_to(rows[0], (*drive.shape, rows.shape[1]))
-        return rows[which.ravel()].reshape(*drive.shape, -1)
-
-    def _tables(self, low: float, high: float, period: float) -> tuple[Vector, Vector]:
-        """Knots of both profiles as the drive can play them, rows of times and torques."""
-        second = self.played.after_contact
-        return (
-            _table(self.played, low, high, period),
-            _table(second, low, high, period) if second is not None else np.zeros((2, 0)),
-        )
-
-
-def _table(profile: TorqueProfile, low: float, high: float, period: float) -> Vector:
-    """Knots within the limits, sampled if there is a period."""
-    within = profile.clipped(low, high)
-    if period > 0.0:
-        within = within.sampled(period)
-    return np.stack([within.time, within.torque])
-
-
-def _padded(table: Vector, room: int) -> Vector:
-    """Times, then torques, each in `room` places."""
-    return np.pad(table, ((0, 0), (0, room - table.shape[1]))).ravel()
+        first = self.played.sampled(period) if period > 0.0 else self.played
+        second = first.after_contact
+        parts = [first.time, first.torque]
+        if second is not None:
+            parts += [second.time, second.torque]
+        head = [period, first.time.size, 0.0 if second is None else second.time.size, first.time.size]
+        row = np.concatenate([head, *parts])
+        return np.broadcast_to(row, (*drive.shape, row.size))

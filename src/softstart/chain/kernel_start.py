@@ -28,7 +28,7 @@ from softstart.chain.kernel_records import (
     Start,
 )  # fmt: skip
 from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
-from softstart.plant.advance import next_in_queue
+from softstart.plant.advance import next_in_queue, note_excess
 from softstart.plant.jit import compiled, compiled_as, inlined
 from softstart.plant.layout import (
     ANSWER,
@@ -61,6 +61,7 @@ def begin(start: Start, until: float) -> None:
         start.x[i] = 0.0
     x = start.x.view(STATE)[0]
     m.pending = 0.0
+    m.over = 0.0
     x.t_end = until
     x.start_time = math.nan
     begin_modes(start.masses, start.shafts)
@@ -157,6 +158,7 @@ def advance(start: Start) -> int:
         if math.isnan(x.start_time) and stop == math.inf:
             stop = p.time_limit
         if t >= stop:
+            note_excess(p, x, m)
             return ENDED
         if m.pending > 0.0 and t >= m.due_time[0]:
             next_in_queue(x, m)

@@ -95,8 +95,8 @@ class Command(NamedTuple):
     ask_again : when to be asked again, s, an instant later than now. Infinity is none: then a controller that
         sees the stage is still asked at each gap event, unless it says NEVER.
     state : the new state, handed to the next step.
-    slope : rate of the demand, N m/s. It needs an `ask_again`, where its line ends within the limits of the
-        drive: both ends of a line beyond them are clipped.
+    slope : rate of the demand, N m/s. It needs an `ask_again`, where its line ends. Where
+        the demand is beyond the torque limits of the drive, it is cut off at them.
 
     Raises
     ------
@@ -162,6 +162,8 @@ class Controller:
     source : where it comes from.
     sensors : what it may see beyond time, encoder and motor torque.
     needs : parameters of which one must be given, as no drive implies it.
+    saturates : whether it relies on the torque limits of the drive to cut off its demand, as a feedback may.
+        Then tables do not mention a demand beyond them; `Run.clipped` has it always.
 
     Examples
     --------
@@ -180,6 +182,7 @@ class Controller:
     source: ClassVar[str] = ""
     sensors: ClassVar[Sensor] = Sensor.NONE
     needs: ClassVar[tuple[str, ...]] = ()
+    saturates: ClassVar[bool] = False
 
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """Values of the parameters that were not given, derived from the drive (never from the answer)."""
@@ -304,6 +307,11 @@ class PlainTwin(PlainController):
     def sensors(self) -> Sensor:  # type: ignore[override]
         """Those of the compiled controller."""
         return self.twin.sensors
+
+    @property
+    def saturates(self) -> bool:  # type: ignore[override]
+        """As the compiled controller."""
+        return self.twin.saturates
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         """The compiled controller's own lines, not compiled."""

@@ -18,6 +18,7 @@ from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
 from softstart.start.simulation import simulate
+from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
     from softstart.controller.base import Controller
@@ -57,7 +58,7 @@ class Strategy:
     @property
     def status(self) -> str:
         """How the start ended, as a sentence."""
-        return self.trouble if self.run is None else self.run.status.value
+        return self.trouble if self.run is None else outcome(self.run)
 
 
 class Session:

@@ -147,6 +147,8 @@ class State:
     start_time: float
     release_time: float  # when the brake was released
     position: float  # of an unknown one, that with the largest peak: its place in UNKNOWN_POSITIONS
+    excess: float  # how far a demand of the controller went beyond the torque limits, N m
+    excess_time: float  # for how long, s
     events: float
     n_segments: float
     n_events: float
@@ -193,7 +195,11 @@ class Motion:
     end_v: float
     by_terms: float  # 1 once a search of this start has outlasted the bounds by energy, see `terms`
     passing: float  # when, within this contact, the load passes its target speed; NaN if it does not
-    pending: float  # how many answers of the controller wait for their computing delay
+    pending: float  # how many demands wait: for the computing delay, or for the corner of a cut line
+    over: float  # 1 while the last answer lies beyond the torque limits: the line from `over_since` on
+    over_since: float
+    over_torque: float
+    over_slope: float
     due_time: Vector  # when each of them takes effect, and what it is
     due_demand: Vector
     due_slope: Vector

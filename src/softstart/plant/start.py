@@ -9,10 +9,10 @@ import numpy as np
 from numba import types
 
 from softstart.plant.advance import advance as go_on
-from softstart.plant.advance import take_demand
+from softstart.plant.advance import note_excess, put, put_cut
 from softstart.plant.jit import compiled, compiled_as, inlined, merged
 from softstart.plant.layout import (
-    ANSWER, ASK, BAD_COMMAND, DEAD_ZONE, MEASURED, MOST_PENDING, MOTION, N_P, N_X, PLANT,
+    ANSWER, ASK, BAD_COMMAND, DEAD_ZONE, MEASURED, MOTION, N_P, N_X, PLANT,
     QUEUE_FULL, STATE, Matrix, Motion, Plant, State, Vector, size,
 )  # fmt: skip
 from softstart.plant.modes import engage, shaft_torque
@@ -101,8 +101,8 @@ def take_answer(p: Plant, x: State, m: Motion, torque: float, ask_again: float, 
     """Take the controller's answer; returns ASK, or why it cannot be taken.
 
     An answer is none if it is not a number, names a past instant, or has a slope without end.
-    The demand is the straight line from `torque` now to torque + slope (ask_again - now) then, both ends
-    clipped to the drive's limits. ask_again = -inf (NEVER) also ends the asking at gap events. With a
+    The demand is the straight line from `torque` now to torque + slope (ask_again - now) then, cut off at the
+    drive's limits, see `limits`. ask_again = -inf (NEVER) also ends the asking at gap events. With a
     dead time the answer waits in the queue until it takes effect; the asking does not.
     """
     if ask_again == -math.inf:
@@ -110,25 +110,16 @@ def take_answer(p: Plant, x: State, m: Motion, torque: float, ask_again: float, 
         ask_again = math.inf
     if math.isnan(torque) or not ask_again > x.time:
         return BAD_COMMAND
+    end = torque if slope == 0.0 else torque + slope * (ask_again - x.time)
+    if slope != 0.0 and not math.isfinite(end):
+        return BAD_COMMAND
+    note_excess(p, x, m)
     demand = min(max(torque, p.u_min), p.u_max)
-    if slope != 0.0:
-        length = ask_again - x.time
-        end = torque + slope * length
-        if not math.isfinite(end):
-            return BAD_COMMAND
-        within = min(max(end, p.u_min), p.u_max)
-        if demand != torque or within != end:
-            slope = (within - demand) / length
-    if p.dead_time > 0.0:
-        waiting = int(m.pending)
-        if waiting == MOST_PENDING:
+    if demand == torque and min(max(end, p.u_min), p.u_max) == end:
+        if not put(x, m, x.time + p.dead_time, demand, slope):
             return QUEUE_FULL
-        m.due_time[waiting] = x.time + p.dead_time
-        m.due_demand[waiting] = demand
-        m.due_slope[waiting] = slope
-        m.pending += 1.0
-    else:
-        take_demand(x, demand, slope)
+    elif not put_cut(p, x, m, torque, slope, end, ask_again):
+        return QUEUE_FULL
     x.ask_at = ask_again
     x.asked += 1.0
     if x.contacts == 1.0 and math.isnan(x.contact_torque):  # the start is in contact
@@ -178,6 +169,7 @@ def _starts(  # type: ignore[no-untyped-def]
             motion.memo_v = math.nan
             motion.by_terms = 0.0
             motion.pending = 0.0
+            motion.over = 0.0
             first_state(plant, now, until[i if until.shape[0] > 1 else 0], events)
             now.ask_on_gap = 1.0 if on_gap else 0.0
         reason = until_full(

@@ -18,6 +18,7 @@ from softstart.start.comparison import LIGHT_INERTIA, REFERENCE, WORN_GAP, Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.views.printed import digits, fixed, listed, short
+from softstart.views.starts import clipped_torque
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +119,11 @@ def strategies_section(
             f"{label_of(row.run.controller)}: {row.run.status.value}"
             for row in rows
             if math.isnan(row.run.start_time)
+        ),
+        *(
+            f"{row.run.controller_name}, torque cut off: {clipped}."
+            for row in rows
+            if (clipped := clipped_torque(row.run))
         ),
         *(f"{name} could not be examined: {reason}" for name, reason in failed),
     ]

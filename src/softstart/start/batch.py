@@ -41,6 +41,8 @@ _COLUMNS = (
     ("contacts", at.CONTACTS, "1", "how often the gap closed"),
     ("gap_events", at.GAP_EVENTS, "1", "closings and openings of the gap"),
     ("end_time", at.TIME, "s", "end of the run"),
+    ("torque_excess", at.EXCESS, "N*m", "largest excess of the demand over the torque limits"),
+    ("torque_excess_time", at.EXCESS_TIME, "s", "how long the demand lay beyond the torque limits"),
 )
 
 
@@ -126,6 +128,8 @@ def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
     worst[:, at.IMPACT_SPEED] = np.fmax.reduce(every[:, :, at.IMPACT_SPEED], axis=0)
     first = np.where(np.isnan(every[:, :, at.STAGE_2_END]), -1.0, np.abs(every[:, :, at.FIRST_PEAK]))
     hardest = every[np.argmax(first, axis=0), rows]
+    for column in (at.EXCESS, at.EXCESS_TIME):
+        worst[:, column] = np.max(every[:, :, column], axis=0)
     for column in (at.FIRST_PEAK, at.STAGE_2_END):
         worst[:, column] = hardest[:, column]
     return worst

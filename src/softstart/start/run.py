@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,13 @@ class Stage:
     def duration(self) -> float:
         """Length in s."""
         return self.end - self.start
+
+
+class Clipped(NamedTuple):
+    """What a start's demand lost at the torque limits: its largest excess in N m, and for how long, s."""
+
+    excess: float
+    time: float
 
 
 class BaseRun(ABC):
@@ -127,6 +134,11 @@ class BaseRun(ABC):
         """End of the run, s."""
         return float(self._final[at.TIME])
 
+    @property
+    def clipped(self) -> Clipped:
+        """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
+        return Clipped(float(self._final[at.EXCESS]), float(self._final[at.EXCESS_TIME]))
+
     def _instants(self, times: ArrayLike) -> Vector:
         """The times as one row; raises ValueError for one outside of the run."""
         flat = np.ascontiguousarray(np.asarray(times, dtype=np.float64).ravel())
@@ -174,6 +186,7 @@ class BaseRun(ABC):
             "parameters": {} if self.controller is None else self.controller.parameters,
             "status": self.status.name,
             "status_text": self.status.value,
+            "clipped": self.clipped._asdict(),
         }
 
 
@@ -208,6 +221,9 @@ class Run(BaseRun):
         Dynamic coefficient of the whole run, and of stage 2 alone.
     peak_torque, peak_time : float
         Largest |T|, N m, and its instant, s.
+    clipped : Clipped
+        How far (`excess`, N m) and for how long (`time`, s) the controller's demand lay beyond the torque
+        limits of the drive, where it is cut off.
     start_time, end_time : float
         First instant at which the load has its target speed (NaN if never), and end of the run, s.
     events : tuple of Event
@@ -293,6 +309,12 @@ class Run(BaseRun):
         Counted from the command of the start, so that it includes what the torque takes to release a brake.
         """
         return self._worst(lambda run: float(run.final[at.START_TIME]))
+
+    @property
+    def clipped(self) -> Clipped:
+        """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
+        excess = self._worst(lambda run: float(run.final[at.EXCESS]))
+        return Clipped(excess, self._worst(lambda run: float(run.final[at.EXCESS_TIME])))
 
     @property
     def release_time(self) -> float:

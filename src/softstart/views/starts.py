@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "value")
+SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 
 
@@ -64,12 +65,34 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}"],
         ["contacts", str(run.contacts)],
         ["end of the run", with_unit(run.end_time, "s")],
+        *([["torque cut off", clipped]] if (clipped := clipped_torque(run)) else []),
         *([] if run.drive.brake == "none" else [["brake released", with_unit(run.release_time, "s")]]),
         *(
             [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
             for name, one in run.positions.items()
         ),
     ]
+
+
+def clipped_torque(run: Run) -> str:
+    """How far and how long the demand lay beyond the torque limits, "" if that need not be said.
+
+    It is said of every controller that does not declare that it relies on the limits (`saturates`), and of
+    each that answered with an infinite torque.
+    """
+    excess, time = run.clipped
+    low, high = float(run.drive.minimum_torque), float(run.drive.maximum_torque)
+    infinite = math.isinf(excess)
+    if not infinite and (run.controller.saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
+        return ""
+    size = "infinite" if infinite else f"up to {short(excess)} N m"
+    return f"the demand is {size} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
+
+
+def outcome(run: Run) -> str:
+    """How the start ended, and what was cut off the demand."""
+    clipped = clipped_torque(run)
+    return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value
 
 
 def stage_rows(run: Run) -> list[list[object]]:
@@ -281,6 +304,11 @@ def notes(comparison: Comparison) -> list[str]:
         f"{row.run.controller_name}: {row.run.status.value}"
         for row in comparison.rows
         if math.isnan(row.run.start_time)
+    ]
+    found += [
+        f"{row.run.controller_name}, torque cut off: {clipped}."
+        for row in comparison.rows
+        if (clipped := clipped_torque(row.run))
     ]
     return found
 
