@@ -128,7 +128,7 @@ class AccelerationDelay(CompiledController):
     W^2 >= 6 q J1/(drop torque); so rounding alone never looks like a contact. Up to 30 periods each sample is
     used, with longer windows every second, third, ... one, so that 61 angles are always enough to keep.
 
-    *Delay.* From contact the torque stays reduced for `delay`, by default the length of stage 2, [G](15),
+    *Delay.* From contact the torque stays reduced for `delay`, by default until the torque peak, [G](14),
     from the nominal drive. What passes between contact and its being seen is known: `latency` is the time
     after which the shaft torque of [G](11) brings the window to the threshold, and half the time between two
     looks at it. Contact is seen `latency` late, so the torque is raised max(0, delay - latency) after that,
@@ -137,18 +137,18 @@ class AccelerationDelay(CompiledController):
     Contact that is not seen within `patience` (a load that shares next to nothing of the torque, an encoder
     too coarse) is waited for no longer: the torque is raised then.
 
-    At the end of stage 2 the gap opens again, with the masses parting at the speed they met with. The torque
-    raised there, as [G] proposes (`raise_at` "end"), drives them into the second contact about as hard as
-    method 1 does into the first: the first contact is as soft as [G](18) says (`run.k_dyn_first_contact`),
-    the whole start is not (`run.k_dyn`). With `raise_at` "peak" the delay is half of that, [G](14): the
-    torque is raised while the shaft carries the most, and the gap stays closed.
+    The torque is raised while the shaft carries the most, so that the gap stays closed (`raise_at` "peak").
+    [G] proposes the length of stage 2, (15), twice as long (`raise_at` "end"). At the end of stage 2 the gap
+    opens again, with the masses parting at the speed they met with. The torque raised there drives them into
+    the second contact about as hard as method 1 does into the first: the first contact is as soft as
+    [G](18) says (`run.k_dyn_first_contact`), the whole start is not (`run.k_dyn`).
 
     Source: [G], conclusions; stages by [G](10), (11), (15).
 
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), AccelerationDelay())
-    >>> run.k_dyn_first_contact < 1.3, run.k_dyn > 2
-    (True, True)
+    >>> run.k_dyn < 1.3, run.contacts
+    (True, 1)
     """
 
     name: ClassVar[str] = "acceleration-delay"

@@ -13,7 +13,7 @@ from softstart_controllers.sampled import number
 
 SHARE = 0.15
 INSTANTS = ("peak", "end")  # of stage 2, at which the torque is raised
-RAISE_AT = "end"
+RAISE_AT = "peak"
 
 
 def reduced_torque(drive: Drive) -> Any:

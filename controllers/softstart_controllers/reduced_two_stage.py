@@ -53,19 +53,20 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
 class ReducedTwoStage(CompiledController):
     """Torque reduced through stages 1 and 2, then Ms (method 2 of [G]), switched at the gap's own events.
 
-    The peak of stage 2 follows [G](18) with M1(2) = M1(1) and may lie far below 2. But stage 2 ends with the
-    gap open again and the masses parting at the speed they met with: raised then, the torque drives them
-    into the second contact as hard as method 1 does into the first. The K_dyn of the whole start is
-    therefore that of method 1; the one of [G](18) is `run.k_dyn_first_contact`.
+    The torque is raised at the peak of stage 2, after the time of [G](14) for the nominal drive (`raise_at`
+    "peak"): the gap then stays closed.
 
-    With `raise_at` "peak" the torque is raised at the peak of stage 2 instead, after the time of [G](14) for
-    the nominal drive: the gap then stays closed.
+    [G] raises it at the end of stage 2 (`raise_at` "end"). The peak of stage 2 follows [G](18) with
+    M1(2) = M1(1) and may lie far below 2. But stage 2 ends with the gap open again and the masses parting at
+    the speed they met with: raised then, the torque drives them into the second contact as hard as method 1
+    does into the first. The K_dyn of the whole start is therefore that of method 1; the one of [G](18) is
+    `run.k_dyn_first_contact`.
 
     Where damping keeps the gap closed, stage 2 has no end; the torque is then raised `patience` after
     contact.
 
     >>> from softstart import Drive, simulate
-    >>> run = simulate(Drive.load("crane-4amtkf"), ReducedTwoStage(torque=0.25 * 62))
+    >>> run = simulate(Drive.load("crane-4amtkf"), ReducedTwoStage(torque=0.25 * 62, raise_at="end"))
     >>> round(run.k_dyn_first_contact, 4), round(run.k_dyn, 4)
     (1.2677, 2.3894)
     """

@@ -22,6 +22,7 @@ from softstart.tuning.outcome import Tuning
 from softstart.tuning.ranges import tunable
 from softstart.tuning.solving import tune
 from softstart.views.drawing import new_figure
+from softstart_studies.paper_g.crane import published
 
 ACROSS = 3  # panels
 TARGET = 60.0  # rad/s
@@ -53,7 +54,8 @@ def tuned(
     for number, name in enumerate(names, start=1):
         head = f"{name} ({number} of {len(names)})"
         found[name] = tune(
-            drive, name, gaps, inertias, certified=False, restarts=restarts, generations=generations,
+            drive, published(name), gaps, inertias, certified=False, restarts=restarts,
+            generations=generations,
             progress=lambda text, head=head: progress(f"{head}: {text}"),  # type: ignore[misc]
         )  # fmt: skip
     return found

@@ -53,6 +53,12 @@ def test_the_delays_are_those_of_g() -> None:
         assert delay_of(CRANE, 62 * r, "peak") == pytest.approx(peak, rel=1e-12)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_peak_is_the_default(name: str) -> None:
+    given = simulate(CRANE, make_controller(name, {"raise_at": "peak"}))
+    assert simulate(CRANE, name).k_dyn == given.k_dyn
+
+
 def test_the_torque_is_raised_at_the_located_peak() -> None:
     run = simulate(CRANE, ReducedTwoStage(torque=15.5, raise_at="peak"))
     raised = run.segments[run.segments[:, 9] == 62.0][0, 0]

@@ -62,11 +62,11 @@ def crane(gap: Any) -> Drive:
 
 
 def controller_of(strategy: str, drive: Drive) -> Controller:
-    """The strategy as softstart's controller, with its defaults for the drive; a ramp takes `RAMP_TIME`."""
-    from softstart.controller.finding import make_controller
+    """The controller; a ramp takes `RAMP_TIME`, method 2 raises its torque where [G](15) says."""
+    from softstart_studies.paper_g.crane import published
 
-    given = {"time": RAMP_TIME} if strategy == "ramp" else None
-    return make_controller(strategy, given).fitted(drive)
+    given = {"time": RAMP_TIME} if strategy == "ramp" else {}
+    return published(strategy, **given).fitted(drive)
 
 
 def crane_problem(strategy: str) -> Problem:

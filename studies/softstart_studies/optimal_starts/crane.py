@@ -9,10 +9,12 @@ from functools import cache
 import numpy as np
 
 from softstart import Drive, simulate
+from softstart.controller import ready_controller_names
 from softstart.optimal.front import Front, pareto
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.shortest import shortest_start_time
 from softstart.study import Progress
+from softstart_studies.paper_g.crane import published
 
 TARGET = 60.0  # rad/s, that of the anchors in docs/optimal-starts.md
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=TARGET)  # [G]: J2 = 5 J1, active load, undamped
@@ -87,7 +89,8 @@ def optima(
 ) -> Front:
     """The least K_dyn for each of the start times, beside these controllers (None: all that are shipped)."""
     told = _prefixed(progress, f"gap {drive.gap:g} rad, {terminal}")
-    return pareto(drive, times, terminal=terminal, controllers=controllers, progress=told)
+    beside = [published(name) for name in (ready_controller_names() if controllers is None else controllers)]
+    return pareto(drive, times, terminal=terminal, controllers=beside, progress=told)
 
 
 def _prefixed(progress: Progress, what: str) -> Callable[[str], None]:

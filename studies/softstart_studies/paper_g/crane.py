@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from softstart import Drive, Run, simulate, stages
 from softstart.arrays import Vector
-from softstart.controller import Controller
+from softstart.controller import Controller, make_controller
 from softstart.start.metrics import base_torque
 
 Method = Literal[1, 2]
@@ -21,6 +21,7 @@ SHARE = 0.25  # M1/Ms where one reduced torque stands for all, as in the check t
 RATIOS: Vector = np.linspace(0.0, 1.0, 101)[1:]  # the axis of figs. 2-4
 POINTS: Vector = np.linspace(0.05, 1.0, 20)  # where the plant is asked too
 METHODS: tuple[Method, Method] = (1, 2)
+RAISED_AT_THE_END = ("reduced-two-stage", "acceleration-delay")  # of stage 2, in [G]
 CONTROLLERS = {1: "reduced-first-stage", 2: "reduced-two-stage"}
 
 
@@ -53,13 +54,24 @@ def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None)
     return compute(r, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, base=base)
 
 
+def published(controller: str, **parameters: object) -> Controller:
+    """A strategy as [G] proposes it: reduced torques are raised at the end of stage 2, (15), not its peak.
+
+    >>> published("acceleration-delay").raise_at
+    'end'
+    """
+    if controller in RAISED_AT_THE_END:
+        parameters["raise_at"] = "end"
+    return make_controller(controller, parameters)
+
+
 def simulated(drive: Drive, r: float, method: Method, base: Drive | None = None) -> Run:
     """The whole start by the plant, torque r Ms in stage 1 (method 1) or in stages 1 and 2 (method 2).
 
     >>> round(simulated(crane(), 0.25, 2).k_dyn_first_contact, 4)
     1.2677
     """
-    return simulate(drive, CONTROLLERS[method], parameters={"torque": r * float(drive.Ms)}, base=base)
+    return simulate(drive, published(CONTROLLERS[method], torque=r * float(drive.Ms)), base=base)
 
 
 def many(drives: Drive, controller: str | Controller, **parameters: float) -> tuple[Vector, Vector]:
@@ -68,7 +80,8 @@ def many(drives: Drive, controller: str | Controller, **parameters: float) -> tu
     >>> [k.round(4).tolist() for k in many(CRANE.replace(gap=[0.5, 2.0]), "direct")]
     [[3.1179, 4.8654], [3.1179, 4.8654]]
     """
-    results: Any = simulate(drives, controller, parameters=parameters or None, fitted_to=CRANE, base=CRANE)
+    ready = published(controller, **parameters) if isinstance(controller, str) else controller
+    results: Any = simulate(drives, ready, fitted_to=CRANE, base=CRANE)
     return np.asarray(results["k_dyn_first_contact"]), np.asarray(results["k_dyn"])
 
 

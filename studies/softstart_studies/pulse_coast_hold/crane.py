@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart import Drive
-from softstart.controller import Controller, make_controller
+from softstart.controller import Controller
 from softstart.drive import LoadKind
 from softstart.optimal.result import OptimumError
 from softstart.optimal.solving import optimize
 from softstart.start.batch import array_starts, figures
 from softstart.start.metrics import base_torque
+from softstart_studies.paper_g.crane import published
 
 TARGET = 60.0  # rad/s
 LAG = 0.002  # s
@@ -70,7 +71,7 @@ class Starts:
 
 def run(batch: Drive, controller: str | Controller, told: Drive) -> Starts:
     """Start all drives of the batch under a controller set up for the drive that it is told."""
-    ready = make_controller(controller) if isinstance(controller, str) else controller
+    ready = published(controller) if isinstance(controller, str) else controller
     notes = array_starts(batch, ready, fitted_to=told)
     found = figures(notes, np.broadcast_to(base_torque(batch), batch.shape).ravel())
     return Starts(*(found[name][0].reshape(batch.shape) for name in ("k_dyn", "start_time", "contacts")))
