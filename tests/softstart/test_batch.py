@@ -117,9 +117,7 @@ def test_comparison_rows_are_the_single_starts() -> None:
     direct, reduced = table.rows
     assert direct.time_lost == 0.0
     assert reduced.time_lost == reduced.run.start_time - direct.run.start_time
-    worn = simulate(
-        CRANE.replace(gap=2.0), "reduced-two-stage", parameters={"torque": 15.5}, fitted_to=CRANE
-    )
+    worn = simulate(CRANE.replace(gap=2.0), "reduced-two-stage", parameters={"torque": 15.5}, fitted_to=CRANE)
     assert reduced.k_dyn_worn_gap == pytest.approx(worn.k_dyn, rel=1e-12)
     light = Drive.load("crane-4amtkf-light")
     assert direct.k_dyn_light_load == simulate(light, "direct", base=CRANE, fitted_to=CRANE).k_dyn
