@@ -24,7 +24,7 @@ BUDGET = {
     "chain": (4620, 14, 2, 0),
     "cli": (4300, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too
     "clutch": (2380, 10, 5, 0),
-    "controller": (1180, 5, 0, 0),  # texts with choices
+    "controller": (1190, 5, 0, 0),  # texts with choices; other parameters of a controller that stands
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     "drive": (1040, 5, 1, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
@@ -32,7 +32,7 @@ BUDGET = {
     "input": (1510, 6, 0, 0),
     "linear": (2120, 8, 1, 0),
     "optimal": (8420, 27, 6, 0),  # ends before the bound; points of a limit curve share starts and bounds
-    "page": (3940, 17, 3, 0),
+    "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits
     "plant": (2460, 15, 2, 0),
     "reporting": (2980, 12, 3, 0),
@@ -40,12 +40,8 @@ BUDGET = {
     "start": (1580, 8, 0, 0),  # the worst of several positions, release of a brake, torque cut off
     "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
     "tuning": (2320, 10, 1, 0),
-    "views": (
-        4270,
-        16,
-        5,
-        0,
-    ),  # small cells beside a large one; where a start begins, torque cut off, in words
+    # small cells beside a large one; where a start begins, torque cut off, in words
+    "views": (4270, 16, 5, 0),
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from softstart import Drive, simulate
+from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
 STEPS = 60
@@ -303,12 +304,60 @@ def test_a_page_loaded_anew_goes_on_with_its_drive(page, visit):
     opened(page)
     field(page, "shaft.gap").fill("1.3 rad")
     field(page, "shaft.gap").press("Enter")
-    page.wait_for_function("(sessionStorage.getItem('softstart-drive') ?? '').includes('gap = 1.3')")
+    wait_for_k(page, simulate(CRANE.replace(gap=1.3), "direct").k_dyn)
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    field(page, "strategy.time").fill("200 ms")
+    field(page, "strategy.time").press("Enter")
+    expected = simulate(CRANE.replace(gap=1.3), make_controller("ramp", {"time": 0.2})).k_dyn
+    wait_for_k(page, expected)
+    page.wait_for_function(
+        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
+    )
+    page.wait_for_timeout(700)
     page.reload()
-    wait_for_k(opened(page), simulate(CRANE.replace(gap=1.3), "direct").k_dyn)
+    wait_for_k(opened(page), expected)
     assert field(page, "shaft.gap").input_value() == "1.3"
     other = opened(visit())  # another tab has nothing of it
     assert k_dyn(other) == simulate(CRANE, "direct").k_dyn
+    linked = opened(visit(url=page.url))  # but a link brings all of it
+    wait_for_k(linked, expected)
+    assert field(linked, "strategy.time").input_value() == "0.2"
+
+
+def test_undo_and_redo_by_buttons_and_keys(page):
+    opened(page)
+    first = k_dyn(page)
+    drag(page, "shaft.gap", 0.25, 0.8, 12)
+    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
+    page.wait_for_timeout(600)
+    dragged = k_dyn(page)
+    assert dragged != first
+    page.get_by_label("Undo", exact=True).click()
+    wait_for_k(page, first)
+    assert page.get_by_label("Undo", exact=True).is_disabled()
+    page.keyboard.press("Control+Shift+z")
+    wait_for_k(page, dragged)
+    slider(page, "shaft.gap").focus()
+    page.keyboard.press("Control+z")
+    wait_for_k(page, first)
+    field(page, "shaft.gap").fill("0.9")  # here the keys are those of the text
+    page.keyboard.press("Control+y")
+    page.wait_for_timeout(300)
+    assert k_dyn(page) == first
+
+
+def test_a_parameter_of_a_strategy_follows_its_slider_and_goes_back_to_its_default(page):
+    opened(page)
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    wait_for_k(page, simulate(CRANE, "ramp").k_dyn)
+    drag(page, "strategy.time", 0.5, 0.75, 8)
+    page.wait_for_function("!document.querySelector('tr[data-name=ramp] .changed').hidden")
+    page.wait_for_timeout(500)
+    time = float(field(page, "strategy.time").input_value())
+    assert time > 0.12
+    wait_for_k(page, simulate(CRANE, make_controller("ramp", {"time": time})).k_dyn)
+    slider(page, "strategy.time").dblclick()
+    wait_for_k(page, simulate(CRANE, "ramp").k_dyn)
 
 
 def test_colours_follow_the_system_and_the_switch(page):

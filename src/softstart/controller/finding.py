@@ -7,7 +7,7 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -90,27 +90,7 @@ def make_controller(
     if name.lower().endswith(GAIN_FILES):
         return tuned.load_gains(name, parameters, allow_code=allow_code)
     cls = controller_class(name)
-    known = {f.name: f for f in fields(cls)}
-    values: dict[str, Any] = {}
-    wrong: list[str] = []
-    for key, value in (parameters or {}).items():
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
-            hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(known) or 'no parameters'}."
-            if key in getattr(cls, "__annotations__", {}):
-                hint = "its class names it, but is not a @dataclass(frozen=True)."
-            wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
-            continue
-        kind = known[key].metadata.get("kind", "quantity")
-        if kind == "object":
-            values[key] = value
-            continue
-        try:
-            unit = known[key].metadata.get("unit", "")
-            choices = known[key].metadata.get("choices", ())
-            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value, choices)
-        except InputError as error:
-            wrong.extend(error.sentences)
+    values, wrong = _values(cls, name, parameters or {})
     missing = [
         f.name
         for f in fields(cls)
@@ -132,6 +112,50 @@ def make_controller(
             "Sensor.SHAFT_TORQUE, Sensor.LOAD_SPEED or a sum of these by |."
         )
     return made
+
+
+def changed_controller(controller: Controller, changes: Mapping[str, object]) -> Controller:
+    """The controller with other parameters; None gives a parameter back its default.
+
+    >>> ramp = make_controller("ramp", {"time": "120 ms", "initial": 20})
+    >>> other = changed_controller(ramp, {"time": "0.2 s", "initial": None})
+    >>> other.time, other.initial
+    (0.2, None)
+    """
+    given = {key: value for key, value in changes.items() if value is not None}
+    values, wrong = _values(type(controller), controller.name, given)
+    if wrong:
+        raise InputError(wrong)
+    default = {f.name: None for f in fields(controller) if f.name in changes and f.name not in given}
+    return replace(controller, **default, **values)
+
+
+def _values(
+    cls: type[Controller], name: str, parameters: Mapping[str, object]
+) -> tuple[dict[str, Any], list[str]]:
+    """Parameters of a controller as its class takes them, and a sentence for each that is wrong."""
+    known = {f.name: f for f in fields(cls)}
+    values: dict[str, Any] = {}
+    wrong: list[str] = []
+    for key, value in parameters.items():
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
+            hint = f'did you mean "{near[0]}"?' if near else f"it has {', '.join(known) or 'no parameters'}."
+            if key in getattr(cls, "__annotations__", {}):
+                hint = "its class names it, but is not a @dataclass(frozen=True)."
+            wrong.append(f"{key} = {value}: the controller {name} has no such parameter; {hint}")
+            continue
+        kind = known[key].metadata.get("kind", "quantity")
+        if kind == "object":
+            values[key] = value
+            continue
+        try:
+            unit = known[key].metadata.get("unit", "")
+            choices = known[key].metadata.get("choices", ())
+            values[key] = quantity(key, value, unit) if kind == "quantity" else _text(key, value, choices)
+        except InputError as error:
+            wrong.extend(error.sentences)
+    return values, wrong
 
 
 def quantity(key: str, value: object, unit: str) -> Any:

@@ -10,7 +10,8 @@ from typing import Any
 from softstart.drive import PARAMETERS
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
-from softstart.page.frames import SERVER, Screen
+from softstart.page import links
+from softstart.page.frames import SERVER, STRATEGY, Screen
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import unit
@@ -86,6 +87,7 @@ def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
         "unit": unit(parameter.unit),
         "slider": slider,
         "choices": [] if parameter.unit else list(parameter.choices),
+        "suggestions": list(words),
         "words": not parameter.unit and not parameter.choices,
     }
 
@@ -127,13 +129,16 @@ class Controls:
         self._actions: Mapping[str, tuple[Callable[..., None], Mapping[str, type]]] = {
             "slide": (self._slide, {"path": str, "position": float}),
             "edit": (self._edit, {"path": str, "text": str}),
+            "reset": (self._reset, {"path": str}),
+            "undo": (session.undo, {}),
+            "redo": (session.redo, {}),
             "leave": (self._leave, {"path": str}),
             "jump": (self._jump, {"gap": float, "inertia": float}),
             "select": (session.select, {"name": str}),
             "show": (session.show, {"name": str, "visible": bool}),
             "remove": (session.remove, {"name": str}),
             "keep": (self._keep, {"kept": bool}),
-            "hello": (self._hello, {"kept": object}),
+            "hello": (self._hello, {"kept": object, "link": object}),
         }
 
     def take(self, message: object) -> None:
@@ -145,7 +150,8 @@ class Controls:
         if act is None or not all(_is_a(kind, arguments[name]) for name, kind in kinds.items()):
             return
         # without a field, the message appears next to the figure
-        place = path if (path := str(arguments.get("path"))) in BY_PATH else ""
+        path = str(arguments.get("path"))
+        place = path if path in BY_PATH or path in self._screen.strategy_paths() else ""
         version = self._session.version
         stamp: Any = message.get("stamp")
         if _is_a(float, stamp):
@@ -161,19 +167,35 @@ class Controls:
             self._poke()
 
     def _slide(self, path: str, position: float) -> None:
-        parameter = _parameter(path)
-        scale = self._screen.scales.get(parameter.name)
+        own = path in self._screen.strategy_paths()
+        name = _own(path) if own else _parameter(path).name
+        scale = (self._screen.strategy_scales if own else self._screen.scales).get(name)
         if scale is None:
             raise InputError(f"{path}: there is no such slider.")
-        self._session.set(path, scale.value(position))
+        if own:
+            self._session.set_parameter(name, scale.value(position), gesture=path)
+        else:
+            self._session.set_all({path: scale.value(position)}, gesture=path)
 
     def _edit(self, path: str, text: str) -> None:
-        example = _parameter(path).example
+        own = path in self._screen.strategy_paths()
+        example = "a value, or nothing for the default" if own else _parameter(path).example
         if len(text) > LONGEST_TEXT:
             raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {example}.")
-        if not text.strip():
+        words = " ".join(text.split())
+        if own:
+            self._session.set_parameter(_own(path), words or None)
+        elif words:
+            self._session.set(path, words)
+        else:
             raise InputError(f"{path}: the field is empty; write for example {example}.")
-        self._session.set(path, " ".join(text.split()))
+
+    def _reset(self, path: str) -> None:
+        """A parameter of the drive as it was loaded, or the default of one of the strategy."""
+        if path in self._screen.strategy_paths():
+            self._session.set_parameter(_own(path), None)
+        else:
+            self._session.set(path, getattr(self._session.origin, _parameter(path).name))
 
     def _leave(self, path: str) -> None:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
@@ -183,11 +205,16 @@ class Controls:
         for path in ("shaft.gap", "load.inertia"):
             self._screen.mistakes.pop(path, None)
 
-    def _hello(self, kept: object) -> None:
-        """A page that is loaded anew goes on with the drive that its tab has kept of this server."""
+    def _hello(self, kept: object, link: object) -> None:
+        """A page that is loaded anew goes on with the bench that its tab has kept, or that of its address."""
         self._screen.forget()
-        if isinstance(kept, Mapping) and kept.get("server") == SERVER:
-            self._session.load(str(kept["drive"]))
+        if isinstance(kept, Mapping) and kept.get("server") == SERVER and kept.get("link") == link:
+            known = links.kept(str(kept.get("bench")))
+            if known is not None:
+                self._session.restore(known)
+                return
+        if isinstance(link, str) and link:
+            self._session.restore(links.bench_of(link, self._session.bench))
 
     def _keep(self, kept: bool) -> None:
         self._screen.kept = kept
@@ -197,6 +224,11 @@ def _parameter(path: str) -> Parameter:
     if path not in BY_PATH:
         raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
     return BY_PATH[path]
+
+
+def _own(path: str) -> str:
+    """The name of a parameter of the selected strategy."""
+    return path.removeprefix(STRATEGY)
 
 
 def _is_a(kind: type, value: object) -> bool:

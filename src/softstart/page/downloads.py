@@ -7,6 +7,7 @@ import shlex
 import tempfile
 import unicodedata
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,6 +73,8 @@ def command_text(
     >>> crane = Drive.load("crane-4amtkf").replace(gap=1.0)
     >>> command_text(crane, {name: make_controller(name) for name in ("direct", "ramp")})
     'softstart compare crane-4amtkf --set shaft.gap=1.0 --controllers direct,ramp'
+    >>> command_text(crane, {"ramp": make_controller("ramp", {"time": 0.2})})
+    'softstart compare crane-4amtkf --set shaft.gap=1.0 --controllers ramp --param ramp.time=0.2'
     """
     words = ["softstart", command, *drive_words(drive), *more]
     names: list[str] = []
@@ -84,10 +87,14 @@ def command_text(
             params.append(f"profile.file={profile_file(label)}")
         elif label in controller_names():
             names.append(label)
-    if params or names != list(ready_controller_names()):
+            own = {one.name: getattr(controller, one.name) for one in fields(controller)}
+            params += [f"{label}.{key}={value}" for key, value in own.items() if value is not None]
+    profiles = [param for param in params if param.startswith("profile.")]
+    if profiles or names != list(ready_controller_names()):
         words += ["--controllers", ",".join(dict.fromkeys(names))]
-    for param in params[-1:]:  # the command takes one profile
-        words += ["--param", param]
+    for param in params:
+        if param not in profiles[:-1]:  # the command takes one profile
+            words += ["--param", param]
     return shlex.join(words)
 
 

@@ -6,7 +6,8 @@ import math
 import secrets
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
+from dataclasses import fields as fields_of
 from time import perf_counter
 from typing import Any
 
@@ -15,14 +16,18 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller
+from softstart.controller.tuned import Tuned
 from softstart.drive import PARAMETERS, Drive
+from softstart.page import links
 from softstart.page.live import Frame
-from softstart.page.ranges import Axes, Scale, axes_about, scales_about
-from softstart.page.session import Session, Strategy
+from softstart.page.ranges import Axes, Scale, axes_about, scales_about, scales_of
+from softstart.page.sentences import sentence_of
+from softstart.page.session import Bench, Session, Strategy
 from softstart.plant import layout as at
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.run import Run
+from softstart.views.printed import unit
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
@@ -37,6 +42,7 @@ PER_PERIOD = 16  # points an elastic period before thinning: its crests are then
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
 MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
+STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
 
 
 class Screen:
@@ -55,7 +61,9 @@ class Screen:
         self._next = 0  # whose turn it is among the other strategies
         self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has all rows
         self._map_seen = False  # it has some rows, of whatever
-        self._drive_kept: Drive | None = None  # by its tab
+        self._bench_kept: Bench | None = None  # by its tab
+        self.strategy_scales: Mapping[str, Scale] = {}  # sliders of the selected strategy
+        self._strategy_of: tuple[object, ...] = ()  # what these and the rows in the browser are for
 
     @property
     def version(self) -> int:
@@ -77,6 +85,8 @@ class Screen:
         """The browser has lost what it had: send the map again."""
         self._map_of = None
         self._map_seen = False
+        self._strategy_of = ()
+        self._bench_kept = None
 
     def glance(self) -> Frame | None:
         """The large figure alone, where one of the last two starts of the selected strategy was quick.
@@ -96,6 +106,81 @@ class Screen:
         self._costs[label] = (self._costs.get(label, LONG)[1], found.cost)
         return found
 
+    # parameters of the selected strategy ---------------------------------------------------------------
+
+    def strategy_paths(self) -> frozenset[str]:
+        """The fields of the selected strategy: none for tuned gains and profiles, which come from files."""
+        controller = self.session.controllers[self.session.selected]
+        return frozenset(STRATEGY + one.name for one in parameters_of(controller))
+
+    def _strategy_rows(self) -> Frame:
+        """The fields of the selected strategy, if the browser has others."""
+        session = self.session
+        controller = session.controllers[session.selected]
+        wanted = (session.selected, type(controller), self._origin)
+        if self._strategy_of == wanted:
+            return {}
+        self._strategy_of = wanted
+        return {
+            "strategy": {
+                "name": session.selected,
+                "rows": [self._row(one) for one in parameters_of(controller)],
+            }
+        }
+
+    def _row(self, one: Field[Any]) -> dict[str, Any]:
+        about = one.metadata
+        return {
+            "path": STRATEGY + one.name,
+            "symbol": "",
+            "label": one.name.replace("_", " "),
+            "meaning": f"{about['meaning']}; default: {about['default'] or 'fixed'}",
+            "unit": unit(about["unit"]),
+            "slider": one.name in self.strategy_scales,
+            "choices": list(about["choices"]),
+            "words": False,
+            "suggestions": [],
+        }
+
+    def _strategy_fields(self, found: Strategy) -> dict[str, list[Any]]:
+        """Values of the selected strategy's parameters on the drive of the moment, as `fields` has them."""
+        session = self.session
+        controller = session.controllers[session.selected]
+        names = [one.name for one in parameters_of(controller)]
+        try:
+            if self._strategy_of != (session.selected, type(controller), self._origin):
+                self.strategy_scales = scales_of(controller, self._origin)
+            default = controller.defaults(session.drive.assumed)
+        except Exception as error:  # a controller is anyone's code; its start has said what is wrong
+            sentence_of(error)  # which is logged
+            return {}
+        tuned = [
+            (label, known.run.controller)
+            for label, other in session.controllers.items()
+            if isinstance(other, Tuned) and type(other.controller) is type(controller)
+            and (known := session.ready(label)) is not None and known.run is not None
+        ]  # fmt: skip
+        shown: dict[str, list[Any]] = {}
+        for name in names:
+            given = getattr(controller, name)
+            value = default.get(name) if given is None else given
+            if isinstance(value, str):
+                shown[STRATEGY + name] = [value, None, "", []]
+                continue
+            number = math.nan if value is None else float(value)
+            scale = self.strategy_scales.get(name)
+            marks = []
+            if scale is not None:
+                marks = [[scale.position(float(default[name])), f"default: {float(default[name]):.4g}"]] + [
+                    [scale.position(float(at)), f"{label}: {at:.4g}"]
+                    for label, other in tuned
+                    if (at := getattr(other, name, None)) is not None
+                ]
+            text = "" if math.isnan(number) else f"{number:.4g}" if given is None else written(number)
+            position = scale.position(number) if scale is not None else None
+            shown[STRATEGY + name] = [text, position, "" if given is None else "changed", marks]
+        return shown
+
     # frames that follow the hand -----------------------------------------------------------------------
 
     def first(self) -> Frame:
@@ -107,11 +192,14 @@ class Screen:
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": fields(session.drive, self.scales),
+            "fields": fields(session.drive, session.origin, self.scales) | self._strategy_fields(found),
+            **self._strategy_rows(),
+            "steps": session.steps,
             "drive": session.drive.name,
             "order": list(session.controllers),
             "shown": list(session.shown),
             "added": list(session.added),
+            "changed": list(session.changed),
             "selected": session.selected,
             "figure": figure(session, found),
             "traces": {session.selected: drawn(found)},
@@ -147,9 +235,9 @@ class Screen:
     def at_rest(self) -> Iterator[Frame | None]:
         """The drive, for the tab to keep; long starts, K_dyn with a worn gap, then the map."""
         session = self.session
-        if self._drive_kept is not session.drive:
-            self._drive_kept = session.drive
-            yield {"keep": {"server": SERVER, "drive": session.drive.to_toml()}}
+        if self._bench_kept is not session.bench:
+            self._bench_kept = session.bench
+            yield {"keep": {"server": SERVER, "bench": links.keep(session), "link": links.link_of(session)}}
         for label in session.controllers:
             if session.ready(label) is None:
                 found = session.result(label)
@@ -212,6 +300,22 @@ class Screen:
         }
 
 
+def parameters_of(controller: Controller) -> list[Field[Any]]:
+    """The parameters that the page can change: quantities, and texts with a choice.
+
+    >>> from softstart.controller import make_controller
+    >>> [one.name for one in parameters_of(make_controller("ramp"))]
+    ['initial', 'time', 'full_torque', 'period']
+    """
+    if isinstance(controller, Tuned):
+        return []
+    return [
+        one
+        for one in fields_of(controller)
+        if one.metadata.get("choices") or one.metadata.get("kind") == "quantity"
+    ]
+
+
 def from_middle(count: int, middle: int) -> list[int]:
     """0 to count - 1, those near the middle first.
 
@@ -231,8 +335,11 @@ def numbers(values: Any) -> list[float | None]:
     return [number(value) for value in values.tolist()]
 
 
-def fields(drive: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
-    """By parameter: text of the field, position of the slider or None, and the value told otherwise."""
+def fields(drive: Drive, origin: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
+    """By parameter: text of the field, position of the slider or None, the value in another unit, and marks.
+
+    A mark is a position on the slider and what it means.
+    """
     shown: dict[str, list[Any]] = {}
     for name, parameter in PARAMETERS.items():
         value = getattr(drive, name)
@@ -244,7 +351,9 @@ def fields(drive: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
         text = value if isinstance(value, str) else written(float(value))
         scale = scales.get(name)
         position = scale.position(float(value)) if scale else None
-        shown[parameter.path] = [text, position, otherwise(parameter.unit, value)]
+        first = getattr(origin, name)
+        marks = [[scale.position(float(first)), f"as loaded: {written(float(first))}"]] if scale else []
+        shown[parameter.path] = [text, position, otherwise(parameter.unit, value), marks]
     return shown
 
 

@@ -57,6 +57,7 @@ def build(drive: Drive) -> Session:
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
     session.show_gentlest()
+    session.restore(session.bench)  # the page begins here: that is no step to undo
     screen = Screen(session)
     with instrument()() as element:
         _panels(session, client)

@@ -9,7 +9,9 @@ from types import MappingProxyType
 
 import numpy as np
 
+from softstart.controller.base import Controller
 from softstart.drive import Drive
+from softstart.tuning.ranges import ranges_of, tunable
 
 STEPS = 600
 DIGITS = 4
@@ -85,6 +87,22 @@ def scales_about(origin: Drive) -> Mapping[str, Scale]:
             "target_speed": Scale(rounded(0.2 * target), rounded(2.0 * target)),
         }
     )
+
+
+def scales_of(controller: Controller, origin: Drive) -> Mapping[str, Scale]:
+    """Sliders of a strategy's parameters, as far as tuning would go, about the drive as it was loaded.
+
+    >>> from softstart.controller import make_controller
+    >>> scales_of(make_controller("s-curve"), Drive.load("crane-4amtkf"))["rounding"]
+    Scale(low=0.0, high=1.0, logarithmic=False)
+    """
+    found = {}
+    default = controller.defaults(origin.assumed)
+    for one in ranges_of(controller, tunable(controller)):
+        low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
+        if low < high:
+            found[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
+    return MappingProxyType(found)
 
 
 @dataclass(frozen=True)

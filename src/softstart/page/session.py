@@ -1,17 +1,19 @@
 """The state of one user: a drive, the strategies that start it, and what came out. No NiceGUI here.
 
-Everything happens in the thread of the page's event loop; a session belongs to one client.
+What a user changes is one immutable `Bench`; undo and redo go from one to another. Everything happens in the
+thread of the page's event loop; a session belongs to one client.
 """
 
 from __future__ import annotations
 
 import math
+import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
-from softstart.controller.finding import make_controller, ready_controller_names
+from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from softstart.start.run import Run
 
 MAX_STRATEGIES = 24
+MOST_STEPS = 200  # that can be undone
+PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are one step
 MOST_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
 
 
@@ -61,6 +65,26 @@ class Strategy:
         return self.trouble if self.run is None else outcome(self.run)
 
 
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """All that a user can change.
+
+    Parameters
+    ----------
+    drive : as it is now.
+    origin : the drive as it was loaded; ranges of sliders and maps are about it.
+    controllers : all strategies of the table, by label, shown or not.
+    selected : label of the strategy whose figure is large and whose map is drawn.
+    drawn : labels of the strategies that are drawn beside it.
+    """
+
+    drive: Drive
+    origin: Drive
+    controllers: Mapping[str, Controller]
+    selected: str
+    drawn: frozenset[str]
+
+
 class Session:
     """The drive and the strategies of one user; a refused change raises InputError and changes nothing.
 
@@ -72,16 +96,21 @@ class Session:
     >>> session.set("shaft.gap", "2 rad")
     >>> round(session.result("direct").k_dyn, 3), session.version
     (4.865, 1)
+    >>> session.undo()
+    >>> session.drive.gap
+    0.5
     """
 
     def __init__(self, drive: Drive | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None) -> None:
-        self._drive = _single(Drive.load(drive) if isinstance(drive, str) else drive)
-        self._origin = self._drive
+        drive = _single(Drive.load(drive) if isinstance(drive, str) else drive)
         names = list(ready_controller_names() if controllers is None else controllers)
-        self._controllers: dict[str, Controller] = {name: make_controller(name) for name in names}
-        self._first = frozenset(names)
-        self._selected = REFERENCE if REFERENCE in names or not names else names[0]
-        self._shown = {self._selected}
+        selected = REFERENCE if REFERENCE in names or not names else names[0]
+        self._first = {name: make_controller(name) for name in names}
+        self._bench = Bench(drive, drive, self._first, selected, frozenset((selected,)))
+        self._past: list[Bench] = []
+        self._future: list[Bench] = []
+        self._gesture = ("", -math.inf)  # what was changed last, and when
+        self.name = secrets.token_urlsafe(9)
         self._version = 0
         self._listeners: list[Callable[[], None]] = []
         self._results: dict[str, Strategy] = {}
@@ -91,39 +120,56 @@ class Session:
     # the state -----------------------------------------------------------------------------------------
 
     @property
+    def bench(self) -> Bench:
+        """All that can be changed, as it is now."""
+        return self._bench
+
+    @property
     def drive(self) -> Drive:
         """The drive as it is now."""
-        return self._drive
+        return self._bench.drive
 
     @property
     def origin(self) -> Drive:
         """The drive as it was loaded: ranges of sliders and maps are about it."""
-        return self._origin
+        return self._bench.origin
 
     @property
     def controllers(self) -> Mapping[str, Controller]:
         """All strategies of the table: controllers by label, shown or not."""
-        return dict(self._controllers)
+        return self._bench.controllers
 
     @property
     def shown(self) -> tuple[str, ...]:
         """Labels of the strategies that are drawn, in the order of the table; the selected one always is."""
-        return tuple(label for label in self._controllers if label in {*self._shown, self._selected})
+        drawn = {*self._bench.drawn, self.selected}
+        return tuple(label for label in self.controllers if label in drawn)
 
     @property
     def added(self) -> tuple[str, ...]:
         """Labels of the strategies that have joined: those that may be taken out again."""
-        return tuple(label for label in self._controllers if label not in self._first)
+        return tuple(label for label in self.controllers if label not in self._first)
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Labels of the strategies with a parameter that is not the default."""
+        return tuple(label for label, first in self._first.items()
+                     if self.controllers.get(label, first) != first)  # fmt: skip
 
     @property
     def selected(self) -> str:
-        """Label of the strategy whose figure stands large and whose map is drawn."""
-        return self._selected
+        """Label of the strategy whose figure is large and whose map is drawn."""
+        return self._bench.selected
 
     @property
     def version(self) -> int:
         """How often anything was changed."""
         return self._version
+
+    @property
+    def steps(self) -> tuple[int, int]:
+        """How many steps can be undone, and redone."""
+        return len(self._past), len(self._future)
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
         """Call `callback()` after each change; returns a function that ends this."""
@@ -149,11 +195,23 @@ class Session:
         """
         self.set_all({path: value})
 
-    def set_all(self, changes: Mapping[str, str | float]) -> None:
-        """Change several parameters in one step, or none of them."""
+    def set_all(self, changes: Mapping[str, str | float], gesture: str = "") -> None:
+        """Change several parameters in one step, or none of them; changes of one gesture are one step."""
         settings = [f"{path}={value if isinstance(value, str) else repr(float(value))}"
                     for path, value in changes.items()]  # fmt: skip
-        self._take(_single(self._drive.with_settings(settings)))
+        self._put(gesture, drive=_single(self.drive.with_settings(settings)))
+
+    def set_parameter(self, name: str, value: str | float | None, gesture: str = "") -> None:
+        """Change one parameter of the selected strategy; None gives it back its default.
+
+        >>> session = Session()
+        >>> session.select("ramp")
+        >>> session.set_parameter("time", "200 ms")
+        >>> session.controllers["ramp"].time, session.changed
+        (0.2, ('ramp',))
+        """
+        controller = changed_controller(self.controllers[self.selected], {name: value})
+        self._put(gesture, controllers={**self.controllers, self.selected: controller})
 
     def load(self, text: str, where: str = "") -> None:
         """Take the drive of a TOML text; `where` is put before each sentence of an InputError."""
@@ -162,8 +220,24 @@ class Session:
     def take(self, drive: Drive) -> None:
         """Go over to another drive."""
         drive = _single(drive)
-        self._origin = drive
-        self._take(drive)
+        self._put(drive=drive, origin=drive)
+
+    def restore(self, bench: Bench) -> None:
+        """Begin with a bench of before, or of somebody else; nothing can be undone then."""
+        self._past, self._future = [], []
+        self._go_to(bench)
+
+    def undo(self) -> None:
+        """Take the last change back; nothing happens if there is none."""
+        if self._past:
+            self._future.append(self._bench)
+            self._go_to(self._past.pop())
+
+    def redo(self) -> None:
+        """Make the change that was taken back last; nothing happens if there is none."""
+        if self._future:
+            self._past.append(self._bench)
+            self._go_to(self._future.pop())
 
     def add(self, label: str, controller: Controller, *, select: bool = True) -> str:
         """Let a controller (tuned gains, the profile of an optimum) join the strategies.
@@ -171,44 +245,37 @@ class Session:
         A label that is there already is replaced. Returns the label under which it stands.
         """
         label = " ".join(label.split())[:60] or controller.name or type(controller).__name__
-        if label not in self._controllers and len(self._controllers) >= MAX_STRATEGIES:
+        if label not in self.controllers and len(self.controllers) >= MAX_STRATEGIES:
             raise InputError(
                 f'strategy "{label}": there are {MAX_STRATEGIES} strategies already; remove one first.'
             )
-        self._controllers[label] = controller
-        self._shown.add(label)
-        self._forget([label])
-        if select:
-            self._selected = label
-        self._changed()
+        self._put(
+            controllers={**self.controllers, label: controller},
+            drawn=self._bench.drawn | {label},
+            selected=label if select else self.selected,
+        )
         return label
 
     def remove(self, label: str) -> None:
         """Take a strategy out of the table; the last one stays."""
         self._known(label)
-        if len(self._controllers) == 1:
+        if len(self.controllers) == 1:
             raise InputError(f'strategy "{label}": this is the last strategy; add another one first.')
-        del self._controllers[label]
-        self._shown.discard(label)
-        self._forget([label])
-        if self._selected == label:
-            self._selected = next(iter(self._controllers))
-        self._changed()
+        left = {name: controller for name, controller in self.controllers.items() if name != label}
+        selected = next(iter(left)) if self.selected == label else self.selected
+        self._put(controllers=left, drawn=self._bench.drawn - {label}, selected=selected)
 
     def select(self, label: str) -> None:
-        """Make a strategy the one whose figure stands large; it is shown from then on."""
+        """Make a strategy the one whose figure is large; it is shown from then on."""
         self._known(label)
-        if label != self._selected or label not in self._shown:
-            self._selected = label
-            self._shown.add(label)
-            self._changed()
+        if label != self.selected or label not in self._bench.drawn:
+            self._put(selected=label, drawn=self._bench.drawn | {label})
 
     def show(self, label: str, visible: bool = True) -> None:
         """Draw a strategy or hide it."""
         self._known(label)
-        if visible != (label in self._shown):
-            (self._shown.add if visible else self._shown.discard)(label)
-            self._changed()
+        if visible != (label in self._bench.drawn):
+            self._put(drawn=self._bench.drawn ^ {label})
 
     def show_gentlest(self) -> None:
         """Draw the strategy with the least K_dyn among those that reach the target speed."""
@@ -221,7 +288,7 @@ class Session:
     @property
     def strategies(self) -> list[Strategy]:
         """All strategies on the drive as it is now, in the order of the table."""
-        return [self.result(label) for label in self._controllers]
+        return [self.result(label) for label in self.controllers]
 
     def ready(self, label: str) -> Strategy | None:
         """The result of a strategy if it is computed already."""
@@ -238,7 +305,7 @@ class Session:
         self._known(label)
         began = time.thread_time()
         try:
-            run = simulate(self._drive, self._controllers[label], max_events=max_events)
+            run = simulate(self.drive, self.controllers[label], max_events=max_events)
         except Exception as error:  # a controller is anyone's code and may fail in any way
             found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
             if isinstance(error, SimulationError) and max_events < MOST_EVENTS:
@@ -256,7 +323,7 @@ class Session:
         if label not in self._worn:
             self._known(label)
             try:
-                self._worn[label] = k_dyn_worn_gap(self._drive, self._controllers[label])
+                self._worn[label] = k_dyn_worn_gap(self.drive, self.controllers[label])
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
                 self._worn[label] = math.nan
@@ -270,9 +337,9 @@ class Session:
         """Start time over that of `direct`, s; NaN where one of them is."""
         if self._reference is None:
             try:
-                known = self._results.get(REFERENCE)
+                known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None
                 run = known.run if known is not None and known.run is not None else None
-                self._reference = (run or simulate(self._drive, REFERENCE, max_events=MOST_EVENTS)).start_time
+                self._reference = (run or simulate(self.drive, REFERENCE, max_events=MOST_EVENTS)).start_time
             except (InputError, SimulationError):
                 self._reference = math.nan
         return self.result(label).start_time - self._reference
@@ -280,15 +347,36 @@ class Session:
     def close(self) -> None:
         """Let go of all results and listeners: the user has gone."""
         self._listeners.clear()
-        self._forget(list(self._controllers))
+        self._forget(list(self.controllers))
+        self._past, self._future = [], []
 
     # ---------------------------------------------------------------------------------------------------
 
-    def _take(self, drive: Drive) -> None:
-        self._drive = drive
-        self._forget(self._controllers)
-        self._reference = None
+    def _put(self, gesture: str = "", **changes: Any) -> None:
+        """Change the bench; changes of one gesture that follow one another quickly are one step."""
+        now = time.monotonic()
+        last, when = self._gesture
+        if not gesture or gesture != last or now - when > PAUSE or not self._past:
+            self._past = [*self._past[1 - MOST_STEPS :], self._bench]
+        self._gesture = (gesture, now)
+        self._future = []
+        self._bench = self._adopted(replace(self._bench, **changes))
         self._changed()
+
+    def _go_to(self, bench: Bench) -> None:
+        self._gesture = ("", -math.inf)
+        self._bench = self._adopted(bench)
+        self._changed()
+
+    def _adopted(self, bench: Bench) -> Bench:
+        """A bench whose results are not those of the present one where the two differ."""
+        if bench.drive is not self.drive:
+            self._forget(list(self.controllers))
+            self._reference = None
+        for label, controller in self.controllers.items():
+            if bench.controllers.get(label) is not controller:
+                self._forget([label])
+        return bench
 
     def _forget(self, labels: Iterable[str]) -> None:
         for label in labels:
@@ -301,9 +389,9 @@ class Session:
             listener()
 
     def _known(self, label: str) -> None:
-        if label not in self._controllers:
-            near = nearest(label, list(self._controllers))
-            hint = f"did you mean {near}?" if near else f"there are {', '.join(self._controllers)}."
+        if label not in self.controllers:
+            near = nearest(label, list(self.controllers))
+            hint = f"did you mean {near}?" if near else f"there are {', '.join(self.controllers)}."
             raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from softstart import simulate
 from softstart.controller import make_controller
+from softstart.controller.tuned import RobustGains
 from softstart.drive import PARAMETERS
 from softstart.page.controls import GROUPS, Controls
 from softstart.page.frames import Screen
@@ -185,7 +186,7 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     assert session.drive.gap == 0.5
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
-    assert screen.first()["fields"]["shaft.gap"] == ["0.0698132", 21, "4\N{DEGREE SIGN}"]
+    assert screen.first()["fields"]["shaft.gap"][:3] == ["0.0698132", 21, "4\N{DEGREE SIGN}"]
 
 
 def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
@@ -213,16 +214,21 @@ def test_each_message_is_told_of_once_and_no_place_is_made_up():
     assert list(screen.mistakes) == ["shaft.gap", ""]
 
 
-def test_a_page_loaded_anew_goes_on_with_the_drive_that_its_tab_has_kept():
-    before = Session(controllers=["direct"])
+def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
+    before = Session(controllers=["direct", "ramp"])
     before.set_all({"shaft.gap": 0.1 + 0.2, "name": 'my "own" drive'})
+    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), before.drive)
+    before.add("ramp (robust)", tuned)
     (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
-    session = Session(controllers=["direct"])
+    session = Session(controllers=["direct", "ramp"])
     controls, screen = controls_of(session)
-    controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}})
+    controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}, "link": ""})
     assert session.drive == session.origin != before.drive
-    controls.take({"what": "hello", "kept": kept})
-    assert session.drive == before.drive
+    controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
+    assert session.drive is before.drive
+    assert session.controllers["ramp (robust)"] is tuned
+    assert session.selected == "ramp (robust)"
+    assert session.steps == (0, 0)
     assert not screen.mistakes
     assert len([frame for frame in screen.at_rest() if frame and "keep" in frame]) == 1
     assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
@@ -235,9 +241,69 @@ def test_a_slider_sets_exactly_the_value_that_its_field_shows():
         path = PARAMETERS[name].path
         controls.take({"what": "slide", "path": path, "position": 300})
         assert not screen.mistakes, name
-        text, position, _ = screen.first()["fields"][path]
+        text, position, _, _ = screen.first()["fields"][path]
         assert float(text) == scale.value(300)
         assert position == pytest.approx(300, abs=1)
+
+
+def test_parameters_of_the_selected_strategy_are_fields():
+    """Their values are those that the start runs with; an empty field or `reset` is the default again."""
+    session = Session(controllers=["direct", "ramp", "shaped"])
+    controls, screen = controls_of(session)
+    session.select("ramp")
+    frame = screen.first()
+    assert frame["strategy"]["name"] == "ramp"
+    assert [row["path"] for row in frame["strategy"]["rows"] if row["slider"]] == [
+        "strategy.initial", "strategy.time", "strategy.full_torque"
+    ]  # fmt: skip
+    default = session.result("ramp").run.controller.time
+    text, position, state, ((mark, meaning),) = frame["fields"]["strategy.time"]
+    assert (float(text), state) == (pytest.approx(default, rel=1e-3), "")
+    assert position == mark == screen.strategy_scales["time"].position(default)
+    assert meaning.startswith("default: ")
+    assert "strategy" not in screen.first()  # the browser has these rows
+
+    controls.take({"what": "edit", "path": "strategy.time", "text": "200 ms"})
+    assert session.controllers["ramp"].time == 0.2
+    assert screen.first()["changed"] == ["ramp"]
+    assert (
+        session.result("ramp").k_dyn == simulate(session.drive, make_controller("ramp", {"time": 0.2})).k_dyn
+    )
+    controls.take({"what": "slide", "path": "strategy.time", "position": 600})
+    assert session.controllers["ramp"].time == screen.strategy_scales["time"].high
+    controls.take({"what": "edit", "path": "strategy.time", "text": " "})
+    assert session.controllers["ramp"].time is None
+    controls.take({"what": "edit", "path": "strategy.time", "text": "4 m"})
+    assert "length" in screen.mistakes["strategy.time"]
+    controls.take({"what": "reset", "path": "strategy.time"})
+    assert not screen.mistakes
+    assert session.changed == ()
+
+    session.select("shaped")
+    controls.take({"what": "edit", "path": "strategy.shaper", "text": "zvd"})
+    assert session.controllers["shaped"].shaper == "zvd"
+    controls.take({"what": "edit", "path": "strategy.time", "text": "1"})  # that is one of the ramp's
+    assert "no such field" in screen.mistakes[""]
+
+
+def test_reset_gives_the_value_of_the_drive_as_it_was_loaded():
+    session = Session(controllers=["direct"])
+    controls, _ = controls_of(session)
+    controls.take({"what": "edit", "path": "shaft.gap", "text": "1.5"})
+    controls.take({"what": "reset", "path": "shaft.gap"})
+    assert session.drive == session.origin
+
+
+def test_tuned_values_are_marked_beside_the_default():
+    session = Session(controllers=["ramp"])
+    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), session.drive)
+    session.add("ramp (robust)", tuned, select=False)
+    screen = Screen(session)
+    session.result("ramp (robust)")
+    marks = screen.first()["fields"]["strategy.time"][3]
+    assert [meaning for _, meaning in marks][1:] == ["ramp (robust): 0.3"]
+    session.select("ramp (robust)")  # its gains come from a file
+    assert screen.first()["strategy"]["rows"] == []
 
 
 def test_a_strategy_that_has_joined_can_be_taken_out_again():
@@ -268,7 +334,7 @@ def test_every_parameter_with_a_field_is_one_of_the_drive():
     assert set(Screen(Session(controllers=["direct"])).scales) <= set(shown)
 
 
-KEYS = ("path", "text", "position", "gap", "inertia", "name", "visible", "kept", "stamp")
+KEYS = ("path", "text", "position", "gap", "inertia", "name", "visible", "kept", "link", "stamp")
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
@@ -281,7 +347,20 @@ JSON = st.recursive(
     st.fixed_dictionaries(
         {
             "what": st.sampled_from(
-                ["slide", "edit", "jump", "select", "show", "keep", "remove", "hello", "?"]
+                [
+                    "slide",
+                    "edit",
+                    "reset",
+                    "jump",
+                    "select",
+                    "show",
+                    "keep",
+                    "remove",
+                    "undo",
+                    "redo",
+                    "hello",
+                    "?",
+                ]
             )
         },
         optional=dict.fromkeys(KEYS, JSON),

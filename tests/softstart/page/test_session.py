@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import subprocess
 import sys
+import zlib
+from base64 import urlsafe_b64encode
 
 import pytest
 from hypothesis import given, settings
@@ -13,6 +16,7 @@ from hypothesis import strategies as st
 from softstart import Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
 from softstart.page.downloads import command_text
+from softstart.page.links import bench_of, link_of
 from softstart.page.session import MAX_STRATEGIES, Session
 
 
@@ -46,6 +50,117 @@ def test_set_takes_numbers_and_texts_and_counts_changes():
     assert calls == [1, 2]
     assert session.version == 3
     assert session.drive.load_kind == "reactive"
+
+
+def test_undo_and_redo_go_through_every_change():
+    session = Session(controllers=["direct", "ramp"])
+    seen = [session.bench]
+    for change in (
+        lambda: session.set("shaft.gap", 1.0),
+        lambda: session.select("ramp"),
+        lambda: session.set_parameter("time", 0.2),
+        lambda: session.add("mine", make_controller("s-curve")),
+        lambda: session.remove("direct"),
+        lambda: session.take(Drive.load("servo-axis-small")),
+    ):
+        change()
+        seen.append(session.bench)
+    assert session.steps == (6, 0)
+    for bench in reversed(seen[:-1]):
+        session.undo()
+        assert session.bench is bench
+    session.undo()  # nothing is left
+    assert session.bench is seen[0]
+    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+    for bench in seen[1:]:
+        session.redo()
+        assert session.bench is bench
+    session.undo()
+    session.set("shaft.gap", 0.25)
+    assert session.steps == (6, 0)  # a new change ends what could be redone
+
+
+def test_a_drag_is_one_step_and_results_follow_undo(monkeypatch):
+    session = Session(controllers=["direct"])
+    for gap in (0.6, 0.7, 0.8):
+        session.set_all({"shaft.gap": gap}, gesture="shaft.gap")
+    session.set_all({"load.inertia": 0.2}, gesture="load.inertia")
+    assert session.steps == (2, 0)
+    monkeypatch.setattr("softstart.page.session.PAUSE", -1.0)  # as if the hand had rested
+    session.set_all({"load.inertia": 0.3}, gesture="load.inertia")
+    assert session.steps == (3, 0)
+    session.undo()
+    session.undo()
+    assert session.drive.gap == 0.8
+    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+    session.undo()
+    assert session.drive.gap == 0.5
+    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+
+
+def test_the_steps_that_can_be_undone_are_limited(monkeypatch):
+    monkeypatch.setattr("softstart.page.session.MOST_STEPS", 3)
+    session = Session(controllers=["direct"])
+    for gap in (0.1, 0.2, 0.3, 0.4, 0.6):
+        session.set("shaft.gap", gap)
+    assert session.steps == (3, 0)
+
+
+def test_time_lost_is_against_direct_as_it_is_without_parameters():
+    session = Session(controllers=["direct", "ramp"])
+    expected = session.time_lost("ramp")
+    session.select("direct")
+    session.set_parameter("torque", 40)
+    assert session.time_lost("ramp") == expected
+    assert session.time_lost("direct") > 0.0
+
+
+def test_a_link_brings_back_drive_strategies_and_selection():
+    session = Session()
+    session.set_all({"shaft.gap": 0.1 + 0.2, "name": "Kran \u00e4, <b>"})
+    session.select("shaped")
+    session.set_parameter("shaper", "zvd")
+    session.show("ramp")
+    session.add("mine", make_controller("s-curve"))  # a label of the user's own stands for a file
+    session.select("shaped")
+    other = Session()
+    other.restore(bench_of(link_of(session), other.bench))
+    assert other.drive == session.drive
+    assert other.origin == session.origin
+    assert (other.selected, other.controllers["shaped"].shaper) == ("shaped", "zvd")
+    assert set(other.shown) == {*session.shown} - {"mine"}
+    assert other.result("shaped").k_dyn == session.result("shaped").k_dyn
+
+
+BOMB = urlsafe_b64encode(zlib.compress(b"[" * 5_000_000)).decode()
+
+
+@pytest.mark.parametrize(
+    "link", ["x", "%%%", BOMB, "A" * 20_000, "\u00e4", urlsafe_b64encode(zlib.compress(b"[1]")).decode()]
+)
+def test_a_link_that_holds_no_bench_is_refused_in_a_sentence(link):
+    with pytest.raises(InputError, match="copy the whole link again"):
+        bench_of(link, Session(controllers=["direct"]).bench)
+
+
+def test_a_link_cannot_name_code_or_a_file():
+    """Only strategies that the page has are given parameters."""
+    drive = Drive.load("crane-4amtkf").to_toml()
+    content = {
+        "drive": drive,
+        "origin": "",
+        "parameters": {"evil.py:Evil": {}, "gains.toml": {}},
+        "selected": "evil.py:Evil",
+        "drawn": ["gains.toml"],
+    }
+    link = urlsafe_b64encode(zlib.compress(json.dumps(content).encode())).decode()
+    now = Session(controllers=["direct"]).bench
+    bench = bench_of(link, now)
+    assert (dict(bench.controllers), bench.selected, bench.drawn) == (
+        dict(now.controllers),
+        "direct",
+        frozenset(),
+    )
 
 
 @pytest.mark.parametrize(

@@ -7,16 +7,18 @@ export default {
   <header class="topbar">
     <strong class="brand">softstart</strong>
     <span class="drive-name"></span>
+    <span class="steps" role="group" aria-label="Undo and redo"></span>
     <span class="pulse" title="From the slider to the drawn picture, and pictures in the last second"></span>
     <div class="theme" role="radiogroup" aria-label="Colours"></div>
   </header>
-  <nav class="controls" aria-label="Parameters of the drive"></nav>
+  <nav class="controls fields" aria-label="Parameters of the drive"></nav>
   <main class="centre">
     <section class="plots"><canvas role="img" aria-label="Torques, speeds and twist over time"></canvas></section>
     <section class="strategies"></section>
   </main>
   <aside class="side">
     <section class="figure"></section>
+    <section class="strategy fields" aria-label="Parameters of the selected strategy"></section>
     <section class="map"></section>
     <section class="panels"><slot></slot></section>
   </aside>

@@ -5,22 +5,40 @@ import { scheme } from "./scheme.js";
 const STEPS = 600;
 
 export class Controls {
-  constructor(place, groups, say) {
+  constructor(place, own, groups, say) {
     this.say = say;
     this.rows = new Map();
+    this.own = own;
     place.append(scheme());
-    for (const group of groups) {
-      const box = element("fieldset", {}, element("legend", {}, group.title));
-      for (const row of group.rows) box.append(...this.row(row));
-      place.append(box);
-    }
+    for (const { title, rows } of groups) place.append(this.box(title, rows));
   }
 
-  row({ path, symbol, label, meaning, unit, slider, choices, words }) {
-    const id = `field-${path.replace(".", "-")}`;
-    const name = element("label", { for: id, title: meaning }, element("i", {}, symbol), label);
+  box(title, rows) {
+    const box = element("fieldset", {}, element("legend", {}, title));
+    for (const row of rows) box.append(...this.row(row));
+    return box;
+  }
+
+  // the parameters of the selected strategy, in place of those of the one before
+  strategy({ name, rows }) {
+    for (const path of this.rows.keys()) if (path.startsWith("strategy.")) this.rows.delete(path);
+    const main = rows.filter((row) => row.slider || row.choices.length);
+    const more = rows.filter((row) => !main.includes(row));
+    const parts = main.length ? [this.box(`parameters of ${name}`, main)] : [];
+    if (more.length) {
+      const box = this.box("", more);
+      box.firstChild.remove();
+      parts.push(main.length ? element("details", {}, element("summary", {}, "more parameters"), box) : this.box(`parameters of ${name}`, more));
+    }
+    this.own.replaceChildren(...parts);
+    this.own.hidden = !parts.length;
+  }
+
+  row({ path, symbol, label, meaning, unit, slider, choices, words, suggestions }) {
+    const id = `field-${path.replaceAll(".", "-")}`;
+    const name = element("label", { for: id, title: meaning }, ...(symbol || !path.startsWith("strategy.") ? [element("i", {}, symbol)] : []), label);
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
-    const line = element("div", { class: `row${slider ? "" : " plain"}${words ? " words" : ""}`, "data-path": path }, name);
+    const line = element("div", { class: `row${slider ? "" : " plain"}${words ? " words" : ""}${suggestions.length ? " wide" : ""}`, "data-path": path }, name);
     // stamps of what was asked last: by the field until that is answered, by the slider
     const parts = { line, mistake, other: element("span", { class: "other" }), asked: -1, slid: -1 };
     if (slider) {
@@ -29,17 +47,24 @@ export class Controls {
         parts.slid = this.say({ what: "slide", path, position: Number(parts.slider.value) });
       });
       parts.slider.addEventListener("pointerdown", () => this.hold(parts));
-      line.append(parts.slider);
+      parts.slider.addEventListener("dblclick", () => this.say({ what: "reset", path }));
+      parts.slider.addEventListener("keydown", (event) => {
+        if (event.key === "Delete" || event.key === "Backspace") this.say({ what: "reset", path });
+      });
+      parts.marks = element("span", { class: "marks", "aria-hidden": "true" });
+      line.append(element("span", { class: "track" }, parts.marks, parts.slider));
     }
-    if (!words) line.append(parts.other);
+    if (!words && !suggestions.length) line.append(parts.other);
     if (choices.length) {
       parts.field = element("select", { id, "aria-describedby": mistake.id }, ...choices.map((choice) => element("option", {}, choice)));
       parts.field.addEventListener("change", () => this.edit(path, parts));
       line.append(parts.field, element("span", { class: "unit" }));
     } else {
-      parts.field = element("input", { id, type: "text", spellcheck: "false", autocomplete: "off", "aria-describedby": mistake.id });
+      const list = suggestions.length ? `${id}-words` : null;
+      parts.field = element("input", { id, type: "text", spellcheck: "false", autocomplete: "off", list, "aria-describedby": mistake.id });
       this.listen(path, parts);
       line.append(parts.field);
+      if (list) line.append(element("datalist", { id: list }, ...suggestions.map((value) => element("option", { value }))));
       if (!words) line.append(element("span", { class: "unit" }, unit));
     }
     this.rows.set(path, parts);
@@ -49,7 +74,10 @@ export class Controls {
   listen(path, parts) {
     const { field } = parts;
     field.addEventListener("focus", () => field.select());
-    field.addEventListener("input", () => (parts.typing = true));
+    field.addEventListener("input", () => {
+      parts.typing = true;
+      field.dataset.writing = "";
+    });
     field.addEventListener("change", () => this.edit(path, parts));
     // what was typed and taken back by hand is no change to the browser: the field follows the drive again
     field.addEventListener("blur", () => this.leave(parts));
@@ -64,11 +92,13 @@ export class Controls {
   }
 
   leave(parts) {
+    delete parts.field.dataset.writing;
     if (parts.typing && !parts.refused) parts.field.value = parts.text ?? "";
     parts.typing = false;
   }
 
   edit(path, parts) {
+    delete parts.field.dataset.writing;
     parts.typing = false;
     parts.asked = this.say({ what: "edit", path, text: parts.field.value });
   }
@@ -98,6 +128,19 @@ export class Controls {
     parts.share = share;
   }
 
+  // where the value was when the drive was loaded, or the default and tuned values of a strategy
+  mark(parts, marks) {
+    const key = JSON.stringify(marks);
+    if (parts.marked === key) return;
+    parts.marked = key;
+    parts.marks.replaceChildren(...marks.map(([position, meaning], index) => {
+      const tick = element("i", { class: index ? "tuned" : "", title: meaning });
+      tick.style.setProperty("--share", position / STEPS);
+      return tick;
+    }));
+    parts.slider.title = [...marks.map(([, meaning]) => meaning), "double click or Delete: back to the first of these"].join("; ");
+  }
+
   // `stamp` is that of the last thing the server had taken in when it sent this
   show(fields, mistakes, stamp) {
     this.stamp = stamp;
@@ -105,7 +148,7 @@ export class Controls {
       if (parts.asked > stamp) continue; // it does not know yet what was written here
       const answered = parts.asked >= 0;
       parts.asked = -1;
-      const [text, position, other] = fields[path] ?? ["", null, ""];
+      const [text, position, other, marks] = fields[path] ?? ["", null, "", []];
       const sentence = mistakes[path] ?? "";
       const { field, slider } = parts;
       if (parts.sentence !== sentence) {
@@ -131,6 +174,8 @@ export class Controls {
         parts.other.textContent = other;
         parts.other.title = other;
       }
+      parts.line.classList.toggle("changed", other === "changed");
+      if (slider) this.mark(parts, marks);
       this.put(parts);
     }
   }

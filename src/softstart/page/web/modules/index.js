@@ -3,10 +3,11 @@ import { Controls } from "./controls.js";
 import { Figure } from "./figure.js";
 import { GapMap } from "./map.js";
 import { Plots, unpack } from "./plots.js";
+import { Steps } from "./steps.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
 
-const KEPT = "softstart-drive";
+const KEPT = "softstart-bench";
 
 export class Instrument {
   constructor(root, groups, send) {
@@ -18,7 +19,8 @@ export class Instrument {
     this.waiting = 0;
     const say = (message) => this.say(message);
     this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
-    this.controls = new Controls(root.querySelector(".controls"), groups, say);
+    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), groups, say);
+    this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"));
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);
     this.plots = new Plots(root.querySelector(".plots"), this.theme);
@@ -33,14 +35,17 @@ export class Instrument {
     try {
       kept = JSON.parse(sessionStorage.getItem(KEPT));
     } catch {
-      // a browser that keeps nothing begins with the drive of the server
+      // a browser that keeps nothing begins with the address, or with the drive of the server
     }
-    this.say({ what: "hello", kept });
+    this.say({ what: "hello", kept, link: location.hash.slice(1) });
+    window.addEventListener("hashchange", (this.followed = () => this.say({ what: "hello", kept: null, link: location.hash.slice(1) })));
   }
 
-  keep(drive) {
+  // in this tab, and in its address: a copied address brings back the same drive, strategies and settings
+  keep(bench) {
+    history.replaceState(history.state, "", `#${bench.link}`);
     try {
-      sessionStorage.setItem(KEPT, JSON.stringify(drive));
+      sessionStorage.setItem(KEPT, JSON.stringify(bench));
     } catch {
       // see above
     }
@@ -60,10 +65,13 @@ export class Instrument {
       const known = new Set(frame.order);
       for (const name of state.rows.keys()) if (!known.has(name)) state.rows.delete(name);
       for (const name of state.traces.keys()) if (!known.has(name)) state.traces.delete(name);
-      Object.assign(state, { order: frame.order, shown: frame.shown, added: frame.added, selected: frame.selected });
+      const { order, shown, added, changed, selected } = frame;
+      Object.assign(state, { order, shown, added, changed, selected });
       state.stamp = frame.stamp;
       state.here = frame.here;
       state.fields = frame.fields;
+      this.steps.show(frame.steps);
+      if (frame.strategy) this.controls.strategy(frame.strategy);
     }
     for (const row of frame.rows ?? []) state.rows.set(row.name, { ...state.rows.get(row.name), ...row });
     for (const [name, packed] of Object.entries(frame.traces ?? {})) {
@@ -131,5 +139,7 @@ export class Instrument {
     this.ended = true;
     this.resized.disconnect();
     this.theme.end();
+    this.steps.end();
+    window.removeEventListener("hashchange", this.followed);
   }
 }

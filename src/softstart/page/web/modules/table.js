@@ -52,6 +52,7 @@ export class Table {
         if (line.radio.checked !== selected) line.radio.checked = selected;
       }
       line.out.hidden = !state.added.includes(name);
+      line.changed.hidden = !state.changed.includes(name);
       if (line.asked <= state.stamp) line.asked = -1; // the server knows what was pressed last
       if (line.asked < 0) line.eye.checked = state.shown.includes(name);
       line.tr.style.setProperty("--colour", this.theme.strategy(state.order.indexOf(name)));
@@ -102,7 +103,8 @@ export class Table {
     const bar = element("td", { class: "bar", "aria-hidden": "true" });
     const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
     out.addEventListener("click", () => this.say({ what: "remove", name }));
-    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), out));
+    const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
+    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), changed, out));
     const tr = element("tr", { "data-name": name }, element("td", { class: "eye" }, eye), title, ...cells, bar);
     const select = () => {
       radio.checked = true;
@@ -112,7 +114,7 @@ export class Table {
     tr.addEventListener("click", (event) => {
       if (!event.target.closest("input, label, button")) select();
     });
-    const line = { tr, eye, radio, cells, bar, out, asked: -1 };
+    const line = { tr, eye, radio, cells, bar, out, changed, asked: -1 };
     eye.addEventListener("change", () => (line.asked = this.say({ what: "show", name, visible: eye.checked })));
     return line;
   }

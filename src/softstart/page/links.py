@@ -1,0 +1,116 @@
+"""A bench in the address of the page, so that a link brings back the same picture; and those in memory.
+
+A link holds the drive, the parameters of installed strategies, and what is selected and drawn. Tuned gains
+and profiles come from files and are not part of it; the server keeps them for a tab that is loaded anew.
+"""
+
+from __future__ import annotations
+
+import binascii
+import json
+import zlib
+from base64 import urlsafe_b64decode, urlsafe_b64encode
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from softstart.controller.base import Controller
+from softstart.controller.finding import controller_names, make_controller
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.page.session import Bench, Session
+
+MOST_KEPT = 64  # benches of tabs that may be loaded anew
+LONGEST = 16_384  # letters of a link
+LARGEST = 65_536  # bytes that it may hold
+
+_kept: OrderedDict[str, Bench] = OrderedDict()
+
+
+def keep(session: Session) -> str:
+    """Keep the bench of a session; the name under which `kept` finds it."""
+    name = session.name
+    _kept[name] = session.bench
+    _kept.move_to_end(name)
+    while len(_kept) > MOST_KEPT:
+        _kept.popitem(last=False)
+    return name
+
+
+def kept(name: str) -> Bench | None:
+    """A bench that was kept, if it still is."""
+    return _kept.get(name)
+
+
+def link_of(session: Session) -> str:
+    """What follows # in the address.
+
+    >>> session = Session()
+    >>> session.select("ramp")
+    >>> session.set_parameter("time", "200 ms")
+    >>> session.set("gap", 1.0)
+    >>> other = bench_of(link_of(session), Session().bench)
+    >>> other.drive.gap, other.selected, other.controllers["ramp"].time
+    (1.0, 'ramp', 0.2)
+    """
+    bench, installed = session.bench, controller_names()
+    content = {
+        "drive": bench.drive.to_toml(),
+        "origin": bench.origin.to_toml() if bench.origin is not bench.drive else "",
+        "parameters": {name: given for name, controller in bench.controllers.items()
+                       if name in installed and (given := _given(controller))},
+        "selected": bench.selected,
+        "drawn": sorted(bench.drawn),
+    }  # fmt: skip
+    packed = zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 9)
+    return urlsafe_b64encode(packed).decode("ascii").rstrip("=")
+
+
+def _given(controller: Controller) -> dict[str, Any]:
+    values = {one.name: getattr(controller, one.name) for one in fields(controller)}
+    return {name: value for name, value in values.items() if isinstance(value, str | int | float)}
+
+
+def bench_of(link: str, now: Bench) -> Bench:
+    """The bench of a link; the strategies that it does not name are those of `now`.
+
+    >>> bench_of("nonsense", Session().bench)
+    Traceback (most recent call last):
+    softstart.errors.InputError: the address after #: this is no bench that softstart has written; ...
+    """
+    try:
+        content = _content(link)
+        drive = Drive.from_toml(content["drive"])
+        origin = Drive.from_toml(content["origin"]) if content["origin"] else drive
+        parameters = content["parameters"]
+        given = {name: parameters[name] for name in now.controllers if name in parameters}
+        selected, drawn = content["selected"], frozenset(map(str, content["drawn"]))
+    except (KeyError, TypeError, ValueError, binascii.Error, zlib.error):
+        raise InputError(
+            "the address after #: this is no bench that softstart has written; copy the whole link again, "
+            "or delete what follows the #."
+        ) from None
+    if drive.shape != () or origin.shape != ():
+        raise InputError("the address after #: it holds several drives, and the page starts one.")
+    made = {name: make_controller(name, values) for name, values in given.items()}
+    return Bench(
+        drive,
+        origin,
+        {**now.controllers, **made},
+        selected if selected in now.controllers else now.selected,
+        drawn & set(now.controllers),
+    )
+
+
+def _content(link: str) -> Mapping[str, Any]:
+    if len(link) > LONGEST:
+        raise ValueError
+    unpacking = zlib.decompressobj()
+    text = unpacking.decompress(urlsafe_b64decode(link + "=" * (-len(link) % 4)), LARGEST)
+    if unpacking.unconsumed_tail:
+        raise ValueError
+    content = json.loads(text)
+    if not isinstance(content, dict):
+        raise TypeError
+    return content
