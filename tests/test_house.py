@@ -24,7 +24,7 @@ BUDGET = {
     "chain": (4620, 14, 2, 0),
     "cli": (4300, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too
     "clutch": (2380, 10, 5, 0),
-    "controller": (1190, 5, 0, 0),  # texts with choices; other parameters of a controller that stands
+    "controller": (1200, 5, 0, 0),  # texts with choices; other parameters of a controller that stands
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     "drive": (1040, 5, 1, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
