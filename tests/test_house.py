@@ -22,26 +22,29 @@ BUDGET = {
     "(top)": (2600, 11, 0, 0),
     "balancing": (2020, 7, 0, 0),
     "chain": (4620, 14, 2, 0),
-    "cli": (4300, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too
+    "cli": (4430, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     "controller": (1200, 5, 0, 0),  # texts with choices; other parameters of a controller that stands
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
-    "drive": (1040, 5, 1, 0),
+    # 30 lines: S-N curves
+    "drive": (1070, 5, 1, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
     "linear": (2120, 8, 1, 0),
     "optimal": (8420, 27, 6, 0),  # ends before the bound; points of a limit curve share starts and bounds
     "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
-    # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits
-    "plant": (2460, 15, 2, 0),
+    # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
+    # 50: turning points
+    "plant": (2530, 15, 2, 0),
     "reporting": (2980, 12, 3, 0),
     "stages": (680, 6, 1, 0),
-    "start": (1580, 8, 0, 0),  # the worst of several positions, release of a brake, torque cut off
+    # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`
+    "start": (2100, 9, 1, 0),
     "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
     "tuning": (2320, 10, 1, 0),
-    # small cells beside a large one; where a start begins, torque cut off, in words
-    "views": (4270, 16, 5, 0),
+    # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
+    "views": (4460, 17, 6, 0),
 }
 
 

@@ -40,6 +40,8 @@ from softstart.reporting.result import Report as Report
 from softstart.reporting.result import report as report
 from softstart.start.comparison import Comparison as Comparison
 from softstart.start.comparison import compare as compare
+from softstart.start.fatigue import Fatigue as Fatigue
+from softstart.start.fatigue import fatigue as fatigue
 from softstart.start.run import Run as Run
 from softstart.start.simulation import simulate as simulate
 from softstart.start.status import Status as Status

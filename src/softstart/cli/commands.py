@@ -18,6 +18,10 @@ from softstart.plugins import CONTROLLERS, registered
 COMMANDS = {
     "compare": ("starts", "Start a drive under several controllers and compare them."),
     "simulate": ("starts", "Start a drive once under one controller."),
+    "fatigue": (
+        "starts",
+        "Find how long the shaft line lasts under each controller: rainflow cycles, life, impacts.",
+    ),
     "optimize": (
         "optimize",
         "Find the torque profile with the least K_dyn for a start time, and prove how good it is.",

@@ -1,4 +1,4 @@
-"""`softstart compare` and `softstart simulate`: strategies side by side, and one start in detail."""
+"""`softstart compare`, `simulate` and `fatigue`: strategies side by side, one start in detail, lives."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ from softstart.cli.options import (
     until_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
+from softstart.errors import InputError
 from softstart.late import late
+from softstart.quantities import to_si, whole_number
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
@@ -52,9 +54,10 @@ if TYPE_CHECKING:
     from softstart.drive import Drive
     from softstart.start.comparison import Comparison
     from softstart.start.run import Run
+    from softstart.views import fatigue as lives
     from softstart.views import starts
 else:
-    starts = late("softstart.views.starts")
+    starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 
@@ -217,3 +220,105 @@ def _show_start(to: Console, run: Run, fitted_to: Drive | None) -> None:
 
 def _value(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@click.command(cls=Command)
+@drive_argument(default=DEFAULT_DRIVE)
+@controller_option(
+    "--controllers",
+    "A,B,...",
+    "Controllers, with commas between. By default all installed ones that need no parameter.",
+)
+@set_option
+@fitted_to_option
+@param_option(
+    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
+)
+@click.option(
+    "--slope",
+    metavar="M",
+    help="Slope of the S-N curve instead of limits.fatigue.slope. By default 6.6: pitting of hardened gears.",
+)
+@click.option(
+    "--worn-gap",
+    metavar="GAP",
+    help="Gap at the end of limits.life, as '2 rad': it grows in proportion to time, and damage adds up.",
+)
+@click.option(
+    "--estimate-damping",
+    metavar="gears=N,couplings=N",
+    help="For a drive without damping: a ratio of 1 % a pair of gears and 0.5 % a coupling, at most 6 %.",
+)
+@json_option
+@out_option("Write the figure (SVG, PNG), cycles and turning points (CSV) and report.md into this folder.")
+def fatigue(
+    *,
+    drive: str,
+    controllers: str | None,
+    settings: tuple[str, ...],
+    fitted_to: str | None,
+    params: tuple[str, ...],
+    slope: str | None,
+    worn_gap: str | None,
+    estimate_damping: str | None,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Find how long the shaft line lasts under each controller: rainflow cycles, life, impacts.
+
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. Its tables [limits] and [limits.fatigue] give the S-N curve, the starts per
+    hour and the life asked for; without them lives are compared with that of direct. A drive needs damping.
+    """
+    mistakes = Mistakes()
+    names: Sequence[str] = controller_names()
+    with mistakes.noted():
+        one = read_drive(drive, settings)
+    with mistakes.noted():
+        names = read_names(controllers) or names
+    with mistakes.noted():
+        given = read_params_of(params, names)
+    with mistakes.noted():
+        nominal = read_fitted_to(fitted_to)
+    with mistakes.noted():
+        m = None if slope is None else float(to_si(slope, "1", name="--slope"))
+    with mistakes.noted():
+        estimate = None if estimate_damping is None else _read_numbers(estimate_damping)
+    mistakes.settle()
+
+    with output_folder(out) as folder:
+        with working("starting the drive ..."):
+            made = make_controllers(names if controllers is not None else None, given, prefix=True)
+            with Attributed():
+                runs = [softstart.simulate(one, controller, fitted_to=nominal) for controller in made]
+                found = softstart.fatigue(
+                    runs, slope=m, worn_gap=worn_gap, estimate_damping=estimate, fitted_to=nominal
+                )
+        if folder is not None:
+            with working("drawing the figure ..."):
+                lives.write_fatigue(found, folder, command_line(), nominal)
+
+    if as_json:
+        print_json(found.summary())
+        return
+    to, rows = console(), list(found.rows)
+    if controllers is None:
+        rows.sort(key=lambda row: -row.relative)
+    print_lines(to, drive_lines(found.drive, nominal))
+    to.print()
+    print_table(to, lives.fatigue_table(found, rows))
+    print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
+    if out is not None:
+        print(f"\nWritten to {out}: report.md, figure, cycles and turning points.")
+
+
+def _read_numbers(text: str) -> dict[str, int]:
+    """The `name=number` pairs of --estimate-damping.
+
+    >>> _read_numbers("gears=3,couplings=2")
+    {'gears': 3, 'couplings': 2}
+    """
+    pairs = [part.partition("=") for part in text.split(",")]
+    if not all(name.strip() in {"gears", "couplings"} and number.strip() for name, _, number in pairs):
+        raise InputError(f'--estimate-damping = "{text}": write gears=N,couplings=N, as gears=3,couplings=2.')
+    return {name.strip(): whole_number(number.strip(), "--estimate-damping", 0) for name, _, number in pairs}

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from softstart.drive.limits import LIMIT_TABLES, Fatigue, Limits
+from softstart.drive.limits import LIMIT_TABLES, Limits, SNCurve
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
@@ -19,6 +19,14 @@ from softstart.drive.model import (
 )  # fmt: skip
 
 __all__ = [
-    "LIMIT_TABLES", "PARAMETERS", "TABLES", "UNKNOWN_POSITIONS", "ContactLaw", "Drive", "Fatigue", "Limits",
-    "LoadKind", "library",
+    "LIMIT_TABLES",
+    "PARAMETERS",
+    "TABLES",
+    "UNKNOWN_POSITIONS",
+    "ContactLaw",
+    "Drive",
+    "Limits",
+    "LoadKind",
+    "SNCurve",
+    "library",
 ]  # fmt: skip

@@ -8,17 +8,21 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softstart.input.parameters import Parameter, Wording
 
-__all__ = ["LIMIT_TABLES", "Fatigue", "Limits", "contradicting_limits", "limits_of"]
+__all__ = ["LIMIT_TABLES", "Limits", "SNCurve", "contradicting_limits", "limits_of"]
 
 LIMIT_TABLES = ("limits", "limits.fatigue")  # what stands there changes no start
 
 
 @dataclass(frozen=True)
-class Fatigue:
-    """How many cycles of a torque the shaft line withstands.
+class SNCurve:
+    """How many cycles of a torque the shaft line withstands; a cycle goes from 0 to the torque and back.
+
+    Between the points the curve is straight in logarithms; beyond them it goes on, so that small cycles
+    count as well (Miner's rule in its elementary form).
 
     Attributes
     ----------
@@ -28,10 +32,38 @@ class Fatigue:
         Torque, N m at the motor shaft, and cycles to failure: the reference of the curve with `slope`, or
         two and more points of an S-N curve, the largest torque first. Empty where only the slope is known,
         so that lives can be compared but not computed.
+
+    Examples
+    --------
+    >>> curve = SNCurve(None, ((200.0, 1e4), (100.0, 1e6)))
+    >>> [round(float(n)) for n in curve.cycles([200.0, 100.0, 50.0])], round(float(curve.torque(1e5)), 3)
+    ([10000, 1000000, 100000000], 141.421)
     """
 
     slope: float | None
     points: tuple[tuple[float, float], ...] = ()
+
+    def cycles(self, torque: ArrayLike) -> NDArray[np.float64]:
+        """Cycles of this torque to failure; without points those beside one cycle of 1 N m."""
+        log_torque, log_cycles, slopes = self._lines()
+        with np.errstate(divide="ignore"):
+            log = np.log(np.asarray(torque, dtype=np.float64))
+        piece = np.searchsorted(-log_torque[1:-1], -log)
+        return np.exp(log_cycles[piece] - slopes[piece] * (log - log_torque[piece]))
+
+    def torque(self, cycles: ArrayLike) -> NDArray[np.float64]:
+        """The torque of which so many cycles lead to failure, N m."""
+        log_torque, log_cycles, slopes = self._lines()
+        log = np.log(np.asarray(cycles, dtype=np.float64))
+        piece = np.searchsorted(log_cycles[1:-1], log)
+        return np.exp(log_torque[piece] - (log - log_cycles[piece]) / slopes[piece])
+
+    def _lines(self) -> tuple[NDArray[np.float64], ...]:
+        """Logarithms of the points, the largest torque first, and the slope from each to the next."""
+        log_torque, log_cycles = np.log(np.array(self.points or ((1.0, 1.0),))).T
+        if self.slope is not None:
+            return log_torque, log_cycles, np.array([self.slope])
+        return log_torque, log_cycles, np.diff(log_cycles) / -np.diff(log_torque)
 
 
 @dataclass(frozen=True)
@@ -48,7 +80,7 @@ class Limits:
         Starts in each hour of `life`.
     life : float or None
         Time that the shaft line must last, s.
-    fatigue : Fatigue or None
+    fatigue : SNCurve or None
         What it withstands.
     """
 
@@ -56,7 +88,7 @@ class Limits:
     start_time: float | None = None
     starts_per_hour: float | None = None
     life: float | None = None
-    fatigue: Fatigue | None = None
+    fatigue: SNCurve | None = None
 
     @property
     def starts(self) -> float | None:
@@ -78,7 +110,7 @@ def limits_of(values: Mapping[str, Any]) -> Limits:
     """The limits among the values of a drive."""
     slope, torques, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
     points = tuple(sorted(zip(torques or (), cycles or (), strict=True), reverse=True))
-    fatigue = Fatigue(slope, points) if slope is not None or points else None
+    fatigue = SNCurve(slope, points) if slope is not None or points else None
     return Limits(
         values.get("permissible_torque"), values.get("permissible_start_time"),
         values.get("starts_per_hour"), values.get("required_life"), fatigue,

@@ -25,6 +25,34 @@ def keep_peak(x: State, torque: float, time: float) -> None:
 
 
 @inlined
+def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s: float) -> float:
+    """The first extreme of T in (begin, s) of a contact; z, v are those at `begin`, 0 or an extreme.
+
+    Negative without one, below -1 if it cannot be located.
+    """
+    k = m.k
+    dd = m.dd
+    at = 0.0
+    for _ in range(2):  # once more, with its signs, if the search by terms takes over within this one
+        by_terms = m.by_terms
+        if by_terms != 0.0:  # k v and dd a may cancel to their last digits
+            f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
+            slope = bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
+        else:
+            a, jerk, _ = derivatives(m, begin, z, v, forcing_tail(m, begin))
+            slope = k * v + dd * a
+            bend = k * a + dd * jerk
+            if begin > 0.0:  # an extreme: T' changes sign here
+                slope = bend
+        sign = 1.0 if slope > 0.0 or (slope == 0.0 and bend > 0.0) else -1.0
+        start = RISING if begin > 0.0 else WATCH
+        at = first_crossing(m, 0.0, 0.0, sign * k, sign * dd, 0.0, load, start, begin, s)
+        if m.by_terms == by_terms:
+            break
+    return at
+
+
+@inlined
 def note_peak(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> int:
     """Locate the extremes of T within the span that ends at s; nothing is read off a grid."""
     side = x.side
@@ -52,26 +80,10 @@ def note_peak(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> int:
         return ASK
     begin = 0.0
     z, v = m.z0, m.v0
-    by_terms = m.by_terms
     while True:
-        if by_terms != 0.0:  # k v and dd a may cancel to their last digits
-            f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
-            slope = bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
-        else:
-            a, jerk, _ = derivatives(m, begin, z, v, forcing_tail(m, begin))
-            slope = k * v + dd * a
-            bend = k * a + dd * jerk
-            if begin > 0.0:  # an extreme: T' changes sign here
-                slope = bend
-        sign = 1.0 if slope > 0.0 or (slope == 0.0 and bend > 0.0) else -1.0
-        start = RISING if begin > 0.0 else WATCH
-        at = first_crossing(m, 0.0, 0.0, sign * k, sign * dd, 0.0, load, start, begin, s)
+        at = next_extreme(m, load, begin, z, v, s)
         if at < -1.0:
             return NOT_LOCATED
-        if m.by_terms != by_terms:  # it took over within this search: once more, with its signs
-            by_terms = m.by_terms
-            begin = 0.0
-            continue
         if at < 0.0 or at <= begin:
             break
         z, v = motion(m, at)

@@ -11,11 +11,12 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
 DEFAULT_DRIVE = "crane-4amtkf"
-REFERENCE = "direct"  # the strategy whose start time the others are compared with
+REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
 

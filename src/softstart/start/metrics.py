@@ -42,6 +42,7 @@ class Recorded(Protocol):
     def states_in(self, segment: NDArray[np.int64], times: Vector) -> dict[str, Vector]: ...
 
 
+REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
 # settling is looked for at this many points an elastic period, then located
 POINTS_PER_PERIOD = 64
 # Gauss-Legendre on pieces of at most an eighth of the elastic period: 2e-14 of the swing and better

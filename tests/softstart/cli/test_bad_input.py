@@ -14,8 +14,8 @@ ONE_SENTENCE = {
     "command unlike any": (
         ["zzzzzz"],
         [
-            "there are compare, simulate, optimize, pareto, tune, sweep, linear, reduce, clutch, balance, "
-            "report, serve, drives, controllers, study and completion"
+            "there are compare, simulate, fatigue, optimize, pareto, tune, sweep, linear, reduce, clutch, "
+            "balance, report, serve, drives, controllers, study and completion"
         ],
     ),
     "command by its subject": (["chain"], ['"chain"', "did you mean softstart reduce?"]),

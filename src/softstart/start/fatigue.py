@@ -1,0 +1,517 @@
+"""How long a shaft line lasts that is started so: cycles of the shaft torque, their damage, and impacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.arrays import Matrix, Vector
+from softstart.drive import Drive, SNCurve
+from softstart.errors import InputError, SimulationError
+from softstart.late import late
+from softstart.plant import layout as at
+from softstart.plant import record
+from softstart.quantities import to_si
+from softstart.start.metrics import REFERENCE, base_torque
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
+
+if TYPE_CHECKING:
+    import rainflow
+else:
+    rainflow = late("rainflow")
+
+views = late("softstart.views.fatigue")  # above this module; see softstart.late
+
+# pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
+DEFAULT_SLOPE = 6.6
+# reversals by no more than this share of the mean torque are rounding
+STILL = 1e-9
+# gaps at which a start is computed over wear
+GAPS = 33
+HOURS_PER_YEAR = 8766.0
+# a damping ratio where none is known, see `estimated_ratio`
+RATIO_OF_A_GEAR, RATIO_OF_A_COUPLING, LARGEST_RATIO = 0.01, 0.005, 0.06
+
+
+@dataclass(frozen=True, eq=False)
+class Life:
+    """What one start does to the shaft line, and how often it can be repeated.
+
+    Attributes
+    ----------
+    run : Run
+        The start; of an unknown position the one that does most damage.
+    turning_points : array of shape (n, 2)
+        Time, s, and shaft torque, N m, at the reversals of the shaft torque and at both ends, located.
+    spectrum : array of shape (k, 3)
+        Range and mean, N m, and number of the rainflow cycles of one start, the largest first.
+    equivalent_torque : float
+        Damage-equivalent torque, N m: one cycle of it from 0 and back in each start does the same damage.
+    relative : float
+        Life over that of `direct`.
+    relative_range : tuple of float
+        The same with half and with twice the damping ratio, where that is estimated; else empty.
+    starts : float
+        Starts to failure; NaN without points of the S-N curve.
+    hours : float
+        Time of operation to failure at the starts per hour, h; NaN where one of the two is missing.
+    impacts : int
+        How often the flanks met at a speed.
+    impact_energy : float
+        Kinetic energy of the relative motion at all impacts together, J, 1/2 J1 J2/(J1 + J2) v^2 each: what a
+        rigid contact without rebound would lose.
+    worn_relative, worn_hours : float
+        Life over that of `direct`, and hours to failure, while the gap grows; NaN where no wear is asked for.
+    wear_error : float
+        How much the damage over wear, a share of it, changes with half the number of gaps.
+    """
+
+    run: Run
+    turning_points: Matrix
+    spectrum: Matrix
+    equivalent_torque: float
+    relative: float
+    starts: float
+    hours: float
+    impacts: int
+    impact_energy: float
+    relative_range: tuple[float, ...] = ()
+    worn_relative: float = math.nan
+    worn_hours: float = math.nan
+    wear_error: float = math.nan
+
+    @property
+    def years(self) -> float:
+        """`hours` in years of 8766 h."""
+        return self.hours / HOURS_PER_YEAR
+
+    @property
+    def worn_years(self) -> float:
+        """`worn_hours` in years of 8766 h."""
+        return self.worn_hours / HOURS_PER_YEAR
+
+    def summary(self) -> dict[str, Any]:
+        """The figures under the names used everywhere."""
+        wear = {"worn_relative": self.worn_relative, "worn_hours": self.worn_hours}
+        return {
+            "controller": self.run.controller_name,
+            "position": self.run.position,
+            "k_dyn": self.run.k_dyn,
+            "start_time": self.run.start_time,
+            "equivalent_torque": self.equivalent_torque,
+            "relative_life": self.relative,
+            **({"relative_life_range": self.relative_range} if self.relative_range else {}),
+            "starts_to_failure": self.starts,
+            "hours": self.hours,
+            "years": self.years,
+            "cycles": float(self.spectrum[:, 2].sum()),
+            "impacts": self.impacts,
+            "impact_energy": self.impact_energy,
+            **({} if math.isnan(self.worn_relative) else {**wear, "wear_error": self.wear_error}),
+            "spectrum": [
+                dict(zip(("range", "mean", "count"), row.tolist(), strict=True)) for row in self.spectrum
+            ],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Fatigue:
+    """Lives of a shaft line under several strategies. It is returned by `fatigue`.
+
+    Attributes
+    ----------
+    drive : Drive
+        The drive that is started, with the damping that was estimated if so.
+    curve : SNCurve
+        The S-N curve: slope m, and points if there are any.
+    rows : tuple of Life
+        One for each run, in the order given.
+    slope_given : bool
+        Whether the S-N curve is the user's; else the slope is that of case-hardened gears.
+    damping_ratio : float
+        d/(2 J Omega) with J = J1 J2/(J1 + J2).
+    estimate : mapping of str to int
+        Numbers of gears and couplings from which the damping ratio is estimated; empty if it is given.
+    worn_gap : float
+        The gap at the end of the life asked for, rad; NaN where no wear is asked for.
+
+    Examples
+    --------
+    >>> from softstart import Drive, fatigue, simulate
+    >>> drive = Drive.load("crane-4amtkf").replace(damping=1.0)
+    >>> lives = fatigue([simulate(drive, name) for name in ("direct", "s-curve")])
+    >>> [round(row.relative) for row in lives.rows]
+    [1, 101]
+
+    References
+    ----------
+    Rainflow counting: ASTM E1049; docs/fatigue.md.
+    """
+
+    drive: Drive
+    curve: SNCurve
+    rows: tuple[Life, ...]
+    slope_given: bool
+    damping_ratio: float
+    estimate: Mapping[str, int]
+    worn_gap: float
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON."""
+        return {
+            "drive": self.drive.name,
+            "slope": self.curve.slope,
+            "points": [list(point) for point in self.curve.points],
+            "slope_given": self.slope_given,
+            "damping": self.drive.damping,
+            "damping_ratio": self.damping_ratio,
+            "damping_estimated_from": dict(self.estimate) or None,
+            "starts_per_hour": self.drive.limits.starts_per_hour,
+            "gap": self.drive.gap,
+            "worn_gap": self.worn_gap,
+            "strategies": [row.summary() for row in self.rows],
+        }
+
+    def plot(self) -> Any:
+        """Ranges of the cycles over how many there are, for each strategy."""
+        return views.fatigue_figure(self)
+
+
+def fatigue(
+    runs: Run | Sequence[Run],
+    *,
+    slope: float | None = None,
+    worn_gap: float | str | None = None,
+    estimate_damping: Mapping[str, int] | None = None,
+    fitted_to: Drive | None = None,
+) -> Fatigue:
+    """How long the shaft line lasts under these starts, beside `direct`.
+
+    The turning points of the shaft torque are located in the closed forms, without samples. A start is
+    repeated: behind its end the torque goes back to that of its beginning, so that rainflow counting leaves
+    whole cycles only. Miner's rule adds their damage. S-N curve, starts per hour and the life asked for are
+    `drive.limits`, the tables `[limits]` and `[limits.fatigue]` of the drive file.
+
+    Parameters
+    ----------
+    runs : Run or sequence of Run
+        Starts of one drive.
+    slope : float, optional
+        Slope m of the S-N curve instead of that of `drive.limits.fatigue`. Without either it is 6.6, pitting
+        of case-hardened gears after ISO 6336-2.
+    worn_gap : float or str, optional
+        Gap at the end of the life asked for, rad or with a unit: it grows in proportion to time from that
+        of the drive, and stays from then on. The controllers stay as they were set up.
+    estimate_damping : mapping, optional
+        `{"gears": 3, "couplings": 2}`: for a drive without damping, a ratio of 1 % for each pair of gears and
+        0.5 % for each coupling, at most 6 %. The starts are simulated again with it.
+    fitted_to : Drive, optional
+        The drive for which the controllers are set up, if not the one that is started.
+
+    Returns
+    -------
+    Fatigue
+        A `Life` for each run, in the order given.
+
+    Raises
+    ------
+    InputError
+        For bad input, and for a drive without damping: its rattling never ends.
+    SimulationError
+        If a start with another gap or damping cannot be finished.
+
+    Examples
+    --------
+    >>> from softstart import Drive, fatigue, simulate
+    >>> hoist = Drive.load("hoist-15kw").replace(fatigue_slope=6.6, fatigue_torque=200, fatigue_cycles=2e6)
+    >>> life, = fatigue(simulate(hoist, "direct")).rows
+    >>> life.relative, life.equivalent_torque < life.run.peak_torque, life.impacts
+    (1.0, True, 0)
+    >>> fatigue(simulate(Drive.load("crane-4amtkf"), "direct"))
+    Traceback (most recent call last):
+    softstart.errors.InputError: damping = 0: an undamped shaft line rattles without end, ...
+
+    References
+    ----------
+    ASTM E1049, rainflow counting; ISO 6336-2, life factors; H. R. Simmons, A. J. Smalley on damping of geared
+    trains, J. Eng. Gas Turbines Power 106 (1984) 946; docs/fatigue.md.
+    """
+    asked = _runs(runs)
+    estimate = _read_estimate(estimate_damping)
+    told, drive = fitted_to or asked[0].drive.assumed, asked[0].drive
+    curve, given = _curve(drive, slope)
+    gap = _read_gap(worn_gap, drive)
+    if not estimate and not drive.damping > 0.0:
+        raise InputError(
+            "damping = 0: an undamped shaft line rattles without end, and its cycles make lives out of "
+            "nothing; give shaft.damping, or have its ratio estimated from numbers of gears and couplings "
+            '(estimate_damping={"gears": 3, "couplings": 2}; --estimate-damping gears=3,couplings=2).'
+        )
+    near = [damped(drive, estimate, factor) for factor in (0.5, 2.0)] if estimate else []
+    if estimate:
+        drive = damped(drive, estimate)
+        asked = [_again(run, drive, told) for run in asked]
+    found = next((run for run in asked if run.controller_name == REFERENCE), None)
+    direct = found or simulate(drive, REFERENCE)
+
+    def life_of(run: Run) -> Life:
+        counted = worst_damage(run, curve)
+        life = _life(counted, curve, reference)
+        if near:
+            both = [worst_damage(_again(run, one, told), curve).damage for one in near]
+            life = replace(life, relative_range=tuple(map(_ratio, references, both)))
+        if worn is not None:
+            over = _over_wear(run, told, curve, gap)
+            life = replace(
+                life, worn_relative=_ratio(worn.mean, over.mean), worn_hours=over.hours, wear_error=over.error
+            )
+        return life
+
+    reference = worst_damage(direct, curve).damage
+    references = [worst_damage(simulate(one, REFERENCE), curve).damage for one in near]
+    worn = None if math.isnan(gap) else _over_wear(direct, told, curve, gap)
+    rows = tuple(map(life_of, asked))
+    return Fatigue(drive, curve, rows, given, damping_ratio(drive), estimate, gap)
+
+
+def turning_points(run: Run) -> Matrix:
+    """Times, s, and values, N m, of the shaft torque at its reversals and both ends; located, not sampled.
+
+    >>> from softstart import simulate
+    >>> points = turning_points(simulate("hoist-15kw", "direct"))
+    >>> [round(float(torque), 1) for torque in points[:2, 1]]
+    [120.0, 180.8]
+    """
+    still = STILL * abs(float(base_torque(run.base)))
+    rows = 64
+    while True:
+        points = np.zeros((rows, 2))
+        count = record.turning_points(
+            run.plant, run.segments, still, np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(4), points
+        )
+        if count == record.NOT_LOCATED:
+            raise SimulationError("An extreme of the shaft torque could not be located.")
+        if count != record.NO_ROOM:
+            return points[:count].copy()
+        rows *= 4
+
+
+def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matrix:
+    """Range, mean and count of the rainflow cycles of a history, the largest range first (ASTM E1049).
+
+    A history that is `repeated` is counted from its largest absolute value on, so that all cycles are whole.
+
+    >>> rainflow_cycles([0.0, 3.0, 1.0, 2.0, 0.0]).tolist()
+    [[3.0, 1.5, 0.5], [3.0, 1.5, 0.5], [1.0, 1.5, 1.0]]
+    >>> rainflow_cycles([0.0, 3.0, 1.0, 2.0], repeated=True).tolist()
+    [[3.0, 1.5, 1.0], [1.0, 1.5, 1.0]]
+    """
+    history = [float(one) for one in torques]
+    if repeated and history:
+        top = max(range(len(history)), key=lambda i: abs(history[i]))
+        history = history[top:] + history[: top + 1]
+    cycles = sorted((one[:3] for one in rainflow.extract_cycles(history)), reverse=True)
+    if repeated:  # the largest comes as two halves, from the top down and up to it
+        halves = [one for one in cycles if one[2] == 0.5]
+        whole = [one for one in cycles if one[2] != 0.5]
+        cycles = sorted([*whole, *((r, mean, 1.0) for r, mean, _ in halves[::2])], reverse=True)
+    return np.array(cycles, dtype=np.float64).reshape(-1, 3)
+
+
+def impacts(run: Run) -> Vector:
+    """Kinetic energy of the relative motion, J, at each instant at which the flanks meet at a speed.
+
+    >>> from softstart import simulate
+    >>> impacts(simulate("hoist-15kw", "direct")).size
+    0
+    """
+    rows, drive = run.segments, run.drive
+    meets = np.flatnonzero((rows[:-1, at.S_SIDE] == 0.0) & (rows[1:, at.S_SIDE] != 0.0)) + 1
+    # not above 0 where flanks that overlap still take hold again
+    speed = rows[meets, at.S_SIDE] * rows[meets, at.S_V]
+    inertia = np.where(rows[meets, at.S_HELD] != 0.0, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2))
+    energy: Vector = (0.5 * inertia * speed**2)[speed > 0.0]
+    return energy
+
+
+def damping_ratio(drive: Drive) -> float:
+    """Share of the critical damping: d/(2 J Omega) with J = J1 J2/(J1 + J2).
+
+    >>> from softstart import Drive
+    >>> round(damping_ratio(Drive.load("hoist-15kw")), 4)
+    0.0602
+    """
+    return float(0.5 * drive.d * (1.0 / drive.J1 + 1.0 / drive.J2) / drive.Omega)
+
+
+def estimated_ratio(gears: int, couplings: int) -> float:
+    """A damping ratio where none is known: 1 % a pair of gears, 0.5 % a coupling, at most 6 %.
+
+    A rule of this program, inside what was measured on geared trains: 1 to 6 % (Simmons and Smalley 1984).
+
+    >>> estimated_ratio(3, 2), estimated_ratio(9, 0)
+    (0.04, 0.06)
+    """
+    return min(RATIO_OF_A_GEAR * gears + RATIO_OF_A_COUPLING * couplings, LARGEST_RATIO)
+
+
+def damped(drive: Drive, estimate: Mapping[str, int], factor: float = 1.0) -> Drive:
+    """The drive with `factor` times the damping that is estimated; InputError if it has one of its own."""
+    if drive.damping > 0.0:
+        raise InputError(
+            f"estimate_damping: the drive has a damping of its own, {drive.damping:.6g} N m s/rad; leave the "
+            "estimate out, or set shaft.damping to 0."
+        )
+    ratio = factor * estimated_ratio(estimate.get("gears", 0), estimate.get("couplings", 0))
+    return drive.replace(damping=2.0 * ratio * float(drive.Omega) / float(1.0 / drive.J1 + 1.0 / drive.J2))
+
+
+# what one start does -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Damage:
+    """One start counted: its turning points, its cycles, and the share of the life that it takes."""
+
+    run: Run
+    points: Matrix
+    spectrum: Matrix
+    damage: float  # without points of the S-N curve: cycles of 1 N m beside which it counts as much
+
+
+def damage_of(run: Run, curve: SNCurve) -> Damage:
+    """The damage of one start, by Miner's rule."""
+    points = turning_points(run)
+    spectrum = rainflow_cycles(points[:, 1].tolist(), repeated=True)
+    damage = float(np.sum(spectrum[:, 2] / curve.cycles(spectrum[:, 0]))) if spectrum.size else 0.0
+    return Damage(run, points, spectrum, damage)
+
+
+def worst_damage(run: Run, curve: SNCurve) -> Damage:
+    """The same of the position that does most damage, where the start position is unknown."""
+    each = run.positions.values() or (run,)
+    return max((damage_of(one, curve) for one in each), key=lambda found: found.damage)
+
+
+def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
+    """The figures of a start that is counted, beside the damage of `direct`."""
+    damage, run = found.damage, found.run
+    energies = impacts(run)
+    torque = float(curve.torque(1.0 / damage)) if damage > 0.0 else 0.0
+    starts = (1.0 / damage if damage > 0.0 else math.inf) if curve.points else math.nan
+    rate = run.drive.limits.starts_per_hour
+    hours = starts / rate if rate is not None else math.nan
+    return Life(
+        run, found.points, found.spectrum, torque, _ratio(reference, damage), starts, hours,
+        energies.size, float(energies.sum()),
+    )  # fmt: skip
+
+
+def _ratio(reference: float, damage: float) -> float:
+    return reference / damage if damage > 0.0 else math.inf
+
+
+def _again(run: Run, drive: Drive, told: Drive) -> Run:
+    """The same start of a changed drive, its controller as it was set up."""
+    until = run.end_time if math.isnan(run.start_time) else None
+    return simulate(drive, run.controller, until, fitted_to=told, base=run.base)
+
+
+# over wear -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Worn:
+    """Damage while the gap grows: its mean in a start, hours to failure, and the error of the mean."""
+
+    mean: float
+    hours: float
+    error: float
+
+
+def _over_wear(run: Run, told: Drive, curve: SNCurve, worn_gap: float) -> _Worn:
+    """The damage while the gap grows in proportion to time, to `worn_gap` over the life asked for."""
+    drive = run.drive
+    gaps = np.linspace(float(drive.gap), worn_gap, GAPS).tolist()
+    damages = np.array([worst_damage(_again(run, drive.with_gap(one), told), curve).damage for one in gaps])
+    mean, coarse = (float(np.mean(0.5 * (d[1:] + d[:-1]))) for d in (damages, damages[::2]))
+    error = abs(coarse - mean) / mean if mean > 0.0 else 0.0
+    limits = drive.limits
+    if not curve.points or limits.starts_per_hour is None or limits.life is None:
+        return _Worn(mean, math.nan, error)
+    return _Worn(mean, _hours_to_failure(damages * limits.starts_per_hour, limits.life / 3600.0), error)
+
+
+def _hours_to_failure(rates: Vector, hours: float) -> float:
+    """When the sum of the damage reaches 1, for rates in 1/h, straight between even instants up to `hours`.
+
+    >>> _hours_to_failure(np.array([0.0, 0.1]), 10.0), _hours_to_failure(np.array([0.0, 0.4]), 10.0)
+    (15.0, 7.0710678...)
+    """
+    step = hours / (rates.size - 1)
+    sums = np.concatenate([[0.0], np.cumsum(0.5 * step * (rates[1:] + rates[:-1]))])
+    if sums[-1] < 1.0:
+        return float(hours + (1.0 - sums[-1]) / rates[-1]) if rates[-1] > 0.0 else math.inf
+    i = int(np.searchsorted(sums, 1.0)) - 1
+    slope, rest = (rates[i + 1] - rates[i]) / step, 1.0 - sums[i]
+    return float(i * step + 2.0 * rest / (rates[i] + math.sqrt(rates[i] ** 2 + 2.0 * slope * rest)))
+
+
+# reading what is asked for -------------------------------------------------------------------------------
+
+
+def _runs(runs: object) -> list[Run]:
+    found = [runs] if isinstance(runs, Run) else list(runs) if isinstance(runs, list | tuple) else []
+    if not found or not all(isinstance(one, Run) for one in found):
+        raise InputError("runs: give one Run or several, as softstart.simulate returns them for one drive.")
+    if any(one.drive != found[0].drive for one in found):
+        raise InputError("runs: these are starts of different drives; give those of one drive.")
+    return found
+
+
+def _curve(drive: Drive, slope: float | None) -> tuple[SNCurve, bool]:
+    """The S-N curve asked for, and whether it was."""
+    own = drive.limits.fatigue
+    if slope is None:
+        return (own, True) if own is not None else (SNCurve(DEFAULT_SLOPE), False)
+    m = float(to_si(slope, "1", name="slope"))
+    if not 0.0 < m < 100.0:
+        raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
+    if own is not None and own.slope is None:
+        raise InputError("slope: the points of limits.fatigue give the slopes; leave out one of the two.")
+    return SNCurve(m, own.points if own is not None else ()), True
+
+
+def _read_gap(worn_gap: float | str | None, drive: Drive) -> float:
+    if worn_gap is None:
+        return math.nan
+    gap = float(to_si(worn_gap, "rad", name="worn_gap"))
+    if not gap > drive.gap:
+        raise InputError(
+            f"worn_gap = {worn_gap}: wear widens the gap; give one above that of the drive, "
+            f"{drive.gap:.6g} rad."
+        )
+    return gap
+
+
+def _read_estimate(given: Mapping[str, int] | None) -> dict[str, int]:
+    """Numbers of gears and couplings, checked."""
+    if given is None:
+        return {}
+    known = {"gears", "couplings"}
+    if not isinstance(given, Mapping) or not given or set(given) - known:
+        raise InputError(
+            f"estimate_damping = {given}: give numbers of gears and couplings, as "
+            '{"gears": 3, "couplings": 2}.'
+        )
+    for name, count in given.items():
+        if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= 100:
+            raise InputError(f"estimate_damping: {name} = {count}: give a whole number from 0 to 100.")
+    if not any(given.values()):
+        raise InputError("estimate_damping: without gears and couplings nothing damps; give shaft.damping.")
+    return dict(given)

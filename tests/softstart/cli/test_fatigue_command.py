@@ -1,0 +1,85 @@
+"""`softstart fatigue`: tables, JSON, files, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from softstart import Drive, fatigue, simulate
+
+ASKED = ("fatigue", "crane-4amtkf", "--controllers", "direct,s-curve", "--set", "shaft.damping=1")
+CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
+RUNS = [simulate(CRANE, name) for name in ("direct", "s-curve")]
+LIMITS = (
+    "limits.starts_per_hour=60", "limits.life=20000 h", "limits.fatigue.slope=6.6",
+    "limits.fatigue.torque=90", "limits.fatigue.cycles=2e6",
+)  # fmt: skip
+
+
+def test_json_is_the_summary(run):
+    code, out, err = run(*ASKED, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    lives = fatigue(RUNS)
+    assert [one["relative_life"] for one in told["strategies"]] == [row.relative for row in lives.rows]
+    assert told["slope"] == 6.6
+    assert not told["slope_given"]
+    assert told["damping_ratio"] == lives.damping_ratio
+    assert told["strategies"][1]["spectrum"][0]["range"] == lives.rows[1].spectrum[0, 0]
+
+
+@pytest.mark.parametrize("width", ["80", "140"])
+def test_the_table_is_shown(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", width)
+    settings = [part for one in LIMITS for part in ("--set", one)]
+    code, out, err = run(*ASKED, *settings, "--worn-gap", "2 rad")
+    assert (code, err) == (0, "")
+    text = " ".join(out.split())
+    assert "Longest life: s-curve" in text
+    assert "years" in text
+    assert "error of the sum at most" in text
+    assert "Damping ratio of the shaft: 15 %" in text
+
+
+def test_an_estimated_damping_is_marked(run):
+    given = ("fatigue", "--controllers", "direct,s-curve", "--estimate-damping", "gears=3,couplings=2")
+    code, out, err = run(*given)
+    assert (code, err) == (0, "")
+    text = " ".join(out.split())
+    assert "The damping is ESTIMATED: a ratio of 4 % from 3 gears and 2 couplings" in text
+    assert "d = 0.26226 N m s/rad" in text
+
+
+def test_files(run, place):
+    code, _, err = run(*ASKED, "--slope", "5", "--out", "lives")
+    assert (code, err) == (0, "")
+    folder = place / "lives"
+    with (folder / "spectrum-direct.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    lives = fatigue(RUNS, slope=5.0)
+    assert [float(row["range N m"]) for row in rows] == lives.rows[0].spectrum[:, 0].tolist()
+    for name in ("fatigue.svg", "fatigue.png", "fatigue.csv", "turning-points-s-curve.csv", "drive.toml"):
+        assert (folder / name).stat().st_size > 0
+    text = (folder / "report.md").read_text()
+    assert "Longest life: s-curve" in text
+    assert "m = 5" in text
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ((), "damping = 0: an undamped shaft line rattles without end"),
+        (("--estimate-damping", "teeth=3"), "write gears=N,couplings=N"),
+        (("--estimate-damping", "gears=x"), "whole number"),
+        (("--slope", "steep"), "--slope"),
+        (("--set", "shaft.damping=1", "--worn-gap", "0.1"), "wear widens the gap"),
+        (("--set", "shaft.damping=1", "--estimate-damping", "gears=3"), "a damping of its own"),
+    ],
+)
+def test_bad_input_is_one_sentence(run, more, said):
+    code, out, err = run("fatigue", "--controllers", "direct", *more)
+    assert code == 2
+    assert out == ""
+    assert said in " ".join(err.split())
