@@ -471,6 +471,8 @@ def show(value: object, *, toml: bool = False) -> str:
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9,]*")
 _POINT = re.compile(r"[0-9]\.|\.[0-9]")
+# 1.000,5 and 12.345,6 but not 0.125,2 or 1.125,2.5: a point of thousands before what may be a decimal comma
+_THOUSANDS_POINT = re.compile(r"(?<![0-9.])[1-9][0-9]{0,2}(?:\.[0-9]{3})+,[0-9]+(?![0-9]*\.[0-9])")
 
 
 def values_in(text: str, name: str = "value", *, whole: bool = False) -> list[str]:
@@ -478,7 +480,8 @@ def values_in(text: str, name: str = "value", *, whole: bool = False) -> list[st
 
     Semicolons divide values that may have decimal commas; without them commas divide values. A comma between
     digits that could as well be a decimal comma is refused, unless the list has a decimal point elsewhere or
-    is one of `whole` numbers. Raises `InputError`: a sentence that begins with `name`.
+    is one of `whole` numbers: `1,5,2.5` is 1, 5 and 2.5. A point that may divide thousands, as in `1.000,5`,
+    is no decimal point. Raises `InputError`: a sentence that begins with `name`.
 
     >>> values_in("0.25, 500 mrad"), values_in("0,25; 1"), values_in("1x,2x"), values_in("0.5,1,2")
     (['0.25', '500 mrad'], ['0.25', '1'], ['1x', '2x'], ['0.5', '1', '2'])
@@ -496,6 +499,13 @@ def values_in(text: str, name: str = "value", *, whole: bool = False) -> list[st
             merged = _with_decimal_commas(raw)
             even = len({part[:1].isspace() for part in raw[1:]}) < 2  # "1.5, 2,5" has commas of two kinds
             settled = whole or (even and _POINT.search(text) is not None)
+            thousands = _THOUSANDS_POINT.search(text)
+            if thousands and not _POINT.search(_THOUSANDS_POINT.sub("", text)):
+                one = thousands[0]
+                raise RefusedError(
+                    f'the point in "{one}" may divide thousands; write "{one.replace(",", ", ")}" for 2 '
+                    f'values, or "{one.replace(".", "").replace(",", ".")}" for 1'
+                )
             if len(merged) < len(parts) and all(parts) and not settled:
                 raise RefusedError(
                     f'a comma may divide values or decimals; write "{", ".join(parts)}" for {len(parts)} '

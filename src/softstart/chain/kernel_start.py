@@ -215,7 +215,7 @@ def advance(start: Start) -> int:
         of_gap = handle(start, event, where, press, rest, h)
         if of_gap and x.ask_on_gap != 0.0:
             x.ask_at = x.time
-        if x.events > p.event_cap:
+        if x.events > p.event_cap or x.n_segments > p.event_cap:
             return EVENT_LIMIT
 
 

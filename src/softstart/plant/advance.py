@@ -8,7 +8,7 @@ from softstart.plant.crossing import load_speed
 from softstart.plant.jit import compiled, inlined, merged
 from softstart.plant.layout import (
     ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, MOST_PENDING, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT,
-    UNSOLVED, Matrix, Motion, Plant, Septuple, State,
+    TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque
 from softstart.plant.motion import motion
@@ -170,7 +170,7 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
         if t >= stop:
             note_excess(p, x, m)
             end_stage(x, stages)
-            return ENDED
+            return ENDED if t < p.longest else TOO_LONG
         if m.pending > 0.0 and t >= m.due_time[0]:
             next_in_queue(x, m)
             continue

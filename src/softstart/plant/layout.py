@@ -88,6 +88,7 @@ class Plant:
     w2_0: float
     period: float  # 2 pi/Omega
     time_limit: float
+    longest: float  # a start that lasts so long is given up
     event_cap: float
     inv_J1: float  # derived, since divisions are slow: 1/J1
     inv_J2: float
@@ -278,7 +279,7 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED, RELEASED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 
 # why `advance` came back
-ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL = range(8)
+ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)
 
 # what a span ends with
 (

@@ -41,7 +41,7 @@ def first_state(p: Plant, x: State, until: float, events: Matrix) -> None:
     x.theta = p.theta_0
     x.v = p.w1_0 - p.w2_0
     x.w2 = p.w2_0
-    x.t_end = until
+    x.t_end = until if until == math.inf else min(until, p.longest)
     x.start_time = math.nan
     x.release_time = math.nan
     x.held = 1.0 if p.release_at > 0.0 else 0.0

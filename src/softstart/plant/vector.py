@@ -12,6 +12,7 @@ from softstart.plant import layout as at
 
 LAWS: Final = {"no-pull": at.NO_PULL, "dead-zone": at.DEAD_ZONE, "modelica": at.MODELICA}
 COUNTS_PER_LINE: Final = 4  # quadrature
+LONGEST: Final = 100_000  # elastic periods of one start
 
 
 def encoder_count(drive: Drive) -> float | at.Vector:
@@ -29,7 +30,8 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     """One row of p for each start of the drive (one row for a scalar drive).
 
     Without `time_limit` a start that never reaches its target speed is given up after a hundred times
-    the duration of a stiff drive's start plus a hundred elastic periods, counted from a brake's release.
+    the duration of a stiff drive's start plus a hundred elastic periods, counted from a brake's release. No
+    start lasts more than `LONGEST` elastic periods: its figures are integrals over each of them.
     """
     shape = drive.shape
     count = math.prod(shape)
@@ -65,7 +67,14 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     p["lag"] = np.where(lag > 1e-12 * p["period"], lag, 0.0)
     stiff = (J1 + J2) * (target + np.abs(p["w2_0"]) + np.abs(p["w1_0"])) / (Ms - Mc)
     held = np.where(p["release_at"] < math.inf, p["release_at"], 0.0)
-    p["time_limit"] = 100.0 * (stiff + p["period"]) + held if time_limit is None else time_limit
+    p["longest"] = LONGEST * p["period"]
+    if time_limit is None:
+        limit = 100.0 * (stiff + p["period"]) + held
+        # a tenth of it is more than any start takes: then it is not too long, but does not reach its target
+        ample = (limit > p["longest"]) & (0.1 * limit < p["longest"])
+        p["time_limit"] = np.where(ample, 0.999 * p["longest"], np.minimum(limit, p["longest"]))
+    else:
+        p["time_limit"] = np.minimum(time_limit, p["longest"])
     p["event_cap"] = max_events
     p["inv_J1"], p["inv_J2"], p["inv_J"] = 1.0 / J1, 1.0 / J2, 1.0 / (J1 + J2)
     p["w0sq_slip"], p["inv_w0sq"], p["w0_slip"] = w0sq, 1.0 / w0sq, np.sqrt(w0sq)

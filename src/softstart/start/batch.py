@@ -19,7 +19,7 @@ from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.start import metrics
-from softstart.start.engine import MAX_EVENTS, Recorder, run_one
+from softstart.start.engine import MAX_EVENTS, Recorder, run_one, watched
 from softstart.start.status import status_of
 
 if TYPE_CHECKING:
@@ -146,13 +146,14 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
         numbers = np.array(numbers.reshape(-1, numbers.shape[-1]), order="C")
         size = controller.state_size
         for part in _parts(p.shape[0]):
-            kernel.run_many(
-                type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
-                int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
-                results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED),
-                np.zeros(size), np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P),
-                np.zeros(numbers.shape[1]), np.zeros((0, 0)),
-            )  # fmt: skip
+            with watched(controller):
+                kernel.run_many(
+                    type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
+                    int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
+                    results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED),
+                    np.zeros(size), np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P),
+                    np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+                )  # fmt: skip
         return results
     for row, one in zip(results, p, strict=True):
         recorder = Recorder(one, int(controller.sensors), recording=False)

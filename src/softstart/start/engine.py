@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+import sys
+import threading
+import time
 import traceback
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from softstart.controller.base import CompiledController, Controller, Measured, PlainController, Sensor
+from softstart.controller.base import (
+    CompiledController,
+    Controller,
+    Measured,
+    PlainController,
+    Sensor,
+)
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.plant import layout as at
@@ -18,6 +27,45 @@ from softstart.start.status import Status, status_of
 
 MAX_EVENTS = 1_000_000  # events and control instants of one start
 FIRST_ROWS = 256
+SILENCE = 10.0  # s after which a controller that has not returned is named
+_watched: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
+_watcher: list[threading.Thread] = []
+
+
+class watched:  # noqa: N801  a context manager, used like a function
+    """Name on stderr, once, a controller that has not returned for `SILENCE`; nothing is stopped."""
+
+    __slots__ = ("name",)
+
+    def __init__(self, controller: Controller) -> None:
+        self.name = controller.name or type(controller).__name__
+
+    def __enter__(self) -> None:
+        _watched[threading.get_ident()] = time.monotonic(), self.name
+        if not (_watcher and _watcher[0].is_alive()):
+            _watcher[:] = [threading.Thread(target=_watch, name="softstart-watch", daemon=True)]
+            _watcher[0].start()
+
+    def __exit__(self, *_: object) -> None:
+        _watched.pop(threading.get_ident(), None)
+
+
+def _watch() -> None:
+    """Look at the controllers that compute, until there are none for some seconds."""
+    named: set[tuple[float, str]] = set()
+    idle = 0
+    while idle < 10:  # between two steps of a plain controller there is none
+        idle = 0 if _watched else idle + 1
+        time.sleep(0.1 if SILENCE < 1.0 else 0.5)
+        for began, name in set(_watched.values()) - named:
+            if time.monotonic() - began >= SILENCE:
+                named.add((began, name))
+                print(
+                    f"The controller {name} has not returned for {SILENCE:g} s: its step may not end. "
+                    "It goes on; Ctrl-C ends the command.",
+                    file=sys.stderr,
+                    flush=True,
+                )
 
 
 class Recorder:
@@ -85,8 +133,11 @@ def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: flo
         numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
         size = controller.state_size
         memory, command = np.zeros(size), np.zeros(kernel.NEW_STATE + size)
-        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
-            recorder.grow()
+        with watched(controller):
+            while (
+                reason := recorder.run(type(controller).kernel, numbers, memory, command)
+            ) == at.BUFFER_FULL:
+                recorder.grow()
         return reason
     if not isinstance(controller, PlainController):
         raise InputError(
@@ -112,7 +163,8 @@ def plain_answer(
 ) -> tuple[float, float, tuple[float, ...], float]:
     """What a plain controller answers: torque, when to be asked again, its state, slope."""
     try:
-        answer = controller.step(Measured(*measured.tolist()), state)
+        with watched(controller):
+            answer = controller.step(Measured(*measured.tolist()), state)
     except (Exception, SystemExit) as error:  # the user's own code may fail in any way
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(

@@ -48,6 +48,8 @@ POINTS_PER_PERIOD = 64
 # Gauss-Legendre on pieces of at most an eighth of the elastic period: 2e-14 of the swing and better
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 PIECES_PER_PERIOD = 8.0
+GRADED = 60  # more pieces than there are behind an event
+AT_ONCE = 100_000  # instants, or pieces, that are evaluated together
 
 
 def base_torque(drive: Drive) -> Any:
@@ -91,10 +93,14 @@ def settling_time(run: Recorded, band: float) -> float:
         return math.nan  # too short to be called settled
     count = max(2, math.ceil((run.end_time - begin) / period * POINTS_PER_PERIOD))
     grid = np.linspace(begin, run.end_time, count)
-    outside = np.flatnonzero(excess(grid) > 0.0)
-    if outside.size == 0:
+    for end in range(count, 0, -AT_ONCE):  # from the end: what has not settled is found at once
+        part = max(0, end - AT_ONCE)
+        outside = np.flatnonzero(excess(grid[part:end]) > 0.0)
+        if outside.size:
+            last = part + int(outside[-1])
+            break
+    else:
         return float(begin)
-    last = int(outside[-1])
     if last == count - 1 or run.end_time - grid[last + 1] < period:
         return math.nan
     if excess(grid[last + 1]) == 0.0:
@@ -131,20 +137,25 @@ def energy_balance(run: Recorded) -> Energy:
         fastest = max(fastest, float(drive.d * (1.0 / drive.J1 + 1.0 / drive.J2)))
     if drive.torque_lag > 0.0:
         fastest = max(fastest, 1.0 / float(drive.torque_lag))
-    starts, ends, owner = _pieces(rows, scale, 0.5 / fastest)
-    half = 0.5 * (ends - starts)
-    times = starts[:, None] + half[:, None] * (NODES + 1.0)
-    states = run.states_in(owner[:, None] + np.zeros(NODES.size, dtype=np.int64), times)
-    side, load = rows[owner, at.S_SIDE][:, None], rows[owner, at.S_LOAD][:, None]
-    z = np.where(side != 0.0, side * states["theta"] - 0.5 * drive.gap, 0.0)
-    spring = side * drive.c * z
-
-    def integral(power: np.ndarray) -> float:
-        return float(np.sum(half * (power @ WEIGHTS)))
-
-    motor = integral(states["u"] * states["w1"])
-    against_load = integral(load * drive.Mc * states["w2"])
-    dissipated = integral((states["T"] - spring) * states["v"])
+    work = np.zeros(3)
+    pieces = np.ceil((rows[:, at.S_END] - rows[:, at.S_START]) / scale) + GRADED
+    turn = np.cumsum(pieces) // AT_ONCE  # spans are taken in turns of so many pieces: memory is bounded
+    for part in np.split(np.arange(rows.shape[0]), np.flatnonzero(np.diff(turn)) + 1):
+        starts, ends, owner = _pieces(rows[part], scale, 0.5 / fastest)
+        owner += part[0]
+        half = 0.5 * (ends - starts)
+        times = starts[:, None] + half[:, None] * (NODES + 1.0)
+        states = run.states_in(owner[:, None] + np.zeros(NODES.size, dtype=np.int64), times)
+        side, load = rows[owner, at.S_SIDE][:, None], rows[owner, at.S_LOAD][:, None]
+        z = np.where(side != 0.0, side * states["theta"] - 0.5 * drive.gap, 0.0)
+        spring = side * drive.c * z
+        powers = (
+            states["u"] * states["w1"],
+            load * drive.Mc * states["w2"],
+            (states["T"] - spring) * states["v"],
+        )
+        work += [np.sum(half * (power @ WEIGHTS)) for power in powers]
+    motor, against_load, dissipated = work.tolist()
     dissipated += _lost_at_parting(run)
     kinetic = _kinetic(run, run.end_time) - _kinetic(run, 0.0)
     elastic = _elastic(run, -1) - _elastic(run, 0)

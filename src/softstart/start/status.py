@@ -14,8 +14,8 @@ class Status(Enum):
     ----------
     REACHED, STOPPED_EARLY, NOT_REACHED, NOT_RELEASED : the run went to its end and its figures are
         valid; `finished` is True.
-    TOO_MANY_EVENTS, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL : the start could not be finished: an
-        error for a single start, NaN in every figure in a batch.
+    TOO_MANY_EVENTS, TOO_LONG, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL : the start could not be
+        finished: an error for a single start, NaN in every figure in a batch.
 
     Examples
     --------
@@ -47,6 +47,10 @@ class Status(Enum):
         "The run ended with the motor still held by its brake: the motor torque did not reach the shaft "
         "torque, or the release time lies later."
     )
+    TOO_LONG = (
+        "The start was given up: it lasts more than 100,000 elastic periods of the drive. Check the units of "
+        "inertias, stiffness and target speed, or end the run earlier (until)."
+    )
 
     @property
     def finished(self) -> bool:
@@ -61,6 +65,7 @@ _BROKEN = {
     at.NOT_FINITE: Status.NOT_FINITE,
     at.BAD_COMMAND: Status.BAD_COMMAND,
     at.QUEUE_FULL: Status.QUEUE_FULL,
+    at.TOO_LONG: Status.TOO_LONG,
 }
 
 

@@ -1,0 +1,123 @@
+"""A start is bounded in length and memory, and a controller that does not return is named."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from softstart import Drive, SimulationError, simulate
+from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
+from softstart.controller.base import Measured
+from softstart.controller.compiled import Vector
+from softstart.start import engine, metrics
+
+CRANE = Drive.load("crane-4amtkf")
+HEAVY = CRANE.replace(load_inertia=35_000.0)  # 960,000 elastic periods to its target speed
+
+
+def test_a_start_that_is_too_long_is_given_up_with_the_remedy() -> None:
+    began = time.perf_counter()
+    with pytest.raises(SimulationError, match=r"more than 100,000 elastic periods.*Check the units"):
+        simulate(HEAVY, "ramp")
+    batch = simulate([HEAVY, CRANE], "ramp")
+    assert batch.status.values.tolist() == ["TOO_LONG", "REACHED"]
+    assert math.isnan(batch.k_dyn[0])
+    assert time.perf_counter() - began < 5.0
+    with pytest.raises(SimulationError, match="more than 100,000 elastic periods"):
+        simulate(CRANE, "direct", until=1e9)
+
+
+def test_the_command_ends_soon_and_with_little_memory() -> None:
+    code = (
+        "import resource, sys; from softstart.cli import main; code = main(sys.argv[1:]);"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024); sys.exit(code)"
+    )
+    line = ["simulate", "crane-4amtkf", "--controller", "ramp", "--set", "load.inertia=3500", "--json"]
+    began = time.perf_counter()
+    run = subprocess.run(
+        [sys.executable, "-c", code, *line], capture_output=True, text=True, env=os.environ, check=True
+    )
+    assert int(run.stdout.splitlines()[-1]) < 1000  # MiB; 7.7 GB before with ten times the inertia
+    assert time.perf_counter() - began < 30.0
+
+
+def test_the_longest_start_keeps_its_energy() -> None:
+    run = simulate(CRANE.replace(load_inertia=3500.0), "ramp")
+    assert run.end_time > 96_000 * CRANE.replace(load_inertia=3500.0).elastic_period
+    assert abs(run.energy.residual) < 1e-9 * run.energy.motor
+
+
+def test_a_start_that_does_not_reach_its_target_is_not_too_long() -> None:
+    """A hundred times a stiff start is beyond the bound here, ten times is not: that tells enough."""
+    drive = CRANE.replace(load_inertia=300.0, damping=2.0)
+    assert simulate([drive], make_controller("direct", {"torque": 6.0})).status.item() == "NOT_REACHED"
+
+
+@pytest.mark.parametrize("name", ["direct", "ramp", "s-curve"])
+def test_figures_taken_in_turns_are_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = CRANE.replace(damping=2.0, torque_lag=0.004)
+    whole = simulate(drive, name, until=2.0)
+    monkeypatch.setattr(metrics, "AT_ONCE", 70)
+    parts = simulate(drive, name, until=2.0)
+    assert parts.settling_time() == whole.settling_time()
+    one, other = parts.energy, whole.energy
+    np.testing.assert_allclose(one.motor, other.motor, rtol=1e-13)
+    np.testing.assert_allclose(one.dissipated, other.dissipated, rtol=1e-12)
+    assert abs(one.residual) < 1e-9 * one.motor
+
+
+@dataclass(frozen=True)
+class Sleeper(PlainController):
+    """Does not return for a while."""
+
+    name: ClassVar[str] = "sleeper"
+
+    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
+        if measured.time == 0.0:
+            time.sleep(1.0)
+        return Command(62.0)
+
+
+@compiled_step
+def spin(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Works for about a second."""
+    x = 0.5
+    for _ in range(30_000_000):
+        x = math.sin(x) + 0.5
+    command[0] = 62.0 + 1e-300 * x
+    command[1] = math.inf
+
+
+@dataclass(frozen=True)
+class Spinner(CompiledController):
+    """Works for a while, compiled."""
+
+    name: ClassVar[str] = "spinner"
+    kernel: ClassVar[Any] = spin
+
+    def vector(self, drive: Drive) -> Vector:
+        return np.zeros((*drive.shape, 1))
+
+
+@pytest.mark.parametrize("controller", [Sleeper(), Spinner()], ids=["plain", "compiled"])
+@pytest.mark.parametrize("batch", [False, True])
+def test_a_controller_that_does_not_return_is_named_once(
+    controller: PlainController | CompiledController,
+    batch: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(engine, "SILENCE", 0.2)
+    simulate([CRANE] if batch else CRANE, controller)
+    said = capsys.readouterr().err
+    assert said.count(f"The controller {controller.name} has not returned for 0.2 s") == 1
+    simulate(CRANE, "direct")
+    assert capsys.readouterr().err == ""
