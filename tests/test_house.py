@@ -39,8 +39,8 @@ BUDGET = {
     "plant": (2530, 15, 2, 0),
     "reporting": (2980, 12, 3, 0),
     "stages": (680, 6, 1, 0),
-    # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60: silent
-    # controllers are named, figures of long starts are taken in turns
+    # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
+    # silent controllers are named, figures of long starts are taken in turns
     "start": (2170, 9, 1, 0),
     "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
     "tuning": (2320, 10, 1, 0),
