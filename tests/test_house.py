@@ -35,8 +35,8 @@ BUDGET = {
     "optimal": (8420, 27, 6, 0),  # ends before the bound; points of a limit curve share starts and bounds
     "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
-    # 50: turning points
-    "plant": (2530, 15, 2, 0),
+    # 50: turning points; 10: the longest start
+    "plant": (2550, 15, 2, 0),
     "reporting": (2980, 12, 3, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
