@@ -45,9 +45,12 @@ class SNCurve:
 
     def cycles(self, torque: ArrayLike) -> NDArray[np.float64]:
         """Cycles of this torque to failure; without points those beside one cycle of 1 N m."""
+        sizes = np.asarray(torque, dtype=np.float64)
+        if self.slope is not None:
+            ((reference, number),) = self.points or ((1.0, 1.0),)
+            return np.asarray(number * (reference / sizes) ** self.slope)
         log_torque, log_cycles, slopes = self._lines()
-        with np.errstate(divide="ignore"):
-            log = np.log(np.asarray(torque, dtype=np.float64))
+        log = np.log(sizes)
         piece = np.searchsorted(-log_torque[1:-1], -log)
         return np.exp(log_cycles[piece] - slopes[piece] * (log - log_torque[piece]))
 

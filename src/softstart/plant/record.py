@@ -123,8 +123,9 @@ def turning_points(
             z, v = motion_at(m, at)
             turn(kept, points, row.start + at, side * (m.k * z + m.dd * v), still)
             begin = at
-        z, v = motion_at(m, length)
-        turn(kept, points, row.end, side * (m.k * z + m.dd * v), still)
+        if i + 1 == segments.shape[0] or segments[i + 1].view(SEGMENT)[0].side != side:
+            z, v = motion_at(m, length)  # elsewhere T goes on as the next span begins
+            turn(kept, points, row.end, side * (m.k * z + m.dd * v), still)
     n = int(kept[0])
     if n >= points.shape[0]:
         return NO_ROOM

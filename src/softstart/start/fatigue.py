@@ -16,7 +16,7 @@ from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.quantities import to_si
-from softstart.start.metrics import REFERENCE, base_torque
+from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -29,7 +29,7 @@ views = late("softstart.views.fatigue")  # above this module; see softstart.late
 
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
 DEFAULT_SLOPE = 6.6
-# reversals by no more than this share of the mean torque are rounding
+# reversals by no more than this share of the peak are rounding
 STILL = 1e-9
 # gaps at which a start is computed over wear
 GAPS = 33
@@ -287,8 +287,8 @@ def turning_points(run: Run) -> Matrix:
     >>> [round(float(torque), 1) for torque in points[:2, 1]]
     [120.0, 180.8]
     """
-    still = STILL * abs(float(base_torque(run.base)))
-    rows = 64
+    still = STILL * run.peak_torque
+    rows = 64 + run.segments.shape[0]
     while True:
         points = np.zeros((rows, 2))
         count = record.turning_points(
@@ -311,11 +311,12 @@ def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matr
     >>> rainflow_cycles([0.0, 3.0, 1.0, 2.0], repeated=True).tolist()
     [[3.0, 1.5, 1.0], [1.0, 1.5, 1.0]]
     """
-    history = [float(one) for one in torques]
+    history = list(torques)
     if repeated and history:
-        top = max(range(len(history)), key=lambda i: abs(history[i]))
+        sizes = list(map(abs, history))
+        top = sizes.index(max(sizes))
         history = history[top:] + history[: top + 1]
-    cycles = sorted((one[:3] for one in rainflow.extract_cycles(history)), reverse=True)
+    cycles = sorted([one[:3] for one in rainflow.extract_cycles(history)], reverse=True)
     if repeated:  # the largest comes as two halves, from the top down and up to it
         halves = [one for one in cycles if one[2] == 0.5]
         whole = [one for one in cycles if one[2] != 0.5]
@@ -331,7 +332,10 @@ def impacts(run: Run) -> Vector:
     0
     """
     rows, drive = run.segments, run.drive
-    meets = np.flatnonzero((rows[:-1, at.S_SIDE] == 0.0) & (rows[1:, at.S_SIDE] != 0.0)) + 1
+    closed = rows[:, at.S_SIDE] != 0.0
+    meets = (closed[1:] > closed[:-1]).nonzero()[0] + 1
+    if not meets.size:
+        return np.zeros(0)
     # not above 0 where flanks that overlap still take hold again
     speed = rows[meets, at.S_SIDE] * rows[meets, at.S_V]
     inertia = np.where(rows[meets, at.S_HELD] != 0.0, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2))

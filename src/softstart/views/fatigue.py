@@ -125,7 +125,7 @@ def notes(found: Fatigue) -> list[str]:
         text.append(
             f"Worn: the gap grows in proportion to time from {short(float(drive.gap))} to "
             f"{short(found.worn_gap)} rad over {over}, and Miner's rule adds the damage; error of the sum at "
-            f"most {100.0 * error:.1g} %."
+            f"most {float(f'{100.0 * error:.1g}'):g} %."
         )
     if limits.starts_per_hour is not None and found.curve.points:
         text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
