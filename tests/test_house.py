@@ -37,7 +37,7 @@ BUDGET = {
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start
     "plant": (2550, 15, 2, 0),
-    "reporting": (2980, 12, 3, 0),
+    "reporting": (3020, 12, 3, 0),  # 40: life of the shaft line
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns

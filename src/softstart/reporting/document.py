@@ -11,7 +11,7 @@ from softstart.reporting.drive_section import drive_section
 from softstart.reporting.limit import limit_section
 from softstart.reporting.markup import Figures, Html, css_string, html, joined, table, tag
 from softstart.reporting.result import Provenance, Report
-from softstart.reporting.robustness import robustness_section
+from softstart.reporting.robustness import life_chapter, robustness_section
 from softstart.reporting.sheet import sheet_section
 from softstart.reporting.strategies import kind_of, strategies_section, traces_section
 from softstart.start.comparison import REFERENCE, Row
@@ -50,6 +50,7 @@ def _document(report: Report) -> str:
             "Parameter sheets for the inverter",
             sheet_section(drive, report.sheets, report.resolution, best),
         ),
+        *life_chapter(report.lives, figures),
         ("provenance", "Where this report comes from", provenance_section(report.provenance)),
     ]
     name, made = str(drive.name), report.provenance.made

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, requires, version
 from numbers import Real
 from pathlib import Path
@@ -25,6 +26,7 @@ from softstart.reporting.resolution import Resolution
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import Sheet, make_sheet
 from softstart.start.comparison import REFERENCE, Comparison, Row, compared, make_controllers
+from softstart.start.fatigue import Fatigue, fatigue
 from softstart.start.simulation import simulate
 
 document = late("softstart.reporting.document")  # renders a Report, so it stands above this module
@@ -117,6 +119,16 @@ class Report:
         """The K_dyn that no start as quick as this one can go below."""
         return bound_at(self.drive, row.run.start_time)
 
+    @cached_property
+    def lives(self) -> Fatigue | str | None:
+        """Lives of the shaft line, or the reason why there are none; None without `[limits.fatigue]`."""
+        if self.drive.limits.fatigue is None:
+            return None
+        try:
+            return fatigue([row.run for row in self.comparison.rows])
+        except (InputError, SimulationError) as error:
+            return str(error)
+
     def gentlest_known(self, row: Row) -> float | None:
         """Least K_dyn of all starts that this report knows and that take no longer than this one."""
         return self.limit.gentlest_known(row.run.start_time, self.comparison.rows)
@@ -144,6 +156,7 @@ class Report:
             "choice": self.choice.summary(),
             "maps": {one.name: one.map.summary() for one in self.choice.candidates},
             "limit": self.limit.summary(),
+            "life": self.lives.summary() if isinstance(self.lives, Fatigue) else self.lives,
             "sheets": [sheet.summary() for sheet in self.sheets],
             "provenance": self.provenance.summary(),
         }

@@ -13,10 +13,12 @@ from softstart.arrays import Matrix
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.late import late
-from softstart.reporting.markup import Figures, Html, html, tag
+from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
+from softstart.start.fatigue import Fatigue
+from softstart.views import fatigue as lives
 from softstart.views.drawing import drawing, new_figure, plain_ticks
 from softstart.views.printed import digits, fixed, short
 
@@ -124,6 +126,27 @@ def robustness_section(drive: Drive, shown: Sequence[tuple[str, RobustnessMap]],
         "is. Grey: the load does not reach its target speed."
     )
     return html(tag("p", text), figures.drawn(maps_figure(shown, nominal), title, caption))
+
+
+def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[str, str, Html]]:
+    """Key, title and content of the chapter on the life of the shaft line; none where it is not asked for."""
+    if found is None:
+        return []
+    if isinstance(found, str):
+        content = tag("p", f"Lives cannot be given. {found}")
+    else:
+        shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
+        headings = [column.heading.replace("\n", " ") for column in shown.columns]
+        title = "Cycles of one start, and life over that of direct"
+        content = html(
+            tag("p", lives.conclusion(found)),
+            table(headings, shown.rows, caption="Life of the shaft line under each strategy"),
+            figures.drawn(
+                lives.fatigue_figure(found), title, f"{title}. Rainflow cycles of the shaft torque."
+            ),
+            *(tag("p", one) for one in lives.notes(found)),
+        )
+    return [("life", "How long the shaft line lasts", content)]
 
 
 def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float, float]) -> Any:

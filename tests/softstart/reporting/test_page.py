@@ -6,9 +6,11 @@ from html.parser import HTMLParser
 
 import pytest
 
-from softstart import Drive, compare, optimize
+from softstart import Drive, compare, fatigue, optimize, report
 from softstart.reporting.limit import Limit, _within
 from softstart.reporting.markup import VOID, css_string, inlined
+from softstart.views.fatigue import factor
+from softstart.views.numbers import plain
 
 from .conftest import COMMAND, HOSTILE
 
@@ -174,3 +176,20 @@ def test_a_bound_that_grows_beyond_the_frame_is_cut():
     t, k = _within(limit, 0.9, 1.25, 6.0)
     assert t.tolist() == [1.0, 1.1, 1.2, 1.25]
     np.testing.assert_allclose(k, [6.0, 5.0, 1.2, 1.1])
+
+
+def test_life_of_the_shaft_line_where_it_is_asked_for(hostile):
+    asked = Drive.load("crane-4amtkf").replace(fatigue_slope=6.6, fatigue_torque=90, fatigue_cycles=2e6)
+    assert "How long the shaft line lasts" not in hostile.to_html()
+    assert hostile.summary()["life"] is None
+    made = report(asked.replace(damping=1.0), controllers=["ramp"], budget=0.0)
+    page = Page(made.to_html())
+    wanted = fatigue([row.run for row in made.comparison.rows])
+    assert plain(made.summary()["life"]) == plain(wanted.summary())  # NaN as None
+    (shown,) = [one for one in page.tables if "life over direct" in one[0]]
+    column = shown[0].index("life over direct")
+    assert {row[0]: row[column] for row in shown[1:]} == {
+        row.run.controller_name: factor(row.relative) for row in wanted.rows
+    }
+    refused = report(asked, controllers=["ramp"], budget=0.0).to_html()
+    assert "Lives cannot be given. damping = 0: an undamped shaft line rattles" in refused
