@@ -41,7 +41,7 @@ from softstart.cli.running import Attributed, working
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import OBJECTIVES, TERMINALS, USUAL, Problem, StartTime
+from softstart.optimal.problem import OBJECTIVES, TERMINALS, USUAL, Problem, StartTime, usual_terminal
 from softstart.quantities import to_si
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
@@ -129,7 +129,10 @@ def optimize(
             Problem(
                 one,
                 None if bounds.get("minimise") == "start_time" and asked is None else 1.0,  # any above 0
-                **{name: value for name, value in bounds.items() if name != "method"},
+                **{
+                    "terminal": usual_terminal(one),
+                    **{name: value for name, value in bounds.items() if name != "method"},
+                },
             )
     mistakes.settle()
     assert one is not None
@@ -213,7 +216,8 @@ def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
     sentence(to, f"  method {best.method}: {best.why}")
     to.print()
     print_figures(to, views.figure_rows(best))
-    print_conclusion(to, [views.comparison(best, others)], [views.bound_sentence(best)])
+    notes = [*views.position_sentences(best), views.bound_sentence(best)]
+    print_conclusion(to, [views.comparison(best, others)], notes)
 
 
 # one profile for several drives ---------------------------------------------------------------------------

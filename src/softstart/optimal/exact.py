@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,8 +23,9 @@ from scipy.optimize import brentq, minimize_scalar
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive import Drive
+from softstart.errors import InputError
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import LowerBound, OptimumError, heat_of
+from softstart.optimal.result import Candidate, LowerBound, OptimumError, heat_of
 from softstart.plant import layout as at
 from softstart.profile import TorqueProfile
 from softstart.start import metrics
@@ -51,6 +53,122 @@ def replay(drive: Drive, profile: TorqueProfile, until: float, base: Drive | Non
     """
     player = make_controller("profile", {"profile": profile})
     return simulate(drive, player, until, base=base)
+
+
+# while a brake holds the motor ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hold:
+    """The brake of a motor, and the problem that is left at its release, on a clock that starts then.
+
+    By torque proving the load rests until the motor torque has reached the shaft torque: at once where
+    nothing delays the torque, else after the quickest rise, `demand`. At a time: what the motor does before
+    makes no difference, and the load may have moved. `until` in s, `peak` of T in N m until then.
+    """
+
+    problem: Problem
+    free: Problem
+    until: float = 0.0
+    demand: float = 0.0
+    peak: float = 0.0
+
+    def before(self, profile: TorqueProfile) -> TorqueProfile:
+        """The demand of the whole start, `profile` beginning when the motor is free."""
+        if self.until == 0.0:
+            return profile
+        return TorqueProfile([0.0], [self.demand]).followed_by(self.until, profile)
+
+    def claimed(self, candidate: Candidate) -> float:
+        """The figure that the candidate claims, for the whole start."""
+        if self.problem.minimise == "start_time":
+            return self.until + candidate.claimed
+        return max(candidate.claimed, self.peak / self.problem.base_torque)
+
+
+def hold_of(problem: Problem) -> Hold:
+    """What the brake of the drive leaves to be found; InputError where that is no problem of its own.
+
+    >>> drive = Drive.load("crane-4amtkf").replace(brake="motor", torque_lag=0.01)
+    >>> held = hold_of(Problem(drive, 0.5))
+    >>> round(held.until, 6), round(held.free.first_torque, 3)
+    (0.001228, 7.16)
+    """
+    drive = problem.drive
+    if drive.brake == "none":
+        return Hold(problem, problem)
+    free = drive.replace(brake="none", start_position=float(drive.theta0))
+    T = float(drive.c) * max(float(drive.theta0) - 0.5 * float(drive.gap), 0.0)
+    late = drive.torque_lag > 0.0 or math.isfinite(drive.torque_rate)
+    proving = math.isinf(drive.release_time)
+    excess = T - float(drive.Mc)
+    balanced = excess <= 0.0 if drive.load_kind == "reactive" else abs(excess) <= ROUNDING * drive.Mc
+    resting = balanced and drive.initial_load_speed == 0.0
+    if proving and (T == 0.0 or (resting and not late)):  # nothing to wait for
+        return Hold(problem, replace(problem, drive=free))
+    wrong = []
+    if proving and not resting:
+        wrong.append("the load swings on the wound-up shaft while the brake waits for the motor torque")
+    if not proving and late:
+        wrong.append("the torque that the motor has built up at the release is another unknown")
+    if problem.heat is not None or problem.minimise == "heat":
+        wrong.append("the heat while the motor is held is not counted")
+    if problem.smoothness > 0.0:
+        wrong.append("a smooth torque from 0 on is not one that begins at the release")
+    if wrong:
+        raise InputError(
+            f'brake = "motor": an optimum is not found here, for {"; ".join(wrong)}; leave that out, or '
+            'brake = "none".'
+        )
+    return _proved(problem, free, T) if proving else _timed(problem, free)
+
+
+def _timed(problem: Problem, free: Drive) -> Hold:
+    """The state at a release by time."""
+    until = float(problem.drive.release_time)
+    run = replay(problem.drive, TorqueProfile([0.0], [problem.lowest_torque]), until, problem.base)
+    state = {name: float(value) for name, value in run.at(until).items()}
+    if abs(state["w2"]) > ROUNDING * problem.target:  # else it hangs still
+        speed = {"initial_motor_speed": 0.0, "initial_load_speed": state["w2"]}
+        free = free.replace(start_position=state["theta"], **speed)
+    return _left(problem, free, until, peak=run.peak_torque)
+
+
+def _proved(problem: Problem, free: Drive, T: float) -> Hold:
+    """The quickest rise of the motor torque to T: full demand, at the largest rate, behind the lag."""
+    drive, most = problem.drive, problem.highest_torque
+    if most <= T:
+        raise InputError(
+            f"load_torque = {drive.Mc:g} N m: the motor has no more than {most:g} N m, so the brake is never "
+            "released."
+        )
+    lag, rate = float(drive.torque_lag), float(drive.torque_rate)
+
+    def realised(t: float) -> float:
+        rising = min(t, most / rate)
+        if lag == 0.0:
+            return rate * rising
+        ramp = 0.0 if math.isinf(rate) else rate * (rising + lag * math.expm1(-rising / lag))
+        return most + (ramp - most) * math.exp(-(t - rising) / lag)
+
+    longest = most / rate + lag * (1.0 - math.log1p(-T / most))
+    until = float(brentq(lambda t: realised(t) - T, 0.0, longest, xtol=1e-16, rtol=1e-15))
+    reached = min(rate * until, most) if math.isfinite(rate) else most
+    return _left(problem, free, until, demand=most, torque=T, reached=reached, peak=T)
+
+
+def _left(
+    problem: Problem, free: Drive, until: float, *, peak: float, demand: float = 0.0, torque: float = 0.0,
+    reached: float = 0.0,
+) -> Hold:  # fmt: skip
+    time = problem.start_time
+    if time is not None and time <= until:
+        raise InputError(
+            f"start_time = {time:g} s: the brake holds the motor until {until:.6g} s; give more time."
+        )
+    left = None if time is None else time - until
+    after = replace(problem, drive=free, start_time=left, first_torque=torque, first_demand=reached)
+    return Hold(problem, after, until, demand, peak)
 
 
 # after t_f -------------------------------------------------------------------------------------------------

@@ -37,10 +37,13 @@ Two sharper forms, where the twist cannot fall first and the load is active:
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
+from softstart.errors import InputError
+from softstart.optimal.exact import hold_of
 from softstart.optimal.lp.motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold, fall_time, off_course
@@ -63,12 +66,22 @@ def momentum_bound(problem: Problem) -> LowerBound:
     >>> round(momentum_bound(Problem(drive.replace(load_kind="reactive"), 0.2883042)).k_dyn, 4)
     0.8688
     """
-    peak = least_peak(problem) * (1.0 - ROUNDING)
+    several = [replace(problem, drive=one) for one in problem.drive.positions.values()]
+    peak = max(least_peak(_released(one)[0]) for one in several) * (1.0 - ROUNDING)
     covers = (
         f"every torque from {problem.lowest_torque:g} to {problem.highest_torque:g} N m over time, by "
         "whatever controller, however often the gap closes"
     )
     return LowerBound(peak / problem.base_torque, "momentum", covers)
+
+
+def _released(problem: Problem) -> tuple[Problem, float]:
+    """The problem from the release of a brake on, and that instant in s; as it is where nobody knows it."""
+    try:
+        hold = hold_of(problem)
+    except InputError:
+        return problem, 0.0
+    return hold.free, hold.until
 
 
 def least_peak(problem: Problem) -> float:
@@ -216,6 +229,13 @@ def momentum_shortest_time(problem: Problem) -> float:
     0.2298
     """
     drive = problem.drive
+    if len(drive.positions) > 1:
+        return max(momentum_shortest_time(replace(problem, drive=one)) for one in drive.positions.values())
+    free, until = _released(problem)
+    if free is not problem:
+        return until + momentum_shortest_time(free)
+    if drive.brake != "none":
+        return earliest_pull(problem)  # the brake may carry more than the motor can
     J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
     w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
     Ms, U = problem.highest_torque, max(problem.highest_torque, -problem.lowest_torque)

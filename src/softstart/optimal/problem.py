@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
@@ -62,6 +62,15 @@ class StartTime:
         return f"{self.value:g}x" if self.multiple else f"{self.value:g} s"
 
 
+def usual_terminal(drive: Drive) -> Terminal:
+    """How an optimal start ends if nobody says: `reached` where one profile serves several positions.
+
+    >>> usual_terminal(Drive.load("crane-4amtkf"))
+    'synchronous'
+    """
+    return "reached" if len(drive.positions) > 1 else "synchronous"
+
+
 USUAL = StartTime(1.2, multiple=True)  # where a bound is needed and none is given
 
 
@@ -77,6 +86,7 @@ class Problem:
                    reached:     only w2 = target_speed for the first time; the motor coasts until T peaks
 
     The drive's computing_delay is left out: a profile that is known beforehand is sent that much earlier.
+    Where the start position is unknown, one profile serves all: terminal `reached`, K_dyn the worst.
 
     Parameters
     ----------
@@ -96,6 +106,8 @@ class Problem:
         Weight in s of integral (du/dt)^2 dt / Ms^2 against K_dyn: makes the demand continuous from 0 on.
     base : Drive, optional
         The drive to whose mean shaft torque K_dyn refers, if not `drive`.
+    first_torque, first_demand : float
+        Motor torque at t = 0 and the demand that it follows, N m: not 0 where a brake held the motor before.
 
     Raises
     ------
@@ -122,6 +134,8 @@ class Problem:
     torque_speed: tuple[tuple[float, float], ...] = ()
     smoothness: float = 0.0
     base: Drive | None = None
+    first_torque: float = 0.0
+    first_demand: float = 0.0
 
     def __post_init__(self) -> None:
         wrong: list[str] = []
@@ -162,6 +176,8 @@ class Problem:
         if not _number(self.smoothness) or not 0.0 <= float(self.smoothness) < math.inf:
             wrong.append(f"smoothness = {self.smoothness!r}: a weight in s, 0 or more.")
         wrong += _check_corners(self.torque_speed)
+        if len(drive.positions) > 1:
+            wrong += self._not_over_positions()
         if drive.initial_load_speed >= drive.target_speed:
             wrong.append(
                 f"initial_load_speed = {drive.initial_load_speed:g} rad/s: the load has its target speed of "
@@ -169,6 +185,21 @@ class Problem:
             )
         if wrong:
             raise InputError(wrong)
+
+    def _not_over_positions(self) -> Iterator[str]:
+        """What cannot be asked of one profile for all positions."""
+        asked = {
+            "terminal": self.terminal if self.terminal != "reached" else "",
+            "minimise": self.minimise if self.minimise != "k_dyn" else "",
+            "k_dyn": self.k_dyn, "heat": self.heat, "torque_speed": self.torque_speed,
+            "smoothness": self.smoothness,
+        }  # fmt: skip
+        for name, value in asked.items():
+            if value:
+                yield (
+                    f"{name} = {value}: the start position is unknown, and one profile for all positions has "
+                    'the least largest K_dyn with terminal "reached"; leave it out, or give a position.'
+                )
 
     @property
     def lowest_torque(self) -> float:

@@ -247,6 +247,8 @@ def applies(problem: Problem) -> str:
 def off_course(problem: Problem) -> str:
     """Why the speed limit does not hold even for an undamped shaft; empty if it does."""
     drive = problem.drive
+    if drive.brake != "none":
+        return "a brake holds the motor at first"
     if drive.load_kind == "reactive" and drive.Mc > 0.0:
         return "the load is reactive"
     if problem.lowest_torque < 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ from softstart.profile import TorqueProfile
 from softstart.start import metrics
 from softstart.start.run import Run
 
-Method = Literal["closed-form", "lp", "collocation"]
+Method = Literal["closed-form", "lp", "collocation", "robust"]
 BoundKind = Literal["certificate", "momentum", "none"]
 DemandShape = Literal["steps", "ramps", "continuous"]
 
@@ -91,6 +92,9 @@ class Optimum:
         Computing time, s.
     warm : object
         What `optimize` can start a similar problem from.
+    alone : mapping of str to Optimum
+        Where the start position is unknown: the optimum of each position by itself, as a drive could have it
+        that measures where it stands. Without those that have no start that quick.
 
     Examples
     --------
@@ -114,6 +118,7 @@ class Optimum:
     end_time: float
     seconds: float
     warm: Any = field(default=None, repr=False)
+    alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
 
     @property
     def k_dyn(self) -> float:
@@ -145,6 +150,7 @@ class Optimum:
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
         problem = self.problem
+        known = {at: one.k_dyn for at, one in self.alone.items()}
         return {
             "drive": problem.drive.name,
             "minimise": problem.minimise,
@@ -166,6 +172,7 @@ class Optimum:
             "contacts": self.run.contacts,
             "first_contact": self.run.first_contact,
             "seconds": self.seconds,
+            **({"k_dyn_if_position_known": known} if known else {}),
             "profile": _knots(self.profile),
         }
 
@@ -272,7 +279,13 @@ class RobustOptimum:
             "start_times": list(self.start_times),
             "worst": self.worst,
             "scenarios": [
-                {"drive": d.name, "gap": d.gap, "load_inertia": d.J2, "load_torque": d.Mc}
+                {
+                    "drive": d.name,
+                    "gap": d.gap,
+                    "load_inertia": d.J2,
+                    "load_torque": d.Mc,
+                    "position": d.start_position,
+                }
                 for d in self.scenarios
             ],
             "seconds": self.seconds,

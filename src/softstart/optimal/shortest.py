@@ -37,6 +37,10 @@ def shortest_start_time(problem: Problem) -> float:
     >>> round(shortest_start_time(Problem(drive, 0.3)), 4)
     0.2498
     """
+    if len(problem.drive.positions) > 1:  # no profile for all of them can be quicker
+        return max(
+            shortest_start_time(replace(problem, drive=one)) for one in problem.drive.positions.values()
+        )
     plain = _plain(problem)
     bounded = problem.k_dyn is not None or problem.heat is not None
     if not bounded and not (ideal.not_linear(plain) and whole_search.not_linear(plain)):

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Literal, get_args
 
+from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.certificate import certified_bound, not_certified
-from softstart.optimal.exact import check, replay, with_tail
+from softstart.optimal.exact import Hold, check, hold_of, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
+from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal, usual_terminal
 from softstart.optimal.result import (
     Candidate,
     InfeasibleError,
@@ -27,7 +29,9 @@ from softstart.optimal.result import (
 )
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
+robust = late("softstart.optimal.robust.solving")  # compiled kernels of its own
 collocation = late("softstart.optimal.collocation.search")
 
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
@@ -39,7 +43,7 @@ def optimize(
     drive: Drive | str,
     start_time: float | str | None = None,
     *,
-    terminal: Terminal = "synchronous",
+    terminal: Terminal | None = None,
     minimise: Objective = "k_dyn",
     k_dyn: float | None = None,
     heat: float | None = None,
@@ -52,7 +56,8 @@ def optimize(
     """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
 
     The figures are those of the exact plant running the profile; the bound says how much better any other
-    start could be.
+    start could be. Where the start position is unknown, one profile serves all (`optimize_robust`), the worst
+    counts, and `alone` has the optimum of each.
 
     Parameters
     ----------
@@ -61,8 +66,9 @@ def optimize(
     start_time : float or str, optional
         Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
         ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
-    terminal : {"synchronous", "steady", "reached"}
-        What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed.
+    terminal : {"synchronous", "steady", "reached"}, optional
+        What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed. By default
+        synchronous; reached, and nothing else, where the start position is unknown.
     minimise : {"k_dyn", "heat", "start_time"}
         `heat` is the integral of (u/Ms)^2 from 0 to t_f, s.
     k_dyn, heat : float, optional
@@ -114,7 +120,8 @@ def optimize(
     usual = start_time is None and minimise != "start_time"
     bound = USUAL if usual else None if start_time is None else StartTime.of(start_time)
     some = None if bound is None else 1.0  # any time: what is wrong with the others is said first
-    about = Problem(drive, some, terminal, minimise, k_dyn, heat, corners, smoothness, base)
+    ending = usual_terminal(drive) if terminal is None else terminal
+    about = Problem(drive, some, ending, minimise, k_dyn, heat, corners, smoothness, base)
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
     best = solve(replace(about, start_time=seconds), method, warm)
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
@@ -123,10 +130,14 @@ def optimize(
 def solve(problem: Problem, method: Choice = "auto", warm: Any = None) -> Optimum:
     """The optimum of a problem; see `optimize`."""
     began = time.perf_counter()
-    candidate, why = _candidate(problem, method, warm)
-    profile = with_tail(problem, candidate.profile, candidate.end_time)
-    bound = _bound(problem, candidate, profile)
-    run = check(problem, profile, candidate.end_time, candidate.claimed, bound)
+    if len(problem.drive.positions) > 1:
+        return _over_positions(problem, method)
+    hold = hold_of(problem)
+    candidate, why = _candidate(hold.free, method, warm) if hold.until == 0.0 else _after(hold, method, warm)
+    end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
+    profile = with_tail(problem, hold.before(candidate.profile), end)
+    bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base))
+    run = check(problem, profile, end, claimed, bound)
     return Optimum(
         problem=problem,
         profile=profile,
@@ -134,11 +145,57 @@ def solve(problem: Problem, method: Choice = "auto", warm: Any = None) -> Optimu
         bound=bound,
         method=candidate.method,
         why=why,
-        claimed=candidate.claimed,
-        end_time=candidate.end_time,
+        claimed=claimed,
+        end_time=end,
         seconds=time.perf_counter() - began,
         warm=candidate.warm,
     )
+
+
+def _over_positions(problem: Problem, method: Choice) -> Optimum:
+    """One profile for all positions at which the start may begin, beside the optimum of each by itself."""
+    began = time.perf_counter()
+    drive, latest = problem.drive, problem.start_time
+    assert latest is not None
+    if method != "auto":
+        raise InputError(
+            f"method = {method}: the start position is unknown, and one profile for all positions has a "
+            "search of its own; use method = auto, or give a position."
+        )
+    found = robust.optimize_robust(list(drive.positions.values()), latest, base=problem.base or drive)
+    alone = {}
+    for name, one in drive.positions.items():
+        with suppress(InfeasibleError, OptimumError, NotConverged):
+            alone[name] = solve(replace(problem, drive=one))
+    return Optimum(
+        problem=problem,
+        profile=found.profile,
+        run=simulate(drive, make_controller("profile", {"profile": found.profile}), base=problem.base),
+        bound=found.lower_bound,
+        method="robust",
+        why=f"the start position is unknown: one profile for {', '.join(drive.positions)}",
+        claimed=found.k_dyn,
+        end_time=max(found.start_times),
+        seconds=time.perf_counter() - began,
+        alone=alone,
+    )
+
+
+def _after(hold: Hold, method: Choice, warm: Any) -> tuple[Candidate, str]:
+    """What a method offers once the brake has let the motor go; a refusal is about the time asked for."""
+    try:
+        return _candidate(hold.free, method, warm)
+    except InfeasibleError as error:
+        verdict = error.verdict
+        raise InfeasibleError(
+            replace(
+                verdict,
+                problem=hold.problem,
+                shortest_start_time=hold.until + verdict.shortest_start_time,
+                sentence=f"{verdict.sentence} These times count from {hold.until:.6g} s on, when the brake "
+                "is released.",
+            )
+        ) from None
 
 
 def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, str]:
@@ -191,18 +248,21 @@ def _refusal(problem: Problem) -> InfeasibleError | OptimumError:
     return InfeasibleError(verdict)
 
 
-def _bound(problem: Problem, candidate: Candidate, profile: Any) -> LowerBound:
-    """The certificate where there is one for this class of problems, else the bound by momentum."""
+def _bound(hold: Hold, candidate: Candidate, run: Run) -> LowerBound:
+    """The certificate where there is one for this class of problems, else the bound by momentum.
+
+    It is that of the motor without its brake, in the time that is left after the earliest release.
+    """
+    problem = hold.free
     timed = problem
     if problem.start_time is None:
         timed = replace(problem, start_time=candidate.end_time, minimise="k_dyn", k_dyn=None)
     by_momentum = momentum_bound(timed)
     if problem.minimise != "k_dyn" or not_certified(problem):
         return by_momentum
-    run = replay(problem.drive, profile, candidate.end_time, problem.base)
     if run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
         return by_momentum  # nothing better can be proved
-    k_dyn, entry = (run.k_dyn, _entry_of(run)) if problem.ideal_torque else _ideal(problem, run)
+    k_dyn, entry = (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
     within = 5e-4 if problem.ideal_torque else 2e-3  # what a lag costs it does not know anyway
     bound = certified_bound(problem, k_dyn, entry_near=entry, within=within)
     return bound if bound.k_dyn >= by_momentum.k_dyn else by_momentum
@@ -228,7 +288,8 @@ def _by_formula(problem: Problem) -> Candidate | None:
         return None
 
 
-def _entry_of(run: Run) -> float:
-    """When both masses begin to move in contact, s."""
+def _entry_of(run: Run, since: float = 0.0) -> float:
+    """When both masses begin to move in contact, s from `since` on."""
     starts = [event.time for event in run.events if event.kind == "load starts"]
-    return starts[0] if starts and run.drive.load_kind == "reactive" else run.first_contact
+    entry = starts[0] if starts and run.drive.load_kind == "reactive" else run.first_contact
+    return entry - since

@@ -91,7 +91,7 @@ class _Search:
         self.low, self.high = float(drive.minimum_torque), float(min(drive.Ms, drive.maximum_torque))
         self.period = float(drive.elastic_period)
         self.crossing = crossing_time(drive, self.high)
-        self.evaluator = Evaluator([drive], longest)
+        self.evaluator = Evaluator(list(drive.positions.values()), longest)
         # a stand-in whose levels and edges can be told from each other
         self.parameters = ProfileParameters(self.staircase(np.full(N_NUMBERS, 0.55)), drive)
         self.random = np.random.default_rng(SEED)
@@ -149,9 +149,9 @@ class _Search:
         return np.column_stack([full, level, full, again, hold, edges])
 
     def _figures(self, numbers: Matrix) -> tuple[Vector, Vector]:
-        """Peak (N m, inf where the start was given up) and start time (s, NaN where there is none)."""
+        """Worst peak (N m, inf where a start was given up) and start time (s, NaN where there is none)."""
         figures = self.evaluator.figures(self.parameters, self._unknowns(numbers))
-        return figures.peak[:, 0], figures.start_time[:, 0]
+        return figures.peak.max(axis=1), figures.start_time.max(axis=1)
 
     def _cost(self, peak: Vector, reached: Vector, start_time: float) -> Vector:
         late = np.where(np.isnan(reached), NEVER, np.maximum(reached / start_time - 1.0, 0.0))

@@ -76,6 +76,7 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
         ["contacts", str(run.contacts)],
         ["knots of the profile", str(best.profile.time.size)],
+        *[[f"K_dyn if known to start at {name}", number(one.k_dyn, 6)] for name, one in best.alone.items()],
         ["computed in", f"{best.seconds:.2g} s"],
     ]
 
@@ -117,6 +118,21 @@ def comparison(best: Optimum, others: Sequence[Run]) -> str:
             f"{gentlest.controller_name}, has {gentlest.k_dyn:.3f} in {gentlest.start_time:.4g} s"
         )
     return text + "."
+
+
+def position_sentences(best: Optimum) -> list[str]:
+    """What a sensor of the start position is worth, where that is unknown."""
+    if not best.alone:
+        return []
+    name, worst = max(best.alone.items(), key=lambda item: item[1].k_dyn)
+    lower = 100.0 * (1.0 - worst.k_dyn / best.k_dyn)
+    missing = [one for one in best.run.positions if one not in best.alone]
+    none = f" (no start that quick with one contact: {', '.join(missing)})" if missing else ""
+    return [
+        f"Worst of {', '.join(best.run.positions)}: {best.run.position}. With the position known, the "
+        f"largest of the optima is {worst.k_dyn:.4f} ({name}), {lower:.1f} % lower{none}. A controller that "
+        "measures the contact may do as well."
+    ]
 
 
 def bound_sentence(best: Optimum) -> str:
@@ -235,7 +251,8 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
     best.profile.to_c(folder / "profile.c")
     best.run.to_csv(folder / "trace-optimum.csv")
-    summary = {key: value for key, value in best.summary().items() if key not in ("profile", "seconds")}
+    left_out = ("profile", "seconds", "k_dyn_if_position_known")
+    summary = {key: value for key, value in best.summary().items() if key not in left_out}
     write_rows(folder / "figures.csv", [summary])
     rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report
     others = sorted(others, key=lambda run: run.k_dyn)
@@ -249,6 +266,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
         markdown(comparison(best, others)),
         figure_table(rows),
+        *map(markdown, position_sentences(best)),
         markdown(bound_sentence(best)),
         "![optimum](optimum.svg)",
         "## The profile",
@@ -447,7 +465,9 @@ def scenario_table(worth: SensorWorth) -> Table:
     """What is different in each drive, and its start without and with a sensor."""
     blind, reacting = worth.blind, worth.reacting
     drives = blind.scenarios
+    where = [str(d.start_position) for d in drives]
     columns = {
+        **({"position": where} if len(set(where)) > 1 else {}),
         "gap\nrad": column_of([float(d.gap) for d in drives]),
         "J2\nkg m2": column_of([float(d.J2) for d in drives]),
         "Mc\nN m": column_of([float(d.Mc) for d in drives]),
@@ -456,7 +476,7 @@ def scenario_table(worth: SensorWorth) -> Table:
         "K_dyn\nwith sensor": [number(k, 4) for k in reacting.k_dyn_each],
         "start \ntime s": column_of(list(reacting.start_times), 5),
     }
-    return Table.of("", columns)
+    return Table.of("", columns, texts=["position"] if "position" in columns else [])
 
 
 def worth_conclusion(worth: SensorWorth) -> str:
@@ -515,7 +535,8 @@ def _differing(drive: Drive, drives: Sequence[Drive]) -> str:
         "Mc": (one.Mc for one in drives),
     }
     varied = [name for name, values in figures.items() if len(set(values)) > 1]
-    return ", ".join(f"{name} {getattr(drive, name):.4g}" for name in varied) or "the drive"
+    where = [str(drive.start_position)] if len({one.start_position for one in drives}) > 1 else []
+    return ", ".join([*where, *(f"{name} {getattr(drive, name):.4g}" for name in varied)]) or "the drive"
 
 
 def write_worth(worth: SensorWorth, folder: Path, command: str) -> None:

@@ -413,7 +413,7 @@ class WholeProgram:
             drive.theta0 - 0.5 * drive.gap,
             drive.initial_motor_speed - drive.initial_load_speed,
             drive.initial_load_speed,
-            0.0,
+            self.problem.first_torque,
         ]
         bounds[:STATES] = (np.array(start, dtype=np.float64) / self.scale)[:, None]
         bounds[self.first_r : self.P] = (
@@ -421,7 +421,7 @@ class WholeProgram:
             self.problem.highest_torque / self.U,
         )
         if self.shape == "continuous":
-            bounds[self.first_r] = 0.0
+            bounds[self.first_r] = self.problem.first_demand / self.U
         bounds[self.P] = 0.0, np.inf
         return bounds
 

@@ -91,7 +91,7 @@ class Family:
 
 def crossing_time(drive: Drive, high: float) -> float:
     """How long the motor takes through the gap at its highest torque, s, with what its torque is late by."""
-    travel = max(0.5 * float(drive.gap) - float(drive.theta0), 0.0)
+    travel = max(max(0.5 * float(one.gap) - float(one.theta0), 0.0) for one in drive.positions.values())
     delay = float(drive.torque_lag) + high / float(drive.torque_rate)
     return math.sqrt(2.0 * travel * float(drive.J1) / high) + delay
 

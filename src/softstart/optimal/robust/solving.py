@@ -30,6 +30,7 @@ from softstart.optimal.robust.descent import Point, Rules, descend, evaluate
 from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
 from softstart.optimal.robust.guesses import Evolution, Family, gentleness, quickness
 from softstart.profile import TorqueProfile
+from softstart.quantities import show
 from softstart.start.simulation import simulate
 
 
@@ -40,7 +41,7 @@ def scenarios_of(
     inertias: Iterable[float] = (),
     load_torques: Iterable[float] = (),
 ) -> tuple[Drive, ...]:
-    """The full grid of a drive's gaps (rad), load inertias (kg m2) and load torques (N m).
+    """The full grid of a drive's gaps (rad), load inertias (kg m2) and load torques (N m), and its positions.
 
     A list left out keeps the drive's own value. The drive itself comes first, also where it is not on the
     grid, since K_dyn refers to the first scenario. Raises InputError for values that no drive can have.
@@ -61,12 +62,11 @@ def scenarios_of(
         list(dict.fromkeys(values)) or [getattr(drive, key)]
         for values, (_, key) in zip(lists, own, strict=True)
     ]
-    found = [drive]
-    for gap, load_inertia, load_torque in itertools.product(*axes):
-        one = drive.with_gap(gap, load_inertia=load_inertia, load_torque=load_torque)
-        if one not in found:
-            found.append(one)
-    return tuple(found)
+    grid = [
+        drive.with_gap(gap, load_inertia=load_inertia, load_torque=load_torque)
+        for gap, load_inertia, load_torque in itertools.product(*axes)
+    ]
+    return tuple(dict.fromkeys(one for each in (drive, *grid) for one in each.positions.values()))
 
 
 def _values(name: str, given: Iterable[float]) -> list[float]:
@@ -84,7 +84,7 @@ def check_scenarios(scenarios: Sequence[Drive], start_time: Any, base: Any) -> t
             f"scenarios = {scenarios!r}: give a list of Drives; scenarios_of makes one from a drive's gaps, "
             "inertias and load torques."
         )
-    drives = tuple(scenarios)
+    drives = tuple(one for each in scenarios for one in getattr(each, "positions", {"": each}).values())
     if not drives:
         raise InputError("scenarios: the list is empty; give one Drive or more.")
     if (
@@ -273,7 +273,8 @@ class RobustSearch:
         slowest = self.drives[int(np.argmax(late))]
         shortest = (quickest.late + evaluator.start_time) * (1.0 + 1e-6)
         who = (
-            f"gap {slowest.gap:g} rad, load inertia {slowest.J2:g} kg m2, load torque {slowest.Mc:g} N m"
+            f"gap {slowest.gap:g} rad, load inertia {slowest.J2:g} kg m2, load torque {slowest.Mc:g} N m, "
+            f"start position {show(slowest.start_position)}"
             f"{f' ({slowest.name})' if slowest.name else ''}"
         )
         sentence = (
