@@ -32,7 +32,7 @@ BUDGET = {
     # words, former names of keys
     "input": (1510, 6, 0, 0),
     "linear": (2120, 8, 1, 0),
-    "optimal": (8420, 27, 6, 0),  # ends before the bound; points of a limit curve share starts and bounds
+    "optimal": (8670, 27, 6, 0),  # ends before the bound; shared bounds; 230: brake, release, unknown position
     "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start
