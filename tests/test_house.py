@@ -32,7 +32,7 @@ BUDGET = {
     # words, former names of keys
     "input": (1510, 6, 0, 0),
     "linear": (2120, 8, 1, 0),
-    "optimal": (8670, 27, 6, 0),  # ends before the bound; shared bounds; 230: brake, release, unknown position
+    "optimal": (8670, 27, 6, 0),  # ends before the bound; shared bounds; 230: brake, unknown position
     "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start
@@ -45,7 +45,7 @@ BUDGET = {
     "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
     "tuning": (2320, 10, 1, 0),
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
-    "views": (4460, 17, 6, 0),
+    "views": (4480, 17, 6, 0),  # 20: what a sensor of the start position is worth
 }
 
 
