@@ -1,7 +1,7 @@
 """Controllers and studies that packages register as entry points: the built-in ones have no privilege.
 
-A source checkout registers more: what its pyproject.toml names under [tool.softstart.entry-points], which is
-not part of the wheel (the benchmarks).
+A source checkout registers what its pyproject.toml names, even if it was installed before that was added, and
+under [tool.softstart.entry-points] what is not part of the wheel (the benchmarks).
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def _of_checkout(group: str) -> list[EntryPoint]:
     document = tomllib.loads(CHECKOUT.read_text("utf-8"))
     if document.get("project", {}).get("name") != "softstart":
         return []
-    found = document["tool"]["softstart"]["entry-points"].get(group, {})
+    own = document["project"].get("entry-points", {}).get(group, {})
+    found = own | document["tool"]["softstart"]["entry-points"].get(group, {})
     return [EntryPoint(name, value, group) for name, value in found.items()]
 
 

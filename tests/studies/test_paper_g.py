@@ -12,7 +12,16 @@ import pytest
 
 from softstart import simulate
 from softstart.study import Verdict, find_study
-from softstart_studies.paper_g import PaperG, curves, damping, frequency, invariance, wear, whole_start
+from softstart_studies.paper_g import (
+    PaperG,
+    curves,
+    damping,
+    frequency,
+    from_flank,
+    invariance,
+    wear,
+    whole_start,
+)
 from softstart_studies.paper_g.crane import CRANE, RATIOS, closed_form, crane, simulated
 from softstart_studies.paper_g.switching import SwitchAfterContact, SwitchAtInstant
 
@@ -90,6 +99,7 @@ VERDICTS = {
     "Torque held reduced": "partly",
     "The delay fits": "partly",
     "Regulators acting": "partly",
+    "(Not in [G]) The conclusions hold": "partly",
 }
 
 
@@ -227,3 +237,24 @@ def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     PaperG().run(None, lambda doing: None)
     assert list(tmp_path.iterdir()) == []
+
+
+# from the flanks ---------------------------------------------------------------------------------------
+
+
+def test_the_conclusions_from_a_flank():
+    """From mid-gap the figures of [G]; on the driving flank the closed forms of a drive without a gap."""
+    rows = {row[0]: row[3:] for row in from_flank.table().rows}
+    assert sorted(rows) == list(range(1, 15))
+    assert [rows[number][0] for number in (1, 2, 3, 4, 12)] == [2.3894, 1.2677, 2.3894, 1.2677, 3.2453]
+    light, heavy = ((62.0 * r + 7.16) / (1.0 + r) for r in (2.0, 5.0))  # mean torques
+    reduced = (15.5 * 5.0 + 7.16) / 6.0
+    flank = {number: cells[1] for number, cells in rows.items()}
+    assert flank[1] == flank[3] == 2.0  # a step of torque from rest in contact
+    assert flank[2] == pytest.approx(2.0 * reduced / heavy, abs=5e-5)
+    assert flank[4] == pytest.approx(2.0 - 2.0 * reduced / heavy, abs=5e-5)
+    assert flank[5] == 1.0
+    assert flank[6] == flank[7] == pytest.approx(light / heavy, abs=5e-5)
+    assert flank[9] == 0.0
+    assert from_flank.claim().verdict is Verdict.PARTLY
+    assert f"lowers it to {2.0 - 7.16 / heavy:.4f}" in from_flank.claim().evidence

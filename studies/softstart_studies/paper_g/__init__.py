@@ -18,6 +18,7 @@ from softstart_studies.paper_g import (
     damping,
     durations,
     frequency,
+    from_flank,
     invariance,
     pictures,
     wear,
@@ -63,6 +64,8 @@ class PaperG(Study):
         sweeps = [frequency.detuned("load inertia"), frequency.detuned("stiffness")]
         progress("gap, inertia and stiffness")
         spreads = [invariance.spread(*strategy) for strategy in invariance.STRATEGIES]
+        progress("from the flanks")
+        flanks = from_flank.table()
         progress("drawing")
         traces = [
             ("method 2: raised at the end of stage 2, (15)", simulated(crane(), SHARE, 2)),
@@ -89,6 +92,7 @@ class PaperG(Study):
                 wear.table(worn),
                 frequency.table(sweeps),
                 invariance.table(spreads),
+                flanks,
             ),
             claims=(
                 *damping.of_methods(),
@@ -98,6 +102,7 @@ class PaperG(Study):
                 *wear.claims(worn),
                 *frequency.claims(sweeps),
                 *invariance.claims(spreads),
+                from_flank.claim(),
             ),
             figures=drawn,
         )

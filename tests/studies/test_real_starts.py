@@ -1,0 +1,80 @@
+"""`softstart study real-starts`: a small version against single starts, optima and lives."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from softstart import fatigue, simulate
+from softstart.study import Verdict, find_study
+from softstart_studies.real_starts import (
+    SLOWER,
+    Extent,
+    Findings,
+    RealStarts,
+    claims,
+    concordance,
+    drives,
+    find,
+    present,
+    strategies_reach_the_optimum,
+)
+
+NAMES = ("direct", "s-curve", "shaped", "pulse-coast-hold")
+PART = Extent(drives=("crane", "hoist"), strategies=NAMES, optima=(), unknown=())
+
+
+@pytest.fixture(scope="module")
+def found() -> Findings:
+    return find(PART, lambda text: None)
+
+
+def test_each_case_is_a_start_of_that_drive_from_there(found):
+    assert list(found.of("hoist")) == ["mid-gap", "driving-flank", "opposite-flank", "hanging"]
+    for (name, where), case in found.cases.items():
+        drive = drives()[name].replace(start_position=where, brake="none")
+        runs = [simulate(drive, one) for one in NAMES]
+        assert [run.k_dyn for run in case.runs.values()] == [run.k_dyn for run in runs]
+        assert [case.life(one) for one in NAMES] == [row.relative for row in fatigue(runs).rows]
+
+
+def test_the_brake_of_the_hanging_hoist_changes_nothing(found):
+    own = drives()["hoist"]
+    assert (own.start_position, own.brake) == ("hanging", "motor")
+    for one, run in found.cases["hoist", "hanging"].runs.items():
+        assert simulate(own, one).k_dyn == pytest.approx(run.k_dyn, rel=1e-12)
+
+
+def test_optimum_bound_and_gentlest_strategy():
+    small = Extent(("hoist",), ("driving-flank", "hanging"), NAMES, optima=("hoist",), unknown=())
+    found = find(small, lambda text: None)
+    for case in found.cases.values():
+        best, gentlest = case.optimum, case.runs[case.gentlest()]
+        assert best.k_dyn_lower_bound <= best.k_dyn * (1 + 1e-9)
+        assert best.k_dyn <= gentlest.k_dyn
+        assert best.run.start_time <= SLOWER * case.direct.start_time * (1 + 1e-9)
+        assert gentlest.start_time <= SLOWER * case.direct.start_time
+    claim = strategies_reach_the_optimum(found)
+    held = [case.runs[case.gentlest()].k_dyn <= 1.1 * case.optimum.k_dyn for case in found.cases.values()]
+    assert claim.verdict is Verdict.of(*held)
+
+
+def test_order_of_life_and_of_k_dyn(found):
+    for case in found.cases.values():
+        same, pairs = concordance(case)
+        assert 0 <= same <= pairs <= math.comb(len(NAMES), 2)
+    hanging = found.cases["hoist", "hanging"]
+    assert hanging.runs["pulse-coast-hold"].k_dyn < hanging.direct.k_dyn  # gentler by its peak,
+    assert hanging.life("pulse-coast-hold") < 1.0  # and harder by its range
+    claim = next(one for one in claims(found) if "same order" in one.statement)
+    assert claim.verdict is Verdict.PARTLY
+    assert "pulse-coast-hold on the hoist from hanging" in claim.evidence
+
+
+def test_tables_claims_and_figures(found):
+    result = present(found, lambda text: None)
+    assert [len(table.rows) for table in result.tables] == [4, 4, 8, 8]
+    assert tuple(result.figures) == RealStarts.pictures
+    assert len(result.claims) == 5
+    assert isinstance(find_study("real-starts"), RealStarts)
