@@ -31,7 +31,7 @@ from softstart.views.markdown import (
     write_drive_report,
     write_rows,
 )  # fmt: skip
-from softstart.views.numbers import NOTHING, Table, column_of, number, short
+from softstart.views.numbers import Table, column_of, number, short
 
 SPECTRUM = ("range N m", "mean N m", "count")
 
@@ -49,8 +49,8 @@ def factor(value: float) -> str:
 
 
 def counted(value: float) -> str:
-    """A large number, three digits."""
-    return NOTHING if math.isnan(value) else "inf" if math.isinf(value) else f"{value:.3g}"
+    """A number that may be large, three digits: 2730, 1.44e+09."""
+    return f"{value:.3g}" if 1e6 <= value < math.inf else factor(value)
 
 
 def fatigue_table(found: Fatigue, rows: Sequence[Life], title: str = "") -> Table:
