@@ -24,7 +24,8 @@ BUDGET = {
     "chain": (4620, 14, 2, 0),
     "cli": (4430, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
-    "controller": (1200, 5, 0, 0),  # texts with choices; other parameters of a controller that stands
+    # texts with choices; other parameters of a controller that stands; 60: the order of effort
+    "controller": (1270, 5, 0, 0),
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     # 30 lines: S-N curves
     "drive": (1070, 5, 1, 0),
@@ -33,19 +34,22 @@ BUDGET = {
     "input": (1510, 6, 0, 0),
     "linear": (2120, 8, 1, 0),
     "optimal": (8670, 27, 6, 0),  # ends before the bound; shared bounds; 230: brake, unknown position
-    "page": (4310, 18, 3, 0),  # undo and redo; parameters of strategies; `links`: the bench in the address
+    # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
+    "page": (4380, 18, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start
     "plant": (2550, 15, 2, 0),
     "reporting": (3020, 12, 3, 0),  # 40: life of the shaft line
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
-    # silent controllers are named, figures of long starts are taken in turns
-    "start": (2170, 9, 1, 0),
+    # silent controllers are named, figures of long starts are taken in turns; 400 and a file: settled times,
+    # margins to limits, the rule of what is recommended, that reporting and views had
+    "start": (2580, 10, 1, 0),
     "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
     "tuning": (2320, 10, 1, 0),
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
-    "views": (4480, 17, 6, 0),  # 20: what a sensor of the start position is worth
+    # 20: what a sensor of the start position is worth
+    "views": (4510, 17, 6, 0),
 }
 
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart import stages
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.plant.vector import encoder_count
@@ -154,6 +154,7 @@ class AccelerationDelay(CompiledController):
     name: ClassVar[str] = "acceleration-delay"
     summary: ClassVar[str] = "reduced until the motor's acceleration drops, kept for a delay, then Ms"
     source: ClassVar[str] = "[G]"
+    effort: ClassVar[Effort | None] = Effort.STEPS
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 

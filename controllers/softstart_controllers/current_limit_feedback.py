@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
@@ -199,6 +199,7 @@ class CurrentLimitFeedback(CompiledController):
         "low limit while the gap is open, then a limit with feedback of the estimated dT/dt"
     )
     source: ClassVar[str] = "[G]"
+    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 

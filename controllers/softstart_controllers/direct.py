@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import Answer, Vector, record
 from softstart.drive import Drive
 
@@ -42,6 +42,7 @@ class Direct(CompiledController):
     name: ClassVar[str] = "direct"
     summary: ClassVar[str] = "constant starting torque, the baseline"
     source: ClassVar[str] = "[G]"
+    effort: ClassVar[Effort | None] = Effort.CONTACTOR
     kernel: ClassVar[Any] = step
 
     torque: float | None = parameter("N*m", "motor torque", "starting torque Ms")

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, parameter, stack
+from softstart.controller import CompiledController, Effort, parameter, stack
 from softstart.controller.compiled import Vector, size
 from softstart.drive import Drive
 from softstart.plant.vector import encoder_count
@@ -96,6 +96,7 @@ class PulseCoastHold(CompiledController):
     name: ClassVar[str] = "pulse-coast-hold"
     summary: ClassVar[str] = "pulse to a motor speed, coast until the shaft torque peaks, hold the peak"
     source: ClassVar[str] = "softstart: the optimum of docs/optimal-starts.md as feedback"
+    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 

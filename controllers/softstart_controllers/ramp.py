@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
@@ -69,6 +69,7 @@ class Ramp(CompiledController):
     name: ClassVar[str] = "ramp"
     summary: ClassVar[str] = "torque rises in a straight line from the load torque to the starting torque"
     source: ClassVar[str] = "practice"
+    effort: ClassVar[Effort | None] = Effort.RAMPS
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = 1
 

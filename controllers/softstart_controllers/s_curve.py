@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -86,6 +86,7 @@ class SCurve(CompiledController):
     name: ClassVar[str] = "s-curve"
     summary: ClassVar[str] = "torque rises in an S from the load torque to the starting torque"
     source: ClassVar[str] = "practice"
+    effort: ClassVar[Effort | None] = Effort.RAMPS
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = 1
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.plant.jit import compiled
@@ -247,6 +247,7 @@ class Shaped(CompiledController):
     name: ClassVar[str] = "shaped"
     summary: ClassVar[str] = "soft landing, then torque steps that leave no swing in the shaft (ZV, ZVD)"
     source: ClassVar[str] = "Smith 1957, Singer and Seering 1990"
+    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 

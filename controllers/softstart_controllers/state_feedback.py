@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.controller import CompiledController, compiled_step, parameter, stack
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.plant.jit import compiled
@@ -235,6 +235,7 @@ class StateFeedback(CompiledController):
     name: ClassVar[str] = "state-feedback"
     summary: ClassVar[str] = "soft landing, then LQR of the shaft torque on a Kalman filter"
     source: ClassVar[str] = "LQG, python-control"
+    effort: ClassVar[Effort | None] = Effort.ENCODER
     kernel: ClassVar[Any] = step
     state_size: ClassVar[int] = size(STATE)
 

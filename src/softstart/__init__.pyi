@@ -17,6 +17,7 @@ from softstart.clutch import optimize_engagement as optimize_engagement
 from softstart.controller import Command as Command
 from softstart.controller import CompiledController as CompiledController
 from softstart.controller import Controller as Controller
+from softstart.controller import Effort as Effort
 from softstart.controller import Measured as Measured
 from softstart.controller import PlainController as PlainController
 from softstart.controller import Sensor as Sensor

@@ -100,7 +100,7 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "clutch": ["--law", "--set", "--until", "--optimal", "--points", "--nondecreasing", "--json"],
     "balance": ["--speed", "--set", "--json"],
-    "report": ["--controllers", "--set", "--param", "--resolution", "--slower", "--budget"],
+    "report": ["--controllers", "--set", "--param", "--resolution", "--budget"],
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
     "drives": ["--json"],
     "controllers": ["--json"],

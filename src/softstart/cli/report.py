@@ -66,11 +66,6 @@ else:
     "Torque in % of the rated torque or in N*m. By default 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.",
 )
 @click.option(
-    "--slower",
-    metavar="SHARE",
-    help="By how much longer than direct start the recommended one may take, as 15% (the default) or 0.15.",
-)
-@click.option(
     "--budget",
     metavar="TIME",
     help="Time for the search of optima where there is no formula, as 60 (s). By default 20 s; 0 for none.",
@@ -84,7 +79,6 @@ def report(
     settings: tuple[str, ...],
     params: tuple[str, ...],
     resolution: str | None,
-    slower: str | None,
     budget: str | None,
     as_json: bool,
 ) -> None:
@@ -110,10 +104,9 @@ def report(
     if resolution is not None:
         with mistakes.noted():
             asked["resolution"] = reporting.Resolution.read(resolution, "--resolution")
-    for name, text, read in (("slower", slower, _share), ("budget", budget, _seconds)):
-        if text is not None:
-            with mistakes.noted():
-                asked[name] = read(text)
+    if budget is not None:
+        with mistakes.noted():
+            asked["budget"] = _seconds(budget)
     mistakes.settle()
     assert one is not None
 
@@ -175,25 +168,6 @@ def _check_out(out: str | None, as_json: bool) -> None:
             f'--out = "{out}": the file cannot be written there ({reason}); name one in a folder that is '
             "there and that you may write to."
         ) from None
-
-
-def _share(text: str) -> float:
-    """A share, 0 or more.
-
-    >>> _share("15%"), _share("0.15")
-    (0.15, 0.15)
-    """
-    stripped = text.strip()
-    try:
-        if stripped.endswith("%"):
-            value = float(to_si(stripped[:-1], "1", name="--slower")) / 100.0
-        else:
-            value = float(to_si(stripped, "1", name="--slower"))
-    except InputError:
-        value = -1.0
-    if value < 0.0:
-        raise InputError(f'--slower = "{text}": give a share, as 15% or 0.15, 0 or more.')
-    return value
 
 
 def _seconds(text: str) -> float:

@@ -52,12 +52,14 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.drive import Drive
+    from softstart.start import recommendation
     from softstart.start.comparison import Comparison
     from softstart.start.run import Run
     from softstart.views import fatigue as lives
     from softstart.views import starts
 else:
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
+    recommendation = late("softstart.start.recommendation")
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 
@@ -75,6 +77,12 @@ SHOWN = 24  # rows of stages and events shown; files and JSON hold all
     "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
 )
 @until_option
+@click.option(
+    "--worst-case",
+    metavar="A,B,...",
+    help="Changes under which the drive must keep its [limits] as well: gap x4, J2 x0.4, or none. By default "
+    "both.",
+)
 @json_option
 @out_option("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
 def compare(
@@ -85,6 +93,7 @@ def compare(
     fitted_to: str | None,
     params: tuple[str, ...],
     until: str | None,
+    worst_case: str | None,
     as_json: bool,
     out: str | None,
 ) -> None:
@@ -106,13 +115,15 @@ def compare(
         nominal = read_fitted_to(fitted_to)
     with mistakes.noted():
         end = read_until(until)
+    with mistakes.noted():
+        cases = _cases(worst_case)
     mistakes.settle()
 
     with output_folder(out) as folder:
         with working("starting the drive ..."):
             made = make_controllers(names if controllers is not None else None, given, prefix=True)
             with Attributed():
-                comparison = softstart.compare(one, made, until=end, fitted_to=nominal)
+                comparison = softstart.compare(one, made, until=end, fitted_to=nominal, worst_case=cases)
         if folder is not None:
             with working("drawing the figures ..."):
                 starts.write_comparison(comparison, folder, command_line())
@@ -125,23 +136,40 @@ def compare(
             print(f"\nWritten to {out}: report.md, figures, traces and the table.")
 
 
+def _cases(text: str | None) -> tuple[str, ...] | None:
+    """The changes of a drive that count for its limits; None for all.
+
+    >>> _cases("gap x4"), _cases("none")
+    (('gap x4',), ())
+    """
+    if text is None:
+        return None
+    known = recommendation.CASES
+    named = [" ".join(part.split()) for part in text.split(",") if part.strip()]
+    wrong = [one for one in named if one not in (*known, "none")]
+    if wrong or not named or ("none" in named and len(named) > 1):
+        raise InputError(f'--worst-case = "{text}": write {", ".join(known)}, both with a comma, or none.')
+    return tuple(case for case in known if case in named)
+
+
 def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None:
     rows = list(comparison.rows)
     if by_peak:
         rows.sort(key=lambda row: row.run.k_dyn)
-    best = [rows.index(comparison.gentlest)]
+    best = [rows.index(row) for row in comparison.recommendation.shown]
     print_lines(to, drive_lines(comparison.drive, comparison.fitted_to))
     to.print()
-    table = starts.comparison_table(rows)
-    if fits(to, table):
-        print_table(to, table, bold=best)
-    else:
-        print_table(to, starts.comparison_table(rows, starts.JUDGING, "How gentle, how quick"), bold=best)
-        to.print()
-        print_table(
-            to, starts.comparison_table(rows, starts.AT_THE_GAP, "What happens at the gap"), bold=best
-        )
-    print_conclusion(to, [starts.conclusion(comparison)], starts.notes(comparison))
+    gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.AT_THE_GAP
+    parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *quick, *at_the_gap))]
+    if not fits(to, starts.comparison_table(rows)):
+        parts = [("How gentle, how quick", (*gentle, *quick)), ("What happens at the gap", at_the_gap)]
+        if not fits(to, starts.comparison_table(rows, parts[0][1])):
+            parts[:1] = [("How gentle", gentle), ("How quick", quick)]
+    for index, (title, figures) in enumerate(parts):
+        if index:
+            to.print()
+        print_table(to, starts.comparison_table(rows, figures, title), bold=best)
+    print_conclusion(to, [comparison.recommendation.text], starts.notes(comparison))
 
 
 @click.command(cls=Command)
@@ -191,6 +219,7 @@ def simulate(
             (made,) = make_controllers([controller], {controller: given}, prefix=False)
             with Attributed():
                 run = softstart.simulate(one, made, end, fitted_to=nominal)
+                _ = run.settled_time  # it may ask the controller on
         if folder is not None:
             with working("drawing the figure ..."):
                 starts.write_start(run, folder, command_line(), nominal)

@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from enum import IntFlag
+from enum import Enum, IntFlag
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -47,6 +47,53 @@ class Sensor(IntFlag):
     STAGE = SEES_STAGE
     SHAFT_TORQUE = SEES_SHAFT_TORQUE
     LOAD_SPEED = SEES_LOAD_SPEED
+
+
+class Effort(Enum):
+    """What it takes to build a strategy, the least first; the simplest that is good enough is recommended.
+
+    Attributes
+    ----------
+    CONTACTOR : any contactor does it.
+    RAMPS : any inverter or soft starter with torque ramps.
+    STEPS : an inverter with torque steps, and the motor's speed to time them by.
+    CODE : code of the user in the inverter, that measures speed and current at most. The default.
+    ENCODER : the same with an encoder on the motor and a model of the drive.
+    SENSOR : a sensor beyond these, which drives do not have; the default where there are `sensors`.
+
+    Examples
+    --------
+    >>> Effort.RAMPS.meaning, Effort.RAMPS.order < Effort.CODE.order
+    ('an inverter with torque ramps', True)
+
+    References
+    ----------
+    docs/howto/choose-a-strategy.md.
+    """
+
+    CONTACTOR = "contactor"
+    RAMPS = "ramps"
+    STEPS = "steps"
+    CODE = "code"
+    ENCODER = "encoder"
+    SENSOR = "sensor"
+
+    @property
+    def order(self) -> int:
+        """Its place, 0 for the least effort."""
+        return list(Effort).index(self)
+
+    @property
+    def meaning(self) -> str:
+        """What is needed, in words."""
+        return {
+            Effort.CONTACTOR: "a contactor",
+            Effort.RAMPS: "an inverter with torque ramps",
+            Effort.STEPS: "an inverter with torque steps",
+            Effort.CODE: "code of your own in the inverter",
+            Effort.ENCODER: "code of your own in the inverter, and an encoder",
+            Effort.SENSOR: "a sensor that drives do not have",
+        }[self]
 
 
 class Measured(NamedTuple):
@@ -161,6 +208,7 @@ class Controller:
     summary : one line, what it does.
     source : where it comes from.
     sensors : what it may see beyond time, encoder and motor torque.
+    effort : what it takes to build it; by default code of one's own, or the sensors that it sees.
     needs : parameters of which one must be given, as no drive implies it.
     saturates : whether it relies on the torque limits of the drive to cut off its demand, as a feedback may.
         Then tables do not mention a demand beyond them; `Run.clipped` has it always.
@@ -181,6 +229,7 @@ class Controller:
     summary: ClassVar[str] = ""
     source: ClassVar[str] = ""
     sensors: ClassVar[Sensor] = Sensor.NONE
+    effort: ClassVar[Effort | None] = None
     needs: ClassVar[tuple[str, ...]] = ()
     saturates: ClassVar[bool] = False
 
@@ -253,6 +302,18 @@ def label_of(controller: Controller) -> str:
     return controller.name or type(controller).__name__
 
 
+def effort_of(controller: Controller) -> Effort:
+    """What it takes to build a strategy.
+
+    >>> class Own(PlainController):
+    ...     def step(self, measured, state):
+    ...         return Command(20.0)
+    >>> effort_of(Own())
+    <Effort.CODE: 'code'>
+    """
+    return controller.effort or (Effort.SENSOR if controller.sensors else Effort.CODE)
+
+
 @dataclass(frozen=True)
 class CompiledController(Controller, ABC):
     """A controller whose step is compiled: `kernel(parameters, measured, state, command)`.
@@ -312,6 +373,11 @@ class PlainTwin(PlainController):
     def saturates(self) -> bool:  # type: ignore[override]
         """As the compiled controller."""
         return self.twin.saturates
+
+    @property
+    def effort(self) -> Effort | None:  # type: ignore[override]
+        """That of the compiled controller."""
+        return self.twin.effort
 
     def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
         """The compiled controller's own lines, not compiled."""

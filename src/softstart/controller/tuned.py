@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.controller.base import Controller, PlainController, Sensor, label_of
+from softstart.controller.base import Controller, Effort, PlainController, Sensor, label_of
 from softstart.controller.finding import GAIN_FILES, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -77,6 +77,11 @@ class Tuned(Controller):
     def sensors(self) -> Sensor:  # type: ignore[override]
         """Those of the controller with these gains."""
         return self.controller.sensors
+
+    @property
+    def effort(self) -> Effort | None:  # type: ignore[override]
+        """That of the controller with these gains."""
+        return self.controller.effort
 
     def _called(self, controller: Controller) -> Controller:
         """The controller, under the name of these gains."""

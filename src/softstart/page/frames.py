@@ -233,7 +233,7 @@ class Screen:
     # when the drive is at rest -------------------------------------------------------------------------
 
     def at_rest(self) -> Iterator[Frame | None]:
-        """The drive, for the tab to keep; long starts, K_dyn with a worn gap, then the map."""
+        """The drive, for the tab to keep; long starts, changed drives, what is recommended, then the map."""
         session = self.session
         if self._bench_kept is not session.bench:
             self._bench_kept = session.bench
@@ -247,9 +247,9 @@ class Screen:
                 elif label in session.shown:
                     frame["traces"] = {label: drawn(found, ("t", "T"))}
                 yield frame
-            session.worn(label)
-            yield None
-        yield {"rows": [row(session, found) for found in session.strategies]}
+            yield from (None for _ in session.judged(label))
+        rows = [row(session, found) for found in session.strategies]
+        yield {"rows": rows, "recommendation": session.recommendation().text}
         yield from self._map()
 
     def _map(self) -> Iterator[Frame | None]:
@@ -402,12 +402,17 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
 
 
 def row(session: Session, found: Strategy) -> dict[str, Any]:
-    """One line of the table; `worn` is left out while it is not computed."""
+    """One line of the table; `worn`, `settled` and `flag` are left out while they are not computed."""
     line = judged(session, found)
     line["trouble"] = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
     worn = session.worn_ready(found.name)
     if worn is not None:
         line["worn"] = number(worn)
+    known = session.judged_ready(found.name)
+    if known is not None:
+        line["settled"] = number(known.run.settled_time)
+        line["flag"] = ", ".join(flag.word for flag in known.flags)
+        line["trouble"] = line["trouble"] or "; ".join(flag.text for flag in known.flags)
     return line
 
 

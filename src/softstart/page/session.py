@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import secrets
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,8 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
-from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, k_dyn_worn_gap
+from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
+from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
 from softstart.start.simulation import simulate
 from softstart.views.starts import outcome
 
@@ -114,8 +115,9 @@ class Session:
         self._version = 0
         self._listeners: list[Callable[[], None]] = []
         self._results: dict[str, Strategy] = {}
-        self._worn: dict[str, float] = {}
-        self._reference: float | None = None
+        self._cases: dict[tuple[str, str], Case] = {}
+        self._rows: dict[str, Row] = {}
+        self._direct: list[Run | None] = []  # empty until it is computed
 
     # the state -----------------------------------------------------------------------------------------
 
@@ -320,29 +322,65 @@ class Session:
 
         The same figure, with the same cap on events, as `k_dyn_worn_gap` of `softstart.compare`.
         """
-        if label not in self._worn:
-            self._known(label)
-            try:
-                self._worn[label] = k_dyn_worn_gap(self.drive, self.controllers[label])
-            except Exception as error:  # a controller is anyone's code; there is no room for the sentence
-                sentence_of(error)  # which is logged
-                self._worn[label] = math.nan
-        return self._worn[label]
+        return self._case(label, "gap x4").k_dyn
 
     def worn_ready(self, label: str) -> float | None:
         """`worn` if it is computed already."""
-        return self._worn.get(label)
+        found = self._cases.get((label, "gap x4"))
+        return None if found is None else found.k_dyn
+
+    def _case(self, label: str, case: str) -> Case:
+        """A strategy when the drive has changed."""
+        key = label, case
+        if key not in self._cases:
+            self._known(label)
+            try:
+                self._cases[key] = changed_case(self.drive, self.controllers[label], case)
+            except Exception as error:  # a controller is anyone's code; there is no room for the sentence
+                sentence_of(error)  # which is logged
+                self._cases[key] = Case.of(None)
+        return self._cases[key]
+
+    def judged(self, label: str) -> Iterator[Row | None]:
+        """The row of a strategy in a comparison, after steps that give None; none if its start fails."""
+        run = self.result(label).run
+        yield None
+        for case in CASES:
+            self._case(label, case)
+            yield None
+        if run is not None:
+            direct = self.direct()
+            row = Row(run, direct, {case: self._case(label, case) for case in CASES}, label=label)
+            _ = run.settled_time, row.flags  # computed here, kept in the runs
+            self._rows[label] = row
+            yield row
+
+    def judged_ready(self, label: str) -> Row | None:
+        """The row of a strategy if it is computed already."""
+        return self._rows.get(label)
+
+    def recommendation(self) -> Recommendation:
+        """What is recommended among the strategies, and why: the text of `softstart.compare`."""
+        for label in self.controllers:
+            if label not in self._rows:
+                list(self.judged(label))
+        return recommend(self.drive, [self._rows[one] for one in self.controllers if one in self._rows])
+
+    def direct(self) -> Run | None:
+        """The start that the others are compared with; None where it fails."""
+        if not self._direct:
+            known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None
+            run = known.run if known is not None else None
+            try:
+                self._direct = [run or simulate(self.drive, REFERENCE, max_events=MOST_EVENTS)]
+            except (InputError, SimulationError):
+                self._direct = [None]
+        return self._direct[0]
 
     def time_lost(self, label: str) -> float:
         """Start time over that of `direct`, s; NaN where one of them is."""
-        if self._reference is None:
-            try:
-                known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None
-                run = known.run if known is not None and known.run is not None else None
-                self._reference = (run or simulate(self.drive, REFERENCE, max_events=MOST_EVENTS)).start_time
-            except (InputError, SimulationError):
-                self._reference = math.nan
-        return self.result(label).start_time - self._reference
+        direct = self.direct()
+        return self.result(label).start_time - (math.nan if direct is None else direct.start_time)
 
     def close(self) -> None:
         """Let go of all results and listeners: the user has gone."""
@@ -372,7 +410,7 @@ class Session:
         """A bench whose results are not those of the present one where the two differ."""
         if bench.drive is not self.drive:
             self._forget(list(self.controllers))
-            self._reference = None
+            self._direct.clear()
         for label, controller in self.controllers.items():
             if bench.controllers.get(label) is not controller:
                 self._forget([label])
@@ -381,7 +419,9 @@ class Session:
     def _forget(self, labels: Iterable[str]) -> None:
         for label in labels:
             self._results.pop(label, None)
-            self._worn.pop(label, None)
+            self._rows.pop(label, None)
+            for case in CASES:
+                self._cases.pop((label, case), None)
 
     def _changed(self) -> None:
         self._version += 1

@@ -6,16 +6,17 @@ import math
 import warnings
 from pathlib import Path
 
-from softstart.reporting.choice import ALIKE, Candidate, choice_section, choose
+from softstart.reporting.choice import Candidate, choice_section
 from softstart.reporting.drive_section import drive_section
 from softstart.reporting.limit import limit_section
 from softstart.reporting.markup import Figures, Html, css_string, html, joined, table, tag
 from softstart.reporting.result import Provenance, Report
 from softstart.reporting.robustness import life_chapter, robustness_section
 from softstart.reporting.sheet import sheet_section
-from softstart.reporting.strategies import kind_of, strategies_section, traces_section
-from softstart.start.comparison import REFERENCE, Row
-from softstart.views.printed import RPM, digits, fixed, percent, short
+from softstart.reporting.strategies import strategies_section, traces_section
+from softstart.start.comparison import REFERENCE
+from softstart.start.recommendation import Row
+from softstart.views.printed import digits, fixed, percent, short
 
 SAME = 0.005  # a peak within this share of that of direct is no saving
 MENTIONED = 3  # strategies that are gentler than direct start and out
@@ -35,8 +36,8 @@ def document(report: Report) -> str:
 
 def _document(report: Report) -> str:
     drive, choice, rows, figures = report.drive, report.choice, report.comparison.rows, Figures()
-    chosen = [one.row for one in (choice.recommended, choice.ordinary) if one is not None]
-    best = choice.recommended.name if choice.recommended else ""
+    chosen = [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
+    best = choice.chosen.name if choice.chosen else ""
     maps = [(one.name, one.map) for one in choice.mapped]
     sections: list[tuple[str, str, Html]] = [
         ("drive", "The drive", drive_section(drive, figures)),
@@ -44,11 +45,11 @@ def _document(report: Report) -> str:
         ("traces", "Torques and speeds of each start", traces_section(rows, figures)),
         ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
         ("robustness", "When the gap wears and the load changes", robustness_section(drive, maps, figures)),
-        ("recommendation", "The recommended strategy, and why", choice_section(choice)),
+        ("recommendation", "The recommendation, and why", choice_section(choice)),
         (
             "sheets",
             "Parameter sheets for the inverter",
-            sheet_section(drive, report.sheets, report.resolution, best),
+            sheet_section(drive, report.sheets, report.resolution, best, choice.role),
         ),
         *life_chapter(report.lives, figures),
         ("provenance", "Where this report comes from", provenance_section(report.provenance)),
@@ -96,12 +97,12 @@ def _document(report: Report) -> str:
 
 def _tiles(report: Report) -> Html | None:
     """The four numbers that matter."""
-    best, direct = report.choice.recommended, report.row(REFERENCE)
+    best, direct = report.choice.chosen, report.row(REFERENCE)
     if best is None or direct is None:
         return None
     run, hard = best.row.run, direct.run
     tiles = [
-        ("recommended", best.name, f"worst K_dyn on the map {fixed(best.worst, 3)}"),
+        (report.choice.role, best.name, f"worst K_dyn on the map {fixed(best.worst, 3)}"),
         ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}"),
         (
             "peak shaft torque",
@@ -149,38 +150,29 @@ def provenance_section(about: Provenance) -> Html:
 
 def answer(report: Report) -> str:
     """The paragraph at the head of the report."""
-    best, direct = report.choice.recommended, report.row(REFERENCE)
-    text = _nothing(report)
-    if best:
-        text = _recommended(report, best, direct) + _after_rounding(report, best)
-        text += _with_more_time(report, best)
-    return text + _on_an_ordinary_inverter(report) + (_compared(report, best) if best else "")
+    best = report.choice.chosen
+    text = report.choice.recommendation.text
+    if best is None:
+        return text
+    text += _sheet_of(report, best) + _after_rounding(report, best)
+    return text + _on_an_ordinary_inverter(report) + _compared(report, best)
+
+
+def _sheet_of(report: Report, best: Candidate) -> str:
+    """Which strategy the figures that follow are those of, where the text names several."""
+    several = report.choice.recommendation.recommended is None and len(report.choice.recommendation.best) > 1
+    return f" The parameters below are those of the gentlest, {best.name}." if several else ""
 
 
 def _on_an_ordinary_inverter(report: Report) -> str:
-    best, plain = report.choice.recommended, report.choice.ordinary
-    if plain is None or plain is best:
+    best, plain = report.choice.chosen, report.choice.ordinary
+    if plain is None or plain is best or report.drive.limits:
         return ""
     run = plain.row.run
-    figures = f"K_dyn {fixed(run.k_dyn, 3)} and {digits(run.start_time)} s"
-    if best is not None and kind_of(best.row.run.controller) == "direct":
-        if _no_gentler(plain, best):
-            return f" Torque ramps are no gentler: the best of them, {plain.name}, has {figures}."
-        best = None
-    praise = ""
-    if best is not None and max(plain.worst / best.worst, run.k_dyn / best.row.run.k_dyn) <= 1.0 + ALIKE:
-        praise = ", and as gentle within a per cent"
-    slow = (
-        f", {percent(plain.slower)} slower than {report.choice.reference}" if report.choice.too_slow else ""
-    )
     return (
         " On an ordinary inverter, one that offers torque ramps and no more, "
-        f"{plain.name} is the best{praise}: {figures}{slow}."
+        f"{plain.name} is the best: K_dyn {fixed(run.k_dyn, 3)} and {digits(run.start_time)} s."
     ) + _after_rounding(report, plain)
-
-
-def _no_gentler(one: Candidate, other: Candidate) -> bool:
-    return not (one.row.run.k_dyn < other.row.run.k_dyn * (1.0 - SAME))
 
 
 def _compared(report: Report, best: Candidate) -> str:
@@ -226,86 +218,6 @@ def _after_rounding(report: Report, one: Candidate) -> str:
                 f"time {digits(sheet.slowest)} s."
             )
     return ""
-
-
-def _direct(report: Report, best: Candidate, figures: str) -> str:
-    """Direct start is recommended: whether as nothing is gentler, or as what is gentler is out."""
-    others = [one for one in report.choice.candidates if one is not best and one.means.realisable]
-    if not others:
-        return f"Only direct start was examined of what can be realised: {figures}."
-    gentler = [one for one in others if not math.isnan(one.row.run.start_time) and not _no_gentler(one, best)]
-    if not gentler:
-        return (
-            "For this drive direct start is as good as any strategy examined that can be realised: "
-            f"{figures}. A soft start brings nothing here."
-        )
-    gentler.sort(key=lambda one: one.row.run.k_dyn)
-    why = "; ".join(
-        f"{one.name} (K_dyn {fixed(one.row.run.k_dyn, 3)}, {one.out or 'no better over gaps and loads'})"
-        for one in gentler[:MENTIONED]
-    )
-    return f"The rule leaves direct start: {figures}. Gentler on the drive as it is, but not chosen: {why}."
-
-
-def _with_more_time(report: Report, best: Candidate) -> str:
-    """What the rule would take if the start might last as long as it likes, where that is worth much."""
-    candidates = report.choice.candidates
-    eased = choose([one.row for one in candidates], [one.map for one in candidates], math.inf).recommended
-    if eased is None or max(eased.worst / best.worst, eased.row.run.k_dyn / best.row.run.k_dyn) > MUCH:
-        return ""
-    run = eased.row.run
-    return (
-        f" A slower start is much gentler: with --slower {math.ceil(100.0 * eased.slower)}% the rule takes "
-        f"{eased.name}, K_dyn {fixed(run.k_dyn, 3)} after {digits(run.start_time)} s."
-    )
-
-
-def _recommended(report: Report, best: Candidate, direct: Row | None) -> str:
-    run = best.row.run
-    speed = f"{short(float(f'{float(report.drive.target_speed) * RPM:.5g}'))} rpm"
-    if kind_of(run.controller) == "direct":
-        return _direct(
-            report,
-            best,
-            f"K_dyn {fixed(run.k_dyn, 3)}, peak shaft torque {digits(run.peak_torque)} N m, {speed} after "
-            f"{digits(run.start_time)} s",
-        )
-    text = (
-        f"We recommend {best.name}. With it the shaft carries at most {digits(run.peak_torque)} N m (dynamic "
-        f"coefficient K_dyn {fixed(run.k_dyn, 3)}), and the load has its {speed} after "
-        f"{digits(run.start_time)} s."
-    )
-    if direct is None:
-        return text
-    hard, saved = direct.run, 1.0 - run.peak_torque / direct.run.peak_torque
-    torque = float(getattr(hard.controller, "torque", None) or report.drive.Ms)
-    full = "the full torque" if torque == float(report.drive.Ms) else f"{short(torque)} N m"
-    beside = (
-        f"Direct start, with {full} from the first instant on, loads the shaft with "
-        f"{digits(hard.peak_torque)} N m (K_dyn {fixed(hard.k_dyn, 3)})"
-    )
-    if saved > SAME:
-        beside += f": {percent(saved, 0 if saved >= 0.1 else 1)} of the peak are saved"
-    else:
-        beside += ": on this drive as it is the peak is no lower, but over the range of gaps and loads it is"
-    late = run.start_time - hard.start_time
-    if math.isnan(late):
-        return f"{text} {beside}; direct start does not reach the target speed at all."
-    share = percent(abs(late) / hard.start_time)
-    if abs(late) < 1e-4 * hard.start_time:
-        return f"{text} {beside}, at no cost in time."
-    more = "costs" if late > 0.0 else "saves"
-    return f"{text} {beside}. The strategy {more} {digits(abs(late), 3)} s of start time, {share}."
-
-
-def _nothing(report: Report) -> str:
-    """Honestly, where the rule finds nothing."""
-    choice = report.choice
-    reasons = [f"{one.name} ({one.out})" for one in choice.candidates if one.out]
-    text = "None of the strategies examined can be recommended for this drive: " + "; ".join(reasons) + "."
-    if not any(not math.isnan(one.row.run.start_time) for one in choice.candidates):
-        return text + " No strategy brings the load to its target speed."
-    return text + " Allow a slower start, give tuned gains, or examine more strategies."
 
 
 def share_saved(report: Report, row: Row) -> str:

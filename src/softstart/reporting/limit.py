@@ -27,7 +27,8 @@ from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.reporting.strategies import GREY, SMALL, WIDE, name_in_figure, ordered
-from softstart.start.comparison import REFERENCE, Row
+from softstart.start.comparison import REFERENCE
+from softstart.start.recommendation import Row
 from softstart.views.drawing import COLOURS, DASHES, MARKERS, drawing, name_points, new_figure, plain_ticks
 from softstart.views.printed import digits, fixed, listed, percent, short
 
@@ -214,7 +215,7 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
     if limit.refusal:
         return tag("p", "For this drive there is no limit to compare with. ", limit.refusal)
     caption = (
-        "Every strategy (filled: recommended, and best of an ordinary inverter) by its start time and "
+        f"Every strategy (filled: {choice.role}, and best of an ordinary inverter) by its start time and "
         "K_dyn. Below "
         "the dashed line (hatched) no start is possible, with whatever motor torque within its limits and "
         "however it is controlled."
@@ -350,7 +351,7 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
 
 def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
     """Between which figures the least K_dyn lies in the start time of the recommended strategy."""
-    best = choice.recommended
+    best = choice.chosen
     if best is None:
         return []
     time, own = best.row.run.start_time, best.row.run.k_dyn
@@ -418,7 +419,7 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
                 zorder=3,
             )  # fmt: skip
         for index, one in enumerate(placed):
-            best = one is choice.recommended or one is choice.ordinary
+            best = one is choice.chosen or one is choice.ordinary
             axes.plot([one.row.run.start_time], [one.row.run.k_dyn], MARKERS[index % 8],
                       ms=8 if best else 6.5, mfc=COLOURS[(index + 1) % 8] if best else "white", mew=1.6,
                       color=COLOURS[(index + 1) % 8], zorder=4)  # fmt: skip
@@ -434,7 +435,8 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
         handles = axes.get_legend_handles_labels()[0]
         if handles:
             figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=SMALL)
-        points = [(name_in_figure(one.name), one.row.run.start_time, one.row.run.k_dyn) for one in placed]
+        rows = [one.row for one in placed]
+        points = [(name_in_figure(row.marked), row.run.start_time, row.run.k_dyn) for row in rows]
         name_points(figure, axes, points)
     return figure
 

@@ -20,13 +20,14 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.reporting.choice import SLOWER, Choice, choose
+from softstart.reporting.choice import Choice, choose
 from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import Sheet, make_sheet
-from softstart.start.comparison import REFERENCE, Comparison, Row, compared, make_controllers
+from softstart.start.comparison import REFERENCE, Comparison, compared, make_controllers
 from softstart.start.fatigue import Fatigue, fatigue
+from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 
 document = late("softstart.reporting.document")  # renders a Report, so it stands above this module
@@ -73,10 +74,10 @@ class Report:
     limit : Limit
         A bound that no start can go below, and the optima found.
     choice : Choice
-        The recommended strategy, the best one of an ordinary inverter, and the verdict on each.
+        The recommendation, the best strategy of an ordinary inverter, and the verdict on each.
     sheets : tuple of Sheet
-        Parameter sheets: of the recommended strategy, then of the best one of an ordinary inverter, if
-        these are two.
+        Parameter sheets: of the recommended strategy (without limits: the gentlest that is not beaten), then
+        of the best one of an ordinary inverter, if these are two.
     resolution : Resolution
         The steps in which the inverter can be set.
     provenance : Provenance
@@ -106,10 +107,10 @@ class Report:
     provenance: Provenance
 
     def __repr__(self) -> str:
-        """One line that says what is recommended."""
-        best = self.choice.recommended
-        best_text = f"{best.name}, K_dyn {best.row.run.k_dyn:.3f}" if best else "nothing"
-        return f"<Report: {best_text} recommended for {self.drive.name}>"
+        """One line that says which strategy came out."""
+        best = self.choice.chosen
+        best_text = f"{best.name}, K_dyn {best.row.run.k_dyn:.3f}, {self.choice.role}" if best else "nothing"
+        return f"<Report: {best_text}, for {self.drive.name}>"
 
     def row(self, name: str) -> Row | None:
         """The row of a strategy."""
@@ -135,11 +136,14 @@ class Report:
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON, under the names used everywhere."""
-        best, plain = self.choice.recommended, self.choice.ordinary
+        best, plain = self.choice.chosen, self.choice.ordinary
+        named = self.choice.recommendation.recommended
         direct = self.row(REFERENCE)
         return {
             "drive": self.drive.name,
-            "recommended": best.name if best else None,
+            "recommendation": self.choice.recommendation.text,
+            "recommended": named.name if named else None,
+            "chosen": best.name if best else None,
             "k_dyn": best.row.run.k_dyn if best else None,
             "start_time": best.row.run.start_time if best else None,
             "peak_torque": best.row.run.peak_torque if best else None,
@@ -178,7 +182,6 @@ def report(
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     resolution: Resolution | Mapping[str, object] | str | None = None,
-    slower: float = SLOWER,
     budget: float = BUDGET,
     progress: Progress | None = None,
     command: str = "",
@@ -196,8 +199,6 @@ def report(
         A controller's name -> its parameters.
     resolution : Resolution, mapping or str, optional
         The steps in which the inverter can be set, as "torque=0.5%,time=10ms".
-    slower : float, optional
-        By what share the start of the recommended strategy may be longer than that of `direct`.
     budget : float, optional
         Time to search for optima where there is no formula, s; 0 for no search.
     progress : callable, optional
@@ -221,7 +222,7 @@ def report(
     --------
     >>> found = report("crane-4amtkf", controllers=["ramp", "shaped"], budget=0.0)
     >>> found
-    <Report: shaped, K_dyn 1.004 recommended for Crane travel drive 4AMTKF(H)112L6>
+    <Report: shaped, K_dyn 1.004, gentlest unbeaten, for Crane travel drive 4AMTKF(H)112L6>
     >>> found.choice.ordinary.name
     'ramp'
 
@@ -230,7 +231,7 @@ def report(
     docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
     drive = Drive.load(drive) if isinstance(drive, str) else drive
-    steps = _checked(drive, resolution, slower, budget)
+    steps = _checked(drive, resolution, budget)
     made = _made(controllers, parameters or {})
 
     def tell(share: float, what: str) -> None:
@@ -240,7 +241,7 @@ def report(
     rows: list[Row] = []
     failed: list[tuple[str, str]] = []
     maps = []
-    reference = simulate(drive, REFERENCE).start_time
+    reference = simulate(drive, REFERENCE)
     for number, one in enumerate(made):
         tell(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
         try:
@@ -252,9 +253,10 @@ def report(
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     used = [one for one in made if label_of(one) not in dict(failed)]
-    choice = choose(rows, maps, slower)
+    comparison = Comparison(drive, tuple(rows))
+    choice = choose(maps, rows, comparison.recommendation)
     sheets = []
-    chosen = [one for one in (choice.recommended, choice.ordinary) if one is not None]
+    chosen = [one for one in (choice.chosen, choice.ordinary) if one is not None]
     for index, candidate in enumerate(dict.fromkeys(chosen)):
         tell(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
         controller = used[rows.index(candidate.row)]
@@ -268,13 +270,13 @@ def report(
     )
     tell(1.0, "done")
     return Report(
-        drive, Comparison(drive, tuple(rows)), tuple(failed), found, choice, tuple(sheets), steps,
+        drive, comparison, tuple(failed), found, choice, tuple(sheets), steps,
         provenance(drive, command),
     )  # fmt: skip
 
 
 def _checked(
-    drive: object, resolution: Resolution | Mapping[str, object] | str | None, slower: object, budget: object
+    drive: object, resolution: Resolution | Mapping[str, object] | str | None, budget: object
 ) -> Resolution:
     """The resolution; all mistakes of the input at once."""
     wrong: list[str] = []
@@ -282,10 +284,8 @@ def _checked(
         wrong.append(f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one.")
     elif drive.shape != ():
         wrong.append("drive: a report is about one drive; give one value for each parameter.")
-    for name, value in (("slower", slower), ("budget", budget)):
-        if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < float("inf"):
-            meant = "a share, as 0.15" if name == "slower" else "a time in s, as 20"
-            wrong.append(f"{name} = {value!r}: give {meant}, 0 or more.")
+    if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < float("inf"):
+        wrong.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")
     steps = Resolution()
     try:
         if isinstance(resolution, Resolution):

@@ -291,8 +291,10 @@ def computes_with(ready: Controller, own: Drive) -> list[str] | None:
     return found
 
 
-def sheet_section(drive: Drive, sheets: Sequence[Sheet], resolution: Resolution, recommended: str) -> Html:
-    """One sheet for each chosen strategy; `recommended` is the name of that one."""
+def sheet_section(
+    drive: Drive, sheets: Sequence[Sheet], resolution: Resolution, chosen: str, role: str
+) -> Html:
+    """One sheet for each strategy; `chosen` is the name of that one with this `role`."""
     if not sheets:
         return tag("p", "There is no sheet, because no strategy is recommended.")
     steps = "; ".join(f"{what} to {step}" for what, step in resolution.described(drive))
@@ -304,13 +306,13 @@ def sheet_section(drive: Drive, sheets: Sequence[Sheet], resolution: Resolution,
             "the rounded values, and once more with every value half a step off, as a display that rounds "
             "may hide.",
         ),
-        joined(_sheet(sheet, drive, sheet.name == recommended) for sheet in sheets),
+        joined(_sheet(sheet, role if sheet.name == chosen else "", drive) for sheet in sheets),
     )
 
 
-def _sheet(sheet: Sheet, drive: Drive, recommended: bool) -> Html:
+def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
     rows = [_setting(one, drive) for one in sheet.settings]
-    role = "recommended" if recommended else "for an ordinary inverter"
+    role = role or "for an ordinary inverter"
     heads = ["parameter", "meaning", "set to", "unit", "that is", "exact"]
     return tag(
         "section",

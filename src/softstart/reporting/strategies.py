@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.controller import Controller, Sensor
-from softstart.controller.base import label_of
+from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.start import metrics
-from softstart.start.comparison import LIGHT_INERTIA, REFERENCE, WORN_GAP, Row
+from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
+from softstart.start.metrics import SETTLED_BAND
+from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.views.printed import digits, fixed, listed, short
@@ -23,7 +25,7 @@ from softstart.views.starts import clipped_torque
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ORDINARY = ("ramp", "s-curve")
+ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
 _OPEN_LOOP = {
     "direct": "switching on at a torque limit",
     "ramp": "a torque ramp",
@@ -70,11 +72,14 @@ def means_of(controller: Controller) -> Means:
     [True, False]
     """
     kind = kind_of(controller)
+    effort = effort_of(controller)
     extra = [name for sensor, name in _SENSORS.items() if controller.sensors & sensor]
-    if extra:
+    if extra and effort is Effort.SENSOR:
         return Means(" and ".join(extra), "no: drives have no such sensor", False, False)
     if kind in _OPEN_LOOP:
-        return Means("nothing", f"yes: {_OPEN_LOOP[kind]}", True, kind in ORDINARY)
+        return Means("nothing", f"yes: {_OPEN_LOOP[kind]}", True, effort is Effort.RAMPS)
+    if effort is Effort.STEPS:
+        return Means("motor speed", "yes: torque steps, timed by the speed", True, False)
     return Means(
         "motor encoder, motor torque",
         "no: it takes one that runs control code of its user in each cycle",
@@ -93,15 +98,15 @@ def strategies_section(
 ) -> Html:
     """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
     rows = ordered(compared)
-    direct = next((row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE), math.nan)
     cells, needs = [], []
     for row in rows:
         run, name, means = row.run, label_of(row.run.controller), means_of(row.run.controller)
-        lost = run.start_time - direct
         cells.append([
             name, fixed(run.k_dyn, 3), fixed(row.k_dyn_worn_gap, 3), fixed(row.k_dyn_light_load, 3),
-            digits(run.peak_torque), digits(run.start_time), fixed(lost, _decimals(run.start_time)),
-            fixed(100.0 * lost / direct, 1), str(run.contacts),
+            digits(run.peak_torque), digits(run.start_time), digits(run.settled_time),
+            fixed(row.time_lost, _decimals(run.start_time)),
+            fixed(row.settled_lost, _decimals(run.start_time)), str(run.contacts),
+            ", ".join(flag.word for flag in row.flags),
         ])  # fmt: skip
         needs.append([name, run.controller.summary, means.measures, means.inverter])
     strong = [rows.index(row) for row in chosen]
@@ -114,7 +119,13 @@ def strategies_section(
         f"drive, when "
         f"the gap is {short(WORN_GAP)} times as wide or the load inertia {short(LIGHT_INERTIA)} times as "
         f"large.",
-        "Time lost: start time beyond that of direct start.",
+        f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below the "
+        "target. Time lost: start time, and settled time, beyond that of direct start.",
+        *(
+            f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
+            for row in rows
+            if row.flags and not math.isnan(row.run.start_time)
+        ),
         *(
             f"{label_of(row.run.controller)}: {row.run.status.value}"
             for row in rows
@@ -130,9 +141,11 @@ def strategies_section(
     first = table(
         [
             "strategy", "K_dyn", f"K_dyn, gap × {short(WORN_GAP)}", f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
-            "peak torque, N m", "start time, s", "time lost, s", "time lost, %", "contacts",
+            "peak torque, N m", "start time, s", "settled, s", "time lost, s", "settled, lost, s", "contacts",
+            "flag",
         ],
-        cells, caption="Strategies on this drive, the gentlest first", strong=strong, class_="names",
+        cells, caption="Strategies on this drive, the gentlest first", text_columns=(0, 10),
+        strong=strong, class_="names",
     )  # fmt: skip
     second = table(
         ["strategy", "what it does", "what it measures", "can an ordinary inverter do it?"], needs,

@@ -1,10 +1,10 @@
-"""Which strategy loads the shaft least, and what it costs in time: `compare`."""
+"""Strategies side by side on one drive, and what they do when it has changed: `compare`."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from softstart.controller.base import Controller
@@ -12,6 +12,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.start import metrics
+from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -19,30 +20,6 @@ DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """One strategy: its start, and how it fares when the drive is not the one it was set up for.
-
-    The robustness figures keep the controller as it was set up for the nominal drive, while the gap is
-    4 times as wide (`k_dyn_worn_gap`) or the load inertia 0.4 times as large (`k_dyn_light_load`); they
-    refer to the nominal drive's mean torque, so the three K_dyn compare torques. NaN where that start fails.
-    """
-
-    run: Run
-    time_lost: float  # s, start time over that of `direct`
-    k_dyn_worn_gap: float
-    k_dyn_light_load: float
-
-    def summary(self) -> dict[str, Any]:
-        """The figures of the run and of this row under the names used everywhere."""
-        return {
-            **self.run.summary(),
-            "time_lost": self.time_lost,
-            "k_dyn_worn_gap": self.k_dyn_worn_gap,
-            "k_dyn_light_load": self.k_dyn_light_load,
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +31,12 @@ class Comparison:
     drive : Drive
         The drive that is started.
     rows : tuple of Row
-        One for each strategy, in the order given: its `run`, `time_lost` (s), `k_dyn_worn_gap` and
-        `k_dyn_light_load`.
+        One for each strategy, in the order given: its `run`, `time_lost` (s), `k_dyn_worn_gap`,
+        `k_dyn_light_load`, `flags`, and the `margins` to limits.
     fitted_to : Drive or None
         The drive for which the strategies are set up, None where that is `drive` itself.
+    worst_case : tuple of str
+        The changes of the drive under which its limits must be kept as well.
 
     Examples
     --------
@@ -65,8 +44,8 @@ class Comparison:
     >>> table = compare(Drive.load("crane-4amtkf"), ["direct", "reduced-first-stage"])
     >>> [row.run.controller.name for row in table.rows]
     ['direct', 'reduced-first-stage']
-    >>> table.gentlest.run.controller.name
-    'reduced-first-stage'
+    >>> [row.name for row in table.recommendation.best]
+    ['direct']
 
     References
     ----------
@@ -76,19 +55,19 @@ class Comparison:
     drive: Drive
     rows: tuple[Row, ...]
     fitted_to: Drive | None = None
+    worst_case: tuple[str, ...] = CASES
 
-    @property
-    def gentlest(self) -> Row:
-        """The strategy with the smallest K_dyn among those that reach the target speed."""
-        reaching = [row for row in self.rows if not math.isnan(row.run.start_time)]
-        # equal to nine digits is equal: then the quicker one
-        return min(reaching or self.rows, key=lambda row: (float(f"{row.run.k_dyn:.9g}"), row.time_lost))
+    @cached_property
+    def recommendation(self) -> Recommendation:
+        """What is recommended, and why."""
+        return recommend(self.drive, self.rows)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
         return {
             "drive": self.drive.name,
             "fitted_to": None if self.fitted_to is None else self.fitted_to.name,
+            "recommendation": self.recommendation.summary(),
             "strategies": [row.summary() for row in self.rows],
         }
 
@@ -100,6 +79,7 @@ def compare(
     parameters: Mapping[str, Mapping[str, object]] | None = None,
     until: float | None = None,
     fitted_to: Drive | None = None,
+    worst_case: Sequence[str] | None = None,
 ) -> Comparison:
     """Start the drive under each controller and compare K_dyn, start time and robustness.
 
@@ -117,6 +97,8 @@ def compare(
     fitted_to : Drive, optional
         The drive for which the controllers are set up, if not `drive`: how they fare on a drive that is not
         the one they assume.
+    worst_case : sequence of str, optional
+        Which of "gap x4" and "J2 x0.4" must keep the limits of the drive as well; by default both.
 
     Returns
     -------
@@ -155,10 +137,16 @@ def compare(
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
     if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
+    counted = (
+        (worst_case,) if isinstance(worst_case, str) else CASES if worst_case is None else tuple(worst_case)
+    )
+    if not set(counted) <= set(CASES):
+        named = " and ".join(f'"{case}"' for case in CASES)
+        raise InputError(f"worst_case = {worst_case!r}: there are {named}; () is the drive as it is alone.")
     made = make_controllers(controllers, parameters or {})
-    reference = simulate(drive, REFERENCE, until).start_time
-    rows = tuple(compared(drive, one, reference, until, fitted_to) for one in made)
-    return Comparison(drive, rows, fitted_to)
+    direct = simulate(drive, REFERENCE, until)
+    rows = tuple(compared(drive, one, direct, until, fitted_to, counted) for one in made)
+    return Comparison(drive, rows, fitted_to, counted)
 
 
 def make_controllers(
@@ -191,40 +179,31 @@ def make_controllers(
 def compared(
     drive: Drive,
     controller: Controller,
-    reference: float,
+    direct: Run | None,
     until: float | None = None,
     fitted_to: Drive | None = None,
+    worst_case: tuple[str, ...] = CASES,
 ) -> Row:
-    """The row of one controller; `reference` is the start time of `direct`, s."""
+    """The row of one controller; `direct` is the start that its times are compared with."""
     run = simulate(drive, controller, until, fitted_to=fitted_to)
-    return Row(
-        run,
-        run.start_time - reference,
-        k_dyn_worn_gap(drive, controller, until, fitted_to),
-        k_dyn_light_load(drive, controller, until, fitted_to),
-    )
+    _ = run.settled_time  # now, while what a controller prints is still caught
+    cases = {case: changed_case(drive, controller, case, until, fitted_to) for case in CASES}
+    return Row(run, direct, cases, worst_case)
 
 
-def k_dyn_worn_gap(
-    drive: Drive, controller: Controller, until: float | None = None, fitted_to: Drive | None = None
-) -> float:
-    """K_dyn of a controller set up for `drive` at 4 times its gap; NaN where that start fails."""
-    return _k_dyn_changed(drive, drive.with_gap(WORN_GAP * drive.gap), controller, until, fitted_to)
-
-
-def k_dyn_light_load(
-    drive: Drive, controller: Controller, until: float | None = None, fitted_to: Drive | None = None
-) -> float:
-    """K_dyn of a controller set up for `drive` with 0.4 of its load inertia; NaN where that start fails."""
-    light = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
-    return _k_dyn_changed(drive, light, controller, until, fitted_to)
-
-
-def _k_dyn_changed(
-    drive: Drive, changed: Drive, controller: Controller, until: float | None, fitted_to: Drive | None
-) -> float:
-    """K_dyn of the changed drive, over the mean torque of `drive`."""
+def changed_case(
+    drive: Drive,
+    controller: Controller,
+    case: str,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+) -> Case:
+    """A controller set up for `drive` with 4 times its gap, or 0.4 of its load inertia."""
+    if case == "gap x4":
+        changed = drive.with_gap(WORN_GAP * drive.gap)
+    else:
+        changed = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
     try:
-        return simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive).k_dyn
+        return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:
-        return math.nan
+        return Case.of(None)

@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.start import metrics
-from softstart.start.status import Status
+from softstart.start.engine import MAX_EVENTS, Recorder, run_one
+from softstart.start.status import Status, status_of
 
 Vector = NDArray[np.float64]
 starts = late("softstart.views.starts")  # above this module; see softstart.late
@@ -35,6 +36,7 @@ EVENT_NAMES = {
     at.RELEASED: "brake released",
 }
 PLOT_POINTS = 1500
+SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a load must keep its speed
 
 
 @dataclass(frozen=True)
@@ -238,8 +240,10 @@ class Run(BaseRun):
         Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
         with the largest |T|, to which traces, events and stages belong.
     positions : mapping of str to Run
-        The starts from each position, if it is unknown. Then K_dyn, impact speed, start and settling time are
+        The starts from each position, if it is unknown. Then K_dyn, impact speed, start and settled time are
         the largest among them.
+    told : Drive or None
+        The drive whose numbers the controller works with, if not `drive`.
 
     Examples
     --------
@@ -267,6 +271,7 @@ class Run(BaseRun):
     event_rows: at.Matrix
     stage_rows: at.Matrix
     positions: Mapping[str, Run] = field(default_factory=dict)
+    told: Drive | None = None
 
     def __repr__(self) -> str:
         """One line that says what came out.
@@ -309,6 +314,38 @@ class Run(BaseRun):
         Counted from the command of the start, so that it includes what the torque takes to release a brake.
         """
         return self._worst(lambda run: float(run.final[at.START_TIME]))
+
+    @cached_property
+    def settled_time(self) -> float:
+        """From when on the load keeps its speed, not below 99.9 % of the target, s; NaN if it does not.
+
+        Never before the start time. It is judged over five elastic periods after that, for which the run is
+        computed further where it is shorter. See `metrics.settled_time` for the definition.
+        """
+        return self._worst(lambda run: metrics.settled_time(run._continued))
+
+    @property
+    def settling_end(self) -> float:
+        """Until when it is judged whether the load has settled, s."""
+        return self.start_time + SETTLING_PERIODS * float(self.drive.elastic_period)
+
+    @property
+    def _continued(self) -> Run:
+        """The same start to the end of settling at least; this one where it fails beyond its own end."""
+        if not self.end_time < self.settling_end:
+            return self
+        p = self.plant.copy()
+        p.view(at.PLANT)[0]["event_cap"] = MAX_EVENTS
+        recorder = Recorder(p, int(self.controller.sensors))
+        try:
+            reason = run_one(self.controller, self.told or self.drive, recorder, self.settling_end)
+        except SimulationError:
+            return self
+        if not status_of(reason, True, True).finished:
+            return self
+        segments, events, stages = recorder.rows()
+        final = recorder.x.copy()
+        return replace(self, final=final, segments=segments, event_rows=events, stage_rows=stages)
 
     @property
     def clipped(self) -> Clipped:
@@ -442,6 +479,8 @@ class Run(BaseRun):
     def settling_time(self, band: float = 0.1) -> float:
         """From when on the shaft torque stays settled, s; NaN if it does not within the run.
 
+        That of the load speed is `settled_time`.
+
         Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
         torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant.
         """
@@ -475,7 +514,8 @@ class Run(BaseRun):
             "torque_at_contact": self.torque_at_contact,
             "stage_1_duration": first,
             "stage_2_duration": second,
-            "settling_time": self.settling_time(),
+            "settled_time": self.settled_time,
+            "torque_settling_time": self.settling_time(),
             "energy": asdict(self.energy),
             "end_time": self.end_time,
             **({} if self.drive.brake == "none" else {"release_time": self.release_time}),
@@ -485,7 +525,8 @@ class Run(BaseRun):
     def _by_position(self) -> dict[str, Any]:
         """K_dyn and start time from each position, and which is the worst for the shaft."""
         each = {
-            name: {"k_dyn": run.k_dyn, "start_time": run.start_time} for name, run in self.positions.items()
+            name: {"k_dyn": run.k_dyn, "start_time": run.start_time, "settled_time": run.settled_time}
+            for name, run in self.positions.items()
         }
         return {"worst": self.position, **each}
 

@@ -138,7 +138,7 @@ def simulate(
     reason = run_one(fitted, own, recorder, until)
     name = fitted.name or type(fitted).__name__
     status = ended(recorder.x, reason, until, max_events, f"Drive {drive.name}, controller {name}")
-    return Run(drive, fitted, base or drive, status, p, recorder.x.copy(), *recorder.rows())
+    return Run(drive, fitted, base or drive, status, p, recorder.x.copy(), *recorder.rows(), told=own)
 
 
 def _check_other(name: str, other: object, drive: object) -> None:

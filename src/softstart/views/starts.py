@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.drive import Drive
-from softstart.start.comparison import Comparison, Row
-from softstart.start.run import Run
+from softstart.start.comparison import Comparison
+from softstart.start.metrics import SETTLED_BAND
+from softstart.start.recommendation import Row
+from softstart.start.run import SETTLING_PERIODS, Run
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -58,7 +60,8 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
         ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
         ["start time", with_unit(run.start_time, "s")],
-        ["settled from", with_unit(run.settling_time(), "s")],
+        ["settled time", with_unit(run.settled_time, "s")],
+        ["shaft torque settled from", with_unit(run.settling_time(), "s")],
         ["first contact", with_unit(run.first_contact, "s")],
         ["speed of impact", with_unit(run.impact_speed, "rad/s")],
         ["motor torque at contact", with_unit(run.torque_at_contact, "N m")],
@@ -220,19 +223,23 @@ class Figure(NamedTuple):
 
 
 def share_lost(row: Row) -> float:
-    """Time lost in per cent of the start time of `direct`."""
-    direct = row.run.start_time - row.time_lost
-    return 100.0 * row.time_lost / direct if direct > 0.0 else math.nan
+    """Time lost until the load has settled, in per cent of the settled time of `direct`."""
+    direct = row.run.settled_time - row.settled_lost
+    return 100.0 * row.settled_lost / direct if direct > 0.0 else math.nan
 
 
-JUDGING = (
+GENTLE = (
     Figure("K_dyn", lambda row: row.run.k_dyn, 3),
     Figure("K\ngap x4", lambda row: row.k_dyn_worn_gap, 3),
     Figure("K\nJ2 x0.4", lambda row: row.k_dyn_light_load, 3),
     Figure("peak\nN m", lambda row: row.run.peak_torque),
+)
+QUICK = (
     Figure("start\ntime s", lambda row: row.run.start_time),
-    Figure("time\nlost s", lambda row: row.time_lost, digits=3),
-    Figure("time\nlost %", share_lost, 1),
+    Figure("settled\ns", lambda row: row.run.settled_time),
+    Figure("start\nlost s", lambda row: row.time_lost, digits=3),
+    Figure("settled\nlost s", lambda row: row.settled_lost, digits=3),
+    Figure("settled\nlost %", share_lost, 1),
 )
 AT_THE_GAP = (
     Figure("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
@@ -245,9 +252,9 @@ AT_THE_GAP = (
 
 
 def comparison_table(
-    rows: Sequence[Row], figures: Sequence[Figure] = (*JUDGING, *AT_THE_GAP), title: str = ""
+    rows: Sequence[Row], figures: Sequence[Figure] = (*GENTLE, *QUICK, *AT_THE_GAP), title: str = ""
 ) -> Table:
-    """The strategies and these figures of them."""
+    """The strategies and these figures of them; last columns for limits and flags, where there are any."""
     cells = {"strategy": [row.run.controller_name for row in rows]}
     for figure in figures:
         values = [figure.of(row) for row in rows]
@@ -255,31 +262,20 @@ def comparison_table(
             cells[figure.heading] = column_of(values, figure.digits)
         else:
             cells[figure.heading] = [number(value, figure.decimals) for value in values]
-    return Table.of(title, cells, ("strategy",))
+    limits = rows[0].run.drive.limits
+    if limits and GENTLE[0] in figures:
+        cells["limits"] = [_least_margin(row) for row in rows]
+    if any(row.flags for row in rows):
+        cells["flag"] = [", ".join(flag.word for flag in row.flags) for row in rows]
+    return Table.of(title, cells, ("strategy", "limits", "flag"))
 
 
-def conclusion(comparison: Comparison) -> str:
-    """Which strategy is the gentlest, and what it costs in time."""
-    best = comparison.gentlest
-    others = [row for row in comparison.rows if row is not best]
-    k, name = best.run.k_dyn, best.run.controller_name
-    if math.isnan(best.run.start_time):
-        return f"None reaches the target speed within the run; the gentlest so far is {name}, K_dyn {k:.3f}."
-    said = f"Gentlest: {name}, K_dyn {k:.3f}"
-    direct = next((row for row in others if row.run.controller_name == "direct"), None)
-    if direct is not None:
-        said += f" against {direct.run.k_dyn:.3f} of direct"
-    lost = best.time_lost
-    if math.isnan(lost):
-        return said + "; direct does not reach the target speed within the run."
-    share = abs(share_lost(best))
-    all_lost = [row.time_lost for row in comparison.rows]
-    seconds = column_of(all_lost, digits=3)[comparison.rows.index(best)].lstrip("-")
-    if abs(lost) < 1e-6 * best.run.start_time:
-        return said + "; it takes no more time than direct."
-    if lost < 0.0:
-        return said + f"; it is even {seconds} s ({share:.1f} %) quicker than direct."
-    return said + f"; it costs {seconds} s of start time, {share:.1f} % more than direct."
+def _least_margin(row: Row) -> str:
+    """Whether a strategy keeps the limits, and its least margin."""
+    margins = row.margins(row.run.drive.limits)
+    broken = [one for one in margins if not one.kept]
+    least = min(broken or margins, key=lambda one: one.share)
+    return f"{'exceeded' if broken else 'kept'} {number(100.0 * least.share, 1)} %"
 
 
 def notes(comparison: Comparison) -> list[str]:
@@ -290,8 +286,16 @@ def notes(comparison: Comparison) -> list[str]:
     found = [
         f"K_dyn = peak shaft torque / {base:.4g} N m, the mean shaft torque under full starting torque. "
         f"K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or "
-        "the load inertia 0.4 times as large."
+        "the load inertia 0.4 times as large.",
+        f"settled: from then on the load speed is never more than {100.0 * SETTLED_BAND:g} % below the "
+        f"target, for {SETTLING_PERIODS:g} elastic periods after the start time. "
+        "lost: later than with direct start.",
     ]
+    if comparison.drive.limits:
+        found.append(
+            "limits: the least margin in the worst of "
+            f"{', '.join(['the drive as it is', *comparison.worst_case])}."
+        )
     worst = [f"{row.run.controller_name} {row.run.position}" for row in comparison.rows if row.run.positions]
     if worst:
         found.append(
@@ -310,22 +314,29 @@ def notes(comparison: Comparison) -> list[str]:
         for row in comparison.rows
         if (clipped := clipped_torque(row.run))
     ]
+    found += [
+        f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
+        for row in comparison.rows
+        if row.flags and not math.isnan(row.run.start_time)
+    ]
     return found
 
 
-def comparison_figure(runs: Sequence[Run], title: str) -> Any:
+def comparison_figure(rows: Sequence[Row], title: str) -> Any:
     """Shaft torque (above) and motor torque (below) of several starts, one row of panels each."""
+    runs = [row.run for row in rows]
     with drawing():
         figure, axes = new_figure(
             len(runs), 1, (8.0, 1.0 + 1.35 * len(runs)), sharex=True, sharey=True, squeeze=False
         )
         longest = max(run.end_time for run in runs)
-        for index, (panel, run) in enumerate(zip(axes[:, 0], runs, strict=True)):
+        for index, (panel, row) in enumerate(zip(axes[:, 0], rows, strict=True)):
+            run = row.run
             shade_open_gap(panel, run)
             panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
             panel.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
             panel.set_title(
-                f"{run.controller_name}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
+                f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
                 loc="left",
                 fontsize=9.5,
                 pad=3,
@@ -370,10 +381,9 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
     rows = comparison.rows
     runs = [row.run for row in rows]
     name = comparison.drive.name
-    pictures = {"comparison": comparison_figure(runs, name)}
-    points = [
-        (run.controller_name, run.start_time, run.k_dyn) for run in runs if not math.isnan(run.start_time)
-    ]
+    pictures = {"comparison": comparison_figure(rows, name)}
+    reached = [row for row in rows if not math.isnan(row.run.start_time)]
+    points = [(row.marked, row.run.start_time, row.run.k_dyn) for row in reached]
     if points:
         pictures["trade-off"] = trade_off_figure(points, name)
     for stem, figure in pictures.items():
@@ -383,13 +393,13 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
         stems.append(file_stem(row.run.controller_name, stems))
         _write_run(row.run, folder, stems[-1])
 
-    summaries = [row.summary() for row in rows]
-    keys = [key for key in summaries[0] if key not in ("parameters", "status_text")]
+    summaries = [row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)} for row in rows]
+    keys = [key for key in summaries[0] if key not in ("parameters", "status_text", "limits")]
     write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
 
     parts = [
         f"# {markdown(name)}: soft-start strategies compared",
-        conclusion(comparison),
+        comparison.recommendation.text,
         markdown_table(comparison_table(rows)),
         *notes(comparison),
         *(f"![{stem}]({stem}.svg)" for stem in pictures),

@@ -2,7 +2,6 @@
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ import pytest
 from softstart import Command, Drive, PlainController, simulate
 from softstart.processes import Tell
 from softstart.reporting import report
-from softstart.reporting.choice import choice_section, choose
+from softstart.reporting.choice import choice_section
 from softstart.reporting.document import answer
 from softstart.reporting.limit import bound_at, limit, limit_section, optima
 from softstart.reporting.markup import Figures
@@ -43,52 +42,40 @@ def test_map_is_cell_by_cell_what_simulate_says():
     assert found.worst_at == (found.gaps[i], found.inertias[j])
 
 
-def test_rule(hostile):
+def test_verdicts_are_those_of_the_one_rule(hostile):
     choice = hostile.choice
-    inside = [one for one in choice.candidates if not one.out]
-    direct = choice.of("direct").row.run.start_time
-    assert {one.name for one in choice.candidates} - {one.name for one in inside} == {"reduced-first-stage"}
+    said = hostile.comparison.recommendation
+    assert choice.recommendation is said
     assert choice.of("reduced-first-stage").worst < choice.of("direct").worst  # out for its sensor alone
-    for one in inside:
-        assert one.row.run.start_time <= 1.15 * direct
-        assert choice.recommended.worst <= one.worst
-    assert choice.recommended.name == "shaped"
-    assert choice.ordinary.name in ("ramp", "s-curve")
+    assert choice.of("reduced-first-stage").verdict == "a sensor that drives do not have"
+    assert [one.name for one in choice.candidates if one.verdict == "unbeaten"] == ["direct", "shaped"]
+    assert choice.chosen.row is said.best[-1]
+    assert choice.role == "gentlest unbeaten"
     assert choice.ordinary.worst == min(choice.of(name).worst for name in ("ramp", "s-curve"))
-    maps = [one.map for one in choice.candidates]
-    strict = choose(hostile.comparison.rows, maps, 0.01)
-    assert strict.recommended.name == "direct"
-    assert strict.too_slow
-    assert strict.ordinary.name == choice.ordinary.name
+    assert answer(hostile).startswith(said.text)
+    section = choice_section(choice)
+    assert "no limits, so nothing says which peak is low enough" in section
 
 
-def test_direct_start_is_not_praised_where_gentler_ones_are_only_too_slow(hostile):
-    """With next to no time to lose the rule leaves direct start, which is not as good as the others."""
-    maps = [one.map for one in hostile.choice.candidates]
-    strict = replace(hostile, choice=choose(hostile.comparison.rows, maps, 0.0125))
-    said = answer(strict)
-    assert strict.choice.recommended.name == "direct"
-    assert "brings nothing" not in said
-    assert "shaped (K_dyn 1.004, 5.2 % slower)" in said
-    more = "with --slower 6% the rule takes shaped, K_dyn 1.004 after 0.3928 s."
-    assert said.partition(" On an")[0].endswith(f"A slower start is much gentler: {more}")
-    assert more not in answer(hostile)
-    assert choose(hostile.comparison.rows, maps, 0.06).recommended.name == "shaped"
-    assert "s-curve is the best: K_dyn 1.879" in said
-    assert "7.6\N{NO-BREAK SPACE}% slower than direct" in said
-    assert "at most 1.25\N{NO-BREAK SPACE}% slower than direct" in choice_section(strict.choice)
-    alone = replace(hostile, choice=choose(hostile.comparison.rows[:1], maps[:1]))
-    assert answer(alone).startswith("Only direct start was examined")
+def test_with_limits_the_report_is_about_the_recommended_strategy():
+    crane = Drive.load("crane-4amtkf").replace(permissible_torque=130.0)
+    made = report(crane, controllers=["ramp", "shaped"], budget=0.0)
+    assert made.choice.chosen.name == made.summary()["recommended"] == "shaped"
+    assert [sheet.name for sheet in made.sheets] == ["shaped"]
+    assert "the simplest strategy that keeps the limits of the drive" in choice_section(made.choice)
+    assert "On an ordinary inverter" not in answer(made)
+    none = report(crane.replace(permissible_torque=20.0), controllers=["ramp"], budget=0.0)
+    assert none.choice.chosen is None
+    assert "no strategy is recommended" in none.to_html()
 
 
-def test_a_drive_for_which_nothing_can_be_recommended():
+def test_a_drive_on_which_only_direct_start_gets_there():
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0, gap=0.0)
-    made = report(crane, controllers=[Lazy()], budget=0.0, slower=0.0)
-    assert made.choice.recommended.name == "direct"  # the only one that gets there
-    assert "A soft start brings nothing here." in answer(made)
+    made = report(crane, controllers=[Lazy()], budget=0.0)
+    assert made.choice.chosen.name == "direct"
     assert math.isnan(made.choice.of("lazy").worst)
+    assert made.choice.of("lazy").verdict == "does not reach the target speed"
     page = made.to_html()
-    assert "No ramp was examined" in page
     assert "the drive has none, so the maps have one row" in page
     assert made.sheets[0].name == "direct"
 
@@ -99,9 +86,9 @@ def test_no_strategy_reaches_the_speed():
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     weak = make_controller("direct", {"torque": "5 N*m"})
     made = report(crane, controllers=[weak], budget=0.0)
-    assert made.choice.recommended is None
+    assert made.choice.chosen is None
     assert made.sheets == ()
-    assert "No strategy brings the load to its target speed." in answer(made)
+    assert answer(made) == "None is recommended: direct (does not reach the target speed)."
     assert made.limit.refusal
     assert "no strategy is recommended" in made.to_html()
     assert made.summary()["recommended"] is None

@@ -49,7 +49,7 @@ def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypa
     monkeypatch.setattr("softstart.reporting.limit._in_own_process", lambda *_: [])
     monkeypatch.setattr("softstart.reporting.limit.SHARES", ())
     made = report(LAGGING, controllers=["direct", "shaped"], budget=30.0)
-    best = made.choice.recommended
+    best = made.choice.chosen
     bound, known, own = made.lower_bound(best.row), made.gentlest_known(best.row), best.row.run.k_dyn
     assert bound < known < own
     page = Page(limit_section(made.drive, made.choice, made.limit, Figures()))

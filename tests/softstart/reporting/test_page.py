@@ -143,7 +143,7 @@ def test_limit_is_that_of_optimize(read, hostile):
         assert hostile.lower_bound(row) <= best.k_dyn <= row.run.k_dyn
         assert table[name]["optimum at that time"] == f"{best.k_dyn:.3f}"
         assert table[name]["lower bound at that time"] == f"{hostile.lower_bound(row):.3f}"
-    assert hostile.limit.optimum_at(hostile.choice.recommended.row.run.start_time) is not None
+    assert hostile.limit.optimum_at(hostile.choice.chosen.row.run.start_time) is not None
 
 
 def test_figures_are_vector_named_and_the_same_each_time(read, page):

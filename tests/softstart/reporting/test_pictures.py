@@ -11,11 +11,10 @@ from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import report
-from softstart.reporting.choice import choose
 from softstart.reporting.drive_section import scheme
 from softstart.reporting.limit import Limit, limit_figure
 from softstart.reporting.markup import Figures
-from softstart.reporting.robustness import maps_figure, robustness
+from softstart.reporting.robustness import maps_figure
 from softstart.reporting.strategies import traces_figure, traces_section
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -59,10 +58,9 @@ def test_names_in_figures_are_taken_literally():
 
 
 def test_a_single_strategy_has_a_limit_figure():
-    choice = choose(report(CRANE, controllers=["direct"], budget=0.0).comparison.rows,
-                    [robustness(CRANE, make_controller("direct"))])  # fmt: skip
+    choice = report(CRANE, controllers=["direct"], budget=0.0).choice
     left, right = limit_figure(choice, Limit()).axes[0].get_xlim()
-    assert left <= choice.recommended.row.run.start_time <= right
+    assert left <= choice.chosen.row.run.start_time <= right
 
 
 def test_small_inertias_stand_in_powers_that_keep_their_labels_apart():

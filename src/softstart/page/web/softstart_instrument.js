@@ -15,6 +15,7 @@ export default {
   <main class="centre">
     <section class="plots"><canvas role="img" aria-label="Torques, speeds and twist over time"></canvas></section>
     <section class="strategies"></section>
+    <section class="advice" role="status"></section>
   </main>
   <aside class="side">
     <section class="figure"></section>

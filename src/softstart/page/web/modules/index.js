@@ -23,6 +23,7 @@ export class Instrument {
     this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"));
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);
+    this.advice = root.querySelector(".advice");
     this.plots = new Plots(root.querySelector(".plots"), this.theme);
     this.map = new GapMap(root.querySelector(".map"), this.theme, say);
     this.resized = new ResizeObserver(() => this.redraw());
@@ -85,6 +86,7 @@ export class Instrument {
       this.version = frame.version;
       this.stamp = frame.stamp;
     }
+    if (frame.recommendation !== undefined || frame.order) this.advise(frame.recommendation);
     if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
     if (frame.fields) this.controls.show(frame.fields, frame.mistakes, frame.stamp);
     if (frame.keep) this.keep(frame.keep);
@@ -97,6 +99,12 @@ export class Instrument {
     this.number = number;
     if (frame.order) this.plotted = false;
     this.waiting ||= requestAnimationFrame(() => this.draw());
+  }
+
+  // what is recommended, for the drive as it was when it was last at rest
+  advise(text) {
+    this.advice.classList.toggle("old", text === undefined);
+    if (text !== undefined && this.advice.textContent !== text) this.advice.textContent = text;
   }
 
   // size or colours have changed: everything anew

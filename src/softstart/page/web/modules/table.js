@@ -9,7 +9,9 @@ const COLUMNS = [
   ["worn", "K gap \u00d74", "", (row) => fixed(row.worn, 3), "K when wear has made the gap four times as wide, and the controller is as it was"],
   ["peak_torque", "peak, N m", "", (row) => significant(row.peak_torque, 4), "Largest shaft torque"],
   ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
+  ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed"],
   ["time_lost", "later, s", "", (row) => fixed(row.time_lost, 4), "How much later than with direct the load has its target speed"],
+  ["flag", "flag", "", (row) => row.flag ?? "", "Why a strategy is never recommended: slow, not settled, harder than direct start"],
 ];
 
 export class Table {
@@ -99,7 +101,7 @@ export class Table {
   line(name) {
     const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}` });
     const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}` });
-    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
+    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: key === "flag" ? "flag" : "number", "data-key": key }));
     const bar = element("td", { class: "bar", "aria-hidden": "true" });
     const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
     out.addEventListener("click", () => this.say({ what: "remove", name }));

@@ -1,0 +1,327 @@
+"""Which strategy is recommended, and why: one rule for `compare`, the page and the report.
+
+With limits (`drive.limits`): the simplest strategy that keeps them in the worst case asked for. Without: the
+strategies that no other one beats in K_dyn and time at once, with the cost of each step from one to the next.
+What is flagged, and what needs a sensor that drives do not have, is not recommended.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Final
+
+from softstart.controller.base import Effort, effort_of, label_of
+from softstart.drive import Drive, Limits
+from softstart.start.run import Run
+
+SLOW: Final = 2.0  # times the time of `direct`
+HARDER: Final = 1.001  # times the K_dyn of `direct`
+BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
+ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
+CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Why a strategy is not recommended: in a word, for tables, and in a few."""
+
+    word: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """A start on a drive that has changed: N m, s, NaN where it fails; K_dyn over the mean torque before."""
+
+    k_dyn: float
+    peak_torque: float
+    start_time: float
+
+    @staticmethod
+    def of(run: Run | None) -> Case:
+        """That of a start; None is one that failed."""
+        if run is None:
+            return Case(math.nan, math.nan, math.nan)
+        return Case(run.k_dyn, run.peak_torque, run.start_time)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A limit and the worst value beside it; `case` says where that is, "" on the drive as it is."""
+
+    name: str
+    unit: str
+    value: float
+    limit: float
+    case: str
+
+    @property
+    def share(self) -> float:
+        """What is left, as a share of the limit: below 0 where it is exceeded, NaN where the start fails."""
+        return 1.0 - self.value / self.limit
+
+    @property
+    def kept(self) -> bool:
+        """Whether the limit is kept."""
+        return self.share >= 0.0
+
+    def __str__(self) -> str:
+        """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)"."""
+        where = f" with {self.case}" if self.case else ""
+        if math.isnan(self.value):
+            return f"no {self.name}{where}, as the load does not reach its speed"
+        rest = f"margin {_percent(self.share)}" if self.kept else f"{_percent(-self.share)} over"
+        return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{where} ({rest})"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One strategy: its start, and how it fares when the drive is not the one it was set up for.
+
+    The robustness figures keep the controller as it was set up for the nominal drive, while the gap is
+    4 times as wide (`k_dyn_worn_gap`) or the load inertia 0.4 times as large (`k_dyn_light_load`); they
+    refer to the nominal drive's mean torque, so the three K_dyn compare torques. NaN where that start fails.
+
+    `direct` is the start that times are compared with, None where that fails; `worst_case` names those of the
+    `cases` that must keep the limits, besides the drive as it is.
+    """
+
+    run: Run
+    direct: Run | None
+    cases: Mapping[str, Case] = field(default_factory=dict)
+    worst_case: tuple[str, ...] = CASES
+    label: str = ""  # a name of its own in tables
+
+    @property
+    def name(self) -> str:
+        """Name of the strategy in tables."""
+        return self.label or label_of(self.run.controller)
+
+    @property
+    def marked(self) -> str:
+        """The name with the flags, for pictures."""
+        words = ", ".join(flag.word for flag in self.flags)
+        return f"{self.name} ({words})" if words else self.name
+
+    @property
+    def effort(self) -> Effort:
+        """What it takes to build it."""
+        return effort_of(self.run.controller)
+
+    @property
+    def time_lost(self) -> float:
+        """Start time over that of `direct`, s."""
+        return self.run.start_time - (math.nan if self.direct is None else self.direct.start_time)
+
+    @property
+    def settled_lost(self) -> float:
+        """Settled time over that of `direct`, s."""
+        return self.run.settled_time - (math.nan if self.direct is None else self.direct.settled_time)
+
+    @property
+    def k_dyn_worn_gap(self) -> float:
+        """K_dyn with a gap 4 times as wide."""
+        return self.cases["gap x4"].k_dyn
+
+    @property
+    def k_dyn_light_load(self) -> float:
+        """K_dyn with 0.4 of the load inertia."""
+        return self.cases["J2 x0.4"].k_dyn
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """Why it is never recommended: slow, not settled, harder than direct start; empty if it may be."""
+        return flags(self.run, self.direct)
+
+    def margins(self, limits: Limits) -> tuple[Margin, ...]:
+        """The margin to each limit, in the worst of the drive as it is and of `worst_case`."""
+        own = {"": Case.of(self.run), **{case: self.cases[case] for case in self.worst_case}}
+        figures = (
+            ("shaft torque", "N m", limits.shaft_torque, "peak_torque"),
+            ("start time", "s", limits.start_time, "start_time"),
+        )
+        found = []
+        for name, unit, limit, figure in figures:
+            if limit is not None:
+                values = {case: float(getattr(one, figure)) for case, one in own.items()}
+                worst = max(values, key=lambda case: (math.isnan(values[case]), values[case]))
+                found.append(Margin(name, unit, values[worst], limit, worst))
+        return tuple(found)
+
+    def summary(self) -> dict[str, Any]:
+        """The figures of the run and of this row under the names used everywhere."""
+        limits = self.run.drive.limits
+        return {
+            **self.run.summary(),
+            "time_lost": self.time_lost,
+            "settled_time_lost": self.settled_lost,
+            "k_dyn_worn_gap": self.k_dyn_worn_gap,
+            "k_dyn_light_load": self.k_dyn_light_load,
+            "effort": self.effort.value,
+            "flags": [flag.text for flag in self.flags],
+            **({"limits": [_plain(one) for one in self.margins(limits)]} if limits else {}),
+        }
+
+
+def _plain(one: Margin) -> dict[str, Any]:
+    plain = {"limit": one.name, "unit": one.unit, "value": one.value, "permitted": one.limit}
+    return {**plain, "margin": one.share, "kept": one.kept, "case": one.case}
+
+
+def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
+    """Why this strategy is never recommended; empty if it may be.
+
+    Slow is what takes more than twice as long as `direct` until the load has settled, unless the drive has a
+    limit on the start time, which then decides.
+    """
+    if math.isnan(run.start_time):
+        return (Flag("no start", "does not reach the target speed"),)
+    found = []
+    if math.isnan(run.settled_time):
+        text = f"the load falls below its speed again, not settled within {run.settling_end:.4g} s"
+        found.append(Flag("not settled", text))
+    if direct is None:
+        return tuple(found)
+    slower = run.settled_time / direct.settled_time
+    if slower > SLOW and run.drive.limits.start_time is None:
+        found.append(Flag(f"slow x{slower:.3g}", f"takes {slower:.3g} times as long as direct start"))
+    harder = run.k_dyn / direct.k_dyn
+    if harder > HARDER:
+        text = f"harder than direct start, K_dyn {run.k_dyn:.3f} against {direct.k_dyn:.3f}"
+        found.append(Flag(f"harder x{harder:.3g}", text))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """What is recommended, and why, in one text that is the same wherever it is shown.
+
+    Attributes
+    ----------
+    text : str
+        Answer, margin and reason.
+    recommended : Row or None
+        With limits, the simplest strategy that keeps them, if one does.
+    best : tuple of Row
+        Those that no other one beats in K_dyn and time at once, the quickest first.
+    limits : Limits
+        Those of the drive.
+    """
+
+    text: str
+    recommended: Row | None
+    best: tuple[Row, ...]
+    limits: Limits
+
+    @property
+    def shown(self) -> tuple[Row, ...]:
+        """The strategies to set off in tables: the recommended one, without limits the best."""
+        if self.limits:
+            return () if self.recommended is None else (self.recommended,)
+        return self.best
+
+    def verdict(self, row: Row) -> str:
+        """What the rule says of a strategy."""
+        refused = _why_not(row, self.limits)
+        if refused:
+            return refused
+        if self.limits:
+            more = "keeps the limits, with more effort or less margin"
+            return "recommended" if row is self.recommended else more
+        return "unbeaten" if row in self.best else "another one is gentler and quicker"
+
+    def summary(self) -> dict[str, Any]:
+        """As plain data."""
+        return {
+            "text": self.text,
+            "recommended": None if self.recommended is None else self.recommended.name,
+            "best": [row.name for row in self.best],
+        }
+
+
+def recommend(drive: Drive, rows: Iterable[Row]) -> Recommendation:
+    """The recommendation among the strategies started on a drive."""
+    rows = list(rows)
+    able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
+    best = _unbeaten(able)
+    if not drive.limits:
+        return Recommendation(_without_limits(rows, best), None, best, drive.limits)
+    return _with_limits(drive.limits, rows, able, best)
+
+
+def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
+    """The quickest, then each one that is gentler than all quicker ones."""
+    found: list[Row] = []
+    for row in sorted(able, key=lambda row: (row.run.settled_time, row.run.k_dyn, row.effort.order)):
+        if not found or row.run.k_dyn < BETTER * found[-1].run.k_dyn:
+            if found and row.run.settled_time <= ALIKE * found[-1].run.settled_time:
+                found.pop()  # as quick
+            found.append(row)
+    return tuple(found)
+
+
+def _without_limits(rows: Sequence[Row], best: Sequence[Row]) -> str:
+    if not best:
+        return f"None is recommended: {_refused(rows)}."
+    first = best[0]
+    parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f} in {first.run.settled_time:.4g} s"]
+    for before, row in pairwise(best):
+        less, later = before.run.k_dyn - row.run.k_dyn, row.run.settled_time - before.run.settled_time
+        cost = f"{less:.3f} less for {1e3 * later:.3g} ms, {1e-3 * less / later:.2g} per ms"
+        parts.append(f"{row.name}, {row.run.k_dyn:.3f} in {row.run.settled_time:.4g} s ({cost})")
+    head = "No other strategy beats these" if len(best) > 1 else "No other strategy beats this one"
+    return (
+        f"{head} in K_dyn and time at once: {'; '.join(parts)}. "
+        "Which one is enough depends on what the machine withstands: give [limits] in the drive file."
+    )
+
+
+def _refused(rows: Sequence[Row]) -> str:
+    return "; ".join(f"{row.name} ({_why_not(row, Limits())})" for row in rows)
+
+
+def _why_not(row: Row, limits: Limits) -> str:
+    """Why a strategy is not recommended; "" if it may be."""
+    if row.flags:
+        return row.flags[0].text
+    if row.effort is Effort.SENSOR:
+        return Effort.SENSOR.meaning
+    broken = [one for one in row.margins(limits) if not one.kept]
+    return str(min(broken, key=lambda one: one.share)) if broken else ""
+
+
+def _with_limits(
+    limits: Limits, rows: Sequence[Row], able: Sequence[Row], best: tuple[Row, ...]
+) -> Recommendation:
+    def least(row: Row) -> float:
+        shares = [one.share for one in row.margins(limits)]
+        return -math.inf if any(map(math.isnan, shares)) else min(shares, default=math.inf)
+
+    passing = [row for row in able if all(one.kept for one in row.margins(limits))]
+    if not passing:
+        nearest = max(able, key=least, default=None)
+        text = "No strategy keeps the limits. "
+        text += f"Nearest: {nearest.name}, {_why_not(nearest, limits)}." if nearest else f"{_refused(rows)}."
+        return Recommendation(text, None, best, limits)
+    effort = min(row.effort.order for row in passing)
+    chosen = max((row for row in passing if row.effort.order == effort), key=least)
+    text = (
+        f"Recommended: {chosen.name}, the simplest strategy that keeps the limits ({chosen.effort.meaning}). "
+        f"{_capital('; '.join(map(str, chosen.margins(limits))))}."
+    )
+    simpler = sorted((row for row in rows if row.effort.order < effort), key=lambda row: row.effort.order)
+    if simpler:
+        reasons = "; ".join(f"{row.name}, {_why_not(row, limits)}" for row in simpler)
+        text += f" Simpler ones do not: {reasons}."
+    return Recommendation(text, chosen, best, limits)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,181 @@
+"""Settled times, flags, limits and the one recommendation of compare, page and report."""
+
+import html
+import math
+
+import numpy as np
+import pytest
+
+from softstart import Drive, InputError, compare, report, simulate
+from softstart.controller import Effort, make_controller
+from softstart.controller.base import effort_of
+from softstart.controller.finding import ready_controller_names
+from softstart.drive import library
+from softstart.page.frames import Screen
+from softstart.page.session import Session
+from softstart.start import metrics
+from softstart.start.recommendation import flags
+
+CRANE = Drive.load("crane-4amtkf")
+HOIST = Drive.load("hoist-15kw")
+POSITIONS = ("mid-gap", "driving-flank", "opposite-flank")
+
+
+def test_a_load_that_swings_settles_after_its_first_passage():
+    """The weaker torque of [G], method 1, is first at the target, falls back, and is later for good."""
+    direct, reduced = (simulate(CRANE, name) for name in ("direct", "reduced-first-stage"))
+    assert direct.settled_time == direct.start_time
+    assert reduced.start_time < direct.start_time < reduced.settled_time
+    long = simulate(CRANE, "reduced-first-stage", until=reduced.settling_end)
+    floor = (1.0 - metrics.SETTLED_BAND) * CRANE.target_speed
+    times = np.linspace(reduced.settled_time, long.end_time, 200_001)
+    assert long.at(times)["w2"].min() >= floor * (1 - 1e-12)
+    assert float(long.at(reduced.settled_time - 1e-6)["w2"]) < floor
+    assert float(long.at(reduced.settled_time)["w2"]) == pytest.approx(floor, rel=1e-12)
+
+
+def test_settled_agrees_with_a_dense_search_on_random_drives():
+    rng = np.random.default_rng(14)
+    later = 0
+    for _ in range(60):
+        drive = CRANE.replace(
+            load_inertia=CRANE.J1 * 10.0 ** rng.uniform(-0.3, 1.0), gap=rng.uniform(0.02, 2.0),
+            load_torque=rng.uniform(0.0, 40.0), target_speed=rng.uniform(20.0, 90.0),
+            damping=rng.choice([0.0, 0.2]), start_position=str(rng.choice(POSITIONS)),
+        )  # fmt: skip
+        run = simulate(drive, str(rng.choice(["direct", "s-curve", "reduced-first-stage"])))
+        long = simulate(drive, run.controller, until=run.settling_end)
+        times = np.linspace(run.start_time, run.settling_end, 100_001)
+        step = times[1] - times[0]
+        low = np.flatnonzero(long.at(times.clip(0.0, long.end_time))["w2"]
+                             < (1.0 - metrics.SETTLED_BAND) * drive.target_speed)  # fmt: skip
+        if low.size and low[-1] == times.size - 1:
+            assert math.isnan(run.settled_time)
+            continue
+        dense = times[low[-1]] if low.size else run.start_time
+        assert dense - 1e-9 <= run.settled_time <= dense + step + 1e-9
+        later += run.settled_time > run.start_time
+    assert later >= 5
+
+
+def test_a_run_that_does_not_reach_its_speed_has_not_settled():
+    assert math.isnan(simulate(CRANE, "direct", until=0.05).settled_time)
+
+
+def test_settled_of_an_unknown_position_is_the_latest():
+    run = simulate(CRANE.replace(start_position="unknown"), "reduced-first-stage")
+    each = [
+        simulate(CRANE.replace(start_position=one), "reduced-first-stage", fitted_to=CRANE)
+        for one in POSITIONS
+    ]
+    assert run.settled_time == max(one.settled_time for one in each)
+
+
+def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
+    for name in library.names():
+        drive = Drive.load(name)
+        hangs = drive.load_kind == "active" and drive.Mc != 0.0
+        for position in (*POSITIONS, *(["hanging"] if hangs else [])):
+            started = drive.replace(start_position=position)
+            direct = simulate(started, "direct")
+            assert not flags(direct, direct)
+            for one in ready_controller_names():
+                run = simulate(started, one)
+                words = {flag.word.split()[0] for flag in flags(run, direct)}
+                slow = run.settled_time > 2.0 * direct.settled_time
+                assert slow == ("slow" in words), (name, position, one)
+                assert (run.k_dyn > 1.001 * direct.k_dyn) == ("harder" in words)
+                assert not math.isnan(run.settled_time)
+
+
+def test_flagged_strategies_are_never_recommended():
+    """Held by its brake, the hoist starts harder with `shaped` than directly; that has the text and JSON."""
+    found = compare(HOIST)
+    flagged = {row.name: row.flags for row in found.rows if row.flags}
+    assert "harder" in flagged["shaped"][0].word
+    assert not {row.name for row in found.recommendation.best} & set(flagged)
+    told = {row["controller"]: row["flags"] for row in found.summary()["strategies"]}
+    assert told["shaped"] == [flag.text for flag in flagged["shaped"]]
+    assert told["direct"] == []
+    # a limit on the start time decides what is slow
+    limited = compare(HOIST.replace(permissible_start_time="3 s"))
+    assert not any(flag.word.startswith("slow") for row in limited.rows for flag in row.flags)
+
+
+def test_without_limits_no_other_strategy_beats_those_that_are_named():
+    for drive in (CRANE, HOIST, Drive.load("crane-4amtkf-light-worn")):
+        found = compare(drive)
+        best = found.recommendation.best
+        assert found.recommendation.recommended is None
+        for row in found.rows:
+            if row.flags or row.effort is Effort.SENSOR:
+                assert row not in best
+                continue
+            for other in best:
+                better = row.run.k_dyn < 0.999 * other.run.k_dyn
+                assert not (better and row.run.settled_time < other.run.settled_time)
+            assert row in best or any(
+                other.run.k_dyn <= row.run.k_dyn / 0.999
+                and other.run.settled_time <= row.run.settled_time * 1.0001
+                for other in best
+            )
+        for row in best:
+            assert f"{row.name}, " in found.recommendation.text
+    first, second = best[0].run, best[1].run
+    per_ms = 1e-3 * (first.k_dyn - second.k_dyn) / (second.settled_time - first.settled_time)
+    assert f"{per_ms:.2g} per ms" in found.recommendation.text
+
+
+def test_with_limits_the_simplest_that_keeps_them_in_the_worst_case():
+    drive = CRANE.replace(permissible_torque=180.0, permissible_start_time=0.6)
+    found = compare(drive)
+    chosen = found.recommendation.recommended
+    worn = simulate(CRANE.with_gap(2.0), "acceleration-delay", fitted_to=CRANE, base=CRANE)
+    assert chosen.name == "acceleration-delay"
+    torque, time = chosen.margins(drive.limits)
+    assert (torque.case, torque.value) == ("gap x4", worn.peak_torque)
+    assert torque.share == pytest.approx(1.0 - worn.peak_torque / 180.0)
+    assert time.kept
+    for row in found.rows:
+        if row.effort.order < chosen.effort.order:
+            assert any(not one.kept for one in row.margins(drive.limits))
+            assert f"{row.name}, " in found.recommendation.text.partition("Simpler ones do not")[2]
+    # the drive as it is asks for less
+    new = compare(drive, worst_case=())
+    assert new.recommendation.recommended.name == "direct"
+    assert all(one.case == "" for row in new.rows for one in row.margins(drive.limits))
+    with pytest.raises(InputError, match=r'there are "gap x4" and "J2 x0\.4"'):
+        compare(drive, ["direct"], worst_case=["gap"])
+
+
+def test_limits_that_nothing_keeps():
+    found = compare(CRANE.replace(permissible_torque=20.0), ["direct", "shaped"])
+    assert found.recommendation.recommended is None
+    assert found.recommendation.text.startswith(
+        "No strategy keeps the limits. Nearest: shaped, shaft torque "
+    )
+    assert found.recommendation.shown == ()
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [CRANE, CRANE.replace(permissible_torque=130.0, permissible_start_time=0.6),
+     HOIST.replace(permissible_torque=170.0), CRANE.replace(permissible_torque=20.0)],
+    ids=["none", "crane", "hoist", "too low"],
+)  # fmt: skip
+def test_compare_page_and_report_say_the_same(drive):
+    said = compare(drive).recommendation.text
+    assert Session(drive).recommendation().text == said
+    frames = list(Screen(Session(drive)).at_rest())
+    assert [one["recommendation"] for one in frames if one and "recommendation" in one] == [said]
+    made = report(drive, budget=0.0)
+    assert made.summary()["recommendation"] == said
+    assert said in html.unescape(made.to_html())
+
+
+def test_the_order_of_effort():
+    order = ["direct", "s-curve", "acceleration-delay", "shaped", "reduced-two-stage"]
+    efforts = [effort_of(make_controller(name)).order for name in order]
+    assert efforts == sorted(set(efforts))
+    assert effort_of(make_controller("reduced-first-stage")) is Effort.SENSOR
+    assert [one.order for one in Effort] == list(range(len(Effort)))
