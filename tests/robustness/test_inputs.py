@@ -58,6 +58,7 @@ CODES = {0, 2, 3, 130}
 QUICK: dict[str, list[str]] = {
     "compare": ["compare", "--controllers", "direct,ramp"],
     "simulate": ["simulate", CRANE, "--controller", "ramp"],
+    "fatigue": ["fatigue", "--controllers", "direct,ramp", "--set", "damping=1"],
     "optimize": ["optimize", "--start-time", "1.2x"],
     "pareto": ["pareto", "--start-times", "1.2x", "--controllers", "direct"],
     "tune": [
@@ -79,6 +80,10 @@ QUICK: dict[str, list[str]] = {
 OPTIONS: dict[str, list[str]] = {
     "compare": ["--controllers", "--set", "--fitted-to", "--param", "--until", "--json"],
     "simulate": ["--controller", "--param", "--set", "--fitted-to", "--until", "--json"],
+    "fatigue": [
+        "--controllers", "--set", "--fitted-to", "--param", "--slope", "--worn-gap", "--estimate-damping",
+        "--json",
+    ],
     "optimize": [
         "--start-time", "--terminal", "--method", "--minimise", "--max-k-dyn", "--max-heat", "--torque-speed",
         "--smoothness", "--gaps", "--inertias", "--load-torques", "--set", "--json",

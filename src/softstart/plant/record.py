@@ -107,6 +107,8 @@ def turning_points(
     for i in range(segments.shape[0]):
         row = segments[i].view(SEGMENT)[0]
         side = row.side
+        if row.end == row.start:  # without a gap the flanks change in no time
+            continue
         if side == 0.0:
             turn(kept, points, row.start, 0.0, still)
             continue
