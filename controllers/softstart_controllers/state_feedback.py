@@ -42,7 +42,7 @@ GAP_OPEN, CLOSED, IMPATIENT = 0.0, 1.0, 2.0  # phases
 
 
 class Parameters:
-    """The landing, the weights f of the feedback and the gains of the filter."""
+    """The landing, the weights f of the feedback, the gains of the filter, and how a load hangs at first."""
 
     landing: landing.Parameters
     full: float
@@ -59,6 +59,9 @@ class Parameters:
     k_rate: float
     k_load: float
     opens: float
+    wound: float
+    proving: float
+    released: float
 
 
 class State:
@@ -144,7 +147,13 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     now.sample = before.sample + 1.0
     now.torque = u
 
-    if phase == GAP_OPEN:
+    if before.sample == 0.0 and p.wound > 0.0:  # the load hangs: there is no contact to be seen
+        phase = CLOSED
+        y.z = p.wound
+        y.angle = m.motor_angle
+        y.speed = m.motor_speed
+        y.stuck = 0.0
+    elif phase == GAP_OPEN:
         speed, beyond = watch(near, m, before, now)
         demand = approach(near, before, t, speed)
         if beyond > 0.0:
@@ -162,6 +171,8 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
             y.stuck = still
             y.speed = speed
             y.angle = m.motor_angle
+    elif phase == CLOSED and x.progress == 0.0 and (t < p.released or u < p.proving):
+        y.angle = m.motor_angle  # the brake holds the motor still
     elif phase == CLOSED:
         predict(p, mean_torque(before.torque, u, before.demand), x, y)
         error = m.motor_angle - y.angle
@@ -181,6 +192,8 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
 
     if phase == CLOSED:
         demand = feedback(p, u, before.demand, y)
+        if t < p.released or u < p.proving:
+            y.progress = x.progress  # the reference waits for the brake
     if t >= near.patience:
         phase = IMPATIENT
         demand = p.full
@@ -189,6 +202,23 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     y.ask_again = math.inf if phase == IMPATIENT else (before.sample + 1.0) * near.period
     y.phase = phase
     now.demand = demand
+
+
+def hanging(drive: Drive) -> tuple[Any, Any, Any]:
+    """Twist in rad beyond the gap at which a load hangs at first, or 0, and its brake.
+
+    That is the torque in N m that releases the motor by torque proving, or the instant in s at which it is
+    released.
+
+    >>> [round(float(x), 4) for x in hanging(Drive.load("hoist-15kw"))]
+    [0.0375, 120.0, 0.0]
+    """
+    if drive.start_position != "hanging":
+        return 0.0, 0.0, 0.0
+    T = np.maximum(np.asarray(drive.Mc), 0.0)
+    if drive.brake == "none":
+        return T / drive.c, 0.0, 0.0
+    return (T / drive.c, T, 0.0) if drive.release == "torque" else (T / drive.c, 0.0, drive.release)
 
 
 @dataclass(frozen=True)
@@ -219,6 +249,10 @@ class StateFeedback(CompiledController):
 
     for the drive with its lag, sampled. Here T is c z. A limited torque rate counts as more lag, by the time
     in which it slews a quarter of Ms; a dead time is bridged by the model.
+
+    *Hanging.* Where the drive that it is set up for starts with its load hanging in the wound-up shaft, there
+    is no contact to be seen: the feedback acts from the first sample on, from that twist, and waits with the
+    reference until the brake has let the motor go. Else the start position is nowhere among its numbers.
 
     *Limits.* Designs are made for groups without units on a grid (`contact_designs`) and kept on disk, so
     neighbouring weights may give the same start. Where the estimate pulls by half the threshold, the gap
@@ -322,4 +356,5 @@ class StateFeedback(CompiledController):
             drive.torque_lag, drive.computing_delay, 1.0 / drive.J2, *np.moveaxis(back, -1, 0),
             kalman[..., 0], kalman[..., 1] * drive.Omega, kalman[..., 2], kalman[..., 3] * drive.Omega,
             kalman[..., 4] * drive.c * (drive.J1 + drive.J2) / drive.J1, -OPENS * np.asarray(self.threshold),
+            *hanging(drive),
         )  # fmt: skip
