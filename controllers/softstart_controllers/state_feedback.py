@@ -213,12 +213,13 @@ def hanging(drive: Drive) -> tuple[Any, Any, Any]:
     >>> [round(float(x), 4) for x in hanging(Drive.load("hoist-15kw"))]
     [0.0375, 120.0, 0.0]
     """
-    if drive.start_position != "hanging":
+    where = drive.start_position
+    if not isinstance(where, str) or where != "hanging":
         return 0.0, 0.0, 0.0
     T = np.maximum(np.asarray(drive.Mc), 0.0)
     if drive.brake == "none":
         return T / drive.c, 0.0, 0.0
-    return (T / drive.c, T, 0.0) if drive.release == "torque" else (T / drive.c, 0.0, drive.release)
+    return (T / drive.c, T, 0.0) if isinstance(drive.release, str) else (T / drive.c, 0.0, drive.release)
 
 
 @dataclass(frozen=True)
