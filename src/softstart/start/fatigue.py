@@ -172,6 +172,7 @@ class Fatigue:
             "damping_ratio": self.damping_ratio,
             "damping_estimated_from": dict(self.estimate) or None,
             "starts_per_hour": self.drive.limits.starts_per_hour,
+            "starts_asked_for": self.drive.limits.starts,
             "gap": self.drive.gap,
             "worn_gap": self.worn_gap,
             "strategies": [row.summary() for row in self.rows],

@@ -129,6 +129,14 @@ def notes(found: Fatigue) -> list[str]:
         )
     if limits.starts_per_hour is not None and found.curve.points:
         text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
+    if limits.starts is not None and limits.starts_per_hour is not None and found.curve.points:
+        asked, worn = limits.starts / limits.starts_per_hour, not math.isnan(found.worn_gap)
+        names: dict[bool, list[str]] = {True: [], False: []}
+        for row in found.rows:
+            names[(row.worn_hours if worn else row.hours) >= asked].append(row.run.controller_name)
+        lost = f"; not by: {', '.join(names[False])}." if names[False] else "."
+        kept = ", ".join(names[True]) or "none"
+        text.append(f"The life asked for, {limits.starts:.3g} starts, is reached by: {kept}{lost}")
     worst = [
         f"{row.run.controller_name} {row.run.position}" for row in found.rows if len(drive.positions) > 1
     ]

@@ -41,6 +41,9 @@ def test_the_table_is_shown(run, monkeypatch, width):
     assert "years" in text
     assert "error of the sum at most" in text
     assert "Damping ratio of the shaft: 15 %" in text
+    # 90 N m for 2e6 cycles at m = 6.6: 134.9 N m in each start of direct are 1.4e5, 67.0 of the s-curve 1.4e7
+    assert "asked for, 1.2e+06 starts, is reached by:" in text
+    assert "not by: direct" in text
 
 
 def test_an_estimated_damping_is_marked(run):
