@@ -14,6 +14,7 @@ from softstart.drive import library
 from softstart.page.frames import Screen
 from softstart.page.session import Session
 from softstart.start import metrics
+from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import flags
 
 CRANE = Drive.load("crane-4amtkf")
@@ -171,6 +172,25 @@ def test_compare_page_and_report_say_the_same(drive):
     made = report(drive, budget=0.0)
     assert made.summary()["recommendation"] == said
     assert said in html.unescape(made.to_html())
+
+
+def test_the_life_is_a_limit_like_the_others():
+    """Hours of operation times starts per hour, over the starts to failure, in the worst case."""
+    aged = HOIST.replace(
+        starts_per_hour=60.0, required_life="20000 h", fatigue_slope=6.6, fatigue_torque=90.0,
+        fatigue_cycles=2e6,
+    )  # fmt: skip
+    found = compare(aged, ["direct", "shaped", "s-curve"], worst_case=())
+    lives = fatigue([row.run for row in found.rows])
+    for row, life in zip(found.rows, lives.rows, strict=True):
+        (margin,) = row.margins(aged.limits)
+        assert margin.value == pytest.approx(100.0 * 60.0 * 20000.0 / life.starts, rel=1e-12)
+        assert margin.kept == (life.hours >= 20000.0)
+    assert found.recommendation.recommended.name == "direct"
+    # an undamped shaft has no life that means anything: that is said, and decides nothing
+    undamped = compare(aged.replace(damping=0.0), ["direct", "s-curve"])
+    assert undamped.recommendation.recommended is None
+    assert "The life is not checked: without damping" in undamped.recommendation.text
 
 
 def test_the_order_of_effort():

@@ -119,7 +119,7 @@ def choose(maps: Sequence[RobustnessMap], rows: Sequence[Row], recommendation: R
 
 def choice_section(choice: Choice) -> Html:
     """The answer, the rule behind it, and every strategy before it."""
-    limits = bool(choice.candidates[0].row.run.drive.limits)
+    limits = bool(choice.recommendation.limits)
     cases = choice.candidates[0].row.worst_case
     worst = f"on the drive as it is, with {listed(list(cases))}" if cases else "on the drive as it is"
     rule = (

@@ -166,7 +166,7 @@ def _sheet_of(report: Report, best: Candidate) -> str:
 
 def _on_an_ordinary_inverter(report: Report) -> str:
     best, plain = report.choice.chosen, report.choice.ordinary
-    if plain is None or plain is best or report.drive.limits:
+    if plain is None or plain is best or report.choice.recommendation.limits:
         return ""
     run = plain.row.run
     return (

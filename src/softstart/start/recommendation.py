@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive, Limits
+from softstart.start.fatigue import worst_damage
 from softstart.start.run import Run
 
 SLOW: Final = 2.0  # times the time of `direct`
@@ -34,18 +36,25 @@ class Flag:
 
 @dataclass(frozen=True)
 class Case:
-    """A start on a drive that has changed: N m, s, NaN where it fails; K_dyn over the mean torque before."""
+    """A start on a drive that has changed: N m, s, NaN where it fails; K_dyn over the mean torque before.
+
+    `used_life`: what the starts that the shaft line must last use of its life, %; 0 where no limit asks.
+    """
 
     k_dyn: float
     peak_torque: float
     start_time: float
+    used_life: float
 
     @staticmethod
     def of(run: Run | None) -> Case:
         """That of a start; None is one that failed."""
         if run is None:
-            return Case(math.nan, math.nan, math.nan)
-        return Case(run.k_dyn, run.peak_torque, run.start_time)
+            return Case(math.nan, math.nan, math.nan, math.nan)
+        limits, used = checked_limits(run.drive), 0.0
+        if limits.life is not None and limits.fatigue is not None:
+            used = 100.0 * (limits.starts or 0.0) * worst_damage(run, limits.fatigue).damage
+        return Case(run.k_dyn, run.peak_torque, run.start_time, used)
 
 
 @dataclass(frozen=True)
@@ -140,12 +149,17 @@ class Row:
         """Why it is never recommended: slow, not settled, harder than direct start; empty if it may be."""
         return flags(self.run, self.direct)
 
+    @cached_property
+    def _own(self) -> Case:
+        return Case.of(self.run)
+
     def margins(self, limits: Limits) -> tuple[Margin, ...]:
         """The margin to each limit, in the worst of the drive as it is and of `worst_case`."""
-        own = {"": Case.of(self.run), **{case: self.cases[case] for case in self.worst_case}}
+        own = {"": self._own, **{case: self.cases[case] for case in self.worst_case}}
         figures = (
             ("shaft torque", "N m", limits.shaft_torque, "peak_torque"),
             ("start time", "s", limits.start_time, "start_time"),
+            ("used life", "%", None if limits.life is None else 100.0, "used_life"),
         )
         found = []
         for name, unit, limit, figure in figures:
@@ -157,7 +171,7 @@ class Row:
 
     def summary(self) -> dict[str, Any]:
         """The figures of the run and of this row under the names used everywhere."""
-        limits = self.run.drive.limits
+        limits = checked_limits(self.run.drive)
         return {
             **self.run.summary(),
             "time_lost": self.time_lost,
@@ -248,12 +262,11 @@ class Recommendation:
 
 def recommend(drive: Drive, rows: Iterable[Row]) -> Recommendation:
     """The recommendation among the strategies started on a drive."""
-    rows = list(rows)
+    rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _unbeaten(able)
-    if not drive.limits:
-        return Recommendation(_without_limits(rows, best), None, best, drive.limits)
-    return _with_limits(drive.limits, rows, able, best)
+    found = _with_limits(limits, rows, able, best) if limits else _without_limits(limits, rows, best)
+    return replace(found, text=f"{found.text}{_unchecked(drive)}")
 
 
 def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
@@ -267,9 +280,24 @@ def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
     return tuple(found)
 
 
-def _without_limits(rows: Sequence[Row], best: Sequence[Row]) -> str:
+def checked_limits(drive: Drive) -> Limits:
+    """The limits of a drive without a life that cannot be computed."""
+    return replace(drive.limits, life=None) if _unchecked(drive) else drive.limits
+
+
+def _unchecked(drive: Drive) -> str:
+    """Why the life that is asked for is not checked; "" if it is, or if none is."""
+    limits = drive.limits
+    if limits.life is None:
+        return ""
+    if limits.fatigue is None or not limits.fatigue.points:
+        return " The life is not checked: [limits.fatigue] has no point of an S-N curve."
+    return "" if drive.d > 0.0 else " The life is not checked: without damping the shaft swings for all time."
+
+
+def _without_limits(limits: Limits, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:
     if not best:
-        return f"None is recommended: {_refused(rows)}."
+        return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
     first = best[0]
     parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f} in {first.run.settled_time:.4g} s"]
     for before, row in pairwise(best):
@@ -277,10 +305,11 @@ def _without_limits(rows: Sequence[Row], best: Sequence[Row]) -> str:
         cost = f"{less:.3f} less for {1e3 * later:.3g} ms, {1e-3 * less / later:.2g} per ms"
         parts.append(f"{row.name}, {row.run.k_dyn:.3f} in {row.run.settled_time:.4g} s ({cost})")
     head = "No other strategy beats these" if len(best) > 1 else "No other strategy beats this one"
-    return (
+    text = (
         f"{head} in K_dyn and time at once: {'; '.join(parts)}. "
         "Which one is enough depends on what the machine withstands: give [limits] in the drive file."
     )
+    return Recommendation(text, None, best, limits)
 
 
 def _refused(rows: Sequence[Row]) -> str:

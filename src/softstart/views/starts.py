@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from softstart.drive import Drive
 from softstart.start.comparison import Comparison
 from softstart.start.metrics import SETTLED_BAND
-from softstart.start.recommendation import Row
+from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import SETTLING_PERIODS, Run
 from softstart.views.drawing import (
     COLOURS,
@@ -262,7 +262,7 @@ def comparison_table(
             cells[figure.heading] = column_of(values, figure.digits)
         else:
             cells[figure.heading] = [number(value, figure.decimals) for value in values]
-    limits = rows[0].run.drive.limits
+    limits = checked_limits(rows[0].run.drive)
     if limits and GENTLE[0] in figures:
         cells["limits"] = [_least_margin(row) for row in rows]
     if any(row.flags for row in rows):
@@ -272,7 +272,7 @@ def comparison_table(
 
 def _least_margin(row: Row) -> str:
     """Whether a strategy keeps the limits, and its least margin."""
-    margins = row.margins(row.run.drive.limits)
+    margins = row.margins(checked_limits(row.run.drive))
     broken = [one for one in margins if not one.kept]
     least = min(broken or margins, key=lambda one: one.share)
     return f"{'exceeded' if broken else 'kept'} {number(100.0 * least.share, 1)} %"
@@ -291,7 +291,7 @@ def notes(comparison: Comparison) -> list[str]:
         f"target, for {SETTLING_PERIODS:g} elastic periods after the start time. "
         "lost: later than with direct start.",
     ]
-    if comparison.drive.limits:
+    if checked_limits(comparison.drive):
         found.append(
             "limits: the least margin in the worst of "
             f"{', '.join(['the drive as it is', *comparison.worst_case])}."
