@@ -162,6 +162,8 @@ def _over_positions(problem: Problem, method: Choice) -> Optimum:
             f"method = {method}: the start position is unknown, and one profile for all positions has a "
             "search of its own; use method = auto, or give a position."
         )
+    if latest < momentum_shortest_time(problem):
+        raise InfeasibleError(verdict_on(problem))  # at once: the search takes its time to say so
     found = robust.optimize_robust(list(drive.positions.values()), latest, base=problem.base or drive)
     alone = {}
     for name, one in drive.positions.items():

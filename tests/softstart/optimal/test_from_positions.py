@@ -21,10 +21,11 @@ from softstart.errors import SimulationError
 from softstart.optimal.exact import hold_of
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-from softstart.optimal.robust import optimize_robust, scenarios_of
+from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError
+from softstart.optimal.robust import scenarios_of
 from softstart.optimal.shortest import start_time_of_direct
 from softstart.start.run import Run
+from softstart.views.optima import position_sentences
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 HELD = HOIST.replace(brake="motor")
@@ -192,7 +193,7 @@ def random_unknown(seed: int) -> Drive:
     return drive.replace(gap=gap, start_position="unknown")
 
 
-def compared(drive: Drive, multiple: float = 1.2) -> dict[str, float]:
+def compared(drive: Drive, best: Optimum) -> dict[str, float]:
     """The robust optimum against its bound and all strategies in its time; shares, 0 or more is right."""
     runs = {}
     for name in ready_controller_names():
@@ -203,7 +204,6 @@ def compared(drive: Drive, multiple: float = 1.2) -> dict[str, float]:
     for run in runs.values():
         each = [simulate(one, run.controller, fitted_to=drive.assumed) for one in drive.positions.values()]
         assert run.k_dyn == max(single.k_dyn for single in each)
-    best = optimize(drive, multiple * start_time_of_direct(drive))
     singles = [
         simulate(one, "profile", parameters={"profile": best.profile}) for one in drive.positions.values()
     ]
@@ -221,6 +221,12 @@ def compared(drive: Drive, multiple: float = 1.2) -> dict[str, float]:
             if not math.isnan(run.start_time)
         },
     }
+
+
+def answered(seed: int) -> dict[str, float]:
+    """A random drive, its optimum within 1.2 times the start time of direct, compared."""
+    drive = random_unknown(seed)
+    return compared(drive, optimize(drive, 1.2 * start_time_of_direct(drive)))
 
 
 def wrong_in(found: dict[str, float]) -> dict[str, float]:
@@ -241,22 +247,21 @@ def test_unknown_is_the_robust_optimum_and_its_bound_the_largest() -> None:
     assert "driving-flank, mid-gap, opposite-flank" in best.why
     each = [momentum_bound(Problem(one, 0.35, "reached")).k_dyn for one in drive.positions.values()]
     assert best.bound.k_dyn == max(each)
-    assert best.k_dyn == optimize_robust(list(drive.positions.values()), 0.35).k_dyn
     assert list(best.alone) == list(drive.positions)
     for where, alone in best.alone.items():
         assert alone.k_dyn == optimize(drive.replace(start_position=where), 0.35, terminal="reached").k_dyn
         assert alone.k_dyn <= best.k_dyn
     assert best.summary()["k_dyn_if_position_known"] == {at: one.k_dyn for at, one in best.alone.items()}
-    assert not wrong_in(compared(drive))
-    front = pareto(drive, [0.2, 0.35], controllers=[])
-    assert [point.status for point in front.points] == ["INFEASIBLE", "OPTIMAL"]
-    assert front.points[1].k_dyn == best.k_dyn
+    assert not wrong_in(compared(drive, best))
+    (said,) = position_sentences(best)
+    assert said.startswith("Worst of driving-flank, mid-gap, opposite-flank: ")
+    front = pareto(drive, [0.05], controllers=[])
+    assert [point.status for point in front.points] == ["INFEASIBLE"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_random_drives_of_unknown_position(seed: int) -> None:
-    assert not wrong_in(compared(random_unknown(seed)))
+def test_a_random_drive_of_unknown_position() -> None:
+    assert not wrong_in(answered(0))
 
 
 def test_scenarios_take_every_position() -> None:
@@ -273,7 +278,7 @@ def print_many(count: int) -> None:
     gentler: dict[str, int] = {}
     for seed in range(count):
         try:
-            found = compared(random_unknown(seed))
+            found = answered(seed)
         except (InfeasibleError, OptimumError, NotConverged, SimulationError) as error:
             print(f"{seed}: {error}")
             continue
