@@ -57,10 +57,6 @@ class TorquePath:
         start, _, r, slope, u = span
         if self.lag == 0:
             return r + slope * (t - start), slope
-        fade = (
-            np.exp(-(t - start) / self.lag)
-            if isinstance(t, np.ndarray)
-            else math.exp(-(t - start) / self.lag)
-        )
-        away = u - r + slope * self.lag
-        return r + slope * (t - start - self.lag) + away * fade, slope - away / self.lag * fade
+        grown = -np.expm1((start - t) / self.lag)  # of the lag's step response; no digits cancel
+        now = u + (r - u) * grown + slope * (t - start - self.lag * grown)
+        return now, slope * grown + (r - u) / self.lag * (1.0 - grown)

@@ -46,7 +46,7 @@ from softstart.plant.layout import (
     Plant,
     State,
 )
-from softstart.plant.span import torque_course
+from softstart.plant.span import torque_after, torque_course
 from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, sample, take_answer
 
 _A = types.Array(types.float64, 1, "C")
@@ -115,7 +115,7 @@ def move_masses(start: Start, n: int, s: float) -> None:
 def move_motor(p: Plant, x: State, m: Motion, s: float) -> None:
     """Torque, slew limiter and demand after s seconds, as in the two-mass plant."""
     left = math.exp(-s / p.lag) if m.ue != 0.0 else 0.0
-    x.u = m.ua + m.ub * s + m.ue * left
+    x.u = torque_after(p, x, m, s, left)
     if x.demand_slope != 0.0:
         x.demand += x.demand_slope * s
     x.ref = x.demand if s >= m.slew_end else x.ref + m.ub * s

@@ -13,7 +13,9 @@ from softstart.plant.layout import (
 from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque
 from softstart.plant.motion import motion
 from softstart.plant.notes import end_stage, note_peak, note_segment
-from softstart.plant.span import begin_span, next_event, torque_course
+from softstart.plant.span import (
+    begin_span, faster_than_the_lag, lagging, next_event, torque_after, torque_course,
+)  # fmt: skip
 from softstart.plant.steady import bounce, repeats
 
 # A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
@@ -136,13 +138,14 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
             push = s * s * (0.5 * load[1] + s * load[2] / 6.0)
             if m.ue != 0.0:
                 rate = m.rate
-                push += load[3] * (s - tail / rate) / rate
+                later = lagging(rate * s) / rate if faster_than_the_lag(p, m) else s - tail / rate
+                push += load[3] * later / rate
             x.phi2 += s * (x.w2 + share * x.v) + push - share * (theta - x.theta)
             x.w2 = load_speed(m, load, s, v)
         v *= side
     x.theta = theta
     x.v = v if x.held == 0.0 else -x.w2
-    x.u = m.ua + m.ub * s + m.ue * (1.0 - tail)
+    x.u = torque_after(p, x, m, s, 1.0 - tail)
     if x.demand_slope != 0.0:
         x.demand += x.demand_slope * s
     x.ref = x.demand if s >= m.slew_end else x.ref + m.ub * s

@@ -33,7 +33,8 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
     k = m.k
     dd = m.dd
     at = 0.0
-    for _ in range(2):  # once more, with its signs, if the search by terms takes over within this one
+    turned = 1.0
+    for _ in range(3):  # once more, with its signs, if the search by terms takes over within this one
         by_terms = m.by_terms
         if by_terms != 0.0:  # k v and dd a may cancel to their last digits
             f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
@@ -46,8 +47,11 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
                 slope = bend
         sign = 1.0 if slope > 0.0 or (slope == 0.0 and bend > 0.0) else -1.0
         start = RISING if begin > 0.0 else WATCH
+        sign *= turned
         at = first_crossing(m, 0.0, 0.0, sign * k, sign * dd, 0.0, load, start, begin, s)
-        if m.by_terms == by_terms:
+        if begin == 0.0 and at == 0.0 and turned > 0.0:
+            turned = -1.0  # T', T'' begin at zero: T goes the other way at once
+        elif m.by_terms == by_terms:
             break
     return at
 

@@ -39,6 +39,8 @@ def begin_again(p: Plant, x: State, m: Motion, row: Segment) -> Septuple:
     m.ua = row.ua
     m.ub = row.ub
     m.ue = row.ue
+    x.u = row.ua + row.ue
+    x.ref = row.ua + row.ub * p.lag
     m.slew_end = np.inf
     return begin_span(p, x, m)
 

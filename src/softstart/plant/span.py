@@ -22,6 +22,7 @@ from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 from softstart.plant.terms import MAX_STEPS
 
+MUCH_FASTER = 1e4  # the limiter than the lag
 
 @inlined
 def torque_course(p: Plant, x: State, m: Motion) -> None:
@@ -57,6 +58,29 @@ def torque_course(p: Plant, x: State, m: Motion) -> None:
     m.ua = ua
     m.ub = ub
     m.ue = ue
+
+
+@inlined
+def faster_than_the_lag(p: Plant, m: Motion) -> bool:
+    """Whether the limiter slews so much faster than the lag that ua and ue cancel each other's digits."""
+    return m.ue != 0.0 and abs(m.ub) * p.lag > MUCH_FASTER * (abs(p.u_min) + abs(p.u_max))
+
+
+@inlined
+def lagging(y: float) -> float:
+    """The value of y - (1 - exp(-y)), without cancellation."""
+    if y > 1e-3:
+        return y + math.expm1(-y)
+    return y * y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y / 120.0)))
+
+
+@inlined
+def torque_after(p: Plant, x: State, m: Motion, s: float, left: float) -> float:
+    """The motor torque after s, as the span began with x; `left` is exp(-s/lag)."""
+    if faster_than_the_lag(p, m):
+        y = s / p.lag
+        return x.u + (x.ref - x.u) * -math.expm1(-y) + m.ub * p.lag * lagging(y)
+    return m.ua + m.ub * s + m.ue * left
 
 
 @inlined
