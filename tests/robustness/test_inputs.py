@@ -6,9 +6,10 @@ By hand, each input in a process of its own:
 
 An attack is a command line with the files it needs, drawn by `attacks` from a seed. `judged` says what is
 wrong with how it ended: an exit code other than 0, 2, 3 and 130, a traceback or a warning, a hang, a message
-of more than a screenful, control characters on the terminal, files left behind, a number in the JSON that is
-not finite. Where the truth is known - the same numbers in another notation - an answer other than that of the
-plain notation is a wrong number, and where only refusal is right (`refused`), so is any answer.
+of more than a screenful, control characters on the terminal, an option that no command has, files left
+behind, a number in the JSON that is not finite. Where the truth is known - the same numbers in another
+notation - an answer other than that of the plain notation is a wrong number, and where only refusal is right
+(`refused`), so is any answer.
 
 The suite runs a few dozen of them in this process.
 """
@@ -32,16 +33,18 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from softstart.balancing.engine import LIBRARY as ENGINES
 from softstart.balancing.engine import TABLES as ENGINE_TABLES
 from softstart.chain.elements import LIBRARY as CHAINS
 from softstart.chain.elements import TABLES as CHAIN_TABLES
-from softstart.cli.commands import COMMANDS
+from softstart.cli.commands import COMMANDS, cli
 from softstart.cli.main import main
 from softstart.clutch.model import LIBRARY as CLUTCHES
 from softstart.clutch.model import Clutch
@@ -554,6 +557,10 @@ def _wrong(attack: Attack, ended: Ended, left: set[str]) -> list[str]:
         wrong.append("control characters")
     if attack.refused and ended.code == 0:
         wrong.append("not refused")
+    typed = " ".join(attack.words)
+    named = {name for name in re.findall(r"(?<![\w-])--[a-z][a-z-]*[a-z]", ended.err) if name not in typed}
+    if unknown := named - option_names():
+        wrong.append(f"options that do not exist: {', '.join(sorted(unknown))[:80]}")
     if left:
         wrong.append(f"left behind: {', '.join(sorted(left))[:80]}")
     if ended.code == 0 and "--json" in attack.words and "--help" not in attack.words:
@@ -562,6 +569,15 @@ def _wrong(attack: Attack, ended: Ended, left: set[str]) -> list[str]:
         except (ValueError, ZeroDivisionError):
             wrong.append("no JSON")
     return wrong
+
+
+@cache
+def option_names() -> frozenset[str]:
+    """The options of all commands, as a remedy may name them."""
+    context = click.Context(cli)
+    commands = [cli.get_command(context, name) for name in cli.list_commands(context)]
+    parameters = [one for command in (cli, *commands) for one in command.get_params(context)]
+    return frozenset(name for one in parameters for name in (*one.opts, *one.secondary_opts))
 
 
 def _numbers(text: str) -> list[float]:

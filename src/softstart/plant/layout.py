@@ -288,7 +288,7 @@ ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEU
 ) = range(14)  # fmt: skip
 
 # masks: the event that has just fired must not fire again at the instant at which the span begins
-NOTHING, LEFT_UPPER, LEFT_LOWER, LEFT_BEYOND, SWITCHED, BROKE_AWAY = range(6)
+NOTHING, LEFT_UPPER, LEFT_LOWER, LEFT_BEYOND, SWITCHED, BROKE_AWAY, REJOINED = range(7)
 
 
 _PREFIXES = (("", (PLANT, STATE, MOTION)), ("S_", (SEGMENT,)), ("E_", (EVENT,)), ("G_", (STAGE_ROW,)))

@@ -8,7 +8,7 @@ from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, CLOSED, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND,
     LEFT_LOWER, LEFT_UPPER, LOAD_STARTS, LOAD_STOPS, LOWER, MODELICA, NOTHING, OPENED, REACHED, REJOIN,
-    RELEASE, RELEASED, STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
+    REJOINED, RELEASE, RELEASED, STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
 )  # fmt: skip
 from softstart.plant.notes import end_stage, note_event, note_event_at
 
@@ -85,6 +85,8 @@ def handle(p: Plant, x: State, m: Motion, event: int, events: Matrix, stages: Ma
         side = x.beyond
         x.beyond = 0.0
         close_gap(p, x, side, events, stages)
+        if x.mask == NOTHING:
+            x.mask = REJOINED
         return True
     if event == EXIT:
         side = x.side

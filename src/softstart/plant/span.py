@@ -15,7 +15,8 @@ from softstart.plant.crossing import (
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
-    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, RELEASE, STOP, SWITCH, SWITCHED, UNSOLVED, UPPER,
+    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, REJOINED, RELEASE, STOP, SWITCH, SWITCHED,
+    UNSOLVED, UPPER,
     Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
@@ -23,6 +24,7 @@ from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_targ
 from softstart.plant.terms import MAX_STEPS
 
 MUCH_FASTER = 1e4  # the limiter than the lag
+
 
 @inlined
 def torque_course(p: Plant, x: State, m: Motion) -> None:
@@ -212,6 +214,8 @@ def flank_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -
 def exit_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The instant at which the flanks part (or the damping regime of `modelica` changes)."""
     modelica = p.law == MODELICA and p.d > 0.0
+    # the search by terms would take the rounding of a torque that has just risen from zero for its fall
+    begun = RISING if x.mask == REJOINED and m.by_terms != 0.0 else WATCH
     if modelica:
         sign = 1.0 if x.doubled != 0.0 else -1.0
         start = RISING if x.mask == SWITCHED else WATCH
@@ -220,14 +224,14 @@ def exit_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) ->
             return UNSOLVED, 0.0
         if x.doubled != 0.0:
             return (SWITCH, s) if s >= 0.0 else (NO_EVENT, horizon)
-        out = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, WATCH, 0.0, s if s >= 0.0 else horizon)
+        out = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, begun, 0.0, s if s >= 0.0 else horizon)
         if out >= 0.0:
             return EXIT, out
         return (SWITCH, s) if s >= 0.0 else (NO_EVENT, horizon)
     if m.steady != 0.0:
         return steady_exit(m, horizon)
     if p.law != DEAD_ZONE and m.dd > 0.0:
-        s = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, WATCH, 0.0, horizon)
+        s = first_crossing(m, 0.0, m.k, m.dd, 0.0, 0.0, load, begun, 0.0, horizon)
     else:
         s = first_crossing(m, 0.0, 1.0, 0.0, 0.0, 0.0, load, WATCH, 0.0, horizon)
     if s < -1.0:

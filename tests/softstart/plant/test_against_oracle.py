@@ -111,6 +111,42 @@ def test_rates_decades_apart(drive: dict[str, Any], law: str) -> None:
     compare_with_oracle(drawn, law)
 
 
+def test_a_peak_after_a_rest_on_the_flank() -> None:
+    """At rest on the flank under a torque that begins behind a lag: T, T' and T'' are zero, then T rises."""
+    drawn = {
+        "J1": 0.4, "J2": 0.2, "c": 2.6, "d": 0.0, "gap": 6e-4, "Mc": 0.0, "kind": "active", "law": "no-pull",
+        "theta0": 3e-4, "w1_0": 0.0, "w2_0": 0.0, "torque_pieces": [(0.0, 1e-3)], "lag": 4e-4,
+        "rate": math.inf, "u0": 0.0, "t_end": 2.0, "target": 1.0,
+    }  # fmt: skip
+    run, other = run_of(drawn), integrate(**drawn)
+    assert run.peak_torque == pytest.approx(2.0 * 1e-3 * 0.2 / 0.6, rel=1e-5)  # of a step: twice the mean
+    assert run.peak_torque == pytest.approx(abs(other.peak), rel=1e-8)
+
+
+def test_a_limiter_much_faster_than_the_lag() -> None:
+    """Slewing in 1e-8 s before a lag of 10 s: the torque is that of the lag alone, to all its digits."""
+    drive = Drive.load("crane-4amtkf").replace(torque_lag=10.0, torque_rate=6e9)
+    run = simulate(drive, "direct", until=0.5)
+    t = np.array([1e-3, 0.1, 0.5])
+    np.testing.assert_allclose(run.at(t)["u"], -62.0 * np.expm1(-t / 10.0), rtol=2e-8)
+    other = simulate(drive.replace(torque_rate=math.inf), "direct", until=0.5)
+    np.testing.assert_allclose(run.at(t)["u"], other.at(t)["u"], rtol=2e-8)
+
+
+def test_a_torque_that_rises_again_is_no_fall_of_rounding() -> None:
+    """Flanks that overlap without torque press again: in a wide gap one of two starts opened indefinitely."""
+    drive = Drive(
+        motor_inertia=0.003280417279720255, load_inertia=0.026933979981461822, stiffness=6081.461213564751,
+        damping=12.194722711325356, gap=6.0770811691186095, load_torque=0.008161493682864906,
+        start_position=2.9824742482687534, torque_lag=0.0019378736470435942, starting_torque=62.0,
+        maximum_torque=64.0, minimum_torque=-64.0, target_speed=92.15,
+    )  # fmt: skip
+    steps = Pieces(pieces=((0.0, 40.0), (0.15, 15.0), (0.3, -25.0)), end=0.6)
+    run = simulate(drive, steps, until=0.6)
+    assert len(run.events) < 20
+    assert abs(run.energy.residual) < 1e-9 * abs(run.energy.motor)
+
+
 def compare_with_oracle(drawn: dict[str, Any], seed: int | str) -> None:
     """Same peak, events in the same order, same final state."""
     if drawn["gap"] == 0.0 and drawn["w1_0"] == drawn["w2_0"] and drawn["theta0"] == 0.0:
