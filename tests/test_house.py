@@ -37,8 +37,8 @@ BUDGET = {
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     "page": (4380, 18, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
-    # 50: turning points; 10: the longest start
-    "plant": (2550, 15, 2, 0),
+    # 50: turning points; 10: the longest start; 25: limiters much faster than the lag
+    "plant": (2580, 15, 2, 0),
     "reporting": (3020, 12, 3, 0),  # 40: life of the shaft line
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
