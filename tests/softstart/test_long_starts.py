@@ -45,7 +45,8 @@ def test_the_command_ends_soon_and_with_little_memory() -> None:
     run = subprocess.run(
         [sys.executable, "-c", code, *line], capture_output=True, text=True, env=os.environ, check=True
     )
-    assert int(run.stdout.splitlines()[-1]) < 1000  # MiB; 7.7 GB before with ten times the inertia
+    # MiB, of which compiling may take half; 7.7 GB before with ten times the inertia
+    assert int(run.stdout.splitlines()[-1]) < 1500
     assert time.perf_counter() - began < 30.0
 
 
