@@ -68,6 +68,9 @@ else:  # no numba for a help, a wrong option or the Tab key
     shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
 
 
+SEARCH = ("method", "tolerance", "time_limit", "confirm")  # how, not what
+
+
 @click.command(cls=Command)
 @drive_argument(default=DEFAULT_DRIVE)
 @click.option(
@@ -82,6 +85,15 @@ else:  # no numba for a help, a wrong option or the Tab key
 @click.option("--max-heat", metavar="TIME", help="Largest I2t heat allowed, in s of starting torque.")
 @torque_speed_option
 @smoothness_option
+@click.option(
+    "--tolerance", metavar="SHARE", help="Gap to the lower bound at which the search ends. By default 0.5 %."
+)
+@click.option(
+    "--time-limit", metavar="TIME", help="No further search after this, as 20 (s); 0: the first answer."
+)
+@click.option(
+    "--confirm", is_flag=True, help="Solve the CasADi problem too, from its own guess, and show both."
+)
 @click.option(
     "--gaps", metavar="GAP,...", help="One profile for these gaps, with a contact sensor and without."
 )
@@ -98,6 +110,7 @@ def optimize(
     inertias: str | None,
     load_torques: str | None,
     settings: tuple[str, ...],
+    confirm: bool,
     as_json: bool,
     out: str | None,
     **texts: str | None,
@@ -116,7 +129,7 @@ def optimize(
     if start_time is not None:
         with mistakes.noted():
             asked = StartTime.of(start_time, "--start-time")
-    bounds = bounds_of(texts, mistakes)
+    bounds = bounds_of(texts, mistakes) | ({"confirm": True} if confirm else {})
     lists = (("gaps", gaps, "rad"), ("inertias", inertias, "kg*m^2"), ("load_torques", load_torques, "N*m"))
     for name, text, unit in lists:
         with mistakes.noted():
@@ -131,7 +144,7 @@ def optimize(
                 None if bounds.get("minimise") == "start_time" and asked is None else 1.0,  # any above 0
                 **{
                     "terminal": usual_terminal(one),
-                    **{name: value for name, value in bounds.items() if name != "method"},
+                    **{name: value for name, value in bounds.items() if name not in SEARCH},
                 },
             )
     mistakes.settle()
@@ -152,6 +165,8 @@ def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, 
         "max_heat": ("heat", lambda text: read_positive(text, "--max-heat", "s", "a time above 0 s")),
         "torque_speed": ("torque_speed", read_corners),
         "smoothness": ("smoothness", _weight),
+        "tolerance": ("tolerance", lambda text: _from_zero(text, "--tolerance", "1", "a share, as 0.5 %")),
+        "time_limit": ("time_limit", lambda text: _from_zero(text, "--time-limit", "s", "a time in s")),
     }
     found: dict[str, Any] = {}
     for name, text in texts.items():
@@ -174,9 +189,13 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
 
 
 def _weight(text: str) -> float:
-    value = float(to_si(text, "s", name="--smoothness"))
-    if value < 0.0:
-        raise InputError(f'--smoothness = "{text}": a weight in s, 0 or more.')
+    return _from_zero(text, "--smoothness", "s", "a weight in s")
+
+
+def _from_zero(text: str, option: str, unit: str, what: str) -> float:
+    value = float(to_si(text, unit, name=option))
+    if not value >= 0.0:
+        raise InputError(f'{option} = "{text}": {what}, 0 or more.')
     return value
 
 

@@ -408,7 +408,9 @@ def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
     why = ""
     for start in (warm, None) if warm is not None else (None,):
         try:
-            best = optimize(asked.drive, start_time, terminal=terminal, warm=start, **asked.options)
+            best = optimize(
+                asked.drive, start_time, terminal=terminal, warm=start, time_limit=0.0, **asked.options
+            )
         except InfeasibleError as error:
             return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
         except (OptimumError, NotConverged) as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -68,6 +68,16 @@ class LowerBound:
     covers: str
 
 
+@dataclass(frozen=True)
+class Trial:
+    """A search: its minimised figure on the exact plant, its computing time in s, and why it failed."""
+
+    method: Method
+    value: float | None
+    seconds: float
+    failure: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Optimum:
     """The best start found, as the exact plant runs it, and how much better any start could be.
@@ -95,6 +105,8 @@ class Optimum:
     alone : mapping of str to Optimum
         Where the start position is unknown: the optimum of each position by itself, as a drive could have it
         that measures where it stands. Without those that have no start that quick.
+    tried : tuple of Trial
+        All searches in their order; the answer is that of the best one.
 
     Examples
     --------
@@ -119,11 +131,17 @@ class Optimum:
     seconds: float
     warm: Any = field(default=None, repr=False)
     alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
+    tried: tuple[Trial, ...] = ()
 
     @property
     def k_dyn(self) -> float:
         """Dynamic coefficient of the whole run, re-simulated."""
         return float(metrics.k_dyn(self.run.peak_torque, self.problem.base or self.problem.drive))
+
+    @property
+    def minimised(self) -> float:
+        """The figure that was minimised, of the run."""
+        return {"k_dyn": self.k_dyn, "heat": self.heat, "start_time": self.end_time}[self.problem.minimise]
 
     @property
     def k_dyn_lower_bound(self) -> float:
@@ -160,6 +178,7 @@ class Optimum:
             "heat_bound": problem.heat,
             "method": self.method,
             "why": self.why,
+            "tried": [asdict(one) for one in self.tried],
             "k_dyn": self.k_dyn,
             "k_dyn_claimed": self.claimed if problem.minimise == "k_dyn" else None,
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,

@@ -26,6 +26,7 @@ from softstart.optimal.result import (
     NotConverged,
     Optimum,
     OptimumError,
+    Trial,
 )
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.start.run import Run
@@ -37,6 +38,7 @@ collocation = late("softstart.optimal.collocation.search")
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)
 TIGHT = 1e-5  # a bound within this share needs no other one
+TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
 
 def optimize(
@@ -52,6 +54,9 @@ def optimize(
     method: Choice = "auto",
     base: Drive | None = None,
     warm: Any = None,
+    tolerance: float = TOLERANCE,
+    time_limit: float = math.inf,
+    confirm: bool = False,
 ) -> Optimum:
     """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
 
@@ -83,6 +88,14 @@ def optimize(
         The drive to whose mean shaft torque K_dyn refers, if not `drive`.
     warm : object, optional
         `warm` of the optimum of a similar problem, from which the collocation starts.
+    tolerance : float
+        `auto` ends when the answer is within this share of its lower bound (0.5 % by default); else it solves
+        the CasADi problem too, from its own guess and from the answer, and keeps the better one.
+    time_limit : float
+        s of the clock for further searches of `auto`, of which none is begun after this; by default without
+        limit, so that the answer does not depend on the machine; 0 takes the first answer.
+    confirm : bool
+        Solve the CasADi problem in any case, from its own guess; `tried` has both answers.
 
     Returns
     -------
@@ -122,18 +135,57 @@ def optimize(
     some = None if bound is None else 1.0  # any time: what is wrong with the others is said first
     ending = usual_terminal(drive) if terminal is None else terminal
     about = Problem(drive, some, ending, minimise, k_dyn, heat, corners, smoothness, base)
+    for name, number in (("tolerance", tolerance), ("time_limit", time_limit)):
+        if not number >= 0.0:
+            raise InputError(f"{name} = {number:g}: give a number that is 0 or more.")
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
-    best = solve(replace(about, start_time=seconds), method, warm)
+    best = solve(replace(about, start_time=seconds), method, warm, tolerance, time_limit, confirm)
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
 
 
-def solve(problem: Problem, method: Choice = "auto", warm: Any = None) -> Optimum:
+def solve(
+    problem: Problem,
+    method: Choice = "auto",
+    warm: Any = None,
+    tolerance: float = TOLERANCE,
+    time_limit: float = 0.0,
+    confirm: bool = False,
+) -> Optimum:
     """The optimum of a problem; see `optimize`."""
     began = time.perf_counter()
     if len(problem.drive.positions) > 1:
         return _over_positions(problem, method)
     hold = hold_of(problem)
     candidate, why = _candidate(hold.free, method, warm) if hold.until == 0.0 else _after(hold, method, warm)
+    best = _checked(hold, candidate, why, began)
+    tried = [_trial(best)]
+    goes_on = method == "auto" and best.method == "lp" and best.gap_percent > 100.0 * tolerance
+    until = time.perf_counter() + time_limit
+    # from the likely contact of the CasADi problem's own guess; where that disagrees, from the answer's
+    for contact in (None, best.run.first_contact - hold.until):
+        if not (confirm and contact is None) and not (goes_on and time.perf_counter() < until):
+            break
+        start = time.perf_counter()
+        try:
+            other = collocation.solve(hold.free, contact_guess=contact, until=None if confirm else until)
+            found = _checked(hold, other, f"gentler than that of {best.method}", start)
+        except (NotConverged, OptimumError) as failed:
+            tried.append(Trial("collocation", None, time.perf_counter() - start, str(failed)))
+            continue
+        tried.append(_trial(found))
+        goes_on = abs(found.minimised / best.minimised - 1.0) > tolerance
+        if found.minimised < best.minimised * (1.0 - TIGHT):
+            best = found
+    return replace(best, tried=tuple(tried), seconds=time.perf_counter() - began)
+
+
+def _trial(found: Optimum) -> Trial:
+    return Trial(found.method, found.minimised, found.seconds, "")
+
+
+def _checked(hold: Hold, candidate: Candidate, why: str, began: float) -> Optimum:
+    """A candidate that has passed the exact plant, with its bound."""
+    problem = hold.problem
     end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
     profile = with_tail(problem, hold.before(candidate.profile), end)
     bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base))
@@ -225,7 +277,13 @@ def _candidate(problem: Problem, method: Choice, warm: Any) -> tuple[Candidate, 
         if best is None and linear[0] is whole_search:
             best = from_quickest(problem)
         if best is None:
-            raise _refusal(problem)
+            refusal = _refusal(problem)
+            if method == "lp" or isinstance(refusal, InfeasibleError):
+                raise refusal
+            try:
+                return collocation.solve(problem), "the linear program found no start"
+            except NotConverged:
+                raise refusal from None
         return best, f"no closed form: {no_formula}" if method == "auto" else asked
     try:
         best = collocation.solve(problem, warm=warm)

@@ -202,7 +202,9 @@ def optima(drive: Drive, start_times: Sequence[float], *, tell: WorkerTell) -> N
     """Look for the optima of start times, one after the other, and send each at once."""
     for start_time in start_times:
         try:
-            point = FrontPoint.of_optimum(optimize(drive, start_time, terminal=TERMINAL), start_time)
+            point = FrontPoint.of_optimum(
+                optimize(drive, start_time, terminal=TERMINAL, time_limit=0.0), start_time
+            )
         except InfeasibleError as error:
             point = FrontPoint.of_verdict(error.verdict, start_time, TERMINAL)
         except (OptimumError, NotConverged, InputError) as error:  # InputError: of no class it solves

@@ -251,7 +251,7 @@ def optimum_of(asked: Asked) -> dict[str, Any]:
     ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
-        best = optimize(ideal, asked.bound, terminal="reached", base=asked.base)
+        best = optimize(ideal, asked.bound, terminal="reached", base=asked.base, time_limit=0.0)
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
     except (OptimumError, NotConverged, InputError):

@@ -77,8 +77,16 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         ["contacts", str(run.contacts)],
         ["knots of the profile", str(best.profile.time.size)],
         *[[f"K_dyn if known to start at {name}", number(one.k_dyn, 6)] for name, one in best.alone.items()],
+        *([["answers of the searches", _searches(best)]] if len(best.tried) > 1 else []),
         ["computed in", f"{best.seconds:.2g} s"],
     ]
+
+
+def _searches(best: Optimum) -> str:
+    """What each method found, in the order in which they were tried."""
+    return ", ".join(
+        f"{one.method} {'none' if one.value is None else number(one.value, 6)}" for one in best.tried
+    )
 
 
 def question(best: Optimum) -> str:
@@ -251,7 +259,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     best.profile.to_toml(folder / "profile.toml", about={"drive": drive.name, "k_dyn": best.k_dyn})
     best.profile.to_c(folder / "profile.c")
     best.run.to_csv(folder / "trace-optimum.csv")
-    left_out = ("profile", "seconds", "k_dyn_if_position_known")
+    left_out = ("profile", "seconds", "tried", "k_dyn_if_position_known")
     summary = {key: value for key, value in best.summary().items() if key not in left_out}
     write_rows(folder / "figures.csv", [summary])
     rows = figure_rows(best)[:-1]  # without the computing time: the same command writes the same report

@@ -255,3 +255,53 @@ def test_the_closed_form_and_the_program_agree_on_what_cannot_be_held() -> None:
     with pytest.raises(pulse_coast_hold.NotApplicable):
         pulse_coast_hold.solve(Problem(CRANE, SHORT))
     assert optimize(CRANE, SHORT).why.startswith("no closed form: holding the shaft torque")
+
+
+# the best of both methods -----------------------------------------------------------------------------------
+
+DAMPED = CRANE.replace(target_speed=60.0, damping=0.3)
+
+
+@pytest.fixture
+def worse_programs(monkeypatch):
+    """Linear programs that leave 4 % of the time unused: starts that are valid and not the best."""
+    solve = ideal.solve
+    monkeypatch.setattr(
+        ideal, "solve", lambda problem: solve(replace(problem, start_time=0.96 * problem.start_time))
+    )
+
+
+def test_auto_goes_on_while_the_bound_is_far_and_keeps_the_better_answer(worse_programs):
+    first = optimize(DAMPED, 0.28, time_limit=0.0)
+    assert (first.method, len(first.tried)) == ("lp", 1)
+    assert first.gap_percent > 0.5
+    best = optimize(DAMPED, 0.28)
+    assert best.method == "collocation"
+    assert [one.method for one in best.tried][:2] == ["lp", "collocation"]
+    assert best.k_dyn < first.k_dyn * 0.99
+    assert best.k_dyn == min(one.value for one in best.tried)
+    assert best.gap_percent < 0.5
+    assert optimize(DAMPED, 0.28, tolerance=0.5).k_dyn == first.k_dyn  # content with that
+
+
+def test_auto_ends_where_the_bound_is_near():
+    best = optimize(DAMPED, 0.28)
+    assert (best.method, len(best.tried)) == ("lp", 1)
+    assert best.gap_percent < 0.5
+
+
+def test_confirm_solves_the_casadi_problem_from_its_own_guess():
+    best = optimize(DAMPED, 0.28, confirm=True)
+    assert [one.method for one in best.tried] == ["lp", "collocation"]
+    ours, theirs = (one.value for one in best.tried)
+    assert theirs == pytest.approx(ours, rel=1e-3)
+    assert best.k_dyn == min(ours, theirs)
+    formula = optimize(CRANE.replace(target_speed=60.0), 0.2883042, confirm=True)
+    assert [one.method for one in formula.tried] == ["closed-form", "collocation"]
+    assert formula.tried[1].value == pytest.approx(formula.k_dyn, rel=1e-3)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance": -0.1}, {"time_limit": -1.0}, {"tolerance": math.nan}])
+def test_how_long_to_search_is_checked(wrong):
+    with pytest.raises(InputError, match="0 or more"):
+        optimize(DAMPED, 0.28, **wrong)

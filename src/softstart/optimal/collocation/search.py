@@ -7,6 +7,7 @@ and replayed on the exact plant, and the mesh is refined until the two agree.
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -263,6 +264,7 @@ def solve(
     contact_guess: float | None = None,
     tolerance: float = 1e-4,
     max_refinements: int = 5,
+    until: float | None = None,
 ) -> Candidate:
     """The optimal start by direct collocation.
 
@@ -275,6 +277,7 @@ def solve(
     tolerance : relative; the mesh is refined until the re-simulated figure moves by less than this and agrees
         with the claimed one to this.
     max_refinements : at most so many meshes after the first.
+    until : instant of time.perf_counter after which no other guess and no finer mesh is begun.
 
     Raises InputError for a problem of no class known here, and NotConverged where IPOPT finds no solution or
     the mesh does not get fine enough: `NotConverged.violation` is the largest violated constraint.
@@ -292,15 +295,15 @@ def solve(
         if not solution.found:
             solution = None
     if solution is not None:
-        return _refine(problem, solution, spent, tolerance, max_refinements, warm.refined_value)
+        return _refine(problem, solution, spent, tolerance, max_refinements, warm.refined_value, until)
     failure: NotConverged | None = None
     for contact in _contacts(problem, contact_guess):
         try:
             solution, cost = _first(problem, contact)
-            return _refine(problem, solution, spent + cost, tolerance, max_refinements)
+            return _refine(problem, solution, spent + cost, tolerance, max_refinements, until=until)
         except NotConverged as stopped:
             failure = failure or stopped
-            if stopped.final:
+            if stopped.final or _late(until):
                 break
     assert failure is not None
     raise failure
@@ -394,8 +397,18 @@ def _reason_of(reason: str) -> str:
 # ---- finer meshes ----------------------------------------------------------------------------------------
 
 
+def _late(until: float | None) -> bool:
+    return until is not None and time.perf_counter() > until
+
+
 def _refine(
-    problem: Problem, solution: Solution, spent: int, tolerance: float, most: int, known: float | None = None
+    problem: Problem,
+    solution: Solution,
+    spent: int,
+    tolerance: float,
+    most: int,
+    known: float | None = None,
+    until: float | None = None,
 ) -> Candidate:
     """Halve intervals until the claimed figure stands still and the exact plant agrees with it.
 
@@ -424,7 +437,7 @@ def _refine(
         merit = exact.value * (1.0 if lands else 1.1)
         if best is None or merit < best[0]:
             best = (merit, solution, own, exact)
-        if settled or refinements >= most:
+        if settled or refinements >= most or _late(until):
             break
         before = (exact.value, own.value)
         finer, cost = _finer(problem, solution, own, exact, tolerance)
