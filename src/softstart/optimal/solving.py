@@ -163,7 +163,8 @@ def solve(
     until = time.perf_counter() + time_limit
     # from the likely contact of the CasADi problem's own guess; where that disagrees, from the answer's
     for contact in (None, best.run.first_contact - hold.until):
-        if not (confirm and contact is None) and not (goes_on and time.perf_counter() < until):
+        again = goes_on and time.perf_counter() < until and (contact is None or contact > 0.0)
+        if not again and not (confirm and contact is None):
             break
         start = time.perf_counter()
         try:
