@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -178,7 +178,9 @@ class Optimum:
             "heat_bound": problem.heat,
             "method": self.method,
             "why": self.why,
-            "tried": [asdict(one) for one in self.tried],
+            "tried": [
+                {"method": one.method, "value": one.value, "failure": one.failure} for one in self.tried
+            ],
             "k_dyn": self.k_dyn,
             "k_dyn_claimed": self.claimed if problem.minimise == "k_dyn" else None,
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
