@@ -89,7 +89,8 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "optimize": [
         "--start-time", "--terminal", "--method", "--minimise", "--max-k-dyn", "--max-heat", "--torque-speed",
-        "--smoothness", "--gaps", "--inertias", "--load-torques", "--set", "--json",
+        "--smoothness", "--tolerance", "--time-limit", "--gaps", "--inertias", "--load-torques", "--set",
+        "--json",
     ],
     "pareto": [
         "--start-times", "--terminal", "--method", "--torque-speed", "--controllers", "--workers", "--set",
