@@ -19,7 +19,6 @@ import socket
 import stat
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -285,7 +284,6 @@ def fresh_folder(home: Path, *also: Path) -> Iterator[Path]:
 
 
 PREFIX, SUFFIX = ".softstart-", ".part"
-FRESH = 5.0  # s, in which an empty folder may be one that its owner is about to lock
 
 
 def _locked_folder(home: Path) -> tuple[Path, int | None]:
@@ -293,7 +291,10 @@ def _locked_folder(home: Path) -> tuple[Path, int | None]:
         path = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=home))
         if sys.platform == "win32":
             return path, None
-        handle = os.open(path, os.O_RDONLY)
+        try:
+            handle = os.open(path, os.O_RDONLY)
+        except FileNotFoundError:  # swept away by another process before it was locked
+            continue
         with suppress(OSError):  # a file system without locks on folders: nobody can remove it either
             if not _lock(handle) or not path.exists():
                 os.close(handle)
@@ -317,8 +318,7 @@ def _sweep(home: Path) -> None:
             with suppress(OSError):
                 handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
                 try:
-                    fresh = time.time() - os.fstat(handle).st_mtime < FRESH
-                    if _lock(handle) and not (fresh and not any(path.iterdir())):
+                    if _lock(handle):  # an owner that has not yet locked its own makes another one
                         shutil.rmtree(path, ignore_errors=True)
                 finally:
                     os.close(handle)

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -175,6 +176,28 @@ def test_what_a_killed_owner_left_is_removed_and_a_living_one_keeps_his(tmp_path
             assert mine != other
     with records(tmp_path / "parts.jsonl"):
         pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_owner_killed_before_its_first_file_leaves_nothing_to_the_next(tmp_path):
+    (tmp_path / ".softstart-empty.part").mkdir()
+    with fresh_folder(tmp_path) as mine:
+        assert list(tmp_path.iterdir()) == [mine]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_made_and_swept_at_once_are_not_taken_from_one_another(tmp_path):
+    """A folder that another thread sweeps away before it is locked is made again."""
+
+    def work(number):
+        for _ in range(60):
+            with fresh_folder(tmp_path) as mine:
+                (mine / "file").write_text(str(number))
+                assert (mine / "file").read_text() == str(number)
+        return number
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(work, range(4))) == [0, 1, 2, 3]
     assert list(tmp_path.iterdir()) == []
 
 
