@@ -98,7 +98,8 @@ def scales_of(controller: Controller, origin: Drive) -> Mapping[str, Scale]:
     """
     found = {}
     default = controller.defaults(origin.assumed)
-    for one in ranges_of(controller, tunable(controller)):
+    names = tunable(controller)
+    for one in ranges_of(controller, names) if names else ():
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
         if low < high:
             found[one.name] = Scale(low, high, one.logarithmic and low > 0.0)

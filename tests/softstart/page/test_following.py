@@ -286,6 +286,22 @@ def test_parameters_of_the_selected_strategy_are_fields():
     assert "no such field" in screen.mistakes[""]
 
 
+def test_every_strategy_shows_the_values_that_it_starts_with():
+    session = Session()
+    screen = Screen(session)
+    for label in session.controllers:
+        session.select(label)
+        shown = screen.first()["fields"]
+        own = session.result(label).run.controller.parameters
+        for path, (text, *_) in shown.items():
+            if path.startswith("strategy."):
+                value = own[path.removeprefix("strategy.")]
+                assert (
+                    text == value if isinstance(value, str) else float(text) == pytest.approx(value, rel=1e-3)
+                )
+        assert {path for path in shown if path.startswith("strategy.")} == screen.strategy_paths()
+
+
 def test_reset_gives_the_value_of_the_drive_as_it_was_loaded():
     session = Session(controllers=["direct"])
     controls, _ = controls_of(session)

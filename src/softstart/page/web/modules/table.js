@@ -11,7 +11,6 @@ const COLUMNS = [
   ["start_time", "start, s", "", (row) => fixed(row.start_time, 4), "Time until the load has its target speed"],
   ["settled", "settled, s", "", (row) => fixed(row.settled, 4), "From when on the load keeps its target speed"],
   ["time_lost", "later, s", "", (row) => fixed(row.time_lost, 4), "How much later than with direct the load has its target speed"],
-  ["flag", "flag", "", (row) => row.flag ?? "", "Why a strategy is never recommended: slow, not settled, harder than direct start"],
 ];
 
 export class Table {
@@ -64,6 +63,7 @@ export class Table {
         const text = COLUMNS[index + 1][3](row);
         if (cell.textContent !== text) cell.textContent = text;
       });
+      if (line.flag.textContent !== (row.flag ?? "")) line.flag.textContent = row.flag ?? "";
       line.tr.title = row.trouble;
       line.tr.classList.toggle("trouble", Boolean(row.trouble));
       line.bar.style.setProperty("--share", `${(100 * (row.k_dyn ?? 0)) / largest}%`);
@@ -101,8 +101,9 @@ export class Table {
   line(name) {
     const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}` });
     const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}` });
-    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: key === "flag" ? "flag" : "number", "data-key": key }));
-    const bar = element("td", { class: "bar", "aria-hidden": "true" });
+    const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
+    const flag = element("span", { class: "flag", title: "Why it is never recommended: slow, not settled, harder than direct start" });
+    const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
     const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
     out.addEventListener("click", () => this.say({ what: "remove", name }));
     const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
@@ -116,7 +117,7 @@ export class Table {
     tr.addEventListener("click", (event) => {
       if (!event.target.closest("input, label, button")) select();
     });
-    const line = { tr, eye, radio, cells, bar, out, changed, asked: -1 };
+    const line = { tr, eye, radio, cells, bar, flag, out, changed, asked: -1 };
     eye.addEventListener("change", () => (line.asked = this.say({ what: "show", name, visible: eye.checked })));
     return line;
   }
