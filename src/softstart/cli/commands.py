@@ -106,6 +106,10 @@ class Command(click.Command):
             if parameter.type is click.STRING:
                 parameter.type = Words()
 
+    def get_help_option_names(self, ctx: click.Context) -> list[str]:
+        """Both names, whichever context asks first: click keeps the option that it has made for that one."""
+        return ["-h", "--help"]
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """The arguments read; a UsageError always has its context."""
         try:
@@ -155,7 +159,7 @@ class Commands(Command, click.Group):
 @click.group(
     cls=Commands,
     invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings={"max_content_width": 100},
     epilog=EPILOG,
     no_args_is_help=False,
 )

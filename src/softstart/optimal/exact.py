@@ -89,10 +89,11 @@ class Hold:
 def hold_of(problem: Problem) -> Hold:
     """What the brake of the drive leaves to be found; InputError where that is no problem of its own.
 
-    >>> drive = Drive.load("crane-4amtkf").replace(brake="motor", torque_lag=0.01)
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> drive = crane.replace(start_position="hanging", brake="motor", torque_lag=0.01)
     >>> held = hold_of(Problem(drive, 0.5))
     >>> round(held.until, 6), round(held.free.first_torque, 3)
-    (0.001228, 7.16)
+    (0.001227, 7.16)
     """
     drive = problem.drive
     if drive.brake == "none":

@@ -124,6 +124,7 @@ def test_the_listed_help_of_each_command_is_its_own():
     context = click.Context(cli)
     for name, (_, sentence) in COMMANDS.items():
         command = cli.get_command(context, name)
+        assert command.get_help_option(click.Context(command)).opts == ["-h", "--help"]
         assert (command.name, " ".join(command.help.split("\n\n")[0].split())) == (name, sentence)
 
 
