@@ -67,7 +67,7 @@ def test_others_see_the_same_start(case: str, monkeypatch: pytest.MonkeyPatch) -
 
     searched = whole_search.search
     monkeypatch.setattr(whole_search, "search", noted)
-    best = optimize(drive, end, terminal=terminal, torque_speed=curve)
+    best = optimize(drive, end, terminal=terminal, torque_speed=curve, time_limit=0.0)
     assert best.method == "lp"
     assert best.run.contacts == 1
     assert best.claimed == pytest.approx(best.k_dyn, rel=3e-4)
@@ -225,7 +225,7 @@ def test_the_drives_with_a_lag_that_come_along_have_optima(name: str) -> None:
     shortest = shortest_start_time(Problem(drive, terminal="reached", minimise="start_time"))
     ratios = []
     for share in (1.02, 1.2, 1.6):
-        best = optimize(drive, share * shortest, terminal="reached")
+        best = optimize(drive, share * shortest, terminal="reached", time_limit=0.0)
         ratios.append(best.k_dyn / best.k_dyn_lower_bound)
     assert np.all(np.array(ratios) >= 1.0 - 1e-5)
     assert ratios[-1] < 1.03  # with time enough the bound of an ideal torque is nearly met
