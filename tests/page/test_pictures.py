@@ -20,7 +20,7 @@ def small(path: Path) -> int:
 
 
 def test_the_page_for_the_readme(visit: Any, screenshot: Any) -> None:
-    page = visit(width=1180, height=720)
+    page = visit(width=1320, height=780)
     page.locator('tr[data-name="direct"] input[type=checkbox]').check()
     page.locator('tr[data-name="pulse-coast-hold"] input[type=radio]').check()
     page.wait_for_function("document.querySelector('#k-dyn').dataset.value < 1")
