@@ -330,7 +330,7 @@ def judged(seed: int, number: int) -> tuple[str, list[str]]:
     except SimulationError as error:
         lost = any(one.value in str(error) for one in (Status.NOT_LOCATED, Status.NOT_FINITE))
         return "given up", [str(error)] if lost else []
-    except Exception:
+    except Exception:  # whatever else happens is a defect, and is reported as one
         return "failed", [traceback.format_exc()]
     wrong += balances(run)
     took = time.perf_counter() - began

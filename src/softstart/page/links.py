@@ -84,9 +84,9 @@ def bench_of(link: str, now: Bench) -> Bench:
         drive = Drive.from_toml(content["drive"])
         origin = Drive.from_toml(content["origin"]) if content["origin"] else drive
         parameters = content["parameters"]
-        given = {name: parameters[name] for name in now.controllers if name in parameters}
-        selected, drawn = content["selected"], frozenset(map(str, content["drawn"]))
-    except (KeyError, TypeError, ValueError, binascii.Error, zlib.error):
+        given = {name: dict(parameters[name]) for name in now.controllers if name in parameters}
+        selected, drawn = str(content["selected"]), frozenset(map(str, content["drawn"]))
+    except (KeyError, TypeError, ValueError, RecursionError, binascii.Error, zlib.error):
         raise InputError(
             "the address after #: this is no bench that softstart has written; copy the whole link again, "
             "or delete what follows the #."

@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 import zlib
-from base64 import urlsafe_b64encode
+from base64 import urlsafe_b64decode, urlsafe_b64encode
 
 import pytest
 from hypothesis import given, settings
@@ -141,6 +141,36 @@ BOMB = urlsafe_b64encode(zlib.compress(b"[" * 5_000_000)).decode()
 def test_a_link_that_holds_no_bench_is_refused_in_a_sentence(link):
     with pytest.raises(InputError, match="copy the whole link again"):
         bench_of(link, Session(controllers=["direct"]).bench)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"parameters": {"direct": [1]}},
+        {"parameters": {"direct": 3}},
+        {"parameters": 3},
+        {"drawn": 3},
+        {"drive": 3},
+    ],
+)
+def test_a_link_with_parts_of_another_kind_is_refused_in_the_same_sentence(change):
+    session = Session(controllers=["direct"])
+    packed = link_of(session)
+    content = json.loads(zlib.decompress(urlsafe_b64decode(packed + "=" * (-len(packed) % 4))))
+    link = urlsafe_b64encode(zlib.compress(json.dumps(content | change).encode())).decode()
+    with pytest.raises(InputError, match=r"copy the whole link again"):
+        bench_of(link, session.bench)
+
+
+def test_a_link_of_brackets_and_one_with_a_list_as_selection():
+    session = Session(controllers=["direct"])
+    nested = urlsafe_b64encode(zlib.compress(b"[" * 60_000)).decode()
+    with pytest.raises(InputError, match="copy the whole link again"):
+        bench_of(nested, session.bench)
+    packed = link_of(session)
+    content = json.loads(zlib.decompress(urlsafe_b64decode(packed + "=" * (-len(packed) % 4))))
+    link = urlsafe_b64encode(zlib.compress(json.dumps(content | {"selected": [1]}).encode())).decode()
+    assert bench_of(link, session.bench).selected == "direct"
 
 
 def test_a_link_cannot_name_code_or_a_file():
