@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -64,18 +64,23 @@ else:
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 
 
+def several_strategies(command: Callable[..., Any]) -> Callable[..., Any]:
+    """DRIVE, --controllers, --set, --fitted-to and --param."""
+    names = "Controllers, with commas between. By default all installed ones that need no parameter."
+    param = "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
+    for option in (
+        param_option("CONTROLLER.KEY=VALUE", param),
+        fitted_to_option,
+        set_option,
+        controller_option("--controllers", "A,B,...", names),
+        drive_argument(default=DEFAULT_DRIVE),
+    ):
+        command = option(command)
+    return command
+
+
 @click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
-@controller_option(
-    "--controllers",
-    "A,B,...",
-    "Controllers, with commas between. By default all installed ones that need no parameter.",
-)
-@set_option
-@fitted_to_option
-@param_option(
-    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
-)
+@several_strategies
 @until_option
 @click.option(
     "--worst-case",
@@ -252,17 +257,7 @@ def _value(value: object) -> str:
 
 
 @click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
-@controller_option(
-    "--controllers",
-    "A,B,...",
-    "Controllers, with commas between. By default all installed ones that need no parameter.",
-)
-@set_option
-@fitted_to_option
-@param_option(
-    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
-)
+@several_strategies
 @click.option(
     "--slope",
     metavar="M",
