@@ -161,6 +161,7 @@ def _watch_for_stops() -> None:
     compiled code, or waits for a thread that is. The system writes the signal's number into a pipe at once,
     where another thread reads it.
     """
+    sys.unraisablehook = _unraisable
     signal.signal(signal.SIGTERM, _stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _stop)
@@ -186,6 +187,12 @@ def _stop(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGALRM, _stop_again)
         signal.setitimer(signal.ITIMER_REAL, REPEAT_AFTER, REPEAT_AFTER)
     raise KeyboardInterrupt
+
+
+def _unraisable(lost: sys.UnraisableHookArgs) -> None:
+    """What was raised where nothing can catch it, as in callbacks of weak references: a stop comes again."""
+    if not issubclass(lost.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(lost)
 
 
 def _stop_again(number: int, frame: FrameType | None) -> None:

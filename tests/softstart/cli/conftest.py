@@ -11,6 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from softstart.cli import main
+from softstart.cli.running import COMPILING
 
 CONTROLLERS = """
 from softstart import Command, PlainController, Sensor
@@ -108,12 +109,13 @@ def place(tmp_path, monkeypatch):
 
 @pytest.fixture
 def run(place, capfd):
-    """softstart ARGUMENTS in this process."""
+    """softstart ARGUMENTS in this process; what is compiled in it depends on the tests before."""
 
     def go(*arguments: str) -> Ended:
         capfd.readouterr()
         code = main(list(arguments))
-        return Ended(code, *capfd.readouterr())
+        out, err = capfd.readouterr()
+        return Ended(code, out, err.replace(f"softstart: {COMPILING}\n", ""))
 
     return go
 

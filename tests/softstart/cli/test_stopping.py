@@ -32,6 +32,14 @@ LOST = """
         pass  # as a callback of a compiled library does
     time.sleep(20)
 """
+IN_A_CALLBACK = """
+    import weakref
+    class Kept: pass
+    kept = Kept()
+    reference = weakref.ref(kept, lambda _: (os.kill(os.getpid(), signal.{name}), time.sleep(1)))
+    del kept  # nothing can catch what is raised there: Python prints it, with its lines
+    time.sleep(20)
+"""
 TURNED = """
     try:
         raise KeyboardInterrupt
@@ -75,7 +83,9 @@ def ended(work: str, name: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize(("work", "name"), [(LOST, "SIGINT"), (LOST, "SIGTERM"), (TURNED, "SIGINT")])
+@pytest.mark.parametrize(
+    ("work", "name"), [(LOST, "SIGINT"), (LOST, "SIGTERM"), (IN_A_CALLBACK, "SIGINT"), (TURNED, "SIGINT")]
+)
 def test_a_stop_that_was_lost_is_repeated(work: str, name: str) -> None:
     done = ended(work, name)
     assert (done.returncode, done.stdout) == (130, "")
