@@ -21,7 +21,8 @@ BUDGET = {
     # folders of killed processes, the end of a process that does not stop
     "(top)": (2600, 11, 0, 0),
     "balancing": (2020, 7, 0, 0),
-    "chain": (4620, 14, 2, 0),
+    # 150 lines: damping ratios, mean torque and K_dyn of a chain, permissible torques
+    "chain": (4770, 14, 2, 0),
     "cli": (4430, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort

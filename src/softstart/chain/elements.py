@@ -75,13 +75,14 @@ class Shaft(ParameterSet):
     """What joins two neighbouring masses: a spring with a damper, a gap, then a gear.
 
     `ratio` is the speed of the mass before over that of the mass after (3 for a reduction of three to one).
-    Stiffness, damping, gap and start position are measured on the `side` of the gear that is named: "before"
-    it, at the speed of the mass before (the default), or "after" it. A `stiffness` of infinity is a rigid
-    joint: with a gap the masses meet in impacts of the `restitution`, without one they move as one mass. The
-    gap may be given as `backlash` on a pitch `diameter`, `gap = 2 backlash/diameter` [R]. `efficiency` is
-    the share of the power that leaves the gear, whichever way it flows: of the torque T of the shaft, brought
-    to the other side, eta T acts there while the shaft drives, and T/eta while it is driven. At rest the gear
-    holds whatever lies between.
+    Stiffness, damping, gap, permissible torque and start position are measured on the `side` of the gear that
+    is named: "before" it, at the speed of the mass before (the default), or "after" it. The damping may be
+    given as a ratio zeta, d = 2 zeta sqrt(c J) with J = J1 J2/(J1 + J2) of the two masses that it joins. A
+    `stiffness` of infinity is a rigid joint: with a gap the masses meet in impacts of the `restitution`,
+    without one they move as one mass. The gap may be given as `backlash` on a pitch `diameter`,
+    `gap = 2 backlash/diameter` [R]. `efficiency` is the share of the power that leaves the gear, whichever
+    way it flows: of the torque T of the shaft, brought to the other side, eta T acts there while the shaft
+    drives, and T/eta while it is driven. At rest the gear holds whatever lies between.
 
     >>> Shaft("2 kN*m/rad", backlash="0.2 mm", diameter="185 mm").gap
     0.002162...
@@ -98,6 +99,10 @@ class Shaft(ParameterSet):
     damping: Number = parameter(
         "shaft.damping", "N*m*s/rad", "damping", '"1.5 N*m*s/rad"', "0 or more", default=0.0
     )
+    damping_ratio: MaybeNumber = parameter(
+        "shaft.damping_ratio", "1", "damping ratio of its two masses alone, instead of `damping`", "0.02",
+        "0 or more", default=None,
+    )  # fmt: skip
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", default=None)
     backlash: MaybeNumber = parameter(
         "shaft.backlash", "m", "backlash on the pitch circle", '"0.2 mm"', "0 or more", default=None
@@ -122,6 +127,10 @@ class Shaft(ParameterSet):
         "shaft.contact_law", "", "law of the torque in contact", '"no-pull"',
         default="no-pull", choices=get_args(ContactLaw),
     )  # fmt: skip
+    permissible_torque: MaybeNumber = parameter(
+        "shaft.permissible_torque", "N*m", "permissible peak torque of shaft, coupling or gear", '"800 N*m"',
+        "above 0", default=None,
+    )  # fmt: skip
     start_position: Number = parameter(
         "shaft.start_position", "rad", "twist at the start (0 is mid-gap)", '"0 rad"', default=0.0
     )
@@ -136,6 +145,11 @@ class Shaft(ParameterSet):
             missing = "diameter" if diameter is None else "backlash"
             wrong.append(
                 f"{missing} is missing: a backlash is on a pitch diameter; give both, or the gap as an angle."
+            )
+        if self.damping > 0.0 and self.damping_ratio is not None:
+            wrong.append(
+                f"damping = {self.damping!r} and damping_ratio = {self.damping_ratio!r}: both give the "
+                "damping; leave one out."
             )
         if self.efficiency == 0.0:
             wrong.append("efficiency = 0: the efficiency of the gear must be above 0.")
@@ -166,8 +180,9 @@ class Shaft(ParameterSet):
         else:
             if gap > 0.0 and restitution is None:
                 yield "restitution is missing: a rigid gap needs one, from 0 (no rebound) to 1 (elastic)."
-            if self.damping > 0.0:
-                yield f"damping = {self.damping!r}: a rigid joint has no damping; leave it out."
+            for key in ("damping", "damping_ratio"):
+                if vars(self)[key]:
+                    yield f"{key} = {vars(self)[key]!r}: a rigid joint has no damping; leave it out."
             if abs(self.start_position) > 0.5 * gap:
                 yield (
                     f"start_position = {self.start_position!r}: a rigid gap of {gap!r} rad lets the twist "

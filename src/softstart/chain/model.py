@@ -12,6 +12,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -233,6 +234,44 @@ class Chain:
         of_reference = speeds[self.index(reference)]
         return tuple(speed / of_reference for speed in speeds)
 
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Each shaft by the masses that it joins.
+
+        >>> Chain.load("crane-4-mass").shaft_names[0]
+        'rotor - pinion'
+        """
+        return tuple(f"{a.name} - {b.name}" for a, b in pairwise(self.masses))
+
+    @property
+    def mean_torque(self) -> float:
+        """M12avg of the chain, N m at the motor shaft, to which its K_dyn refers.
+
+        >>> round(Chain.load("crane-4-mass").mean_torque, 2)
+        52.87
+        """
+        if self.motor is None:
+            raise InputError("[motor] is missing: K_dyn refers to its starting torque; add it to the chain.")
+        return self.at_motor_shaft().mean_torque(self.motor.starting_torque)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what the chain leaves out that decides its shaft torques.
+
+        >>> Chain.load("tractor-like").warnings
+        ()
+        """
+        damped = any(s.damping or s.damping_ratio or s.efficiency < 1.0 for s in self.shafts)
+        inelastic = any(s.restitution is not None and s.restitution < 1.0 for s in self.shafts)
+        if damped or inelastic or any(mass.damping for mass in self.masses):
+            return ()
+        if not any(shaft.gap > 0.0 for shaft in self.shafts):
+            return ()
+        return (
+            "Nothing damps this chain: its light masses rattle in the gaps indefinitely, and late contacts "
+            "decide the peaks. Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
+        )
+
     # ---- the chain at one shaft --------------------------------------------------------------------------
 
     def brought_to(self, reference: str | int = "motor") -> Self:
@@ -255,17 +294,19 @@ class Chain:
             m.replace(inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
             for m, J, d, Mc, w0 in columns
         ]
-        rows = zip(self.shafts, at.c, at.d, at.gap, at.theta0, strict=True)
+        rows = zip(self.shafts, at.c, at.d, at.gap, at.permissible, at.theta0, strict=True)
         shafts = [
             s.replace(
                 stiffness=float(c),
                 damping=float(d),
+                damping_ratio=None,
                 gap=float(gap),
+                permissible_torque=None if math.isnan(most) else float(most),
                 start_position=float(theta0),
                 ratio=1.0,
                 side=s.side if s.efficiency < 1.0 else "before",
             )
-            for s, c, d, gap, theta0 in rows
+            for s, c, d, gap, most, theta0 in rows
         ]
         here = at.speed_ratio[self.motor_index] == 1.0
         return replace(
@@ -334,8 +375,9 @@ class ChainArrays:
     `reactive` its kind, `w0` speed at the start, `speed_ratio` the speed of the mass's own shaft over that of
     the reference shaft (`i` of [R]; own speed = speed here * speed_ratio).
     Of the shafts: `c` stiffness (infinite where `rigid`), `d` damping, `gap` total gap, `restitution` (NaN
-    where not rigid), `law` contact laws, `theta0` twist at the start, `efficiency` of its gear and `gear`,
-    the index of the mass at which that sits: it turns with the mass, the shaft lies on its other side.
+    where not rigid), `law` contact laws, `theta0` twist at the start,
+    `permissible` torque (NaN where none), `efficiency` of its gear and `gear`, the index of the mass at which
+    that sits: it turns with the mass, the shaft lies on its other side.
     `motor` and `load` are the indices of the masses with the motor and with the target speed.
     """
 
@@ -352,6 +394,7 @@ class ChainArrays:
     restitution: Vector
     law: tuple[ContactLaw, ...]
     theta0: Vector
+    permissible: Vector
     efficiency: Vector
     gear: NDArray[np.int64]
     motor: int
@@ -361,6 +404,27 @@ class ChainArrays:
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+
+    @property
+    def path(self) -> range:
+        """The shafts that lead from the motor to the load; all of them where both are on one mass."""
+        low, high = sorted((self.motor, self.load))
+        return range(low, high) if low < high else range(self.c.size)
+
+    def mean_torque(self, motor_torque: float) -> float:
+        """Mean torque of the shafts from motor to load, N m, while all masses speed up as one.
+
+        T_k = sum (J_i a + Mc_i) over the masses that shaft k drives, with a = (u - sum Mc)/sum J. The mean is
+        weighted by compliance: it is then M12avg = (u J2 + J1 Mc)/(J1 + J2) of [G](16) with J1 and J2 by the
+        lever rule, where the load torque is on the load mass.
+        """
+        whole, load = float(self.J.sum()), float(self.Mc.sum())
+        needed = self.J * (motor_torque - load) / whole + self.Mc
+        torques = np.cumsum(needed)[:-1]
+        torques[self.motor :] = np.cumsum(needed[::-1])[::-1][1 + self.motor :]
+        path = list(self.path)
+        weights = np.where(self.rigid, 0.0, 1.0 / self.c)[path]
+        return float(np.average(torques[path], weights=weights if weights.any() else None))
 
     @property
     def efficiency_from_motor(self) -> Vector:
@@ -382,22 +446,46 @@ def arrays_at(chain: Chain, index: int) -> ChainArrays:
     masses, shafts = chain.masses, chain.shafts
     i = np.array(chain.speed_ratios(index))
     of_shaft = np.array([i[k] if shaft.side == "before" else i[k + 1] for k, shaft in enumerate(shafts)])
+    J = np.array([mass.inertia for mass in masses]) * i * i
+    c = np.array([shaft.stiffness for shaft in shafts]) * of_shaft * of_shaft
+    permissible = [math.nan if s.permissible_torque is None else s.permissible_torque for s in shafts]
     return ChainArrays(
-        J=np.array([mass.inertia for mass in masses]) * i * i,
+        J=J,
         d_ground=np.array([mass.damping for mass in masses]) * i * i,
         Mc=np.array([mass.torque for mass in masses]) * i,
         reactive=np.array([mass.kind == "reactive" for mass in masses]),
         w0=np.array([mass.initial_speed for mass in masses]) / i,
         speed_ratio=i,
-        c=np.array([shaft.stiffness for shaft in shafts]) * of_shaft * of_shaft,
-        d=np.array([shaft.damping for shaft in shafts]) * of_shaft * of_shaft,
+        c=c,
+        d=np.array([shaft.damping for shaft in shafts]) * of_shaft * of_shaft + _from_ratios(shafts, J, c),
         gap=np.array([shaft.gap for shaft in shafts]) / of_shaft,
         rigid=np.array([shaft.rigid for shaft in shafts]),
         restitution=np.array([math.nan if s.restitution is None else s.restitution for s in shafts]),
         law=tuple(shaft.contact_law for shaft in shafts),
         theta0=np.array([shaft.start_position for shaft in shafts]) / of_shaft,
+        permissible=np.array(permissible) * of_shaft,
         efficiency=np.array([shaft.efficiency for shaft in shafts]),
         gear=np.array([k + (shaft.side == "before") for k, shaft in enumerate(shafts)]),
         motor=chain.motor_index,
         load=chain.load_index,
     )
+
+
+def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
+    """The dampings of the shafts that have a damping ratio: d = 2 zeta sqrt(c J1 J2/(J1 + J2)).
+
+    J1 and J2 are the masses that the shaft joins, each with those joined to it rigidly without a gap: what
+    swings on this shaft when all others are cut.
+    """
+    welded = [shaft.rigid and shaft.gap == 0.0 for shaft in shafts]
+    found = np.zeros(len(shafts))
+    for k, shaft in enumerate(shafts):
+        if shaft.damping_ratio:
+            first, last = k, k + 1
+            while first > 0 and welded[first - 1]:
+                first -= 1
+            while last < len(shafts) and welded[last]:
+                last += 1
+            before, after = float(J[first : k + 1].sum()), float(J[k + 1 : last + 1].sum())
+            found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * before * after / (before + after))
+    return found

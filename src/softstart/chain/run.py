@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softstart import stages
 from softstart.arrays import Vector
 from softstart.chain import kernel_start as kernel
 from softstart.chain.kernel_records import (
@@ -36,6 +37,7 @@ from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.plant import layout
+from softstart.start import metrics
 from softstart.start.run import BaseRun
 from softstart.start.status import Status
 
@@ -108,7 +110,7 @@ class ChainRun(BaseRun):
     controller : Controller or None
         The controller as it was set up; None where the motor was off.
     base : Drive or None
-        The drive to whose mean torque K_dyn refers.
+        The drive to whose mean torque K_dyn refers; None where it refers to that of the chain itself.
     status : Status
         How the start ended.
     t, u : array of shape (n,)
@@ -118,7 +120,9 @@ class ChainRun(BaseRun):
     twist, T : array of shape (n, N - 1)
         Twists, rad, and torques, N m, of the shafts.
     k_dyn : float
-        Dynamic coefficient of the shaft beside the motor.
+        Dynamic coefficient: the largest torque of all shafts, at the motor shaft, over `base_torque`.
+    k_dyns, utilisation : array of shape (N - 1,)
+        The same of each shaft, and its torque over its permissible torque (NaN where none is given).
     peak_torques, peak_times : array of shape (N - 1,)
         Largest |T| of each shaft, N m, and its instant, s.
     peak_impulses : array of shape (N - 1,)
@@ -191,14 +195,40 @@ class ChainRun(BaseRun):
         return self.numbers.place.motor_shaft
 
     @property
+    def worst_shaft(self) -> int:
+        """The index of the shaft with the largest torque at the motor shaft."""
+        return int(self.peak_torques.argmax())
+
+    @property
     def peak_torque(self) -> float:
-        """Largest |T| of the shaft beside the motor, N m."""
-        return float(self.peak_torques[self.motor_shaft])
+        """Largest |T| of all shafts, N m."""
+        return float(self.peak_torques[self.worst_shaft])
 
     @property
     def peak_time(self) -> float:
         """When that is, s."""
-        return float(self.peak_times[self.motor_shaft])
+        return float(self.peak_times[self.worst_shaft])
+
+    @property
+    def base_torque(self) -> float:
+        """The mean torque to which K_dyn refers, N m: that of `base`, or of the chain itself."""
+        return self.chain.mean_torque if self.base is None else float(metrics.base_torque(self.base))
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16): largest torque of all shafts over `base_torque`."""
+        return float(self.k_dyns[self.worst_shaft])
+
+    @property
+    def k_dyns(self) -> Vector:
+        """Dynamic coefficient of each shaft."""
+        return np.asarray(stages.dynamic_coefficient(self.peak_torques, self.base_torque))
+
+    @property
+    def utilisation(self) -> Vector:
+        """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
+        found: Vector = self.peak_torques / self.chain.at_motor_shaft().permissible
+        return found
 
     @property
     def stages(self) -> int:
@@ -251,7 +281,7 @@ class ChainRun(BaseRun):
 
     def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
         masses = [mass.name for mass in self.chain.masses]
-        shafts = [f"{a} - {b}" for a, b in pairwise(masses)]
+        shafts = self.chain.shaft_names
         columns = {"u [N*m]": states["u"]}
         for name, unit, parts in (
             ("phi", "rad", masses), ("w", "rad/s", masses), ("twist", "rad", shafts), ("T", "N*m", shafts),
@@ -306,12 +336,18 @@ class ChainRun(BaseRun):
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere."""
+        known = self.base is not None or self.chain.motor is not None
         return {
             "chain": self.chain.name,
             "assumed": self.chain.assumed,
             **self._controller_and_status(),
+            "warnings": list(self.chain.warnings),
             "base": None if self.base is None else self.base.name,
-            "k_dyn": None if self.base is None else self.k_dyn,
+            "base_torque": self.base_torque if known else None,
+            "k_dyn": self.k_dyn if known else None,
+            "k_dyns": self.k_dyns.tolist() if known else None,
+            "worst_shaft": self.chain.shaft_names[self.worst_shaft],
+            "utilisation": [None if math.isnan(one) else one for one in self.utilisation.tolist()],
             "peak_torque": self.peak_torque,
             "peak_time": self.peak_time,
             "peak_torques": self.peak_torques.tolist(),

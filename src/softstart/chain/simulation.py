@@ -61,7 +61,8 @@ def simulate_chain(
     parameters : mapping, optional
         Parameters of a controller given by name: SI numbers or strings with a unit.
     base : Drive, optional
-        The drive to whose mean torque K_dyn refers, if not `fitted_to`.
+        The drive to whose mean torque K_dyn refers, if not `fitted_to`; without both it refers to the mean
+        torque of the chain itself (`Chain.mean_torque`).
     time_limit : float, optional
         Time after which a start that has not reached its target speed ends as not reached, s.
     max_events : int
@@ -86,7 +87,7 @@ def simulate_chain(
     --------
     >>> run = simulate_chain("crane-4-mass", "direct")
     >>> round(run.k_dyn, 3), round(run.start_time, 4)
-    (6.299, 0.3708)
+    (6.296, 0.3708)
 
     References
     ----------
@@ -110,8 +111,7 @@ def simulate_chain(
             recorder.grow()
     else:
         made = make_controller(controller, parameters)
-        fitted_to = fitted_to or drive_of(chain)
-        fitted, own = made.set_up(fitted_to)
+        fitted, own = made.set_up(fitted_to or drive_of(chain))
         recorder = _ChainRecorder(given, int(fitted.sensors))
         reason = run_one(fitted, own, recorder, until)
     status = ended(recorder.x, reason, until, max_events, f"Chain {chain.name}")
@@ -212,17 +212,12 @@ class Verification:
     @property
     def worst_shaft(self) -> int:
         """The index of the shaft between motor and load with the largest torque at the motor shaft."""
-        arrays = self.chain.chain.at_motor_shaft()
-        first, last = sorted((arrays.motor, arrays.load))
-        if first == last:
-            first, last = 0, arrays.J.size - 1
-        return first + int(self.chain.peak_torques[first:last].argmax())
+        return max(self.chain.chain.at_motor_shaft().path, key=lambda k: self.chain.peak_torques[k])
 
     @property
     def worst_place(self) -> str:
         """Between which masses it is."""
-        masses = self.chain.chain.masses
-        return f"{masses[self.worst_shaft].name} - {masses[self.worst_shaft + 1].name}"
+        return self.chain.chain.shaft_names[self.worst_shaft]
 
     @property
     def worst_k_dyn(self) -> float:
@@ -230,9 +225,14 @@ class Verification:
         return float(metrics.k_dyn(float(self.chain.peak_torques[self.worst_shaft]), self.drive.drive))
 
     @property
+    def chain_k_dyn(self) -> float:
+        """K_dyn of the chain's shaft beside the motor."""
+        return float(self.chain.k_dyns[self.chain.motor_shaft])
+
+    @property
     def error(self) -> float:
         """How far the K_dyn of the drive is from that of the chain's shaft beside the motor, as a share."""
-        return self.drive.k_dyn / self.chain.k_dyn - 1.0
+        return self.drive.k_dyn / self.chain_k_dyn - 1.0
 
     def summary(self) -> dict[str, Any]:
         """Both side by side, as plain data."""
@@ -241,8 +241,8 @@ class Verification:
             "k_dyn": self.drive.k_dyn,
             "peak_torque": self.drive.peak_torque,
             "start_time": self.drive.start_time,
-            "chain_k_dyn": self.chain.k_dyn,
-            "chain_peak_torque": self.chain.peak_torque,
+            "chain_k_dyn": self.chain_k_dyn,
+            "chain_peak_torque": float(self.chain.peak_torques[self.chain.motor_shaft]),
             "chain_start_time": self.chain.start_time,
             "k_dyn_error": self.error,
             "worst_k_dyn": self.worst_k_dyn,

@@ -74,13 +74,13 @@ def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification]
     """
     pairs = []
     for one, other in combinations(done, 2):
-        gentler, harder = sorted((one, other), key=lambda v: v.chain.k_dyn)
+        gentler, harder = sorted((one, other), key=lambda v: v.chain_k_dyn)
         if (
-            gentler.chain.k_dyn < (1.0 - ALIKE) * harder.chain.k_dyn
+            gentler.chain_k_dyn < (1.0 - ALIKE) * harder.chain_k_dyn
             and harder.drive.k_dyn < (1.0 - ALIKE) * gentler.drive.k_dyn
         ):
             pairs.append((gentler, harder))
-    return max(pairs, key=lambda pair: pair[1].chain.k_dyn / pair[0].chain.k_dyn, default=None)
+    return max(pairs, key=lambda pair: pair[1].chain_k_dyn / pair[0].chain_k_dyn, default=None)
 
 
 def caution(done: Sequence[Verification]) -> str:
@@ -90,8 +90,8 @@ def caution(done: Sequence[Verification]) -> str:
     if pair is not None:
         gentler, harder = pair
         said.append(
-            f"{gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain.k_dyn:.3g} and "
-            f"{harder.chain.k_dyn:.3g}), on the drive it is the other way round "
+            f"{gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain_k_dyn:.3g} and "
+            f"{harder.chain_k_dyn:.3g}), on the drive it is the other way round "
             f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})"
         )
     far = max(done, key=_ratio, default=None)
@@ -106,7 +106,7 @@ def verdict(done: Sequence[Verification]) -> dict[str, Any] | None:
         return None
     return {
         "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
-        "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain.k_dyn)],
+        "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain_k_dyn)],
         "order_differs": reordered(done) is not None,
         "largest_ratio": max(map(_ratio, done)),
         "caution": caution(done) or None,
@@ -115,7 +115,7 @@ def verdict(done: Sequence[Verification]) -> dict[str, Any] | None:
 
 def _ratio(one: Verification) -> float:
     """K_dyn on the chain over that on the drive."""
-    return one.chain.k_dyn / one.drive.k_dyn
+    return one.chain_k_dyn / one.drive.k_dyn
 
 
 # tables ----------------------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ def verified_table(done: Sequence[Verification]) -> Table:
         "strategy": [one.name for one in done],
         "largest in": [one.worst_place for one in done],
         "K_dyn\ndrive": [number(one.drive.k_dyn, 4) for one in done],
-        "K_dyn\nchain": [number(one.chain.k_dyn, 4) for one in done],
+        "K_dyn\nchain": [number(one.chain_k_dyn, 4) for one in done],
         "drive off\n%": [f"{100 * one.error:+.1f}" for one in done],
         "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
         "start time\nchain s": column_of([one.chain.start_time for one in done], 4),

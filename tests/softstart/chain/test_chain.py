@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from softstart import Drive, InputError
@@ -186,6 +186,10 @@ starting_torque = "6 N"
         ("[[shaft]]\n", "stiffness is missing"),
         ("[[shaft]]\nstiffness = 5\nrestitution = 0.5\n", "a gap that closes on a spring has no impact"),
         ("[[shaft]]\nrestitution = 0.5\ngap = 0.1\ndamping = 1\n", "a rigid joint has no damping"),
+        ("[[shaft]]\nrestitution = 0.5\ngap = 0.1\ndamping_ratio = 0.1\n", "a rigid joint has no damping"),
+        ("[[shaft]]\nstiffness = 5\ndamping = 1\ndamping_ratio = 0.1\n", "both give the damping"),
+        ("[[shaft]]\nstiffness = 5\ndamping_ratio = -0.1\n", "must be 0 or more"),
+        ("[[shaft]]\nstiffness = 5\npermissible_torque = 0\n", "must be above 0"),
         ("[[shaft]]\nstiffness = inf\ngap = 0.1\n", "restitution is missing"),
         ("[[shaft]]\nstiffness = 5\ngap = 0.1\nbacklash = '1 mm'\n", "both give the gap"),
         ("[[shaft]]\nstiffness = 5\nbacklash = '1 mm'\n", "diameter is missing"),
@@ -215,6 +219,44 @@ def test_what_the_parts_say_against_one_another(more: str, reason: str) -> None:
     with pytest.raises(InputError) as caught:
         Chain.from_toml(BASE + more)
     assert reason in str(caught.value)
+
+
+def test_a_damping_ratio_is_that_of_the_two_masses_alone() -> None:
+    """d = 2 zeta sqrt(c J1 J2/(J1 + J2)), whatever gears lie beside it; welded masses count as one."""
+    masses = [Mass(1.0), Mass(2.0), Mass(6.0), Mass(5.0)]
+    shafts = [Shaft(8.0), Shaft(3.0, damping_ratio=0.05, ratio=4, side="after"), Shaft(restitution=0.0)]
+    chain = Chain(masses, shafts)
+    J2, J3, c = 2.0, (6.0 + 5.0) / 16.0, 3.0 / 16.0
+    d = 2 * 0.05 * np.sqrt(c * J2 * J3 / (J2 + J3))
+    np.testing.assert_allclose(chain.at_motor_shaft().d, [0.0, d, 0.0], rtol=1e-14)
+    np.testing.assert_allclose(chain.brought_to(0).at_motor_shaft().d, [0.0, d, 0.0], rtol=1e-14)
+    assert Chain.from_toml(chain.to_toml()) == chain
+
+
+@given(chains(), st.data())
+@settings(max_examples=40, deadline=None)
+def test_the_mean_torque_is_that_of_the_lever_rule(chain: Chain, data: st.DataObject) -> None:
+    """[G](16) with the two masses of the lever rule: share x of a mass goes to the load."""
+    load = data.draw(st.sampled_from([mass.name for mass in chain.masses]))
+    masses = [mass.replace(torque=5.0 if mass.name == load else 0.0) for mass in chain.masses]
+    chain = replace(chain, masses=tuple(masses), load_mass=load)
+    assume(chain.motor_index != chain.load_index)
+    at = chain.at_motor_shaft()
+    low, high = sorted((at.motor, at.load))
+    place = np.concatenate([[0.0], np.cumsum(1.0 / at.c[low:high])]) / np.sum(1.0 / at.c[low:high])
+    x = np.concatenate([np.zeros(low), place, np.ones(at.J.size - high - 1)])
+    J2 = float(at.J @ (x if at.motor < at.load else 1.0 - x))
+    J1, Mc = float(at.J.sum()) - J2, float(at.Mc[at.load])
+    assert chain.mean_torque == pytest.approx((62.0 * J2 + J1 * Mc) / (J1 + J2), rel=1e-10)
+
+
+def test_a_chain_that_nothing_damps_says_so() -> None:
+    bare = Chain.load("crane-4-mass")
+    assert "rattle" in bare.warnings[0]
+    assert Chain.load("crane-4-mass", also={"shaft[2].damping_ratio": 0.01}).warnings == ()
+    assert Chain.load("crane-4-mass", also={"mass[4].damping": 0.01}).warnings == ()
+    assert Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)]).warnings == ()
+    assert Chain([Mass(1.0), Mass(1.0)], [Shaft(gap=0.1, restitution=0.5)]).warnings == ()
 
 
 def test_changes_as_typed() -> None:

@@ -17,6 +17,7 @@ from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration_with_gaps import backbone
+from softstart.start import metrics
 
 CRANE = Drive.load("crane-4amtkf")
 # what can differ between a drive and another, each with the two-mass plant's own closed forms
@@ -118,6 +119,33 @@ def test_gears_change_nothing_but_the_shaft_on_which_things_are_said():
     same = simulate_chain(plain, "ramp", fitted_to=CRANE, excitation={"crane": slow})
     assert hummed.peak_torque == pytest.approx(same.peak_torque, rel=1e-12)
     assert hummed.peak_torque != pytest.approx(a.peak_torque, rel=1e-6)
+
+
+def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
+    """Each torque on its own shaft over what that may carry; K_dyn over the mean torque of the chain."""
+    most = {"shaft[1].permissible_torque": 400.0, "shaft[3].permissible_torque": 2000.0}
+    chain = Chain.load("crane-4-mass", also={"shaft[2].damping_ratio": 0.02, **most})
+    run = simulate_chain(chain, "direct")
+    own = run.peak_torques * np.array([1.0, 1.0, 20.0])  # shaft 3 lies behind gears of 4 and 5
+    assert run.utilisation[[0, 2]] == pytest.approx(own[[0, 2]] / [400.0, 2000.0], rel=1e-13)
+    assert np.isnan(run.utilisation[1])
+    assert run.k_dyn == pytest.approx(max(run.peak_torques) / chain.mean_torque, rel=1e-14)
+    assert run.summary()["utilisation"][1] is None
+    assert simulate_chain(chain, "direct", base=CRANE).k_dyn == pytest.approx(
+        max(run.peak_torques) / float(metrics.base_torque(CRANE)), rel=1e-14
+    )
+
+
+def test_two_masses_on_a_shaft_with_a_damping_ratio_swing_with_it():
+    """Free vibration: after a damped period the twist has fallen to exp(-2 pi zeta/sqrt(1 - zeta^2))."""
+    zeta, c, J1, J2 = 0.03, 900.0, 0.4, 1.6
+    shaft = Shaft(c, damping_ratio=zeta, start_position=0.01)
+    omega = np.sqrt(c * (1.0 / J1 + 1.0 / J2))
+    period = 2.0 * np.pi / (omega * np.sqrt(1.0 - zeta**2))
+    run = simulate_chain(Chain([Mass(J1), Mass(J2)], [shaft]), None, 2.0 * period)
+    swings = run.at([0.0, period, 2.0 * period])["twist"][:, 0]
+    decrement = np.exp(-2.0 * np.pi * zeta / np.sqrt(1.0 - zeta**2))
+    assert swings == pytest.approx(0.01 * decrement ** np.arange(3.0), rel=1e-12)
 
 
 # ---- what must be kept --------------------------------------------------------------------------------
