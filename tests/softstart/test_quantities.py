@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softstart import quantities
 from softstart.errors import InputError
 from softstart.quantities import (
     OTHER_NOUNS,
@@ -256,12 +257,22 @@ def test_a_wrong_unit_in_the_code_is_a_sentence_too():
         to_si("1 m", "furlong")
 
 
-def test_bare_numbers_do_not_import_pint():
+def test_ordinary_units_do_not_import_pint():
     code = (
         "import sys; from softstart.quantities import to_si; to_si(1.0, 'rad'); to_si('2', 'rad');"
-        "assert 'pint' not in sys.modules"
+        "to_si('62 N*m', 'N*m'); to_si('880 rpm', 'rad/s'); assert 'pint' not in sys.modules;"
+        "to_si('1 kgf*m', 'N*m'); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_ordinary_units_are_those_of_pint(monkeypatch):
+    known = dict(quantities.ORDINARY)
+    monkeypatch.setattr(quantities, "ORDINARY", {})
+    for (written, unit), factor in known.items():
+        assert to_si(f"1 {written}", unit) == factor
+    for unit in set(QUANTITIES) - {"1"}:
+        assert to_si(f"0.37 {unit}", unit) == to_si(f"0.37 ({unit})", unit) == 0.37
 
 
 def test_helpers():
