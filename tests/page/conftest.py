@@ -151,8 +151,9 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
     wrong: list[str] = []
 
     def visiting(
-        width: int = 1280, height: int = 800, dark: bool = False, url: str = "", **options: Any
-    ) -> Any:
+        width: int = 1280, height: int = 800, dark: bool = False, url: str = "", select: str = "direct",
+        **options: Any,
+    ) -> Any:  # fmt: skip
         context = browser.new_context(
             viewport={"width": width, "height": height}, color_scheme="dark" if dark else "light",
             accept_downloads=True, **options,
@@ -176,6 +177,11 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
         page.on("request", asked)
         page.goto(url or server.url)
         page.wait_for_selector(".instrument .k-dyn:not(:empty)")
+        if select:  # else the gentlest is
+            page.locator(f'tr[data-name="{select}"] input[type=radio]').check()
+            page.wait_for_function(
+                "name => document.querySelector('.figure .name').textContent === name", arg=select
+            )
         return page
 
     visiting.wrong = wrong  # type: ignore[attr-defined]

@@ -248,10 +248,10 @@ def test_messages_of_the_live_part_with_junk(own: Any) -> None:
     """What the browser's script cannot have sent changes nothing, and is called nobody's mistake."""
     chance = random.Random(SEED)
     whats = ["slide", "edit", "reset", "jump", "select", "show", "remove", "keep", "leave", "undo", "redo",
-             "hello", "drawn"]  # fmt: skip
+             "hello", "drawn", "window"]  # fmt: skip
     known = {
         "path": "shaft.gap", "position": 300, "text": "1", "name": "ramp", "visible": True, "kept": True,
-        "gap": 0.5, "inertia": 0.1, "number": 1, "link": "x",
+        "gap": 0.5, "inertia": 0.1, "number": 1, "link": "x", "begin": 0.1, "end": 0.2,
     }  # fmt: skip
     with Tab(own.url) as tab:
         for _ in range(400 * TIMES):

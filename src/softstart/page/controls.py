@@ -138,6 +138,7 @@ class Controls:
             "show": (session.show, {"name": str, "visible": bool}),
             "remove": (session.remove, {"name": str}),
             "keep": (self._keep, {"kept": bool}),
+            "window": (self._window, {"begin": float, "end": float}),
             "hello": (self._hello, {"kept": object, "link": object}),
         }
 
@@ -218,6 +219,10 @@ class Controls:
 
     def _keep(self, kept: bool) -> None:
         self._screen.kept = kept
+
+    def _window(self, begin: float, end: float) -> None:
+        """What of the starts is seen, in s; all of it if it has no length."""
+        self._screen.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
 
 
 def _parameter(path: str) -> Parameter:

@@ -38,6 +38,7 @@ SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded
 PACKED = ("t", "T", "u", "w1", "w2", "theta")
 CHANNELS = ("T", "u", "w1", "w2", "theta")
 BUCKETS = 320  # about one for three pixels of the widest plot; each keeps the extrema of each channel
+WITHIN = 1600  # points in a window of the plots: one a pixel, nearly
 PER_PERIOD = 16  # points an elastic period before thinning: its crests are then within 2 % at worst
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
@@ -55,6 +56,7 @@ class Screen:
         self.kept = False  # the map keeps the controller as it is set up for the drive of the moment
         self.stamp = 0.0  # the browser's clock at the last input that has been taken
         self.late = 0.0  # s, how long the last message has waited to be read
+        self.window: tuple[float, float] | None = None  # s, what of the starts is seen; None for all
         self.mistakes: dict[str, str] = {}  # sentences by the field they stand beside
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
         self._origin = session.origin
@@ -202,7 +204,7 @@ class Screen:
             "changed": list(session.changed),
             "selected": session.selected,
             "figure": figure(session, found),
-            "traces": {session.selected: drawn(found)},
+            "traces": {session.selected: drawn(found, PACKED, self.window)},
             "rows": [row(session, found)],
             "here": here(session.drive),
             "map_is_old": self._map_seen and not self._map_is_right(),
@@ -223,7 +225,7 @@ class Screen:
             found = self._result(label)
             frame["rows"].append(row(session, found))
             if label in session.shown:
-                frame["traces"][label] = drawn(found, ("t", "T"))
+                frame["traces"][label] = drawn(found, ("t", "T"), self.window)
             if perf_counter() - begun > SLICE:
                 yield frame
                 begun, frame = perf_counter(), {"rows": [], "traces": {}}
@@ -245,7 +247,7 @@ class Screen:
                 if label == session.selected:
                     frame |= self.first() | {"at_rest": True}
                 elif label in session.shown:
-                    frame["traces"] = {label: drawn(found, ("t", "T"))}
+                    frame["traces"] = {label: drawn(found, ("t", "T"), self.window)}
                 yield frame
             yield from (None for _ in session.judged(label))
         rows = [row(session, found) for found in session.strategies]
@@ -260,6 +262,7 @@ class Screen:
         wanted = self._map_drive(), controller, self.kept, axes
         nominal = drive if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
+        head = self._map_head()
         order = from_middle(len(axes.inertias), axes.nearest(*here(drive))[1])
         self._map_of, self._map_seen = (
             None,
@@ -276,7 +279,7 @@ class Screen:
                 yield None
             if index == order[-1]:
                 self._map_of = wanted
-            yield {"map_row": {"index": index, "k": k}, "map": self._map_head()}
+            yield {"map_row": {"index": index, "k": k}, "map": head}
 
     def _map_is_right(self) -> bool:
         """True if the browser has the map of this drive and strategy."""
@@ -292,11 +295,18 @@ class Screen:
         return drive if self.kept else drive.with_gap(axes.gaps[0], load_inertia=axes.inertias[0])
 
     def _map_head(self) -> dict[str, Any]:
+        session, axes = self.session, self.axes
+        drive, inertias = self._map_drive(), list(axes.inertias)
+        allowed = session.drive.limits.shaft_torque
+        each = drive if self.kept else drive.with_gap([axes.gaps[0]] * len(inertias), load_inertia=inertias)
+        base = np.broadcast_to(metrics.base_torque(each), (len(inertias),))
         return {
-            "gaps": list(self.axes.gaps),
-            "inertias": list(self.axes.inertias),
-            "strategy": self.session.selected,
+            "gaps": list(axes.gaps),
+            "inertias": inertias,
+            "strategy": session.selected,
             "kept": self.kept,
+            "of": str(hash(drive)),
+            "limit": None if allowed is None else numbers(allowed / base),
         }
 
 
@@ -427,20 +437,25 @@ def judged(session: Session, found: Strategy) -> dict[str, Any]:
     }
 
 
-def drawn(found: Strategy, channels: tuple[str, ...] = PACKED) -> dict[str, Any] | None:
-    """Traces as the browser draws them: packed channels, stages and the located peak."""
+def drawn(
+    found: Strategy, channels: tuple[str, ...] = PACKED, window: tuple[float, float] | None = None
+) -> dict[str, Any] | None:
+    """Traces as the browser draws them: packed channels, the located peak, and stages."""
     run = found.run
     if run is None:
         return None
-    picture: dict[str, Any] = {"rows": len(channels), "data": traces_of(run).packed(*channels)}
+    largest = max(run.stages, key=lambda stage: abs(stage.peak_torque), default=None)
+    picture: dict[str, Any] = {
+        "rows": len(channels),
+        "data": traces_of(run, window=window).packed(*channels),
+        "peak": [run.peak_time, largest.peak_torque if largest else 0.0],
+    }
     if "u" in channels:
-        stages = [(s.start, s.end, s.side) for s in run.stages[:400] if s.duration > 0.0]
-        largest = max(run.stages, key=lambda stage: abs(stage.peak_torque), default=None)
         picture |= {
-            "stages": stages,
-            "peak": [run.peak_time, largest.peak_torque if largest else 0.0],
+            "stages": [(s.start, s.end, s.side) for s in run.stages[:400] if s.duration > 0.0],
             "gap": float(run.drive.gap),
             "target": float(run.drive.target_speed),
+            "allowed": run.drive.limits.shaft_torque,
         }
     return picture
 
@@ -467,8 +482,10 @@ class Traces:
         return b64encode(rows.tobytes()).decode("ascii")
 
 
-def traces_of(run: Run, buckets: int = BUCKETS) -> Traces:
+def traces_of(run: Run, buckets: int = BUCKETS, window: tuple[float, float] | None = None) -> Traces:
     """The traces of a run with a few points a bucket, and every instant of `landmarks`.
+
+    `window`: two instants in s between which the traces are as fine as a screen can show.
 
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
@@ -486,6 +503,10 @@ def traces_of(run: Run, buckets: int = BUCKETS) -> Traces:
         keep[np.searchsorted(times, fixed)] = True
         times = times[keep]
         states = {name: values[keep] for name, values in states.items()}
+    if window is not None and window[0] < run.end_time:
+        seen = np.linspace(window[0], min(window[1], run.end_time), WITHIN)
+        times = np.union1d(times[(times < window[0]) | (times > window[1])], np.union1d(seen, fixed))
+        states = run.at(times)
     return Traces(times, *(states[name] for name in CHANNELS))
 
 

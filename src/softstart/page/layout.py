@@ -56,7 +56,7 @@ def build(drive: Drive) -> Session:
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.show_gentlest()
+    session.select_gentlest()
     session.restore(session.bench)  # the page begins here: that is no step to undo
     screen = Screen(session)
     with instrument()() as element:

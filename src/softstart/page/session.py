@@ -19,7 +19,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
-from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
+from softstart.start.recommendation import CASES, SLOW, Case, Recommendation, Row, recommend
 from softstart.start.simulation import simulate
 from softstart.views.starts import outcome
 
@@ -279,11 +279,12 @@ class Session:
         if visible != (label in self._bench.drawn):
             self._put(drawn=self._bench.drawn ^ {label})
 
-    def show_gentlest(self) -> None:
-        """Draw the strategy with the least K_dyn among those that reach the target speed."""
-        reaching = [found for found in self.strategies if not math.isnan(found.start_time)]
-        if reaching:
-            self.show(min(reaching, key=lambda found: found.k_dyn).name)
+    def select_gentlest(self) -> None:
+        """Select the strategy with the least K_dyn of those that reach the target speed in good time."""
+        latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.start_time)
+        timely = [found for found in self.strategies if found.start_time <= latest]
+        if timely:
+            self.select(min(timely, key=lambda found: found.k_dyn).name)
 
     # what came out -------------------------------------------------------------------------------------
 

@@ -350,7 +350,20 @@ def test_every_parameter_with_a_field_is_one_of_the_drive():
     assert set(Screen(Session(controllers=["direct"])).scales) <= set(shown)
 
 
-KEYS = ("path", "text", "position", "gap", "inertia", "name", "visible", "kept", "link", "stamp")
+KEYS = (
+    "path",
+    "text",
+    "position",
+    "gap",
+    "inertia",
+    "name",
+    "visible",
+    "kept",
+    "link",
+    "begin",
+    "end",
+    "stamp",
+)
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=12) | st.sampled_from(["shaft.gap", "direct"]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner, max_size=3),
@@ -375,6 +388,7 @@ JSON = st.recursive(
                     "undo",
                     "redo",
                     "hello",
+                    "window",
                     "?",
                 ]
             )

@@ -12,8 +12,9 @@ from hypothesis.extra.numpy import arrays
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.page.frames import CHANNELS, k_dyn_row, landmarks, thinned, traces_of
+from softstart.page.frames import CHANNELS, Screen, k_dyn_row, landmarks, thinned, traces_of
 from softstart.page.ranges import STEPS, Scale, axes_about, scales_about
+from softstart.page.session import Session
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -52,6 +53,38 @@ def test_each_bucket_keeps_its_least_and_largest(rows, buckets):
         part, kept = rows[:, start : start + width], keep[start : start + width]
         assert np.array_equal(part.max(axis=1), part[:, kept].max(axis=1))
         assert np.array_equal(part.min(axis=1), part[:, kept].min(axis=1))
+
+
+@pytest.mark.parametrize("window", [(0.1, 0.11), (0.0, 1e-5), (0.4, 0.6), (0.7, 0.8)])
+def test_a_window_is_as_fine_as_a_screen(window):
+    run = simulate(CRANE, "direct")
+    traces = traces_of(run, window=window)
+    assert np.all(np.diff(traces.t) > 0.0)
+    assert traces.t[[0, -1]].tolist() == [0.0, run.end_time]
+    exact = run.at(traces.t)
+    for name in CHANNELS:
+        assert np.array_equal(getattr(traces, name), exact[name])
+    begin, end = window[0], min(window[1], run.end_time)
+    within = traces.t[(traces.t >= begin) & (traces.t <= end)]
+    if begin < run.end_time:
+        assert np.diff(within).max() < (end - begin) / 1500
+        assert set(landmarks(run)) <= set(traces.t)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_the_limit_of_the_map_is_the_permissible_torque_over_the_mean_one(kept):
+    drive = Drive.from_toml(CRANE.to_toml() + "\n[limits]\nshaft_torque = 130.0\n")
+    session = Session(drive, controllers=["direct"])
+    screen = Screen(session)
+    screen.kept = kept
+    rows = [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+    for frame in rows[:3]:
+        head, index = frame["map"], frame["map_row"]["index"]
+        one = drive.replace(gap=head["gaps"][4], load_inertia=head["inertias"][index])
+        of = drive if kept else one
+        assert head["limit"][index] == pytest.approx(130.0 / simulate(of, "direct").base, rel=1e-14)
+    assert len({frame["map"]["of"] for frame in rows}) == 1
+    assert Screen(Session(controllers=["direct"]))._map_head()["limit"] is None
 
 
 def test_packed_traces_come_back_to_single_precision():

@@ -13,7 +13,8 @@ export default {
   </header>
   <nav class="controls fields" aria-label="Parameters of the drive"></nav>
   <main class="centre">
-    <section class="plots"><canvas role="img" aria-label="Torques, speeds and twist over time"></canvas></section>
+    <section class="plots"><canvas tabindex="0" role="application" aria-label="Torques, speeds and twist over time: arrow keys move the instant, plus and minus the window, 0 shows all"></canvas></section>
+    <section class="player" role="group" aria-label="Instant and window"></section>
     <section class="strategies"></section>
     <section class="advice" role="status"></section>
   </main>

@@ -1,6 +1,5 @@
 // Sliders and fields of the drive: what is typed or slid is sent at once, what the server says is shown.
 import { element } from "./numbers.js";
-import { scheme } from "./scheme.js";
 
 const STEPS = 600;
 
@@ -9,7 +8,6 @@ export class Controls {
     this.say = say;
     this.rows = new Map();
     this.own = own;
-    place.append(scheme());
     for (const { title, rows } of groups) place.append(this.box(title, rows));
   }
 

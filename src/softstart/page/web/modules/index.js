@@ -2,10 +2,13 @@
 import { Controls } from "./controls.js";
 import { Figure } from "./figure.js";
 import { GapMap } from "./map.js";
-import { Plots, unpack } from "./plots.js";
+import { Player } from "./player.js";
+import { Plots } from "./plots.js";
+import { Scheme } from "./scheme.js";
 import { Steps } from "./steps.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
+import { unpack } from "./trace.js";
 
 const KEPT = "softstart-bench";
 
@@ -19,12 +22,15 @@ export class Instrument {
     this.waiting = 0;
     const say = (message) => this.say(message);
     this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
+    this.scheme = new Scheme(root.querySelector(".controls"));
     this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), groups, say);
     this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"));
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);
     this.advice = root.querySelector(".advice");
-    this.plots = new Plots(root.querySelector(".plots"), this.theme);
+    const windowed = (window) => say({ what: "window", begin: window?.[0] ?? 0, end: window?.[1] ?? 0 });
+    this.plots = new Plots(root.querySelector(".plots"), this.theme, windowed, (t) => this.timed(t));
+    this.player = new Player(root.querySelector(".player"), this.plots);
     this.map = new GapMap(root.querySelector(".map"), this.theme, say);
     this.resized = new ResizeObserver(() => this.redraw());
     for (const part of root.querySelectorAll("canvas")) this.resized.observe(part.parentElement);
@@ -107,6 +113,13 @@ export class Instrument {
     if (text !== undefined && this.advice.textContent !== text) this.advice.textContent = text;
   }
 
+  // the plots read this instant: so stands the drive
+  timed(t) {
+    const [from, to] = this.plots.seen;
+    this.scheme.show(this.state.traces.get(this.state.selected), t, to - from);
+    this.player.show(t);
+  }
+
   // size or colours have changed: everything anew
   redraw() {
     this.plotted = false;
@@ -148,6 +161,7 @@ export class Instrument {
     this.resized.disconnect();
     this.theme.end();
     this.steps.end();
+    this.player.end();
     window.removeEventListener("hashchange", this.followed);
   }
 }

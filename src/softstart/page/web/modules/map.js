@@ -1,15 +1,52 @@
-// K_dyn over gap and load inertia; a press goes there, arrow keys walk.
+// K_dyn over gap and load inertia, in colours that mean the same for every strategy and drive, with contours and
+// the limit of the drive; or its difference to a map that was kept. A press goes there, arrow keys walk.
 import { element, fixed, label, sharp, significant, ticks } from "./numbers.js";
 
 // cividis, thinned: even in lightness, the same to colour-blind readers
 const STOPS = [[0, 34, 78], [42, 63, 109], [87, 93, 109], [112, 113, 115], [138, 134, 120], [165, 156, 116], [195, 179, 105], [225, 204, 85], [254, 232, 56]];
+// gentler is blue, harsher is red, equal is white
+const WAYS = [[33, 102, 172], [103, 169, 207], [209, 229, 240], [247, 247, 247], [253, 219, 199], [239, 138, 98], [178, 24, 43]];
 const LEFT = 52, RIGHT = 46, TOP = 8, BOTTOM = 34;
+const K = {
+  stops: STOPS,
+  share: (k) => Math.log(k / 0.75) / Math.log(8),
+  levels: [0.8, 0.9, 1, 1.1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100],
+  marks: [0.8, 1, 1.2, 1.5, 2, 3, 4, 6],
+  pale: (k) => k < 2.2,
+};
+const MORE = {
+  stops: WAYS,
+  share: (more) => 0.5 + 0.5 * Math.tanh(more),
+  levels: [-4, -2, -1, -0.5, -0.2, -0.1, 0, 0.1, 0.2, 0.5, 1, 2, 4],
+  marks: [-1, -0.5, -0.2, 0, 0.2, 0.5, 1],
+  pale: (more) => Math.abs(more) > 0.8,
+};
 
-function shadeOf(share) {
-  const at = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1);
-  const i = Math.min(Math.floor(at), STOPS.length - 2);
-  const mix = STOPS[i].map((value, k) => Math.round(value + (at - i) * (STOPS[i + 1][k] - value)));
+function shadeOf({ stops, share }, value) {
+  const at = Math.min(Math.max(share(value), 0), 1) * (stops.length - 1);
+  const i = Math.min(Math.floor(at), stops.length - 2);
+  const mix = stops[i].map((tone, k) => Math.round(tone + (at - i) * (stops[i + 1][k] - tone)));
   return `rgb(${mix})`;
+}
+
+// pieces of the line on which rows of numbers pass a level, in steps of the grid (marching squares)
+export function contour(rows, level) {
+  const pieces = [];
+  for (let j = 0; j + 1 < rows.length; j++) {
+    for (let i = 0; rows[j] && rows[j + 1] && i + 1 < rows[j].length; i++) {
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(([x, y]) => [x, y, rows[y][x]]);
+      if (corners.some(([, , value]) => value === null)) continue;
+      const passed = [];
+      corners.forEach(([x, y, value], side) => {
+        const [nx, ny, next] = corners[(side + 1) % 4];
+        if (value < level === next < level) return;
+        const share = (level - value) / (next - value);
+        passed.push([x + share * (nx - x), y + share * (ny - y)]);
+      });
+      for (let k = 0; k + 1 < passed.length; k += 2) pieces.push([passed[k], passed[k + 1]]);
+    }
+  }
+  return pieces;
 }
 
 export class GapMap {
@@ -26,8 +63,12 @@ export class GapMap {
       role: "application",
       "aria-label": "Map of K dyn over gap and load inertia: arrow keys go to the neighbouring drive",
     });
+    this.other = element("input", { type: "checkbox", id: "map-other" });
+    this.other.addEventListener("change", () => this.pin());
+    this.otherName = element("span", {}, "difference");
+    const other = element("label", { class: "keep", title: "Ticked: this map is kept, and that of the next strategy is shown as its difference to it" }, this.other, this.otherName);
     const holder = element("div", { class: "map-canvas" }, this.canvas);
-    place.append(element("div", { class: "map-head" }, this.title, keep), holder, this.said);
+    place.append(element("div", { class: "map-head" }, this.title, element("span", {}, keep, other)), holder, this.said);
     this.canvas.addEventListener("pointerdown", (event) => this.press(event));
     this.canvas.addEventListener("pointermove", (event) => this.point(event));
     for (const way of ["pointerup", "pointercancel"]) this.canvas.addEventListener(way, () => (this.pressed = false));
@@ -55,6 +96,30 @@ export class GapMap {
     this.fresh.add(frame.map_row.index);
     this.old = undefined;
     this.fade();
+  }
+
+  // the map of this strategy is kept, to show that of another one as a difference to it
+  pin() {
+    this.pinned = this.other.checked && this.rows?.every(Boolean) ? { head: this.head, rows: [...this.rows] } : null;
+    this.other.checked = Boolean(this.pinned);
+    this.fade();
+    this.redraw();
+  }
+
+  // numbers of the map, as they are drawn
+  shown() {
+    const { pinned, head } = this;
+    if (pinned && (pinned.head.of !== head.of || String(pinned.head.gaps) !== String(head.gaps))) this.pinned = null; // another drive
+    const against = this.pinned && this.pinned.head.strategy !== head.strategy;
+    this.other.checked = Boolean(this.pinned);
+    this.otherName.textContent = this.pinned ? `less ${this.pinned.head.strategy}` : "difference";
+    if (!against) return [this.rows, K];
+    const rows = this.rows.map((row, j) => row?.map((k, i) => (k === null || this.pinned.rows[j][i] === null ? null : k - this.pinned.rows[j][i])));
+    return [rows, MORE];
+  }
+
+  redraw() {
+    if (this.state) requestAnimationFrame(() => this.draw(this.state));
   }
 
   place(gap, inertia) {
@@ -99,7 +164,9 @@ export class GapMap {
     }
     if (this.pressed && String(node) !== String(this.aim.node)) this.go(node);
     const k = this.rows[node[1]]?.[node[0]];
-    this.said.textContent = `\u03b4 ${significant(this.head.gaps[node[0]], 4)} rad   J\u2082 ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}`;
+    const other = this.pinned ? this.pinned.rows[node[1]]?.[node[0]] : undefined;
+    const against = other === undefined || this.pinned.head.strategy === this.head.strategy ? "" : ` (${this.pinned.head.strategy}: ${fixed(other, 3)})`;
+    this.said.textContent = `\u03b4 ${significant(this.head.gaps[node[0]], 4)} rad   J\u2082 ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}${against}`;
   }
 
   walk(event) {
@@ -125,6 +192,7 @@ export class GapMap {
   }
 
   draw(state) {
+    this.state = state;
     this.stamp = state.stamp;
     if (!this.head) return;
     const here = String(state.here);
@@ -151,26 +219,27 @@ export class GapMap {
     pen.font = `11px ${this.theme.font}`;
     const box = { x: LEFT, y: TOP, w: width - LEFT - RIGHT, h: height - TOP - BOTTOM };
     this.box = box;
-    const known = this.rows.filter(Boolean).flat().filter((k) => k !== null);
-    const [low, high] = [Math.min(...known), Math.max(...known)];
+    const [rows, scale] = this.shown();
     const [dx, dy] = [box.w / (gaps.length - 1), box.h / (inertias.length - 1)];
     pen.save();
     pen.beginPath();
     pen.rect(box.x, box.y, box.w, box.h);
     pen.clip();
-    this.rows.forEach((row, j) => {
+    rows.forEach((row, j) => {
       pen.globalAlpha = this.fresh.has(j) ? 1 : 0.45;
       row?.forEach((k, i) => {
         const [cx, cy] = [box.x + i * dx, box.y + box.h - j * dy];
-        pen.fillStyle = k === null ? paper : shadeOf((k - low) / (high - low || 1));
+        pen.fillStyle = k === null ? paper : shadeOf(scale, k);
         pen.fillRect(cx - dx / 2 - 0.3, cy - dy / 2 - 0.3, dx + 0.6, dy + 0.6);
       });
     });
+    pen.globalAlpha = 1;
+    this.contours(pen, box, rows, scale, [dx, dy]);
     pen.restore();
     pen.strokeStyle = line;
     pen.lineWidth = 1;
     pen.strokeRect(box.x + 0.5, box.y + 0.5, box.w - 1, box.h - 1);
-    this.scales(pen, box, gaps, inertias, low, high);
+    this.scales(pen, box, gaps, inertias, scale);
   }
 
   // where the drive is, kept at the edge when it is beyond
@@ -191,7 +260,43 @@ export class GapMap {
     }
   }
 
-  scales(pen, box, gaps, inertias, low, high) {
+  contours(pen, box, rows, scale, [dx, dy]) {
+    const at = ([i, j]) => [box.x + i * dx, box.y + box.h - j * dy];
+    const drawn = (pieces, colour, thick) => {
+      pen.strokeStyle = colour;
+      pen.lineWidth = thick;
+      pen.beginPath();
+      for (const [from, to] of pieces) {
+        pen.moveTo(...at(from));
+        pen.lineTo(...at(to));
+      }
+      pen.stroke();
+    };
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    const taken = [];
+    for (const level of scale.levels) {
+      const pieces = contour(rows, level);
+      if (!pieces.length) continue;
+      const colour = scale.pale(level) ? "rgba(255, 255, 255, 0.85)" : "rgba(0, 0, 0, 0.65)";
+      drawn(pieces, colour, level === (scale === K ? 1 : 0) ? 1.8 : 0.8);
+      const places = pieces.map(([from]) => at(from)).filter(([x, y]) => x > box.x + 18 && x < box.x + box.w - 18 && y > box.y + 9 && y < box.y + box.h - 9);
+      const free = places.find(([x, y]) => taken.every(([ox, oy]) => Math.abs(x - ox) > 34 || Math.abs(y - oy) > 14));
+      if (!free) continue;
+      taken.push(free);
+      pen.fillStyle = shadeOf(scale, level);
+      pen.fillRect(free[0] - 11, free[1] - 6, 22, 12);
+      pen.fillStyle = colour;
+      pen.fillText(String(level).replace("-", "\u2212"), ...free);
+    }
+    const { limit } = this.head;
+    if (!limit || scale !== K) return;
+    const pieces = contour(rows.map((row, j) => row?.map((k) => (k === null ? null : k / limit[j]))), 1);
+    drawn(pieces, "#ffffff", 4);
+    drawn(pieces, this.theme.colours.warn, 2);
+  }
+
+  scales(pen, box, gaps, inertias, scale) {
     const { quiet, line } = this.theme.colours;
     pen.fillStyle = quiet;
     pen.textBaseline = "alphabetic";
@@ -213,20 +318,16 @@ export class GapMap {
     pen.fillText("J\u2082, kg m\u00b2", 0, 0);
     pen.restore();
     const x = box.x + box.w + 8;
+    const { stops } = scale;
     for (let i = 0; i < box.h; i++) {
-      pen.fillStyle = shadeOf(1 - i / box.h);
+      pen.fillStyle = shadeOf({ stops, share: (value) => value }, 1 - i / box.h);
       pen.fillRect(x, box.y + i, 8, 1.5);
     }
     pen.strokeStyle = line;
     pen.strokeRect(x + 0.5, box.y + 0.5, 7, box.h - 1);
     pen.fillStyle = quiet;
     pen.textAlign = "left";
-    if (high >= low) {
-      const marks = ticks(low, high, Math.max(2, Math.round(box.h / 40)));
-      for (const mark of marks) {
-        const share = (mark - low) / (high - low || 1);
-        pen.fillText(label(mark, marks.digits ?? 3), x + 12, box.y + box.h * (1 - share));
-      }
-    }
+    pen.textBaseline = "middle";
+    for (const mark of scale.marks) pen.fillText(String(mark).replace("-", "\u2212"), x + 12, box.y + box.h * (1 - scale.share(mark)));
   }
 }

@@ -1,77 +1,222 @@
-// Torques, speeds and the twist within the gap over time, on one canvas with one time axis.
+// Torques, speeds and the twist within the gap over time, on one canvas with one time axis. The window on it is
+// moved by wheel, drag and keys; an instant is pointed at by the mouse, or held by a press, the keys and the player.
 import { label, Range, sharp, significant, ticks } from "./numbers.js";
+import { SvgPen } from "./svg.js";
+import { extent, indexAt, valueAt } from "./trace.js";
 
-const CHANNELS = ["t", "T", "u", "w1", "w2", "theta"];
-const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24;
+const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24, LINE = 15;
 const SHARES = [0.5, 0.25, 0.25];
-
-// rows of single-precision numbers in base 64, as the server packs them
-export function unpack(packed) {
-  const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
-  const all = new Float32Array(bytes.buffer);
-  const size = all.length / packed.rows;
-  const found = { ...packed, data: undefined };
-  for (let row = 0; row < packed.rows; row++) found[CHANNELS[row]] = all.subarray(row * size, (row + 1) * size);
-  return found;
-}
-
-function extent(series, low = Infinity, high = -Infinity) {
-  for (const value of series) {
-    if (value < low) low = value;
-    if (value > high) high = value;
-  }
-  return [low, high];
-}
+const FINEST = 1e-7; // of the whole start: a shorter window has no digits left in single precision
 
 export class Plots {
-  constructor(place, theme) {
+  // `windowed(window)` is told the window that is seen, or null; `timed(t)` the instant, or null
+  constructor(place, theme, windowed, timed) {
     this.canvas = place.querySelector("canvas");
-    this.theme = theme;
+    Object.assign(this, { theme, windowed, timed, window: null, hovered: null, held: null });
     this.ranges = [new Range(), new Range(), new Range(), new Range()];
-    this.canvas.addEventListener("pointermove", (event) => this.point(event.offsetX));
-    this.canvas.addEventListener("pointerleave", () => this.point(null));
+    const on = (kind, act) => this.canvas.addEventListener(kind, act);
+    on("pointermove", (event) => this.move(event));
+    on("pointerleave", () => this.hover(null));
+    on("pointerdown", (event) => this.press(event));
+    on("pointerup", (event) => this.release(event));
+    on("pointercancel", () => (this.pressed = null));
+    on("wheel", (event) => this.wheel(event));
+    on("dblclick", () => this.show(null));
+    on("keydown", (event) => this.key(event));
   }
 
-  point(x) {
-    this.cursor = x;
-    if (!this.asked) {
-      this.asked = requestAnimationFrame(() => {
-        this.asked = 0;
-        if (this.state) this.draw(this.state);
-      });
+  // ---- the window and the instant
+
+  get end() {
+    return this.box?.end ?? 0;
+  }
+
+  get seen() {
+    return this.window ?? [0, this.box?.whole ?? 0];
+  }
+
+  // the instant that is read: where the mouse is, else the one that is held
+  get time() {
+    return this.hovered ?? this.held;
+  }
+
+  show(window) {
+    if (!this.box) return;
+    const whole = this.box.whole;
+    if (window) {
+      const span = Math.min(Math.max(window[1] - window[0], FINEST * whole), whole);
+      const from = Math.min(Math.max(window[0], 0), whole - span);
+      window = span >= 0.999 * whole ? null : [from, from + span];
+    }
+    this.window = window;
+    this.later();
+    clearTimeout(this.telling);
+    this.telling = setTimeout(() => this.windowed(this.window), 120);
+  }
+
+  zoom(factor, about = null) {
+    const [from, to] = this.seen;
+    const at = about ?? (this.held !== null && this.held >= from && this.held <= to ? this.held : (from + to) / 2);
+    this.show([at + (from - at) * factor, at + (to - at) * factor]);
+  }
+
+  pan(share) {
+    const [from, to] = this.seen;
+    if (this.window) this.show([from + share * (to - from), to + share * (to - from)]);
+  }
+
+  hover(t) {
+    this.hovered = t;
+    this.later();
+  }
+
+  hold(t) {
+    this.held = t;
+    this.later();
+  }
+
+  timeOf(x) {
+    const [from, to] = this.seen;
+    const share = this.box ? (x - LEFT) / this.box.w : -1;
+    return share < 0 || share > 1 ? null : from + share * (to - from);
+  }
+
+  move(event) {
+    const { pressed } = this;
+    if (pressed) {
+      pressed.moved ||= Math.abs(event.offsetX - pressed.x) > 4;
+      if (pressed.moved && pressed.window) {
+        const shift = ((pressed.x - event.offsetX) / this.box.w) * (pressed.window[1] - pressed.window[0]);
+        this.show([pressed.window[0] + shift, pressed.window[1] + shift]);
+      }
+      pressed.to = event.offsetX;
+    }
+    this.hover(this.timeOf(event.offsetX));
+  }
+
+  // a drag marks the window to see, with Shift it moves the one that is seen; a press holds an instant
+  press(event) {
+    if (event.button !== 0 || this.timeOf(event.offsetX) === null) return;
+    this.pressed = { x: event.offsetX, to: event.offsetX, moved: false, window: event.shiftKey ? this.seen : null };
+    this.canvas.setPointerCapture(event.pointerId);
+  }
+
+  release(event) {
+    const { pressed } = this;
+    this.pressed = null;
+    if (!pressed) return;
+    if (!pressed.moved) this.hold(this.timeOf(pressed.x));
+    else if (!pressed.window) {
+      const clamp = (x) => Math.min(Math.max(x, LEFT), LEFT + this.box.w);
+      const ends = [pressed.x, event.offsetX].map((x) => this.timeOf(clamp(x))).sort((a, b) => a - b);
+      if (ends[1] > ends[0]) this.show(ends);
     }
   }
 
-  draw(state) {
+  wheel(event) {
+    if (!this.box) return;
+    event.preventDefault();
+    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.pan((event.deltaX || event.deltaY) / 800);
+    else this.zoom(1.0015 ** event.deltaY, this.timeOf(event.offsetX));
+  }
+
+  key(event) {
+    const [from, to] = this.seen;
+    const step = (to - from) / 200;
+    const at = this.held ?? from;
+    const acts = {
+      ArrowLeft: () => this.hold(Math.max(at - step, 0)),
+      ArrowRight: () => this.hold(Math.min(at + step, this.end)),
+      PageUp: () => this.pan(-0.5),
+      PageDown: () => this.pan(0.5),
+      "+": () => this.zoom(0.5),
+      "=": () => this.zoom(0.5),
+      "-": () => this.zoom(2),
+      0: () => this.show(null),
+      Escape: () => this.hold(null),
+    };
+    if (event.ctrlKey || event.metaKey || event.altKey || !acts[event.key]) return;
+    event.preventDefault();
+    acts[event.key]();
+  }
+
+  later() {
+    this.asked ||= requestAnimationFrame(() => {
+      this.asked = 0;
+      if (this.state) this.draw(this.state);
+    });
+  }
+
+  // ---- drawing
+
+  draw(state, sheet = sharp(this.canvas)) {
     this.state = state;
-    const sheet = sharp(this.canvas);
     if (!sheet) return;
     const { pen, width, height } = sheet;
     const main = state.traces.get(state.selected);
     pen.font = `11px ${this.theme.font}`;
     pen.lineJoin = "round";
-    const usable = height - TOP - BOTTOM - 2 * BETWEEN;
-    let y = TOP;
-    const panels = SHARES.map((share) => {
-      const panel = { x: LEFT, y, w: width - LEFT - RIGHT, h: Math.floor(usable * share), pen };
-      y += panel.h + BETWEEN;
-      return panel;
-    });
     if (!main?.u) {
+      this.box = null;
       pen.fillStyle = this.theme.colours.quiet;
       pen.fillText("No start to draw: see the sentence beside K.", LEFT, TOP + 30);
+      this.timed(null);
       return;
     }
     const others = state.order.filter((name) => name !== state.selected && state.shown.includes(name) && state.traces.has(name));
-    const end = Math.max(main.t[main.t.length - 1], ...others.map((name) => state.traces.get(name).t.at(-1)));
-    const time = this.ranges[3].fit(0, end, 0.01, 20);
-    for (const panel of panels) Object.assign(panel, { t0: 0, t1: time.high });
-    this.times = ticks(0, time.high, Math.round(panels[0].w / 90));
-    this.torques(panels[0], state, main, others);
+    const w = width - LEFT - RIGHT;
+    const named = this.named(pen, w, state, others);
+    const usable = height - TOP - BOTTOM - 2 * BETWEEN - LINE * (named.length - 1);
+    let y = TOP + LINE * (named.length - 1);
+    const panels = SHARES.map((share) => {
+      const panel = { x: LEFT, y, w, h: Math.floor(usable * share), pen };
+      y += panel.h + BETWEEN;
+      return panel;
+    });
+    const end = Math.max(main.t.at(-1), ...others.map((name) => state.traces.get(name).t.at(-1)));
+    const whole = this.ranges[3].fit(0, end, 0.01, 20).high;
+    this.box = { w, end: main.t.at(-1), whole };
+    if (this.window && this.window[0] >= end) this.window = null;
+    const [t0, t1] = this.seen;
+    for (const panel of panels) Object.assign(panel, { t0, t1 });
+    this.times = ticks(t0, t1, Math.round(w / 90));
+    this.torques(panels[0], state, main, others, named);
     this.speeds(panels[1], state, main);
     this.twist(panels[2], state, main);
     this.timeAxis(panels[2]);
-    if (this.cursor !== null && this.cursor !== undefined) this.readout(panels, main);
+    if (this.pressed?.moved && !this.pressed.window) this.mark(panels);
+    const t = this.time;
+    if (t !== null && t >= t0 && t <= t1) this.readout(panels, main, state, others, t);
+    this.timed(t);
+  }
+
+  // lines of legend entries: those of the selected start last, names before them, as many lines as they need
+  named(pen, w, state, others) {
+    const entries = others.map((name) => [`T, ${name}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
+    if (state.traces.get(state.selected).allowed) entries.push(["permissible", this.theme.colours.warn, [], 1]);
+    entries.push(["motor u", this.theme.colours.ink, [5, 3], 1.2], ["shaft T", this.own(state), [], 2.4]);
+    const lines = [[]];
+    let free = w - 90; // the heading stands in the lowest line
+    for (const entry of entries.reverse()) {
+      const wide = pen.measureText(entry[0]).width + 36;
+      if (wide > free && lines[0].length) {
+        lines.unshift([]);
+        free = w;
+      }
+      lines[0].unshift(entry);
+      free -= wide;
+    }
+    return lines;
+  }
+
+  // the window that a drag marks
+  mark(panels) {
+    const { pen } = panels[0];
+    const [left, right] = [this.pressed.x, this.pressed.to].sort((a, b) => a - b);
+    pen.globalAlpha = 0.14;
+    pen.fillStyle = this.theme.colours.accent;
+    for (const { y, h } of panels) pen.fillRect(left, y, right - left, h);
+    pen.globalAlpha = 1;
   }
 
   frame(panel, range, title, unit) {
@@ -112,8 +257,9 @@ export class Plots {
     panel.legendAt = x + w;
   }
 
-  legend(panel, entries) {
-    const { pen, y } = panel;
+  legend(panel, entries, above = 0) {
+    const { pen } = panel;
+    const y = panel.y - above * LINE;
     let at = panel.legendAt;
     pen.textAlign = "right";
     for (const [text, colour, dash, thick] of [...entries].reverse()) {
@@ -159,14 +305,17 @@ export class Plots {
     const scale = panel.w / (panel.t1 - panel.t0);
     const rise = panel.h / (panel.high - panel.low);
     const bottom = panel.y + panel.h + panel.low * rise;
+    const left = panel.x - panel.t0 * scale;
+    const from = Math.max(indexAt(times, panel.t0) - 1, 0);
+    const to = Math.min(indexAt(times, panel.t1) + 1, times.length);
     pen.strokeStyle = colour;
     pen.lineWidth = thick;
     pen.setLineDash(dash);
     pen.beginPath();
-    for (let i = 0; i < times.length; i++) {
-      const px = panel.x + times[i] * scale;
+    for (let i = from; i < to; i++) {
+      const px = left + times[i] * scale;
       const py = bottom - values[i] * rise;
-      if (i) pen.lineTo(px, py);
+      if (i > from) pen.lineTo(px, py);
       else pen.moveTo(px, py);
     }
     pen.stroke();
@@ -191,8 +340,9 @@ export class Plots {
     pen.fillStyle = this.theme.colours.shade;
     for (const [start, end, side] of stages) {
       if (side !== 0) continue;
-      const from = this.x(panel, start);
-      pen.fillRect(from, y, Math.max(this.x(panel, end) - from, 0.5), h);
+      const from = Math.max(this.x(panel, start), panel.x);
+      const to = Math.min(this.x(panel, end), panel.x + panel.w);
+      if (to > panel.x && from < panel.x + panel.w) pen.fillRect(from, y, Math.max(to - from, 0.5), h);
     }
   }
 
@@ -211,23 +361,23 @@ export class Plots {
     pen.setLineDash([]);
   }
 
-  torques(panel, state, main, others) {
-    let [low, high] = extent(main.T, 0, 0);
-    [low, high] = extent(main.u, low, high);
-    for (const name of others) [low, high] = extent(state.traces.get(name).T, low, high);
+  torques(panel, state, main, others, named) {
+    let [low, high] = extent(main, "T", this.seen, 0, 0);
+    [low, high] = extent(main, "u", this.seen, low, high);
+    for (const name of others) [low, high] = extent(state.traces.get(name), "T", this.seen, low, high);
     const { quiet, ink, paper } = this.theme.colours;
     const own = this.own(state);
+    const { allowed } = main;
+    if (allowed && high > 0.5 * allowed) high = Math.max(high, 1.02 * allowed); // a limit far above says nothing
     const range = this.ranges[0].fit(low, high);
     Object.assign(panel, { low: range.low, high: range.high });
     this.shade(panel, main.stages);
     this.frame(panel, range, "Torque", "N m");
-    let named = others.length > 2 ? [] : others.map((name) => [`T, ${name}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
-    const wide = named.reduce((sum, [text]) => sum + panel.pen.measureText(text).width + 36, 0);
-    if (wide > panel.w - 260) named = []; // names that do not fit beside the others stand in the table alone
-    this.legend(panel, [...named, ["motor u", ink, [5, 3], 1.2], ["shaft T", own, [], 2.4]]);
+    [...named].reverse().forEach((line, above) => this.legend(panel, line, above));
     this.inside(panel, () => {
       const base = state.rows.get(state.selected);
       if (base?.k_dyn) this.level(panel, base.peak_torque / base.k_dyn, quiet, [1, 3]);
+      if (allowed) this.level(panel, allowed, this.theme.colours.warn, []);
       for (const name of others) {
         const trace = state.traces.get(name);
         this.curve(panel, trace.t, trace.T, this.theme.strategy(state.order.indexOf(name)), 1);
@@ -235,29 +385,50 @@ export class Plots {
       this.startLine(panel, state);
       this.curve(panel, main.t, main.u, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.T, own, 2.2);
-      const [when, peak] = main.peak;
-      const { pen } = panel;
-      const [px, py] = [this.x(panel, when), this.y(panel, peak)];
-      pen.fillStyle = paper;
-      pen.strokeStyle = own;
-      pen.lineWidth = 2;
-      pen.beginPath();
-      pen.arc(px, py, 3.5, 0, 7);
-      pen.fill();
-      pen.stroke();
-      const text = significant(Math.abs(peak), 4);
-      const right = px + pen.measureText(text).width + 14 < panel.x + panel.w;
-      pen.textAlign = right ? "left" : "right";
-      pen.textBaseline = "middle";
-      pen.fillStyle = ink;
-      pen.fillText(text, px + (right ? 8 : -8), Math.max(py, panel.y + 8));
-      pen.textBaseline = "alphabetic";
+      this.peaks(panel, state, main, others);
     });
   }
 
+  // the peak of each start; labels that would lie on one another are left to the table, the selected one's never
+  peaks(panel, state, main, others) {
+    const { pen } = panel;
+    const { ink, paper, quiet } = this.theme.colours;
+    const taken = [];
+    pen.textBaseline = "middle";
+    for (const name of [state.selected, ...others]) {
+      const own = name === state.selected;
+      const [when, peak] = state.traces.get(name).peak;
+      const [px, py] = [this.x(panel, when), this.y(panel, peak)];
+      if (px < panel.x || px > panel.x + panel.w) continue;
+      pen.fillStyle = paper;
+      pen.strokeStyle = this.theme.strategy(state.order.indexOf(name));
+      pen.lineWidth = own ? 2 : 1;
+      pen.beginPath();
+      pen.arc(px, py, own ? 3.5 : 2.5, 0, 7);
+      pen.fill();
+      pen.stroke();
+      const text = significant(Math.abs(peak), 4);
+      const wide = pen.measureText(text).width;
+      const right = px + wide + 14 < panel.x + panel.w;
+      const left = right ? px + 8 : px - 8 - wide;
+      const at = Math.max(py, panel.y + 8);
+      if (taken.some(([x0, x1, y]) => left < x1 && left + wide > x0 && Math.abs(at - y) < 13)) continue;
+      taken.push([left - 4, left + wide + 4, at]);
+      pen.globalAlpha = 0.7;
+      pen.fillStyle = paper;
+      pen.fillRect(left - 2, at - 7, wide + 4, 13);
+      pen.globalAlpha = 1;
+      pen.textAlign = "left";
+      pen.fillStyle = own ? ink : quiet;
+      pen.fillText(text, left, at);
+    }
+    pen.textBaseline = "alphabetic";
+  }
+
   speeds(panel, state, main) {
-    let [low, high] = extent(main.w1, 0, main.target);
-    [low, high] = extent(main.w2, low, high);
+    let [low, high] = this.window ? [Infinity, -Infinity] : [0, main.target];
+    [low, high] = extent(main, "w1", this.seen, low, high);
+    [low, high] = extent(main, "w2", this.seen, low, high);
     const { ink, quiet } = this.theme.colours;
     const own = this.own(state);
     const range = this.ranges[1].fit(low, high);
@@ -275,7 +446,7 @@ export class Plots {
 
   twist(panel, state, main) {
     const half = main.gap / 2;
-    const [low, high] = extent(main.theta, -half, half);
+    const [low, high] = extent(main, "theta", this.seen, -half, half);
     const { quiet, shade } = this.theme.colours;
     const range = this.ranges[2].fit(low, high);
     Object.assign(panel, { low: range.low, high: range.high });
@@ -302,46 +473,72 @@ export class Plots {
     pen.fillText("s", x + w, y + h + 15);
   }
 
-  readout(panels, main) {
-    const [first] = panels;
-    const share = (this.cursor - first.x) / first.w;
-    if (share < 0 || share > 1) return;
-    const t = share * first.t1;
-    let i = main.t.findIndex((time) => time >= t);
-    if (i < 0) i = main.t.length - 1;
-    const { pen } = first;
+  readout(panels, main, state, others, t) {
+    const { pen } = panels[0];
     const { quiet, ink, paper, line } = this.theme.colours;
-    const between = (series) => {
-      if (i === 0) return series[0];
-      const step = main.t[i] - main.t[i - 1];
-      const part = step > 0 ? (t - main.t[i - 1]) / step : 1;
-      return t > main.t[i] ? NaN : series[i - 1] + part * (series[i] - series[i - 1]);
-    };
+    const at = this.x(panels[0], t);
+    const own = (channel) => valueAt(main, channel, t);
+    const among = others.map((name) => [this.theme.strategy(state.order.indexOf(name)), name, valueAt(state.traces.get(name), "T", t), ""]);
     const texts = [
-      [["t", t, "s"], ["T", between(main.T), "N m"], ["u", between(main.u), "N m"]],
-      [["\u03c9\u2081", between(main.w1), ""], ["\u03c9\u2082", between(main.w2), "rad/s"]],
-      [["\u03b8", between(main.theta), "rad"]],
+      [["", "t", t, "s"], ["", "T", own("T"), "N m"], ["", "u", own("u"), "N m"]],
+      [["", "\u03c9\u2081", own("w1"), ""], ["", "\u03c9\u2082", own("w2"), "rad/s"]],
+      [["", "\u03b8", own("theta"), "rad"]],
     ];
     panels.forEach((panel, index) => {
-      const at = Math.round(this.cursor) + 0.5;
       pen.strokeStyle = quiet;
       pen.lineWidth = 1;
       pen.beginPath();
       pen.moveTo(at, panel.y);
       pen.lineTo(at, panel.y + panel.h);
       pen.stroke();
-      const text = texts[index].map(([name, value, unit]) => `${name} ${significant(value, 4)} ${unit}`.trim()).join("   ");
-      const wide = pen.measureText(text).width + 12;
+      const written = ([, name, value, unit]) => `${name} ${significant(value, 4)} ${unit}`.trim();
+      const lines = [[quiet, texts[index].map(written).join("   ")]];
+      if (index === 0) lines.push(...among.slice(0, Math.floor((panel.h - 30) / LINE)).map((one) => [one[0], written(one)]));
+      const wide = Math.max(...lines.map(([, text]) => pen.measureText(text).width)) + 12;
+      const high = 3 + LINE * lines.length;
       const left = at + 8 + wide > panel.x + panel.w ? at - 8 - wide : at + 8;
+      const top = panel.y + panel.h - 6 - high;
       pen.fillStyle = paper;
       pen.strokeStyle = line;
       pen.beginPath();
-      pen.rect(left, panel.y + panel.h - 24, wide, 18);
+      pen.rect(left, top, wide, high);
       pen.fill();
       pen.stroke();
-      pen.fillStyle = ink;
       pen.textAlign = "left";
-      pen.fillText(text, left + 6, panel.y + panel.h - 11);
+      lines.forEach(([colour, text], row) => {
+        pen.fillStyle = row ? colour : ink;
+        pen.fillText(text, left + 6, top + 13 + LINE * row);
+      });
     });
+  }
+
+  // ---- what is seen, as files
+
+  // the plots as they stand, without the instant that is read
+  svg() {
+    const { pen, width, height } = sharp(this.canvas);
+    const [hovered, held] = [this.hovered, this.held];
+    Object.assign(this, { hovered: null, held: null });
+    const written = new SvgPen(width, height, pen, this.theme.colours.paper);
+    this.draw(this.state, { pen: written, width, height });
+    Object.assign(this, { hovered, held });
+    this.draw(this.state);
+    return written.text(`Start of ${document.title}`);
+  }
+
+  // points of the traces that are drawn, between the ends of the window; a start after the other
+  csv() {
+    const { state } = this;
+    const [from, to] = this.seen;
+    const channels = ["t", "T", "u", "w1", "w2", "theta"];
+    const lines = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad"];
+    for (const name of state.order.filter((one) => one === state.selected || state.shown.includes(one))) {
+      const trace = state.traces.get(name);
+      trace?.t.forEach((t, i) => {
+        if (t < from || t > to) return;
+        lines.push([`"${name.replaceAll('"', '""')}"`, ...channels.map((one) => (trace[one] ? Number(trace[one][i].toPrecision(7)) : ""))].join(","));
+      });
+    }
+    return `${lines.join("\n")}\n`;
   }
 }

@@ -1,0 +1,94 @@
+// Below the plots: an instant that runs through the start, the window on it, and what is seen as files.
+import { element, significant } from "./numbers.js";
+
+const STEPS = 2000;
+const SPEEDS = [1, 3, 10, 30, 100, 300, 1000];
+const USUAL = 10;
+
+export class Player {
+  constructor(place, plots) {
+    this.plots = plots;
+    this.button = this.press("\u25b6", "Play", () => this.toggle());
+    this.slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, value: 0, "aria-label": "Instant of the start" });
+    this.slider.addEventListener("input", () => {
+      this.stop();
+      const [from, to] = this.span();
+      plots.hold(from + (this.slider.value / STEPS) * (to - from));
+    });
+    this.speed = element("select", { "aria-label": "Play speed", title: "Play speed" }, ...SPEEDS.map((slower) => element("option", { value: slower, selected: slower === USUAL }, `1:${slower}`)));
+    this.said = element("output", { class: "instant" });
+    const windows = element("span", { role: "group", "aria-label": "Window in time" },
+      this.press("\u2212", "Zoom out (\u2212)", () => plots.zoom(2)),
+      this.press("+", "Zoom in (+)", () => plots.zoom(0.5)),
+      (this.all = this.press("all", "The whole start (0)", () => plots.show(null))));
+    const files = element("span", { role: "group", "aria-label": "What is seen, as a file" },
+      this.press("SVG", "The plots as they are seen, as SVG", () => this.save("svg", "image/svg+xml", plots.svg())),
+      this.press("CSV", "The points that are seen, as CSV", () => this.save("csv", "text/csv", plots.csv())));
+    place.append(this.button, this.slider, this.said, this.speed, windows, files);
+  }
+
+  press(text, title, act) {
+    const button = element("button", { type: "button", title, "aria-label": title }, text);
+    button.addEventListener("click", act);
+    return button;
+  }
+
+  // what is played: of the window that is seen, what lies within the start
+  span() {
+    const [from, to] = this.plots.seen;
+    return [from, Math.min(to, this.plots.end)];
+  }
+
+  // the plots read another instant, or are seen through another window
+  show(t) {
+    const [from, to] = this.span();
+    const held = this.plots.held;
+    const share = held === null || to <= from ? 0 : Math.round(((held - from) / (to - from)) * STEPS);
+    if (Number(this.slider.value) !== share) this.slider.value = share;
+    const text = t === null ? "" : `${significant(1000 * t, 4)} ms`;
+    if (this.said.textContent !== text) this.said.textContent = text;
+    this.all.disabled = this.plots.window === null;
+  }
+
+  toggle() {
+    if (this.playing) {
+      this.stop();
+      return;
+    }
+    const [from, to] = this.span();
+    if (to <= from) return;
+    const held = this.plots.held;
+    this.plots.hold(held === null || held < from || held >= to ? from : held);
+    this.button.textContent = "\u23f8\ufe0e";
+    this.button.title = "Pause";
+    this.last = performance.now();
+    this.playing = requestAnimationFrame((now) => this.step(now));
+  }
+
+  step(now) {
+    const to = this.span()[1];
+    const t = Math.min(this.plots.held + Math.max(now - this.last, 0) / 1000 / this.speed.value, to);
+    this.last = now;
+    this.plots.hold(t);
+    if (t >= to) this.stop();
+    else this.playing = requestAnimationFrame((next) => this.step(next));
+  }
+
+  stop() {
+    cancelAnimationFrame(this.playing);
+    this.playing = 0;
+    this.button.textContent = "\u25b6\ufe0e";
+    this.button.title = "Play";
+  }
+
+  save(ending, kind, text) {
+    const name = document.title.replace(/^softstart: /, "").replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "start";
+    const link = element("a", { href: URL.createObjectURL(new Blob([text], { type: kind })), download: `${name}.${ending}` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  end() {
+    this.stop();
+  }
+}

@@ -1,0 +1,62 @@
+// A start as the browser has it: channels over time, what they are at an instant, and where the bodies stand.
+const CHANNELS = ["t", "T", "u", "w1", "w2", "theta"];
+
+// rows of single-precision numbers in base 64, as the server packs them
+export function unpack(packed) {
+  const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
+  const all = new Float32Array(bytes.buffer);
+  const size = all.length / packed.rows;
+  const found = { ...packed, data: undefined };
+  for (let row = 0; row < packed.rows; row++) found[CHANNELS[row]] = all.subarray(row * size, (row + 1) * size);
+  return found;
+}
+
+// index of the first instant that is not before t
+export function indexAt(times, t) {
+  let [low, high] = [0, times.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle] < t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+// the value of one channel at t, NaN after the end
+export function valueAt(trace, channel, t) {
+  const i = indexAt(trace.t, t);
+  const values = trace[channel];
+  if (i >= trace.t.length) return NaN;
+  if (i === 0) return values[0];
+  const step = trace.t[i] - trace.t[i - 1];
+  return values[i - 1] + (step > 0 ? (t - trace.t[i - 1]) / step : 1) * (values[i] - values[i - 1]);
+}
+
+// least and largest value between two instants, neighbours beyond them included
+export function extent(trace, channel, [from, to], low = Infinity, high = -Infinity) {
+  const values = trace[channel];
+  const last = Math.min(indexAt(trace.t, to) + 1, values.length);
+  for (let i = Math.max(indexAt(trace.t, from) - 1, 0); i < last; i++) {
+    if (values[i] < low) low = values[i];
+    if (values[i] > high) high = values[i];
+  }
+  return [low, high];
+}
+
+// angle of a body since the start, rad: its speed summed up
+export function angleAt(trace, channel, t) {
+  const sums = ((trace.sums ??= {})[channel] ??= summed(trace.t, trace[channel]));
+  const i = Math.min(indexAt(trace.t, t), sums.length - 1);
+  return sums[i] + (t - trace.t[i]) * trace[channel][i];
+}
+
+function summed(times, values) {
+  const sums = new Float64Array(times.length);
+  for (let i = 1; i < times.length; i++) sums[i] = sums[i - 1] + 0.5 * (times[i] - times[i - 1]) * (values[i] + values[i - 1]);
+  return sums;
+}
+
+// the stage of an instant as [start, end, side]: side 0 while the gap is open
+export function stageAt(trace, t) {
+  return trace.stages.findLast(([start]) => start <= t) ?? [0, Infinity, 0];
+}

@@ -1,0 +1,230 @@
+"""Window, instant and files of the plots, the moving scheme of the drive, and the map, in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import math
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softstart import Drive, simulate
+
+CRANE = Drive.load("crane-4amtkf")
+DIRECT = simulate(CRANE, "direct")
+HALF = float(CRANE.gap) / 2.0
+MODULE = """name => import(performance.getEntriesByType("resource").map((one) => one.name)
+  .find((one) => one.endsWith(`/${name}.js`)))"""
+
+
+def box(page: Any) -> dict[str, float]:
+    found: dict[str, float] = page.locator(".plots canvas").bounding_box()
+    return found
+
+
+def button(page: Any, text: str) -> Any:
+    return page.locator(".player button", has_text=text)
+
+
+def saved(page: Any, text: str) -> tuple[str, str]:
+    """Name and content of the file that a button gives."""
+    with page.expect_download() as download:
+        button(page, text).click()
+    return download.value.suggested_filename, Path(download.value.path()).read_text(encoding="utf-8")
+
+
+def points(page: Any) -> dict[str, np.ndarray]:
+    """Columns of the CSV by strategy and name, as they are seen now."""
+    name, text = saved(page, "CSV")
+    assert name == "Crane-travel-drive-4AMTKF-H-112L6.csv"
+    rows = list(csv.DictReader(text.splitlines()))
+    found: dict[str, np.ndarray] = {}
+    for strategy in {row["strategy"] for row in rows}:
+        own = [row for row in rows if row["strategy"] == strategy]
+        for column in own[0]:
+            if column != "strategy" and own[0][column]:
+                found[f"{strategy} {column}"] = np.array([float(row[column]) for row in own])
+    return found
+
+
+def refined(page: Any, least: int) -> dict[str, np.ndarray]:
+    """The points, when the server has sent those of the window."""
+    for _ in range(50):
+        found = points(page)
+        if found["direct time_s"].size >= least:
+            return found
+        page.wait_for_timeout(200)
+    raise AssertionError("no finer points came")
+
+
+def scheme(page: Any) -> dict[str, str]:
+    found: dict[str, str] = page.locator(".scheme").evaluate("one => ({...one.dataset})")
+    return found
+
+
+def instant(page: Any) -> float:
+    """The instant that is read, s."""
+    return float(page.locator(".player .instant").inner_text().removesuffix(" ms")) / 1000.0
+
+
+def hold(page: Any, share: float) -> float:
+    page.locator(".player input").evaluate(
+        "(one, share) => { one.value = share * one.max; one.dispatchEvent(new Event('input')); }", share
+    )
+    page.wait_for_function("document.querySelector('.player .instant').textContent !== ''")
+    page.wait_for_timeout(100)
+    return instant(page)
+
+
+def test_a_window_shows_the_exact_start(page):
+    page.locator('tr[data-name="ramp"] input[type=checkbox]').check()
+    all_of_it = points(page)
+    assert all_of_it["direct time_s"][[0, -1]] == pytest.approx([0.0, DIRECT.end_time], rel=1e-6)
+    assert button(page, "all").is_disabled()
+    place = box(page)
+    page.mouse.move(place["x"] + 140, place["y"] + 90)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 180, place["y"] + 110, steps=5)
+    page.mouse.up()
+    seen = refined(page, 1000)
+    times = seen["direct time_s"]
+    assert times[-1] - times[0] < 0.1 * DIRECT.end_time
+    assert np.diff(times).max() < 2e-3 * (times[-1] - times[0])
+    for strategy in ("direct", "ramp"):
+        at = seen[f"{strategy} time_s"]
+        exact = simulate(CRANE, strategy).at(at)["T"]
+        scale = np.abs(exact).max() + 1.0
+        # times and torques have seven digits; beside a step of the slope that is seen
+        assert seen[f"{strategy} shaft_torque_Nm"] == pytest.approx(exact, abs=2e-4 * scale)
+    assert seen["direct twist_rad"] == pytest.approx(DIRECT.at(times)["theta"], abs=1e-5)
+    button(page, "all").click()
+    page.wait_for_function("document.querySelector('.player [title^=\"The whole\"]').disabled")
+
+
+def test_wheel_drag_and_keys_move_the_window(page):
+    place = box(page)
+    page.mouse.move(place["x"] + 300, place["y"] + 90)
+    page.mouse.wheel(0, -600)
+    first = refined(page, 1000)["direct time_s"]
+    assert first[-1] - first[0] == pytest.approx(
+        (DIRECT.end_time / 0.9) * 1.0015**-600, rel=0.15
+    )  # the axis goes to a round number beyond the end
+    page.keyboard.down("Shift")
+    page.mouse.move(place["x"] + 300, place["y"] + 90)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 200, place["y"] + 90, steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    page.wait_for_timeout(1000)
+    second = points(page)["direct time_s"]
+    assert second[0] > first[0]
+    assert second[-1] - second[0] == pytest.approx(first[-1] - first[0], rel=0.02)
+    page.locator(".plots canvas").focus()
+    page.keyboard.press("+")
+    page.wait_for_timeout(1000)
+    third = points(page)["direct time_s"]
+    assert third[-1] - third[0] == pytest.approx(0.5 * (first[-1] - first[0]), rel=0.02)
+    page.locator(".plots canvas").focus()
+    page.keyboard.press("0")
+    page.wait_for_timeout(1000)
+    assert points(page)["direct time_s"][-1] == pytest.approx(DIRECT.end_time, rel=1e-6)
+    page.locator(".plots canvas").focus()
+    page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(100)
+    assert instant(page) > 0.0
+
+
+def test_the_scheme_stands_as_the_drive_does(page):
+    for share in (0.0, 0.05, 0.2, 0.43, 0.7, 0.9):
+        t = hold(page, share)
+        assert t == pytest.approx(share * DIRECT.end_time, rel=1e-3, abs=1e-5)
+        stands = DIRECT.at(t)
+        pin = min(max(float(stands["theta"]) / HALF, -1.0), 1.0)
+        assert float(scheme(page)["pin"]) == pytest.approx(pin, abs=0.02)
+        side = next(s.side for s in reversed(DIRECT.stages) if s.start <= t)
+        assert int(scheme(page)["side"]) == side
+    contact = next(stage for stage in DIRECT.stages if stage.side != 0)
+    hold(page, contact.start / DIRECT.end_time + 2e-3)
+    assert scheme(page)["struck"] == "true"
+    assert page.locator(".scheme .front.struck").count() == 1
+    hold(page, 0.5 * (contact.start + contact.end) / DIRECT.end_time)
+    assert scheme(page)["struck"] == "false"
+
+
+def test_a_start_is_played_to_its_end(page):
+    page.locator(".player select").select_option("3")
+    button(page, "\u25b6").click()
+    page.wait_for_timeout(500)
+    first = instant(page)
+    assert 0.0 < first <= DIRECT.end_time
+    page.wait_for_function("document.querySelector('.player [title=\"Play\"]')")
+    page.wait_for_timeout(300)
+    assert instant(page) == pytest.approx(DIRECT.end_time, rel=1e-3)
+
+
+def test_what_is_seen_is_saved_as_svg(page):
+    for name in ("ramp", "shaped", "s-curve", "state-feedback", "reduced-two-stage"):
+        page.locator(f'tr[data-name="{name}"] input[type=checkbox]').check()
+    page.wait_for_timeout(1500)
+    name, text = saved(page, "SVG")
+    assert name.endswith(".svg")
+    root = ET.fromstring(text)
+    written = ["".join(one.itertext()) for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    shown = {"T, ramp", "T, shaped", "T, s-curve", "T, state-feedback", "T, reduced-two-stage", "shaft T"}
+    assert shown <= set(written)  # the legend has every one of them
+    assert f"{DIRECT.peak_torque:.1f}" in written
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
+    places = [
+        (float(one.get("x")), float(one.get("y")))
+        for one in root.iter("{http://www.w3.org/2000/svg}text")
+        if "".join(one.itertext()).startswith("T, ")
+    ]
+    assert all(0.0 < x <= float(root.get("width")) and y > 0.0 for x, y in places)
+
+
+def test_the_gentlest_is_selected_at_first(visit):
+    page = visit(select="")
+    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
+    page.wait_for_timeout(1000)
+    cells = page.locator('.strategies td[data-key="k_dyn"]').all_inner_texts()
+    assert float(page.locator("#k-dyn").inner_text()) == min(float(cell) for cell in cells)
+    assert page.locator("tbody tr").first.get_attribute("class") == "selected"
+    assert page.locator('tr[data-name="direct"] input[type=checkbox]').is_checked()
+
+
+def test_contours_lie_on_their_level(page):
+    """Marching squares on a paraboloid: along each piece the level is kept to the order of the grid."""
+    count = 40
+    rows = [[(i / count) ** 2 + (j / count) ** 2 for i in range(count)] for j in range(count)]
+    rows[5][5] = None
+    pieces = page.evaluate(
+        f"async ([rows, name]) => (await ({MODULE})(name)).contour(rows, 0.25)", [rows, "map"]
+    )
+    assert len(pieces) > 20
+    for piece in pieces:
+        for x, y in piece:
+            assert math.hypot(x, y) / count == pytest.approx(0.5, abs=1.0 / count**2)
+    ends = [tuple(round(v, 9) for v in end) for piece in pieces for end in piece]
+    assert sum(ends.count(end) == 1 for end in ends) == 2  # one line, open at the two edges only
+
+
+def test_maps_of_two_strategies_are_compared(page):
+    ready = "() => !document.querySelector('#map-other').disabled"
+    page.wait_for_function(ready)
+    page.wait_for_timeout(6000)  # a whole map of direct
+    page.locator("#map-other").check()
+    assert page.locator("#map-other").is_checked()
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    page.wait_for_timeout(6000)
+    place = page.locator(".map-canvas canvas").bounding_box()
+    page.mouse.move(place["x"] + 150, place["y"] + 60)
+    page.wait_for_function("document.querySelector('.map .said').textContent.includes('(direct: ')")
+    words = page.locator(".map .said").inner_text().replace("(direct:", "").replace(")", "").split()
+    gap, inertia = float(words[1]), float(words[4])
+    own, other = float(words[words.index("K") + 1]), float(words[-1])
+    drive = CRANE.replace(gap=gap, load_inertia=inertia)
+    assert own == pytest.approx(simulate(drive, "ramp").k_dyn, abs=2e-3)
+    assert other == pytest.approx(simulate(drive, "direct").k_dyn, abs=2e-3)
