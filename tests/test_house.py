@@ -37,7 +37,8 @@ BUDGET = {
     # ends before the bound; shared bounds; 230: brake, unknown position; 80: two methods where a bound is far
     "optimal": (8750, 27, 6, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
-    "page": (4380, 18, 3, 0),
+    # 10: the window of the plots
+    "page": (4390, 18, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 25: limiters much faster than the lag
     "plant": (2580, 15, 2, 0),

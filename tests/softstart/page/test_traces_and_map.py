@@ -81,8 +81,8 @@ def test_the_limit_of_the_map_is_the_permissible_torque_over_the_mean_one(kept):
     for frame in rows[:3]:
         head, index = frame["map"], frame["map_row"]["index"]
         one = drive.replace(gap=head["gaps"][4], load_inertia=head["inertias"][index])
-        of = drive if kept else one
-        assert head["limit"][index] == pytest.approx(130.0 / simulate(of, "direct").base, rel=1e-14)
+        run = simulate(drive if kept else one, "direct")
+        assert head["limit"][index] == pytest.approx(130.0 / run.peak_torque * run.k_dyn, rel=1e-13)
     assert len({frame["map"]["of"] for frame in rows}) == 1
     assert Screen(Session(controllers=["direct"]))._map_head()["limit"] is None
 
