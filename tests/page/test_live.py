@@ -324,8 +324,8 @@ def test_a_page_loaded_anew_goes_on_with_its_drive(page, visit):
     assert field(linked, "strategy.time").input_value() == "0.2"
 
 
-def test_undo_and_redo_by_buttons_and_keys(page):
-    opened(page)
+def test_undo_and_redo_by_buttons_and_keys(visit):
+    page = opened(visit(select=""))  # to select another one would be a step to undo
     first = k_dyn(page)
     drag(page, "shaft.gap", 0.25, 0.8, 12)
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
