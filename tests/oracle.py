@@ -360,6 +360,7 @@ class _Run:
             rhs, self.t, self.y, end, max_step=self.period / 8, rtol=self.rtol, atol=self.atol, first_step=h
         )
         fractions, slope_before = FIRST_STEP, 0.0
+        drift = self.drift(functionals, self.t, np.asarray(rhs(self.t, self.y)))
         while solver.status == "running":
             t_old, y_old = solver.t, solver.y
             message = solver.step()
@@ -385,6 +386,16 @@ class _Run:
                 instant = step.root(functionals[i], grid[k], grid[k + 1])
                 if found is None or instant < found[0]:
                     found = (instant, names[i])
+            # f may be above zero for a moment between two samples: then it has a maximum within the step
+            drift_before, drift = drift, self.drift(functionals, solver.t, solver.f)
+            tops = (drift_before > 0) & (drift < 0) & np.all(history < 0, axis=1)
+            tops &= before + drift_before * (solver.t - t_old) >= 0
+            for i in np.flatnonzero(tops):
+                top = step.top(functionals[i], solver.t)
+                if step.value(functionals[i], top, step.state(top)) >= 0:
+                    instant = step.root(functionals[i], t_old, top)
+                    if found is None or instant < found[0]:
+                        found = (instant, names[i])
             if self.mode.form in ("press", "stiff"):
                 slopes = self.values(slope[None, :], times, states)[0]
                 bends = np.concatenate([[slope_before], slopes])
@@ -402,6 +413,11 @@ class _Run:
             before, fractions = values[:, -1], LATER_STEPS
         self.t, self.y = end, solver.y.copy()
         self.note_torque()
+
+    def drift(self, functionals: np.ndarray, t: float, rates: np.ndarray) -> np.ndarray:
+        """d/dt of the functionals, with the derivative of the state."""
+        du = self.path.torque(t, self.span)[1]
+        return np.asarray(functionals[:, :3] @ rates[:3] + functionals[:, 3] * du)
 
     def values(self, functionals: np.ndarray, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         u = self.path.torque(times, self.span)[0] * np.ones_like(times)
@@ -424,6 +440,17 @@ class _Step:
     def value(self, functional: np.ndarray, t: float, y: np.ndarray) -> float:
         u = self.run.path.torque(t, self.run.span)[0]
         return float(functional[:3] @ y[:3] + functional[3] * u + functional[4])
+
+    def top(self, functional: np.ndarray, end: float) -> float:
+        """Where the functional, rising at the start of the step and falling at its end, is largest."""
+
+        def drift(t: float) -> float:
+            rates = np.asarray(self.rhs(t, self.state(t)))
+            return float(self.run.drift(functional[None, :], t, rates)[0])
+
+        if not drift(self.t) > 0 > drift(end):  # but for rounding
+            return end
+        return float(brentq(drift, self.t, end, xtol=1e-300, rtol=4 * np.finfo(float).eps))
 
     def root(self, functional: np.ndarray, low: float, high: float) -> float:
         def interpolated(t: float) -> float:

@@ -103,7 +103,7 @@ TONE = record_type([("mass", int), ("omega", float), ("cosine", float), ("sine",
 OPEN, CONTACT, DOUBLED, BEYOND, PRESSED, JOINED, WELDED = range(7)
 
 # a recorded span: time and motor; motion of each mass and shaft at its beginning
-SPAN = record_type([(name, float) for name in ("start", "end", "ua", "ub", "ue", "phi")])
+SPAN = record_type([(name, float) for name in ("start", "end", "ua", "ub", "ue", "u", "ref", "phi")])
 SPAN_MASS = record_type([("w", float), ("direction", float)])
 SPAN_SHAFT = record_type([("theta", float), ("mode", int), ("side", float), ("sign", float)])
 

@@ -208,6 +208,9 @@ def expand_torques(start: Start, h: float, n: int) -> None:
         for o in range(n + 1):
             u[o] += term
             term *= -h / (lag * (o + 1.0))
+        if m.slow_lag != 0.0:
+            u[0] = x.u
+            u[1] = (x.ref - x.u) * h / lag
     for mass in start.masses:
         mass.outside[0] = mass.mean
         for o in range(1, n + 1):

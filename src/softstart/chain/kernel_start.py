@@ -46,7 +46,7 @@ from softstart.plant.layout import (
     Plant,
     State,
 )
-from softstart.plant.span import torque_after, torque_course
+from softstart.plant.span import lag_is_slow, torque_after, torque_course
 from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, sample, take_answer
 
 _A = types.Array(types.float64, 1, "C")
@@ -85,6 +85,8 @@ def record(start: Start, h: float) -> None:
     span.ua = m.ua
     span.ub = m.ub
     span.ue = m.ue
+    span.u = x.u
+    span.ref = x.ref
     span.phi = x.phi2
     for i in range(start.masses.size):
         mass, kept = start.masses[i], start.span_masses[row, i]
@@ -288,6 +290,9 @@ def restore(start: Start, row: int) -> int:
     m.ua = span.ua
     m.ub = span.ub
     m.ue = span.ue
+    m.slow_lag = 1.0 if lag_is_slow(start.p.view(PLANT)[0], m) else 0.0
+    x.u = span.u
+    x.ref = span.ref
     x.phi2 = span.phi
     for i in range(start.masses.size):
         mass, kept = start.masses[i], start.span_masses[row, i]

@@ -11,10 +11,10 @@ from softstart.plant.layout import (
     TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque
-from softstart.plant.motion import motion
+from softstart.plant.motion import SERIES, motion, remainders
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import (
-    begin_span, faster_than_the_lag, lagging, next_event, torque_after, torque_course,
+    begin_span, next_event, torque_after, torque_course,
 )  # fmt: skip
 from softstart.plant.steady import bounce, repeats
 
@@ -136,10 +136,11 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
         if x.load != 0.0:
             share = p.J1 * p.inv_J if x.held == 0.0 else 1.0
             push = s * s * (0.5 * load[1] + s * load[2] / 6.0)
-            if m.ue != 0.0:
+            if m.slow_lag != 0.0:
+                push += load[3] * (remainders(m.rate * s)[2] / m.rate) / m.rate
+            elif m.ue != 0.0:
                 rate = m.rate
-                later = lagging(rate * s) / rate if faster_than_the_lag(p, m) else s - tail / rate
-                push += load[3] * later / rate
+                push += load[3] * (s - tail / rate) / rate
             x.phi2 += s * (x.w2 + share * x.v) + push - share * (theta - x.theta)
             x.w2 = load_speed(m, load, s, v)
         v *= side
@@ -182,20 +183,23 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
         torque_course(p, x, m)
         if x.held != 0.0 and (t >= p.release_at or (p.release_at == math.inf and x.u >= shaft_torque(p, x))):
             release_motor(x, events)
-        load = begin_span(p, x, m)
         until = min(x.ask_at, stop)
         if x.held != 0.0:
             until = min(until, p.release_at)
         if m.pending > 0.0:
             until = min(until, m.due_time[0])
-        if not recording and repeats(p, x, m) and bounce(p, x, m, load, until) > 0:
-            if x.events > p.event_cap:
-                return EVENT_LIMIT
-            continue
         horizon = until - t
         cut = m.slew_end < horizon
         if cut:
             horizon = m.slew_end
+        load = begin_span(p, x, m, horizon)
+        if not recording and repeats(p, x, m) and bounce(p, x, m, load, until) > 0:
+            if x.events > p.event_cap:
+                return EVENT_LIMIT
+            continue
+        if m.form == SERIES and m.ue != 0.0 and horizon > p.lag:
+            cut = True
+            horizon = p.lag
         if x.side != 0.0 and horizon > LONGEST_SPAN * p.period:
             cut = True
             horizon = LONGEST_SPAN * p.period

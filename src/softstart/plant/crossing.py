@@ -18,7 +18,9 @@ import math
 
 from softstart.plant.jit import compiled
 from softstart.plant.layout import Motion, Quintuple, Septuple
-from softstart.plant.motion import derivatives, forcing_tail, motion
+from softstart.plant.motion import (
+    IN_PARTS, SERIES, derivatives, forcing_from_start, forcing_tail, motion, remainders, slow_part,
+)  # fmt: skip
 from softstart.plant.terms import crossing_by_terms
 
 NO_CROSSING = -1.0
@@ -60,8 +62,46 @@ def overdamped_bounds(m: Motion, s: float, end: float, y: float, yv: float, tail
 
 
 @compiled
+def bounds_from_start(m: Motion, s: float, end: float, z: float, v: float) -> Quintuple:
+    """`bounds` where the right-hand side is written from its start."""
+    rate = m.rate
+    length = end - s
+    f, rise, _ = forcing_from_start(m, end)
+    bend = abs(m.E) * rate * rate * (math.exp(-rate * s) if m.E != 0.0 else 1.0)
+    push = max(abs(m.f0), abs(f)) + abs(m.f1) * end + bend * end * end
+    jolt = max(abs(m.f1), abs(rise))
+    if m.free != 0.0:
+        return abs(v) + push * length, push, jolt, bend, rate * bend
+    w0sq = m.w0sq
+    twice = 2.0 * m.zeta
+    if m.form == SERIES:  # too short for the spring: z and z' hardly change but for the push
+        speed = abs(v) + push * length
+        y2 = push + 1.01 * (twice * speed + w0sq * (abs(z) + speed * length))
+        y3 = jolt + twice * y2 + w0sq * 1.01 * speed
+        y4 = bend + twice * y3 + w0sq * y2
+        return 1.01 * speed, y2, y3, y4, rate * bend + twice * y4 + w0sq * y3
+    slow, speed, _ = slow_part(m, s)
+    y = z - m.p0 - m.p1 * s - slow
+    yv = v - m.p1 - speed
+    bend = abs(m.p2) * rate * rate * math.exp(-rate * s)
+    most = abs(m.p1) + abs(slow_part(m, end)[1]) + abs(speed)
+    if m.q < -0.01 * w0sq:
+        y1, y2, y3, y4, y5 = overdamped_bounds(m, s, end, y, yv, 0.0)
+        y1 -= abs(m.p1)
+    else:
+        y1 = math.sqrt(yv * yv + w0sq * y * y)
+        y2 = (twice + m.w0) * y1
+        y3 = twice * y2 + w0sq * y1
+        y4 = twice * y3 + w0sq * y2
+        y5 = twice * y4 + w0sq * y3
+    return (y1 + most, y2 + bend, y3 + rate * bend, y4 + rate * rate * bend, y5 + rate * rate * rate * bend)
+
+
+@compiled
 def bounds(m: Motion, s: float, end: float, z: float, v: float, tail: float) -> Quintuple:
     """Upper bounds of |z'| to |z'''''| on [s, end]."""
+    if m.form != IN_PARTS:
+        return bounds_from_start(m, s, end, z, v)
     tail = abs(tail)
     rate = m.rate
     if m.free != 0.0:
@@ -90,7 +130,10 @@ def bounds(m: Motion, s: float, end: float, z: float, v: float, tail: float) -> 
 def load_speed(m: Motion, load: Septuple, s: float, v: float) -> float:
     """w2 at s from the total momentum; load = (w2_0, a, b, e, ratio, factor, offset), see `advance`."""
     w2 = load[0] + s * (load[1] + 0.5 * s * load[2]) - load[4] * (v - m.v0)
-    if load[3] != 0.0:
+    if m.slow_lag != 0.0:
+        _, third, _ = remainders(m.rate * s)
+        w2 += load[3] * third / m.rate
+    elif load[3] != 0.0:
         w2 -= load[3] * math.expm1(-m.rate * s) / m.rate
     return w2
 
@@ -101,7 +144,7 @@ def first_crossing(
     load: Septuple, start: float, begin: float, end: float,
 ) -> float:  # fmt: skip
     """First s in [begin, end] at which f falls through zero, or NO_CROSSING."""
-    if m.by_terms != 0.0:
+    if m.by_terms != 0.0 and m.form != SERIES:
         return crossing_by_terms(m, c0, alpha, beta, gamma, kappa, load, start != WATCH, begin, end)
     s = begin
     begun = start == WATCH
@@ -120,7 +163,7 @@ def first_crossing(
         curve = alpha * a + beta * jerk + gamma * snap
         most = abs(alpha) * b2 + abs(beta) * b3 + abs(gamma) * b4
         third = abs(alpha) * b3 + abs(beta) * b4 + abs(gamma) * b5
-        rest = abs(m.p0) if m.free == 0.0 else 0.0
+        rest = abs(m.p0) if m.free == 0.0 and m.form != SERIES else 0.0
         scale = abs(c0) + abs(alpha) * (abs(z) + rest) + abs(beta * v) + abs(gamma * a)
         if kappa != 0.0:
             w2 = load_speed(m, load, s, v)

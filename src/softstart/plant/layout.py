@@ -183,6 +183,12 @@ class Motion:
     ub: float
     ue: float
     slew_end: float
+    form: float  # how the torque is written, see `motion`
+    f0: float  # where its parts would cancel: the right-hand side at the start of the span, and its slope
+    f1: float
+    p3: float
+    p4: float
+    slow_lag: float  # 1 where ua, ub s and ue exp(-s/lag) would cancel each other's digits
     last_v: float  # the speed at its end where that is known without evaluating the motion
     w0: float
     steady: float  # 1 for an undamped spring under constant torque, whose events are closed formulas
@@ -224,6 +230,8 @@ class Segment:
     k: float
     dd: float
     held: float
+    u: float  # torque and demand at the start; ua and ub give them only to the digits that cancel
+    ref: float
 
 
 class EventRow:

@@ -8,6 +8,14 @@ with w0 = zeta = 0 while the gap is open. The right-hand side is the motor torqu
 (linear) and lag (exponential) plus the load torque, over the inertias. `prepare` computes the
 coefficients once a span, `motion` evaluates z and z' at any s; under-, over- and critically damped
 springs and a lag that resonates with the damping run through the same smooth formulas.
+
+Where the lag is far longer than the span, A, B s and E exp(-lambda s) are far larger than their sum. There
+`write_without_cancelling` turns to what the right-hand side and its slope are at the start,
+
+    f0 + f1 s + E chi(s),   chi(s) = exp(-lambda s) - 1 + lambda s,
+
+of which no part is larger than the whole. Where the torque rises far faster than the spring can answer, a
+power series takes over, since the particular solution B s/w0^2 is far larger than the motion.
 """
 
 from __future__ import annotations
@@ -19,6 +27,10 @@ from softstart.plant.layout import Motion, Pair, Triple
 
 # how the response to the exponential is computed
 NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0
+
+# the right-hand side as A + B s + E exp(-lambda s), as f0 + f1 s + E chi(s), and that by a power series
+IN_PARTS, FROM_START, SERIES = 0.0, 1.0, 2.0
+SERIES_TERMS = 24  # lambda s may be up to 1
 
 
 @inlined
@@ -35,6 +47,7 @@ def prepare(
     m.rate = rate
     m.k = k
     m.dd = dd
+    m.form = IN_PARTS
     if k == 0.0:
         m.free = 1.0
         m.w0sq = 0.0
@@ -72,6 +85,102 @@ def prepare(
         m.yv0 += rate * p2
     else:
         m.branch = REAL_ROOTS if -q > 1e-4 * w0sq else NEAR_TRIPLE
+
+
+@compiled
+def remainders(x: float) -> Triple:
+    """Of the series of exp(-x), x >= 0, what follows its first two, three and four terms, without sign."""
+    if x > 1.0:
+        second = x + math.expm1(-x)
+        third = 0.5 * x * x - second
+        return second, third, x * x * x / 6.0 - third
+    fourth = 1.0
+    for n in range(22, 4, -1):
+        fourth = 1.0 - x / n * fourth
+    fourth *= x * x * x * x / 24.0
+    third = x * x * x / 6.0 - fourth
+    return 0.5 * x * x - third, third, fourth
+
+
+@compiled
+def write_without_cancelling(m: Motion, f0: float, f1: float, series: bool) -> None:
+    """The right-hand side by its value f0 and its slope f1 at the start; see the head of this file."""
+    m.f0 = f0
+    m.f1 = f1
+    if series:
+        m.form = SERIES
+        return
+    if m.free == 0.0:
+        if m.branch != PARTICULAR:
+            return  # nor does a lag that meets a decay rate of the spring cancel
+        # chi has the particular solution (chi + beta chi' + constant)/w0^2
+        inverse = 1.0 / m.w0sq
+        rate = m.rate
+        shift = m.zeta - rate
+        beta = -(m.zeta + shift) / (shift * shift + m.q)
+        m.p3 = m.E * inverse
+        m.p4 = m.p3 * beta
+        m.p1 = f1 * inverse
+        bent = rate * rate * m.p3
+        m.p0 = (f0 - 2.0 * m.zeta * m.p1 - bent * (1.0 + beta * (m.zeta + shift))) * inverse
+        m.y0 = m.z0 - m.p0
+        m.yv0 = m.v0 - m.p1 - rate * rate * m.p4
+    m.form = FROM_START
+
+
+@compiled
+def slow_part(m: Motion, s: float) -> Triple:
+    """Of the particular solution to E chi(s), what is not constant, and its first two derivatives."""
+    rate = m.rate
+    x = rate * s
+    chi, _, _ = remainders(x)
+    slope = -rate * math.expm1(-x)
+    bend = rate * rate * math.exp(-x)
+    return (
+        m.p3 * chi + m.p4 * slope,
+        m.p3 * slope + m.p4 * bend,
+        (m.p3 - rate * m.p4) * bend,
+    )
+
+
+@compiled
+def motion_from_start(m: Motion, s: float) -> Pair:
+    """Z and z' at s where the right-hand side is written from its start."""
+    rate = m.rate
+    if m.form == SERIES:
+        before, this = m.z0, m.v0  # the n-th and the next derivative at 0, times s^n/n!
+        z, v = m.z0, m.v0
+        power = 1.0
+        forcing = m.E
+        for n in range(SERIES_TERMS):
+            push = m.f0 if n == 0 else m.f1 if n == 1 else forcing
+            before, this = this, push - 2.0 * m.zeta * this - m.w0sq * before
+            power *= s / (n + 1.0)
+            z += before * power
+            v += this * power
+            forcing *= -rate
+            if n > 3 and abs(this * power) <= 1e-18 * abs(v) and abs(before * power) <= 1e-18 * abs(z):
+                break
+        return z, v
+    if m.free != 0.0:
+        _, third, fourth = remainders(rate * s)
+        z = m.z0 + s * (m.v0 + s * (0.5 * m.f0 + s * (m.f1 / 6.0))) + m.E * (fourth / rate) / rate
+        return z, m.v0 + s * (m.f0 + 0.5 * s * m.f1) + m.E * third / rate
+    cos, sin = decaying_pair(m.zeta, m.q, m.root_q, s)
+    slow, speed, _ = slow_part(m, s)
+    z = m.y0 * cos + (m.yv0 + m.zeta * m.y0) * sin + m.p0 + m.p1 * s + slow
+    return z, m.yv0 * cos - (m.zeta * m.yv0 + m.w0sq * m.y0) * sin + m.p1 + speed
+
+
+@compiled
+def forcing_from_start(m: Motion, s: float) -> Triple:
+    """The right-hand side at s, and its first two derivatives, where it is written from its start."""
+    if m.E == 0.0:
+        return m.f0 + m.f1 * s, m.f1, 0.0
+    x = m.rate * s
+    chi, _, _ = remainders(x)
+    bend = m.rate * m.rate * m.E * math.exp(-x)
+    return m.f0 + m.f1 * s + m.E * chi, m.f1 - m.rate * m.E * math.expm1(-x), bend
 
 
 @inlined
@@ -143,6 +252,8 @@ def exponential_response(m: Motion, s: float) -> Pair:
 @inlined
 def motion(m: Motion, s: float) -> Pair:
     """Z and z' at s."""
+    if m.form != IN_PARTS:
+        return motion_from_start(m, s)
     if m.free != 0.0:
         z = m.z0 + s * (m.v0 + s * (0.5 * m.A + s * (m.B / 6.0)))
         v = m.v0 + s * (m.A + 0.5 * s * m.B)
@@ -185,6 +296,11 @@ def forcing_tail(m: Motion, s: float) -> float:
 @inlined
 def derivatives(m: Motion, s: float, z: float, v: float, tail: float) -> Triple:
     """z'', z''' and z'''' at s, from the equation of motion."""
+    if m.form != IN_PARTS:
+        f, rise, bend = forcing_from_start(m, s)
+        a = f - 2.0 * m.zeta * v - m.w0sq * z
+        jerk = rise - 2.0 * m.zeta * a - m.w0sq * v
+        return a, jerk, bend - 2.0 * m.zeta * jerk - m.w0sq * a
     a = m.A + m.B * s + tail - 2.0 * m.zeta * v - m.w0sq * z
     jerk = m.B - m.rate * tail - 2.0 * m.zeta * a - m.w0sq * v
     snap = m.rate * m.rate * tail - 2.0 * m.zeta * jerk - m.w0sq * a

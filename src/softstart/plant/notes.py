@@ -12,7 +12,7 @@ from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     ASK, EVENT, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
-from softstart.plant.motion import derivatives, forcing_tail, motion
+from softstart.plant.motion import SERIES, derivatives, forcing_tail, motion
 from softstart.plant.terms import ROUNDING, terms
 
 
@@ -36,7 +36,7 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
     turned = 1.0
     for _ in range(3):  # once more, with its signs, if the search by terms takes over within this one
         by_terms = m.by_terms
-        if by_terms != 0.0:  # k v and dd a may cancel to their last digits
+        if by_terms != 0.0 and m.form != SERIES:  # k v and dd a may cancel to their last digits
             f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
             slope = bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
         else:
@@ -160,4 +160,6 @@ def note_segment(x: State, m: Motion, s: float, segments: Matrix) -> None:
     row.k = m.k
     row.dd = m.dd
     row.held = x.held
+    row.u = x.u
+    row.ref = x.ref
     x.n_segments += 1.0

@@ -12,7 +12,7 @@ from softstart.plant.layout import MOTION, PLANT, SEGMENT, STATE, Motion, Plant,
 from softstart.plant.modes import shaft_torque
 from softstart.plant.motion import motion as motion_at
 from softstart.plant.notes import next_extreme
-from softstart.plant.span import begin_span
+from softstart.plant.span import begin_span, lag_is_slow
 
 # columns of the evaluated states
 PHI1_OUT, PHI2_OUT, W1_OUT, W2_OUT, U_OUT, T_OUT, THETA_OUT, V_OUT = range(8)
@@ -39,10 +39,11 @@ def begin_again(p: Plant, x: State, m: Motion, row: Segment) -> Septuple:
     m.ua = row.ua
     m.ub = row.ub
     m.ue = row.ue
-    x.u = row.ua + row.ue
-    x.ref = row.ua + row.ub * p.lag
+    x.u = row.u
+    x.ref = row.ref
     m.slew_end = np.inf
-    return begin_span(p, x, m)
+    m.slow_lag = 1.0 if lag_is_slow(p, m) else 0.0
+    return begin_span(p, x, m, row.end - row.start)
 
 
 @compiled

@@ -19,11 +19,15 @@ from softstart.plant.layout import (
     UNSOLVED, UPPER,
     Motion, Plant, Septuple, State,
 )  # fmt: skip
-from softstart.plant.motion import derivatives, forcing_tail, motion, prepare
+from softstart.plant.motion import (
+    derivatives, forcing_tail, motion, prepare, remainders, write_without_cancelling,
+)  # fmt: skip
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 from softstart.plant.terms import MAX_STEPS
 
-MUCH_FASTER = 1e4  # the limiter than the lag
+MUCH_LONGER = 1e3  # a lag than the slewing or than an elastic period: more digits would cancel
+MUCH_FASTER = 1e4  # a torque that rises, than the spring can answer
+MOST_PARTS = 1e4  # a power series needs steps no longer than the lag; so many of them at most
 
 
 @inlined
@@ -60,33 +64,42 @@ def torque_course(p: Plant, x: State, m: Motion) -> None:
     m.ua = ua
     m.ub = ub
     m.ue = ue
+    m.slow_lag = 1.0 if lag_is_slow(p, m) else 0.0
 
 
 @inlined
-def faster_than_the_lag(p: Plant, m: Motion) -> bool:
-    """Whether the limiter slews so much faster than the lag that ua and ue cancel each other's digits."""
-    return m.ue != 0.0 and abs(m.ub) * p.lag > MUCH_FASTER * (abs(p.u_min) + abs(p.u_max))
+def lag_is_slow(p: Plant, m: Motion) -> bool:
+    """Whether the lag is so long that ua, ub s and ue exp(-s/lag) cancel each other's digits."""
+    return m.ue != 0.0 and (
+        p.lag > MUCH_LONGER * p.period or abs(m.ub) * p.lag > MUCH_LONGER * (abs(p.u_min) + abs(p.u_max))
+    )
 
 
 @inlined
-def lagging(y: float) -> float:
-    """The value of y - (1 - exp(-y)), without cancellation."""
-    if y > 1e-3:
-        return y + math.expm1(-y)
-    return y * y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y / 120.0)))
+def too_fast_for_the_spring(p: Plant, x: State, m: Motion, horizon: float) -> bool:
+    """Whether the torque rises so fast that the particular solution of the spring is far larger than z."""
+    if m.ub == 0.0 or x.side == 0.0:
+        return False
+    stiff = 1.0 + (x.doubled if x.doubled > 0.0 else 0.0)
+    rates = math.sqrt(stiff * p.w0sq_slip) + p.d * (p.inv_J1 + p.inv_J2)  # above those of the span
+    return (
+        abs(m.ub) > MUCH_FASTER * rates * (abs(p.u_min) + abs(p.u_max))
+        and rates * horizon < 1e-3
+        and horizon < MOST_PARTS * (p.lag if p.lag > 0.0 else math.inf)
+    )
 
 
 @inlined
 def torque_after(p: Plant, x: State, m: Motion, s: float, left: float) -> float:
     """The motor torque after s, as the span began with x; `left` is exp(-s/lag)."""
-    if faster_than_the_lag(p, m):
+    if m.slow_lag != 0.0:
         y = s / p.lag
-        return x.u + (x.ref - x.u) * -math.expm1(-y) + m.ub * p.lag * lagging(y)
+        return x.u + (x.ref - x.u) * -math.expm1(-y) + m.ub * p.lag * remainders(y)[0]
     return m.ua + m.ub * s + m.ue * left
 
 
 @inlined
-def begin_span(p: Plant, x: State, m: Motion) -> Septuple:
+def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
     """Coefficients of the motion from the state x on; returns those of the load speed."""
     ua = m.ua
     ub = m.ub
@@ -135,11 +148,20 @@ def begin_span(p: Plant, x: State, m: Motion) -> Septuple:
             prepare(m, z0, side * x.v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rate)
             m.k = k
             m.dd = dd
+    slope = (x.ref - x.u) * rate if p.lag > 0.0 else ub
+    fast = too_fast_for_the_spring(p, x, m, horizon)
+    if (m.slow_lag != 0.0 or fast) and not held:
+        f0 = x.u * inv_J1
+        if not stuck:
+            f0 += friction * p.inv_J2
+        write_without_cancelling(m, side * f0, side * slope * inv_J1, fast)
     if stuck:
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if held:
         return (x.w2, 0.0, 0.0, 0.0, side, side * p.inv_J2, -friction * p.inv_J2)
     inverse = p.inv_J
+    if m.slow_lag != 0.0:
+        ua, ub = x.u, slope
     return (
         x.w2, (ua - friction) * inverse, ub * inverse, ue * inverse,
         side * p.J1 * inverse, side * p.inv_J2, -friction * p.inv_J2,
@@ -315,6 +337,10 @@ def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
         rest = m.ue * math.exp(-rate * s)
         f, slope, most = -(m.ua + m.ub * s + rest), rate * rest - m.ub, abs(rest) * rate * rate
         scale = abs(m.ua) + abs(m.ub * s) + abs(rest)
+        if m.slow_lag != 0.0:
+            f = -torque_after(p, x, m, s, 0.0)
+            slope = (x.u - x.ref) * rate * math.exp(-rate * s) + m.ub * math.expm1(-rate * s)
+            scale = abs(x.u) + abs(f)
         if side != 0.0:
             _, b2, b3, _, _ = bounds(m, s, end, z, v, 0.0)
             f += side * (m.k * z + m.dd * v)

@@ -28,7 +28,8 @@ import math
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import Motion, Septuple
 from softstart.plant.motion import (
-    PARTICULAR, decaying_pair, derivatives, exponential_response, forcing_tail, motion,
+    IN_PARTS, PARTICULAR, decaying_pair, derivatives, exponential_response, forcing_from_start, forcing_tail,
+    motion, remainders, slow_part,
 )  # fmt: skip
 
 ROUNDING = 4.0 * 2.220446049250313e-16
@@ -41,6 +42,29 @@ STILL = 1e-290  # a motion below this is none
 def least(weight: float, rate: float, s: float, end: float) -> float:
     """The least value of weight exp(-rate x) on [s, end]."""
     return weight * math.exp(-rate * (end if weight > 0.0 else s))
+
+
+@compiled
+def terms_of_slow_flight(m: Motion, c0: float, alpha: float, beta: float, s: float, end: float) -> Septuple:
+    """`terms_of_flight` where the right-hand side is written from its start: f'' lies above its tangents."""
+    z, v = motion(m, s)
+    a, rise, bend = forcing_from_start(m, s)
+    later, steeper, last = forcing_from_start(m, end)
+    here, there = alpha * a + beta * rise, alpha * later + beta * steeper
+    slope, slope_there = alpha * rise + beta * bend, alpha * steeper + beta * last
+    lowest = min(here, there)
+    if slope < 0.0 < slope_there:
+        lowest = here + slope * (end - s)
+    size = abs(alpha) * (abs(m.f0) + abs(a) + abs(later)) + abs(beta) * (abs(m.f1) + abs(rise) + abs(steeper))
+    return (
+        c0 + alpha * z + beta * v,
+        alpha * v + beta * a,
+        here,
+        lowest - ROUNDING * size,
+        max(abs(slope), abs(slope_there)),
+        abs(c0) + abs(alpha) * (abs(m.z0) + abs(m.v0 * s) + abs(z)) + abs(beta) * (abs(m.v0) + abs(v)),
+        abs(alpha) * (abs(m.v0) + abs(v)) + abs(beta) * (abs(m.f0) + abs(a)),
+    )
 
 
 @compiled
@@ -76,6 +100,8 @@ def terms(
 ) -> Septuple:  # fmt: skip
     """F, f', f'' at s, least f'' on [s, end], bound of |f'''| from s on, sizes of the terms of f, f'."""
     if m.free != 0.0:
+        if m.form != IN_PARTS:
+            return terms_of_slow_flight(m, c0, alpha, beta, s, end)
         return terms_of_flight(m, c0, alpha, beta, s, end)
     rate, w0sq, w0, zeta, p1 = m.rate, m.w0sq, m.w0, m.zeta, m.p1
     # w2 holds -load[4] v, see `crossing.load_speed`
@@ -115,13 +141,29 @@ def terms(
                 p2 = (0.5 if near == slow else -0.5) * m.E / (m.root_q * (rate - far))
                 returned = -p2
         amount = p2 * (alpha - beta * rate + gamma * rate * rate)
-        f += amount * e
         whole = abs(p2) * (abs(alpha) + abs(beta) * rate + abs(gamma) * rate * rate) * e
-        size += whole
-        steep += rate * whole
-        slope -= rate * amount * e
         bend = rate * rate * amount
-        if kappa != 0.0:
+        if m.form != IN_PARTS:
+            d0, d1, d2 = slow_part(m, s)
+            f += alpha * d0 + beta * d1 + gamma * d2
+            slope += alpha * d1 + (beta - gamma * rate) * d2
+            size += abs(alpha * d0) + abs(beta * d1) + abs(gamma * d2)
+            steep += abs(alpha * d1) + (abs(beta) + abs(gamma) * rate) * abs(d2)
+        else:
+            f += amount * e
+            size += whole
+            steep += rate * whole
+            slope -= rate * amount * e
+        if kappa != 0.0 and m.slow_lag != 0.0:
+            chi, third_part, _ = remainders(rate * s)
+            f += kappa * load[3] * third_part / rate
+            size += abs(kappa * load[3] * third_part / rate)
+            slope += kappa * load[3] * chi
+            steep += abs(kappa * load[3] * chi)
+            curve += kappa * load[3] * rate
+            lowest += kappa * load[3] * rate
+            bend -= kappa * load[3] * rate
+        elif kappa != 0.0:
             gained = kappa * load[3] * math.expm1(-rate * s) / rate
             f -= gained
             size += abs(gained)

@@ -73,6 +73,22 @@ def test_overdamped_shafts():
         compare(seed, overdamped=True)
 
 
+def test_a_lag_far_longer_than_the_start():
+    """The limiter rises within a microsecond, the lag takes 1e5 s: the torque keeps its last digits."""
+    drive = Drive.load("crane-4amtkf").replace(
+        torque_lag=1e5, torque_rate=62e6, load_torque=1e-9, start_position="mid-gap"
+    )
+    plant = simulate(drive, "direct", until=30.0)
+    chain = simulate_chain(Chain.from_drive(drive), "direct", until=30.0, fitted_to=drive)
+    t = np.array([1e-7, 1e-6, 1e-3, 10.0, 30.0])
+    late = 0.5e-6  # as if the whole step came in the middle of the slewing
+    step = -62.0 * np.expm1((late - t[2:]) / 1e5)
+    np.testing.assert_allclose(chain.at(t)["u"][2:], step, rtol=1e-12)
+    np.testing.assert_allclose(chain.at(t)["u"], plant.at(t)["u"], rtol=1e-12)
+    assert chain.events[0].time == pytest.approx(plant.first_contact, rel=1e-12)
+    np.testing.assert_allclose(chain.at(t)["w"][:, 0], plant.at(t)["w1"], rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("start", "peak", "events", "twist"),
     [
