@@ -24,7 +24,8 @@ else:  # no numba for a help, a wrong option or the Tab key
 
 METHODS = ("auto", "closed-form", "collocation", "lp")
 OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
-KEYWORDS = ("terminal", "minimise", "method", "torque_speed", "smoothness", "workers", "scheduler")
+KEYWORDS = ("terminal", "minimise", "method", "torque_speed", "smoothness", "limits", "confirm", "workers",
+            "scheduler")  # fmt: skip
 OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in KEYWORDS}
 OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("gaps", "inertias", "load_torques")}
 

@@ -68,7 +68,7 @@ else:  # no numba for a help, a wrong option or the Tab key
     shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
 
 
-SEARCH = ("method", "tolerance", "time_limit", "confirm")  # how, not what
+SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits")  # how, not what
 
 
 @click.command(cls=Command)
@@ -77,6 +77,9 @@ SEARCH = ("method", "tolerance", "time_limit", "confirm")  # how, not what
     "--start-time",
     metavar="TIME",
     help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct. By default 1.2x.",
+)
+@click.option(
+    "--limits", is_flag=True, help="Find the least start time that keeps the [limits] of the drive instead."
 )
 @terminal_option("synchronous")
 @method_option
@@ -111,6 +114,7 @@ def optimize(
     load_torques: str | None,
     settings: tuple[str, ...],
     confirm: bool,
+    limits: bool,
     as_json: bool,
     out: str | None,
     **texts: str | None,
@@ -129,7 +133,8 @@ def optimize(
     if start_time is not None:
         with mistakes.noted():
             asked = StartTime.of(start_time, "--start-time")
-    bounds = bounds_of(texts, mistakes) | ({"confirm": True} if confirm else {})
+    flags = {"confirm": confirm, "limits": limits}
+    bounds = bounds_of(texts, mistakes) | {name: True for name, given in flags.items() if given}
     lists = (("gaps", gaps, "rad"), ("inertias", inertias, "kg*m^2"), ("load_torques", load_torques, "N*m"))
     for name, text, unit in lists:
         with mistakes.noted():

@@ -13,11 +13,13 @@ from softstart.drive import Drive
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.start import metrics
+from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
 Method = Literal["closed-form", "lp", "collocation", "robust"]
 BoundKind = Literal["certificate", "momentum", "none"]
 DemandShape = Literal["steps", "ramps", "continuous"]
+BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
 def heat_of(run: Run, until: float) -> float:
@@ -78,6 +80,51 @@ class Trial:
     failure: str
 
 
+@dataclass(frozen=True)
+class Kept:
+    """How the quickest start that keeps the limits of a drive keeps them.
+
+    Attributes
+    ----------
+    margins : tuple of Margin
+        The margin to each limit; that of the start time may be below 0.
+    at_least : float
+        No start that keeps the permissible shaft torque takes less time than this, s.
+    covers : str
+        For which starts that is proved.
+    unchecked : str
+        Why the life that is asked for was left out; "" if it was not.
+    """
+
+    margins: tuple[Margin, ...]
+    at_least: float
+    covers: str
+    unchecked: str
+
+    @property
+    def binding(self) -> str:
+        """The limit that forbids a quicker start; "" where it is the motor torque that does."""
+        used = [one for one in self.margins if one.name != "start time"]
+        tight = min(used, key=lambda one: one.share)
+        return tight.name if tight.share < BINDING else ""
+
+    @property
+    def kept(self) -> bool:
+        """Whether all limits are kept, that of the start time too."""
+        return all(one.kept for one in self.margins)
+
+    def summary(self) -> dict[str, Any]:
+        """Under the names used everywhere."""
+        return {
+            "kept": self.kept,
+            "binding": self.binding,
+            "start_time_at_least": self.at_least,
+            "start_time_covers": self.covers,
+            "unchecked": self.unchecked,
+            "margins": [one.summary() for one in self.margins],
+        }
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Optimum:
     """The best start found, as the exact plant runs it, and how much better any start could be.
@@ -107,6 +154,8 @@ class Optimum:
         that measures where it stands. Without those that have no start that quick.
     tried : tuple of Trial
         All searches in their order; the answer is that of the best one.
+    kept : Kept or None
+        Where the quickest start that keeps the limits was asked for, how it keeps them.
 
     Examples
     --------
@@ -132,6 +181,7 @@ class Optimum:
     warm: Any = field(default=None, repr=False)
     alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
     tried: tuple[Trial, ...] = ()
+    kept: Kept | None = None
 
     @property
     def k_dyn(self) -> float:
@@ -171,9 +221,9 @@ class Optimum:
         known = {at: one.k_dyn for at, one in self.alone.items()}
         return {
             "drive": problem.drive.name,
-            "minimise": problem.minimise,
+            "minimise": problem.minimise if self.kept is None else "start_time",
             "terminal": problem.terminal,
-            "start_time_bound": problem.start_time,
+            "start_time_bound": problem.start_time if self.kept is None else None,
             "k_dyn_bound": problem.k_dyn,
             "heat_bound": problem.heat,
             "method": self.method,
@@ -194,6 +244,7 @@ class Optimum:
             "first_contact": self.run.first_contact,
             "seconds": self.seconds,
             **({"k_dyn_if_position_known": known} if known else {}),
+            **({"limits": self.kept.summary()} if self.kept is not None else {}),
             "profile": _knots(self.profile),
         }
 

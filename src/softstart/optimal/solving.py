@@ -13,7 +13,7 @@ from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.optimal import pulse_coast_hold
+from softstart.optimal import pulse_coast_hold, within_limits
 from softstart.optimal.certificate import certified_bound, not_certified
 from softstart.optimal.exact import Hold, check, hold_of, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
@@ -57,6 +57,7 @@ def optimize(
     tolerance: float = TOLERANCE,
     time_limit: float = math.inf,
     confirm: bool = False,
+    limits: bool = False,
 ) -> Optimum:
     """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
 
@@ -96,6 +97,10 @@ def optimize(
         limit, so that the answer does not depend on the machine; 0 takes the first answer.
     confirm : bool
         Solve the CasADi problem in any case, from its own guess; `tried` has both answers.
+    limits : bool
+        Find instead the least start time at which the gentlest start keeps the limits of the drive: the
+        permissible shaft torque and the life, from whichever position. `kept` has the margin to each limit,
+        that of the start time too, and a lower bound of the start time.
 
     Returns
     -------
@@ -138,6 +143,16 @@ def optimize(
     for name, number in (("tolerance", tolerance), ("time_limit", time_limit)):
         if not number >= 0.0:
             raise InputError(f"{name} = {number:g}: give a number that is 0 or more.")
+    if limits:
+        given = {"start_time": start_time, "k_dyn": k_dyn, "confirm": confirm or None}
+        given["minimise"] = None if minimise == "k_dyn" else minimise
+        wrong = [name for name, value in given.items() if value is not None]
+        if wrong:
+            raise InputError(
+                [f"{name}: limits asks for the least start time; leave this out." for name in wrong]
+            )
+        within_limits.check_limits(about.drive)
+        return within_limits.quickest(about, lambda one: solve(one, method, warm), time_limit)
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
     best = solve(replace(about, start_time=seconds), method, warm, tolerance, time_limit, confirm)
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best

@@ -77,6 +77,11 @@ class Margin:
         """Whether the limit is kept."""
         return self.share >= 0.0
 
+    def summary(self) -> dict[str, Any]:
+        """As plain data."""
+        plain = {"limit": self.name, "unit": self.unit, "value": self.value, "permitted": self.limit}
+        return {**plain, "margin": self.share, "kept": self.kept, "case": self.case}
+
     def __str__(self) -> str:
         """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)"."""
         where = f" with {self.case}" if self.case else ""
@@ -180,13 +185,8 @@ class Row:
             "k_dyn_light_load": self.k_dyn_light_load,
             "effort": self.effort.value,
             "flags": [flag.text for flag in self.flags],
-            **({"limits": [_plain(one) for one in self.margins(limits)]} if limits else {}),
+            **({"limits": [one.summary() for one in self.margins(limits)]} if limits else {}),
         }
-
-
-def _plain(one: Margin) -> dict[str, Any]:
-    plain = {"limit": one.name, "unit": one.unit, "value": one.value, "permitted": one.limit}
-    return {**plain, "margin": one.share, "kept": one.kept, "case": one.case}
 
 
 def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
@@ -266,7 +266,7 @@ def recommend(drive: Drive, rows: Iterable[Row]) -> Recommendation:
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _unbeaten(able)
     found = _with_limits(limits, rows, able, best) if limits else _without_limits(limits, rows, best)
-    return replace(found, text=f"{found.text}{_unchecked(drive)}")
+    return replace(found, text=f"{found.text}{unchecked_life(drive)}")
 
 
 def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
@@ -282,10 +282,10 @@ def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
 
 def checked_limits(drive: Drive) -> Limits:
     """The limits of a drive without a life that cannot be computed."""
-    return replace(drive.limits, life=None) if _unchecked(drive) else drive.limits
+    return replace(drive.limits, life=None) if unchecked_life(drive) else drive.limits
 
 
-def _unchecked(drive: Drive) -> str:
+def unchecked_life(drive: Drive) -> str:
     """Why the life that is asked for is not checked; "" if it is, or if none is."""
     limits = drive.limits
     if limits.life is None:

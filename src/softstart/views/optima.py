@@ -12,7 +12,8 @@ import numpy as np
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
-from softstart.optimal.result import Optimum, RobustOptimum, SensorWorth
+from softstart.optimal.result import Kept, Optimum, RobustOptimum, SensorWorth
+from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import Run
 from softstart.views.drawing import (
     COLOURS,
@@ -63,7 +64,8 @@ def figure_rows(best: Optimum) -> list[list[str]]:
     """The figures of the optimum, as words and numbers."""
     run, bound, problem = best.run, best.bound, best.problem
     bounded = bound.kind != "none"
-    allowed = "" if problem.start_time is None else f", {short(problem.start_time)} s allowed"
+    asked = problem.start_time is not None and best.kept is None
+    allowed = f", {short(problem.start_time)} s allowed" if asked else ""
     most = "" if problem.k_dyn is None else f", {short(problem.k_dyn)} allowed"
     hottest = "" if problem.heat is None else f", {short(problem.heat)} s allowed"
     return [
@@ -72,6 +74,7 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         ["gap between them", f"{best.gap_percent:.3g} %" if bounded else NOTHING],
         ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
         ["start time", f"{short(best.end_time)} s{allowed}"],
+        *([["least start time", f"{short(best.kept.at_least)} s"]] if best.kept is not None else []),
         ["I2t heat", f"{short(best.heat)} s of starting torque{hottest}"],
         ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
         ["contacts", str(run.contacts)],
@@ -93,7 +96,10 @@ def question(best: Optimum) -> str:
     """What was asked for."""
     problem = best.problem
     words = [f"least {AIMS[problem.minimise]}"]
-    if problem.start_time is not None:
+    if best.kept is not None:
+        limits = [f"{one.name} {short(one.limit)} {one.unit}" for one in best.kept.margins]
+        words = [f"least start time that keeps the limits ({', '.join(limits)})"]
+    elif problem.start_time is not None:
         words.append(f"start time at most {problem.start_time:.6g} s")
     if problem.k_dyn is not None:
         words.append(f"K_dyn at most {problem.k_dyn:.6g}")
@@ -108,7 +114,9 @@ def question(best: Optimum) -> str:
 
 
 def comparison(best: Optimum, others: Sequence[Run]) -> str:
-    """The optimum beside `direct` and beside the gentlest shipped controller."""
+    """The optimum beside `direct` and the gentlest shipped controller, or the quickest within limits."""
+    if best.kept is not None:
+        return _within_limits(best, best.kept, others)
     text = f"K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
     reaching = [run for run in others if not math.isnan(run.start_time)]
     direct = next((run for run in reaching if run.controller_name == "direct"), None)
@@ -143,8 +151,38 @@ def position_sentences(best: Optimum) -> list[str]:
     ]
 
 
+def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
+    """The quickest start that keeps the limits: margins, what forbids a quicker one, shipped strategies."""
+    margins = "; ".join(map(str, kept.margins))
+    least, which = "Least start time that keeps the", "limits" if kept.kept else "others"
+    text = "" if kept.kept else "No start keeps all limits. "
+    text += f"{least} {which}: {best.end_time:.4g} s. {margins[:1].upper()}{margins[1:]}."
+    if kept.binding:
+        text += f" The {kept.binding} forbids a quicker start."
+    else:
+        text += " No limit forbids a quicker start, but the motor torque and the gap, which may close once."
+    less = 100.0 * (1.0 - kept.at_least / best.end_time)
+    text += f" None takes less than {kept.at_least:.6g} s ({less:.2g} % less)."
+    passing = [run for run in others if _keeps(run)]
+    if not passing:
+        return f"{text} No shipped strategy keeps them."
+    first = min(passing, key=lambda run: run.start_time)
+    taken = f"{first.controller_name}, takes {first.start_time:.4g} s"
+    several = first.start_time < best.end_time and first.contacts > 1
+    contacts = f", with {first.contacts} contacts" if several else ""
+    return f"{text} The quickest shipped strategy that keeps them, {taken}{contacts}."
+
+
+def _keeps(run: Run) -> bool:
+    margins = Row(run, None, worst_case=()).margins(checked_limits(run.drive))
+    return all(one.kept for one in margins)
+
+
 def bound_sentence(best: Optimum) -> str:
     """What the lower bound covers."""
+    if best.kept is not None:
+        unchecked = f" {best.kept.unchecked}" if best.kept.unchecked else ""
+        return f"The lower bound of the start time covers {best.kept.covers}".rstrip(".") + f".{unchecked}"
     if best.bound.kind == "none":
         return (
             f"No lower bound is known here: {best.bound.covers}" if best.bound.covers else "No lower bound."
@@ -167,7 +205,7 @@ def optimum_figure(best: Optimum) -> Any:
         _twist(twist, best)
         twist.set_xlabel("time, s     (grey: gap open; dotted: end of the start)")
         twist.set_xlim(0.0, run.end_time)
-        aim = {"k_dyn": "K_dyn", "start_time": "start time"}.get(best.problem.minimise, best.problem.minimise)
+        aim = AIMS[best.problem.minimise] if best.kept is None else "start time within limits"
         asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
     return figure
@@ -216,6 +254,9 @@ def _shaft_torque(axes: Axes, best: Optimum) -> None:
         least = best.bound.k_dyn * base
         axes.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
     axes.axhline(base, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
+    if best.kept is not None and best.problem.drive.limits.shaft_torque is not None:
+        most = best.problem.drive.limits.shaft_torque
+        axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
     axes.plot([run.peak_time], [peak], "o", ms=4, color=COLOURS[0])
     if not math.isnan(run.first_contact):
         axes.plot([run.first_contact], [0.0], "^", ms=6, color=COLOURS[1], clip_on=False, label="contact")
@@ -232,7 +273,7 @@ def _speeds(axes: Axes, best: Optimum) -> None:
     axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
     axes.axhline(problem.target, color=GREY, lw=0.8, ls=":", label="target")
     title = f"start time {best.end_time:.4f} s"
-    if problem.start_time is not None:
+    if problem.start_time is not None and best.kept is None:
         title += f", {problem.start_time:.4f} s allowed"
         axes.axvline(problem.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="allowed")
     head(axes, title, "rad/s")

@@ -25,6 +25,42 @@ def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run):
     assert "With the position known" in " ".join(out.split())
 
 
+LIMITED = ("optimize", *SIXTY, "--limits", "--set", "limits.shaft_torque=50 N*m")
+
+
+def test_the_quickest_start_within_limits(run):
+    code, out, err = run(*LIMITED, "--set", "limits.start_time=0.3")
+    assert (code, err) == (0, "")
+    flat = " ".join(out.split())
+    assert "asked least start time that keeps the limits (shaft torque 50 N m, start time 0.3 s)" in flat
+    assert "Least start time that keeps the limits: 0.2" in flat
+    assert "Shaft torque 50 N m of 50 N m (margin" in flat
+    assert "The shaft torque forbids a quicker start. None takes less than" in flat
+    code, out, err = run(*LIMITED, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    assert (told["minimise"], told["start_time_bound"]) == ("start_time", None)
+    assert told["limits"]["kept"]
+    assert told["limits"]["margins"][0]["permitted"] == 50.0
+    assert told["limits"]["start_time_at_least"] <= told["start_time"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("optimize", "--limits"), "--limits: Crane travel drive"),
+        ((*LIMITED, "--start-time", "1.2x"), "--start-time: limits asks for the least start time"),
+        ((*LIMITED, "--confirm"), "--confirm: limits asks for the least start time"),
+        ((*LIMITED, "--gaps", "0.5,1"), "--limits: one profile for several drives"),
+    ],
+)
+def test_what_limits_do_not_go_with_is_refused(run, arguments, said):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
 def test_json_is_the_summary_of_the_optimum(run):
     code, out, err = run(*ANCHOR, "--json")
     assert (code, err) == (0, "")

@@ -1,0 +1,185 @@
+"""The quickest start that keeps the limits of a drive.
+
+The least K_dyn falls with the start time, so the quickest start that keeps a permissible shaft torque is the
+gentlest one of the first start time at which it does: a root, and each value on the way is an optimum by the
+method that is exact for it, with its lower bound. A life that is asked for joins in: what is looked for is
+the first of these gentlest starts that keeps all.
+
+How good the answer is: where a lower bound of the peak lies above the permissible torque, no start of that
+time or less keeps it. The longest such time is a lower bound of the start time.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from softstart.drive import Drive, Limits
+from softstart.errors import InputError
+from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import InfeasibleError, Kept, NotConverged, Optimum, OptimumError, Verdict
+from softstart.optimal.shortest import Bracket
+from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
+
+AIM = 1.0 - 2e-6  # of a limit: an answer on the near side of it
+WITHIN = 1e-5  # of the start time
+WITHIN_SEVERAL = 1e-3  # the same where one profile serves several positions: each try takes long
+EDGE = 1e-4  # so much longer than the shortest start, its program is sure to find one
+LONGEST = 100.0  # times the first start time that is not ruled out: no longer one is tried
+MOST_TRIALS = 30
+PROOFS = 4  # shorter start times whose certificates are asked for, after the answer
+
+
+def check_limits(drive: Drive) -> None:
+    """InputError where no limit of the drive bounds what a start does to the shaft.
+
+    >>> check_limits(Drive.load("hoist-15kw"))
+    Traceback (most recent call last):
+    softstart.errors.InputError: limits: ... has no permissible shaft torque; give limits.shaft_torque...
+    """
+    limits = checked_limits(drive)
+    if limits.shaft_torque is None and limits.life is None:
+        raise InputError(
+            f"limits: {drive.name or 'the drive'} has no permissible shaft torque; give "
+            f'limits.shaft_torque in its file, as "175 N*m".{unchecked_life(drive)}'
+        )
+
+
+def quickest(problem: Problem, solve: Callable[[Problem], Optimum], seconds: float = math.inf) -> Optimum:
+    """The quickest of the gentlest starts that keep the limits; `solve` finds the gentlest one of a time.
+
+    The start time of `problem` does not count. After `seconds` of the clock no further start time is tried
+    once a start that keeps the limits is known. Raises InfeasibleError where there is none.
+    """
+    began = time.perf_counter()
+    search = _Search(problem, solve)
+    found = search.first_that_keeps(began + seconds)
+    at_least, covers = search.proved(found)
+    margins = search.margins(found, checked_limits(problem.drive))
+    return replace(
+        found,
+        why=f"{found.why}; the first start time whose gentlest start keeps the limits",
+        kept=Kept(margins, at_least, covers, unchecked_life(problem.drive).strip()),
+        seconds=time.perf_counter() - began,
+    )
+
+
+class _Search:
+    """Start times that were tried, each with its gentlest start."""
+
+    def __init__(self, problem: Problem, solve: Callable[[Problem], Optimum]) -> None:
+        self.problem, self.solve = problem, solve
+        self.limits = replace(checked_limits(problem.drive), start_time=None)
+        most = self.limits.shaft_torque
+        self.allowed = math.inf if most is None else most / problem.base_torque
+        self.tried: list[Optimum] = []
+        self.shortest = 0.0  # no start with one contact is quicker, as far as that is known, s
+        self.soonest = self._soonest()
+
+    def _soonest(self) -> float:
+        """No start keeps the permissible torque in less time, s, however often the gap closes."""
+        low = momentum_shortest_time(self.problem)
+        if not self._too_hard(low):
+            return low
+        high = 2.0 * low
+        while self._too_hard(high):
+            if high > LONGEST * low:
+                least = self._bound(high) * self.problem.base_torque
+                raise self._none(f"within {high:.4g} s no start has a peak below {least:.4g} N m")
+            high *= 2.0
+        while high - low > 1e-12 * high:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._too_hard(middle) else (low, middle)
+        return high
+
+    def _bound(self, end: float) -> float:
+        return momentum_bound(replace(self.problem, start_time=end)).k_dyn
+
+    def _too_hard(self, end: float) -> bool:
+        return self._bound(end) > self.allowed
+
+    def first_that_keeps(self, until: float) -> Optimum:
+        """The gentlest start of the least start time that is found, by regula falsi."""
+        within = WITHIN if len(self.problem.drive.positions) == 1 else WITHIN_SEVERAL
+        bracket, found, end = Bracket(), None, self.soonest * (1.0 + 1e-9)
+        bracket.low = self.soonest
+        for _ in range(MOST_TRIALS):
+            best = self._gentlest(end)
+            share = math.inf if best is None else self._share(best)
+            if best is not None and share <= 1.0:
+                found = best
+                if share >= 1.0 - within or end <= max(self.soonest, self.shortest) * (1.0 + 2.0 * EDGE):
+                    break
+            bracket.take(end, end * min(max(share - AIM, -0.5), 1.0) if best else math.inf)
+            bracket.low = max(bracket.low, min(self.shortest, bracket.high))
+            late = found is not None and time.perf_counter() > until
+            if late or bracket.high - bracket.low <= within * end or end > LONGEST * self.soonest:
+                break
+            end = bracket.next()
+            if end <= self.shortest:
+                end = self.shortest * (1.0 + EDGE)
+        if found is None:
+            raise self._none(self._nearest())
+        return found
+
+    def _gentlest(self, end: float) -> Optimum | None:
+        try:
+            best = self.solve(replace(self.problem, start_time=end))
+        except InfeasibleError as none:
+            if math.isinf(none.verdict.shortest_start_time):
+                raise
+            self.shortest = max(self.shortest, none.verdict.shortest_start_time)  # nan: as it was
+            return None
+        except (OptimumError, NotConverged):
+            return None
+        self.tried.append(best)
+        return best
+
+    def margins(self, best: Optimum, limits: Limits) -> tuple[Margin, ...]:
+        """Those of the start, by the rule of `compare`; of an unknown position the worst."""
+        return Row(best.run, None, worst_case=()).margins(limits)
+
+    def _share(self, best: Optimum) -> float:
+        """The largest share of a limit that a start takes."""
+        return max(1.0 - one.share for one in self.margins(best, self.limits))
+
+    def proved(self, found: Optimum) -> tuple[float, str]:
+        """No start that keeps the permissible torque takes less time than this, s; what that covers."""
+        by_momentum = self.soonest, momentum_bound(found.problem).covers
+        if found.bound.kind != "certificate" or math.isinf(self.allowed):
+            return by_momentum
+        # K_dyn falls so many times as fast as the time rises; the certificate lies as far below it as here
+        others = [one for one in self.tried if one.end_time != found.end_time]
+        near = min(others, key=lambda one: abs(one.end_time - found.end_time), default=None)
+        steep = 1.0
+        if near is not None:
+            steep = abs(math.log(near.k_dyn / found.k_dyn) / math.log(near.end_time / found.end_time))
+        step = 1.2 * max(self.allowed / found.bound.k_dyn - 1.0, WITHIN) / max(steep, 0.1)
+        for _ in range(PROOFS):
+            end = found.end_time * (1.0 - step)
+            if end <= self.soonest:
+                break
+            best = self._gentlest(end)
+            if best is None and end <= self.shortest:
+                break
+            if best is not None and best.bound.k_dyn > self.allowed:
+                return end, best.bound.covers
+            step *= 2.0
+        return by_momentum
+
+    def _nearest(self) -> str:
+        if not self.tried:
+            return f"no start of up to {LONGEST * self.soonest:.4g} s was found at all"
+        nearest = min(self.tried, key=self._share)
+        worst = min(self.margins(nearest, self.limits), key=lambda one: one.share)
+        return f"the nearest start that was found takes {nearest.end_time:.4g} s, {worst}"
+
+    def _none(self, reason: str) -> InfeasibleError:
+        most, life = self.limits.shaft_torque, self.limits.life
+        asked = [] if most is None else [f"shaft torque {most:.4g} N m"]
+        asked += [] if life is None else [f"life {life / 3600.0:.4g} h"]
+        sentence = f"limits: no start of {self.problem.drive.name} keeps them ({', '.join(asked)}): {reason}."
+        return InfeasibleError(Verdict(self.problem, math.inf, "the limits", sentence))

@@ -1,0 +1,150 @@
+"""The quickest start that keeps the limits: against closed form, collocation, bounds and strategies."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.softstart.plant.test_brake import HOIST
+
+from softstart import Drive, InputError, TorqueProfile, compare, optimize, simulate
+from softstart.controller import ready_controller_names
+from softstart.optimal.pulse_coast_hold import PulseCoastHold
+from softstart.optimal.result import InfeasibleError
+from softstart.start import metrics
+from softstart.views.optima import bound_sentence, comparison, question
+
+CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+HELD = HOIST.replace(brake="motor", start_position="hanging", permissible_torque=175.0)
+
+
+@pytest.mark.parametrize("torque", [25.0, 40.0, 50.0])
+def test_where_a_formula_is_exact_the_bound_is_reached(torque: float) -> None:
+    best = optimize(CRANE.replace(permissible_torque=torque), limits=True)
+    assert best.kept is not None
+    assert best.run.peak_torque == pytest.approx(torque, rel=1e-5)
+    assert best.run.peak_torque <= torque
+    assert best.kept.at_least <= best.end_time <= best.kept.at_least * (1.0 + 1e-5)
+    assert (best.kept.binding, best.kept.kept) == ("shaft torque", True)
+    formula = PulseCoastHold.of(best.problem).least_peak_for(60.0, best.end_time)
+    assert formula == pytest.approx(torque, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_it_is_the_least_start_time_that_collocation_finds() -> None:
+    torque = 60.0
+    best = optimize(CRANE.replace(permissible_torque=torque), limits=True)
+    k_dyn = torque / float(metrics.base_torque(CRANE))
+    other = optimize(CRANE, minimise="start_time", k_dyn=k_dyn)
+    assert other.method == "collocation"
+    assert best.end_time == pytest.approx(other.end_time, rel=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "drive",
+    [
+        HELD,
+        HELD.replace(torque_lag=0.005),
+        HELD.replace(permissible_torque=153.0),
+        CRANE.replace(permissible_torque=70.0),
+        CRANE.replace(permissible_torque=45.0, load_kind="reactive"),
+    ],
+)
+def test_nothing_keeps_the_limits_in_less_time(drive: Drive) -> None:
+    """Shorter optima, the answer's own torque shaken, and all shipped strategies."""
+    best = optimize(drive, limits=True)
+    assert best.kept is not None
+    most = drive.limits.shaft_torque
+    assert most is not None
+    assert best.run.peak_torque <= most
+    assert best.kept.at_least <= best.end_time
+    with suppress(InfeasibleError):
+        assert optimize(drive, 0.998 * best.end_time, time_limit=0.0).run.peak_torque > most
+    rng = np.random.default_rng(14)
+    for _ in range(40):
+        torque = best.profile.torque * (1.0 + 0.05 * rng.standard_normal(best.profile.torque.size))
+        shaken = TorqueProfile(best.profile.time, np.clip(torque, 0.0, drive.Ms))
+        run = simulate(drive, "profile", parameters={"profile": shaken})
+        keeps = run.peak_torque <= most and run.contacts == 1
+        assert not (keeps and run.start_time < best.kept.at_least * (1.0 - 1e-9))
+    for name in ready_controller_names():
+        run = simulate(drive, name)
+        keeps = run.peak_torque <= most and run.contacts <= 1
+        assert not (keeps and run.start_time < best.kept.at_least * (1.0 - 1e-9)), name
+
+
+@pytest.mark.slow
+def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
+    curve: dict[str, Any] = {"fatigue_slope": 6.6, "fatigue_torque": (90.0,), "fatigue_cycles": (2e6,)}
+    life = {"starts_per_hour": 600.0, "required_life": 3600.0 * 2e5}
+    drive = HELD.replace(**curve, **life)
+    best = optimize(drive, limits=True)
+    assert best.kept is not None
+    used = {one.name: one.value for one in best.kept.margins}
+    assert best.kept.binding == "used life"
+    assert used["used life"] == pytest.approx(100.0, rel=2e-4)
+    assert used["used life"] <= 100.0
+    assert used["shaft torque"] < 170.0
+    assert best.end_time > optimize(HELD, limits=True).end_time
+
+
+def test_margins_are_those_of_compare() -> None:
+    drive = HELD.replace(permissible_start_time=0.3)
+    best = optimize(drive, limits=True)
+    played = compare(drive, [best.run.controller], worst_case=[]).rows[0].margins(drive.limits)
+    assert best.kept is not None
+    assert [str(one) for one in best.kept.margins] == [str(one) for one in played]
+    assert best.summary()["limits"]["margins"] == [one.summary() for one in best.kept.margins]
+
+
+def test_a_start_time_that_cannot_be_kept_is_said() -> None:
+    drive = HELD.replace(permissible_torque=153.0, permissible_start_time=0.2)
+    best = optimize(drive, limits=True)
+    assert best.kept is not None
+    assert not best.kept.kept
+    assert best.kept.at_least > 0.2  # a proof that no start with one contact keeps both
+    assert comparison(best, []).startswith(
+        "No start keeps all limits. Least start time that keeps the others"
+    )
+    assert question(best).startswith("least start time that keeps the limits (shaft torque 153 N m, start")
+
+
+@pytest.mark.slow
+def test_with_wide_limits_the_motor_torque_is_what_forbids_a_quicker_start() -> None:
+    drive = CRANE.replace(permissible_torque=1000.0)
+    best = optimize(drive, limits=True)
+    assert best.kept is not None
+    assert best.kept.binding == ""
+    assert best.end_time == pytest.approx(0.2498, abs=1e-4)  # the shortest start with one contact
+    direct = simulate(drive, "direct")
+    assert best.kept.at_least < direct.start_time < best.end_time
+    said = comparison(best, [direct])
+    assert "No limit forbids a quicker start" in said
+    assert f"direct, takes 0.2403 s, with {direct.contacts} contacts" in said
+    assert "however often the gap closes" in bound_sentence(best)
+
+
+@pytest.mark.parametrize(
+    ("drive", "given", "said"),
+    [
+        (CRANE, {}, "limits: .* has no permissible shaft torque; give limits.shaft_torque in its file"),
+        (CRANE.replace(permissible_start_time=0.3), {}, "has no permissible shaft torque"),
+        (HELD, {"start_time": 0.3}, "start_time: limits asks for the least start time; leave this out"),
+        (HELD, {"minimise": "heat"}, "minimise: limits asks"),
+        (HELD, {"confirm": True}, "confirm: limits asks"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(drive: Drive, given: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        optimize(drive, limits=True, **given)
+
+
+def test_a_torque_that_no_start_keeps_is_proved_so() -> None:
+    """The active load falls back through half the gap and hits harder than 9 N m by itself."""
+    with pytest.raises(
+        InfeasibleError, match=r"keeps them \(shaft torque 9 N m\): within .* has a peak below"
+    ):
+        optimize(CRANE.replace(permissible_torque=9.0), limits=True)
