@@ -64,8 +64,8 @@ def figure_rows(best: Optimum) -> list[list[str]]:
     """The figures of the optimum, as words and numbers."""
     run, bound, problem = best.run, best.bound, best.problem
     bounded = bound.kind != "none"
-    asked = problem.start_time is not None and best.kept is None
-    allowed = f", {short(problem.start_time)} s allowed" if asked else ""
+    latest = problem.start_time if best.kept is None else None
+    allowed = "" if latest is None else f", {short(latest)} s allowed"
     most = "" if problem.k_dyn is None else f", {short(problem.k_dyn)} allowed"
     hottest = "" if problem.heat is None else f", {short(problem.heat)} s allowed"
     return [
