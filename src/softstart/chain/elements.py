@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar, Literal, get_args
 
-from softstart.drive import ContactLaw, Drive, LoadKind
+from softstart.drive import ContactLaw, Drive, LoadKind, Position
 from softstart.input.documents import Table
 from softstart.input.files import Library
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, like, parameter
@@ -131,9 +131,11 @@ class Shaft(ParameterSet):
         "shaft.permissible_torque", "N*m", "permissible peak torque of shaft, coupling or gear", '"800 N*m"',
         "above 0", default=None,
     )  # fmt: skip
-    start_position: Number = parameter(
-        "shaft.start_position", "rad", "twist at the start (0 is mid-gap)", '"0 rad"', default=0.0
-    )
+    start_position: MaybeNumber = parameter(
+        "shaft.start_position", "rad", "twist at the start (0 is mid-gap); else by `start.position`",
+        '"0 rad"',
+        default=None,
+    )  # fmt: skip
 
     def contradictions(self) -> Iterable[str]:
         """Sentences on values that contradict one another."""
@@ -183,7 +185,7 @@ class Shaft(ParameterSet):
             for key in ("damping", "damping_ratio"):
                 if vars(self)[key]:
                     yield f"{key} = {vars(self)[key]!r}: a rigid joint has no damping; leave it out."
-            if abs(self.start_position) > 0.5 * gap:
+            if abs(self.start_position or 0.0) > 0.5 * gap:
                 yield (
                     f"start_position = {self.start_position!r}: a rigid gap of {gap!r} rad lets the twist "
                     f"lie between {-0.5 * gap!r} and {0.5 * gap!r}."
@@ -249,6 +251,10 @@ START = Table(
         Parameter(
             "target_speed", "rad/s", "speed, at the motor shaft, that the load is to reach", '"880 rpm"',
             "above 0", default=None,
+        ),
+        Parameter(
+            "position", "", "position in all gaps at the start", '"hanging"', default="mid-gap",
+            choices=get_args(Position),
         ),
     ),
     required=False,

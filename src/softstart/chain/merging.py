@@ -85,7 +85,7 @@ class Section:
             gap=self.gap,
             efficiency=self.efficiency,
             contact_law=self.law,
-            start_position=self.start,
+            start_position=self.start or None,
         )
 
 

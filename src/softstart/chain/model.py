@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,10 +33,14 @@ from softstart.chain.elements import (
     Quantity,
     Shaft,
 )
-from softstart.drive import ContactLaw, Drive
+from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document, read_table
-from softstart.quantities import nearest, show
+from softstart.input.files import ABSENT, read_text, refusal_of
+from softstart.late import late
+from softstart.quantities import RefusedError, nearest, show
+
+simulation = late("softstart.chain.simulation")  # above this module; see softstart.late
 
 
 @dataclass(frozen=True, init=False)
@@ -58,6 +63,10 @@ class Chain:
     target_speed : float or str, optional
         Speed of the load, rad/s *at the motor shaft*, as in a `Drive`; by default the rated speed of the
         motor.
+    position : str, optional
+        Where the start begins in every gap whose shaft has no `start_position`: "mid-gap" (the default),
+        "driving-flank", "opposite-flank", "hanging" (each shaft wound up by the active load behind it), or
+        "unknown", all gaps alike.
     name, source : str, optional
         Name of the chain, and source of its numbers.
     assumed : str, optional
@@ -84,6 +93,7 @@ class Chain:
     motor: Motor | None
     load_mass: str
     target_speed: float | None
+    position: str
     name: str
     source: str
     assumed: str
@@ -96,6 +106,7 @@ class Chain:
         *,
         load_mass: str = "",
         target_speed: Quantity | None = None,
+        position: str = "mid-gap",
         name: str = "unnamed chain",
         source: str = "",
         assumed: str = "",
@@ -120,6 +131,7 @@ class Chain:
         put(self, "motor", motor)
         put(self, "load_mass", load_mass)
         put(self, "target_speed", target_speed)
+        put(self, "position", read_table({"position": position}, START)["position"])
         put(self, "name", name)
         put(self, "source", source)
         put(self, "assumed", assumed)
@@ -158,6 +170,7 @@ class Chain:
             "motor": found["motor"] and made(Motor, found["motor"], f"{before}[motor], ", wrong),
             "load_mass": start.get("load", ""),
             "target_speed": start.get("target_speed"),
+            "position": start.get("position", "mid-gap"),
         }
         chain = None if wrong else made(cls, parts | found[""], before, wrong)
         if chain is None:
@@ -177,7 +190,9 @@ class Chain:
         of: Any = drive  # one number for each parameter
         rotor = Mass(of.J1, name="motor", initial_speed=of.initial_motor_speed)
         load = Mass(of.J2, name="load", torque=of.Mc, kind=of.load_kind, initial_speed=of.initial_load_speed)
-        shaft = Shaft(of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=of.theta0)
+        shaft = Shaft(
+            of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=of.theta0 or None
+        )
         motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key != "mass"})
         return cls(
             (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source
@@ -185,7 +200,7 @@ class Chain:
 
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
-        start = {"load": self.load_mass, "target_speed": self.target_speed}
+        start = {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
         rows: list[tuple[Table, Any]] = [(TOP, vars(self))]
         for i, mass in enumerate(self.masses):
             rows += [(MASS, mass.values()), *((SHAFT, shaft.values()) for shaft in self.shafts[i : i + 1])]
@@ -272,6 +287,48 @@ class Chain:
             "decide the peaks. Give each shaft a damping_ratio (geared trains have 1 to 6 %).",
         )
 
+    # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------
+
+    @property
+    def limits(self) -> Limits:
+        """The permissible torques of its shafts, as limits of a comparison."""
+        given = any(shaft.permissible_torque is not None for shaft in self.shafts)
+        return Limits(used_torque=100.0 if given else None)
+
+    @property
+    def positions(self) -> Mapping[str, Self]:
+        """The chain at each position at which it may start: one, or three if that is unknown."""
+        if self.position != "unknown":
+            return {self.position: self}
+        return {one: replace(self, position=one) for one in UNKNOWN_POSITIONS}
+
+    def start(self, controller: Any, until: float | None = None, **options: Any) -> Any:
+        """Its start under a controller: `simulate_chain`."""
+        return simulation.simulate_chain(self, controller, until, **options)
+
+    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+        """The chain with so many times its gaps, and its load mass with so many times its inertia.
+
+        An angle in a gap keeps its share of it, one beyond a flank its overlap.
+
+        >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
+        0.8
+        """
+
+        def moved(shaft: Shaft) -> Shaft:
+            theta, half = shaft.start_position, 0.5 * shaft.gap
+            if theta is not None:
+                inside = max(-half, min(theta, half))
+                theta = gaps * inside + (theta - inside)
+            return shaft.replace(gap=gaps * shaft.gap, backlash=None, diameter=None, start_position=theta)
+
+        load = self.load_index
+        masses = [
+            mass.replace(inertia=load_inertia * mass.inertia) if i == load else mass
+            for i, mass in enumerate(self.masses)
+        ]
+        return replace(self, masses=tuple(masses), shafts=tuple(map(moved, self.shafts)))
+
     # ---- the chain at one shaft --------------------------------------------------------------------------
 
     def brought_to(self, reference: str | int = "motor") -> Self:
@@ -289,6 +346,7 @@ class Chain:
         (1.0, 2.0, 0.2)
         """
         at = arrays_at(self, self.index(reference))
+        placed = self.position in ("mid-gap", "unknown")
         columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, strict=True)
         masses = [
             m.replace(inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
@@ -302,7 +360,7 @@ class Chain:
                 damping_ratio=None,
                 gap=float(gap),
                 permissible_torque=None if math.isnan(most) else float(most),
-                start_position=float(theta0),
+                start_position=None if placed and s.start_position is None else float(theta0),
                 ratio=1.0,
                 side=s.side if s.efficiency < 1.0 else "before",
             )
@@ -315,6 +373,7 @@ class Chain:
             shafts=tuple(shafts),
             motor=self.motor if here else None,
             target_speed=self.target_speed if here else None,
+            position=self.position if placed else "mid-gap",
         )
 
     def at_motor_shaft(self) -> ChainArrays:
@@ -375,9 +434,9 @@ class ChainArrays:
     `reactive` its kind, `w0` speed at the start, `speed_ratio` the speed of the mass's own shaft over that of
     the reference shaft (`i` of [R]; own speed = speed here * speed_ratio).
     Of the shafts: `c` stiffness (infinite where `rigid`), `d` damping, `gap` total gap, `restitution` (NaN
-    where not rigid), `law` contact laws, `theta0` twist at the start,
-    `permissible` torque (NaN where none), `efficiency` of its gear and `gear`, the index of the mass at which
-    that sits: it turns with the mass, the shaft lies on its other side.
+    where not rigid), `law` contact laws, `theta0` twist at the start, `permissible` torque (NaN where none),
+    `torque_ratio` a torque here over the same at the shaft itself, `efficiency` of its gear and `gear`, the
+    index of the mass at which that sits: it turns with the mass, the shaft lies on its other side.
     `motor` and `load` are the indices of the masses with the motor and with the target speed.
     """
 
@@ -395,6 +454,7 @@ class ChainArrays:
     law: tuple[ContactLaw, ...]
     theta0: Vector
     permissible: Vector
+    torque_ratio: Vector
     efficiency: Vector
     gear: NDArray[np.int64]
     motor: int
@@ -449,21 +509,25 @@ def arrays_at(chain: Chain, index: int) -> ChainArrays:
     J = np.array([mass.inertia for mass in masses]) * i * i
     c = np.array([shaft.stiffness for shaft in shafts]) * of_shaft * of_shaft
     permissible = [math.nan if s.permissible_torque is None else s.permissible_torque for s in shafts]
+    gap = np.array([shaft.gap for shaft in shafts]) / of_shaft
+    Mc = np.array([mass.torque for mass in masses]) * i
+    angles = np.array([math.nan if s.start_position is None else s.start_position for s in shafts]) / of_shaft
     return ChainArrays(
         J=J,
         d_ground=np.array([mass.damping for mass in masses]) * i * i,
-        Mc=np.array([mass.torque for mass in masses]) * i,
+        Mc=Mc,
         reactive=np.array([mass.kind == "reactive" for mass in masses]),
         w0=np.array([mass.initial_speed for mass in masses]) / i,
         speed_ratio=i,
         c=c,
         d=np.array([shaft.damping for shaft in shafts]) * of_shaft * of_shaft + _from_ratios(shafts, J, c),
-        gap=np.array([shaft.gap for shaft in shafts]) / of_shaft,
+        gap=gap,
         rigid=np.array([shaft.rigid for shaft in shafts]),
         restitution=np.array([math.nan if s.restitution is None else s.restitution for s in shafts]),
         law=tuple(shaft.contact_law for shaft in shafts),
-        theta0=np.array([shaft.start_position for shaft in shafts]) / of_shaft,
+        theta0=np.where(np.isnan(angles), _twists(chain, gap, c, Mc), angles),
         permissible=np.array(permissible) * of_shaft,
+        torque_ratio=of_shaft,
         efficiency=np.array([shaft.efficiency for shaft in shafts]),
         gear=np.array([k + (shaft.side == "before") for k, shaft in enumerate(shafts)]),
         motor=chain.motor_index,
@@ -489,3 +553,52 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
             before, after = float(J[first : k + 1].sum()), float(J[k + 1 : last + 1].sum())
             found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * before * after / (before + after))
     return found
+
+
+def _twists(chain: Chain, gap: Vector, c: Vector, Mc: Vector) -> Vector:
+    """Twists of the shafts at the chain's position; those of an unknown one are 0, its middle.
+
+    The driving flank is that on which the motor drives the masses behind the shaft. Hanging, each shaft is
+    wound up by the active loads behind it.
+    """
+    if chain.position in ("mid-gap", "unknown"):
+        return np.zeros(gap.size)
+    motor = chain.motor_index
+    drives = np.where(np.arange(gap.size) >= motor, 1.0, -1.0)
+    if chain.position != "hanging":
+        return (0.5 if chain.position == "driving-flank" else -0.5) * drives * gap
+    pulls = np.where([mass.kind == "active" for mass in chain.masses], Mc, 0.0)
+    behind = np.cumsum(pulls)[:-1]
+    behind[motor:] = np.cumsum(pulls[::-1])[::-1][1 + motor :]
+    return np.sign(behind) * drives * (0.5 * gap + np.abs(behind) / c)
+
+
+def load_machine(given: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Drive | Chain:
+    """The drive or the chain of a file, or a shipped one by its name; `also` changes a chain.
+
+    A file is that of a chain if it has a table [[mass]].
+
+    >>> type(load_machine("crane-4amtkf")).__name__, type(load_machine("crane-4-mass")).__name__
+    ('Drive', 'Chain')
+    """
+    if is_chain(given):
+        return Chain.load(given, also=also)
+    try:
+        return Drive.load(given)
+    except InputError:
+        names = LIBRARY.names()
+        if refusal_of(given) == ABSENT and nearest(str(given), (*names, *library.names())) in names:
+            Chain.load(given)  # names the chain that was meant
+        raise
+
+
+def is_chain(given: str | os.PathLike[str]) -> bool:
+    """Whether a name or a path is that of a chain."""
+    if isinstance(given, str) and given in LIBRARY.names():
+        return given not in library.names()
+    if not isinstance(given, str | os.PathLike) or not os.fspath(given) or refusal_of(given) is not None:
+        return False
+    try:
+        return bool(re.search(r"^\s*\[\[\s*mass\s*\]\]", read_text(given), re.MULTILINE))
+    except RefusedError:
+        return False

@@ -130,6 +130,7 @@ class Reduction:
         sign = 1.0 if chain.motor_index == 0 else -1.0
         shaft = chain.shafts[0]
         bigger = max((motor, load), key=lambda mass: abs(mass.torque))
+        unknown = len(self.chain.positions) > 1
         note = f"; assumed: {self.chain.assumed}" if self.chain.assumed else ""
         return Drive(
             **chain.motor.keywords(),
@@ -143,7 +144,7 @@ class Reduction:
             damping=shaft.damping,
             gap=shaft.gap,
             contact_law=shaft.contact_law,
-            start_position=sign * shaft.start_position,
+            start_position="unknown" if unknown else sign * (shaft.start_position or 0.0),
             target_speed=chain.target_speed,
             initial_motor_speed=motor.initial_speed,
             initial_load_speed=load.initial_speed,
@@ -294,7 +295,7 @@ def modal(chain: Chain) -> tuple[Chain, list[Step]]:
         gap=float(arrays.gap.sum()),
         contact_law=chain.shafts[0].contact_law,
         efficiency=math.prod(shaft.efficiency for shaft in chain.shafts),
-        start_position=way * float(arrays.theta0.sum()),
+        start_position=way * float(arrays.theta0.sum()) or None,
     )
     motor = None if chain.motor is None else replace(chain.motor, mass=first.name)
     reduced = replace(chain, masses=(rotor, load), shafts=(shaft,), motor=motor, load_mass=last.name)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,11 +36,13 @@ from softstart.chain.kernel_records import (
 from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.drive import Drive
+from softstart.errors import SimulationError
 from softstart.late import late
 from softstart.plant import layout
 from softstart.start import metrics
+from softstart.start.engine import FIRST_ROWS, Recorder, run_one
 from softstart.start.run import BaseRun
-from softstart.start.status import Status
+from softstart.start.status import Status, status_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,8 +112,8 @@ class ChainRun(BaseRun):
         The chain that was started.
     controller : Controller or None
         The controller as it was set up; None where the motor was off.
-    base : Drive or None
-        The drive to whose mean torque K_dyn refers; None where it refers to that of the chain itself.
+    base : Drive, Chain or None
+        The drive or chain to whose mean torque K_dyn refers; None where it is that of the chain itself.
     status : Status
         How the start ended.
     t, u : array of shape (n,)
@@ -137,6 +140,10 @@ class ChainRun(BaseRun):
         The chain as the kernel has it.
     recorded : Start
         Records of the kernel at the end.
+    told : Drive or None
+        The drive for which the controller was set up.
+    positions : mapping of str to ChainRun
+        The starts from each position, if it is unknown. Then K_dyn, peaks and times are the largest of them.
 
     Examples
     --------
@@ -155,10 +162,12 @@ class ChainRun(BaseRun):
 
     chain: Chain
     controller: Controller | None
-    base: Drive | None
+    base: Drive | Chain | None
     status: Status
     numbers: Numbers  # the chain as the kernel has it
     recorded: Start  # the kernel's records at the end
+    told: Drive | None = None
+    positions: Mapping[str, ChainRun] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line that says what came out."""
@@ -172,9 +181,20 @@ class ChainRun(BaseRun):
         return self.recorded.x
 
     @property
+    def drive(self) -> Chain:
+        """The chain: what a start of a drive has under this name."""
+        return self.chain
+
+    @property
+    def elastic_period(self) -> float:
+        """The period of the first natural frequency with all gaps closed, s."""
+        return float(self.numbers.p.view(layout.PLANT)[0].period)
+
+    @property
     def peak_torques(self) -> Vector:
         """Largest |T| of each shaft, N m, located; impacts of rigid flanks have `peak_impulses` instead."""
-        peaks: Vector = np.abs(self.recorded.shafts["peak"])
+        runs = self.positions.values() or (self,)
+        peaks: Vector = np.max([np.abs(run.recorded.shafts["peak"]) for run in runs], axis=0)
         return peaks
 
     @property
@@ -212,7 +232,9 @@ class ChainRun(BaseRun):
     @property
     def base_torque(self) -> float:
         """The mean torque to which K_dyn refers, N m: that of `base`, or of the chain itself."""
-        return self.chain.mean_torque if self.base is None else float(metrics.base_torque(self.base))
+        if isinstance(self.base, Drive):
+            return float(metrics.base_torque(self.base))
+        return (self.base or self.chain).mean_torque
 
     @property
     def k_dyn(self) -> float:
@@ -231,6 +253,16 @@ class ChainRun(BaseRun):
         return found
 
     @property
+    def used_torque(self) -> float:
+        """Largest |T| over the permissible torque of its shaft, %; 0 where none is given."""
+        return 100.0 * float(np.nan_to_num(self.utilisation).max())
+
+    @property
+    def contacts(self) -> int:
+        """How often gaps closed."""
+        return int(np.isin(self.recorded.events["kind"], [CLOSED, IMPACT]).sum())
+
+    @property
     def stages(self) -> int:
         """The number of the last stage: odd while a gap from motor to load is open, even while none is."""
         return int(self._final[layout.STAGE])
@@ -243,6 +275,20 @@ class ChainRun(BaseRun):
             ChainEvent(time, EVENT_NAMES[kind], place, value, impulse)
             for time, kind, place, value, impulse in rows.tolist()
         )
+
+    @property
+    def _continued(self) -> ChainRun:
+        """The same start to the end of settling at least; this one where it fails beyond its own end."""
+        if self.controller is None or self.told is None or not self.end_time < self.settling_end:
+            return self
+        recorder = ChainRecorder(self.numbers, int(self.controller.sensors))
+        try:
+            reason = run_one(self.controller, self.told, recorder, self.settling_end)
+        except SimulationError:
+            return self
+        if not status_of(reason, True, True).finished:
+            return self
+        return replace(self, recorded=recorder.finished())
 
     # states --------------------------------------------------------------------------------------------
 
@@ -265,6 +311,20 @@ class ChainRun(BaseRun):
         shaped = {"phi": phi, "w": w, "twist": twist, "T": T}
         found = {name: values.reshape(*when.shape, -1) for name, values in shaped.items()}
         return {**found, "u": motor["u"].reshape(when.shape)}
+
+    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
+        """Speed of the load mass, rad/s, and the torque that speeds it up, N m, at any instants of the run.
+
+        Of that torque gears with losses and exciting torques are left out.
+        """
+        states, arrays, load = self.at(times), self.chain.at_motor_shaft(), self.numbers.place.load
+        speed, T = states["w"][..., load], states["T"]
+        push = -arrays.Mc[load] - arrays.d_ground[load] * speed
+        if load > 0:
+            push = push + T[..., load - 1]
+        if load < T.shape[-1]:
+            push = push - T[..., load]
+        return speed, push
 
     def _replayed(self) -> Start:
         """A start with the records of this one, whose state may be overwritten."""
@@ -354,11 +414,63 @@ class ChainRun(BaseRun):
             "peak_times": self.peak_times.tolist(),
             "peak_impulses": self.peak_impulses.tolist(),
             "start_time": self.start_time,
+            "settled_time": self.settled_time,
+            "contacts": self.contacts,
             "stages": self.stages,
             "events": len(self.events),
             "energy": asdict(self.energy),
             "end_time": self.end_time,
+            **({"positions": self.by_position()} if self.positions else {}),
         }
+
+
+class ChainRecorder(Recorder):
+    """One start of a chain in the kernel."""
+
+    def __init__(self, given: Numbers, sees: int) -> None:
+        super().__init__(given.p, sees, recording=False)
+        self.start = given.start(FIRST_ROWS)
+        self.x, self.m = self.start.x, self.start.m
+
+    def begin(self, until: float) -> None:
+        kernel.begin(self.start, until)
+
+    def advance(self) -> int:
+        reason: int = kernel.advance(self.start)
+        return reason
+
+    def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
+        reason: int = kernel.run(step, numbers, self.sees, self.start, self.measured, state, command)
+        return reason
+
+    def measure(self) -> None:
+        kernel.measure_chain(self.start, self.sees, self.measured)
+
+    def grow(self) -> None:
+        start = self.start
+        if start.x[layout.N_SEGMENTS] < start.spans.size:
+            self.start = start._replace(events=_doubled(start.events))
+            return
+        self.start = start._replace(
+            spans=_doubled(start.spans),
+            span_masses=_doubled(start.span_masses),
+            span_shafts=_doubled(start.span_shafts),
+        )
+
+    def finished(self) -> Start:
+        """The start with the records that are filled."""
+        start = self.start
+        spans, events = int(start.x[layout.N_SEGMENTS]), int(start.x[layout.N_EVENTS])
+        return start._replace(
+            spans=start.spans[:spans].copy(),
+            span_masses=start.span_masses[:spans].copy(),
+            span_shafts=start.span_shafts[:spans].copy(),
+            events=start.events[:events].copy(),
+        )
+
+
+def _doubled(rows: Record) -> Record:
+    return np.concatenate([rows, np.zeros_like(rows)])
 
 
 def _stored(given: Numbers, rows: Record) -> float:

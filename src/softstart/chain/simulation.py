@@ -7,23 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from softstart.arrays import Vector
 from softstart.balancing.periodic_torque import PeriodicTorque
-from softstart.chain import kernel_start as kernel
-from softstart.chain.kernel_records import Numbers, Record, Start, numbers
+from softstart.chain.kernel_records import Numbers, numbers
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
-from softstart.chain.run import ChainRun
+from softstart.chain.run import ChainRecorder, ChainRun
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.plant import layout
 from softstart.start import metrics
-from softstart.start.engine import FIRST_ROWS, MAX_EVENTS, Recorder, check_limits, ended, run_one
-from softstart.start.run import Run
+from softstart.start.engine import MAX_EVENTS, check_limits, ended, run_one
+from softstart.start.run import Run, worst_run
 from softstart.start.simulation import simulate
 
 
@@ -32,9 +28,9 @@ def simulate_chain(
     controller: str | Controller | None,
     until: float | None = None,
     *,
-    fitted_to: Drive | None = None,
+    fitted_to: Drive | Chain | None = None,
     parameters: Mapping[str, object] | None = None,
-    base: Drive | None = None,
+    base: Drive | Chain | None = None,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
     excitation: Mapping[str | int, PeriodicTorque] | None = None,
@@ -55,12 +51,12 @@ def simulate_chain(
         A name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
     until : float, optional
         End of the run, s; by default one elastic period after the load mass has its target speed.
-    fitted_to : Drive, optional
-        The drive from which the controller's own defaults are derived: by default the modal reduction of
-        the chain to two masses, whatever its error.
+    fitted_to : Drive or Chain, optional
+        The drive from which the controller's own defaults are derived: by default, and of a chain, the modal
+        reduction to two masses, whatever its error.
     parameters : mapping, optional
         Parameters of a controller given by name: SI numbers or strings with a unit.
-    base : Drive, optional
+    base : Drive or Chain, optional
         The drive to whose mean torque K_dyn refers, if not `fitted_to`; without both it refers to the mean
         torque of the chain itself (`Chain.mean_torque`).
     time_limit : float, optional
@@ -98,82 +94,49 @@ def simulate_chain(
         chain = Chain.load(chain)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "chain")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
-        if other is not None and not (isinstance(other, Drive) and other.shape == ()):
-            raise InputError(f"{name} = {other!r}: give a single Drive.")
+        if isinstance(other, Chain) or other is None:
+            continue
+        if not (isinstance(other, Drive) and other.shape == ()):
+            raise InputError(f"{name} = {other!r}: give a single Drive, or a Chain.")
+    made = None if controller is None else make_controller(controller, parameters)
+    if len(chain.positions) > 1:
+        _check_end(chain, made, until, numbers(chain, excitation, time_limit, max_events))
+        told = fitted_to or (None if made is None else chain)
+        return worst_run(
+            {
+                name: simulate_chain(
+                    one, made, until, fitted_to=told, base=base or fitted_to or chain,
+                    time_limit=time_limit, max_events=max_events, excitation=excitation,
+                )
+                for name, one in chain.positions.items()
+            },
+            chain=chain,
+        )  # fmt: skip
     given = numbers(chain, excitation, time_limit, max_events)
     _check_end(chain, controller, until, given)
-    fitted = None
-    if controller is None:
-        recorder = _ChainRecorder(given, 0)
+    fitted, own = None, None
+    if made is None:
+        recorder = ChainRecorder(given, 0)
         recorder.begin(math.inf if until is None else until)
         recorder.x[layout.ASK_AT] = math.inf
         while (reason := recorder.advance()) == layout.BUFFER_FULL:
             recorder.grow()
     else:
-        made = make_controller(controller, parameters)
-        fitted, own = made.set_up(fitted_to or drive_of(chain))
-        recorder = _ChainRecorder(given, int(fitted.sensors))
+        nominal = fitted_to or chain
+        fitted, own = made.set_up(nominal if isinstance(nominal, Drive) else drive_of(nominal))
+        recorder = ChainRecorder(given, int(fitted.sensors))
         reason = run_one(fitted, own, recorder, until)
     status = ended(recorder.x, reason, until, max_events, f"Chain {chain.name}")
-    return ChainRun(chain, fitted, base or fitted_to, status, given, recorder.finished())
+    return ChainRun(chain, fitted, base or fitted_to, status, given, recorder.finished(), own)
 
 
 def drive_of(chain: Chain) -> Drive:
     """The two-mass drive for which a controller is set up where none is named: the modal reduction."""
     try:
-        return reduce_chain(chain, 2, method="modal", force=True).to_drive()
+        return reduce_chain(chain, 2, method="modal", force=True).to_drive().assumed
     except InputError as error:
         sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
         raise InputError(sentences) from None
-
-
-class _ChainRecorder(Recorder):
-    """One start of a chain in the kernel."""
-
-    def __init__(self, given: Numbers, sees: int) -> None:
-        super().__init__(given.p, sees, recording=False)
-        self.start = given.start(FIRST_ROWS)
-        self.x, self.m = self.start.x, self.start.m
-
-    def begin(self, until: float) -> None:
-        kernel.begin(self.start, until)
-
-    def advance(self) -> int:
-        reason: int = kernel.advance(self.start)
-        return reason
-
-    def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
-        reason: int = kernel.run(step, numbers, self.sees, self.start, self.measured, state, command)
-        return reason
-
-    def measure(self) -> None:
-        kernel.measure_chain(self.start, self.sees, self.measured)
-
-    def grow(self) -> None:
-        start = self.start
-        if start.x[layout.N_SEGMENTS] < start.spans.size:
-            self.start = start._replace(events=_doubled(start.events))
-            return
-        self.start = start._replace(
-            spans=_doubled(start.spans),
-            span_masses=_doubled(start.span_masses),
-            span_shafts=_doubled(start.span_shafts),
-        )
-
-    def finished(self) -> Start:
-        """The start with the records that are filled."""
-        start = self.start
-        spans, events = int(start.x[layout.N_SEGMENTS]), int(start.x[layout.N_EVENTS])
-        return start._replace(
-            spans=start.spans[:spans].copy(),
-            span_masses=start.span_masses[:spans].copy(),
-            span_shafts=start.span_shafts[:spans].copy(),
-            events=start.events[:events].copy(),
-        )
-
-
-def _doubled(rows: Record) -> Record:
-    return np.concatenate([rows, np.zeros_like(rows)])
 
 
 def _check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:

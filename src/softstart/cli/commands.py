@@ -16,8 +16,8 @@ from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
-    "compare": ("starts", "Start a drive under several controllers and compare them."),
-    "simulate": ("starts", "Start a drive once under one controller."),
+    "compare": ("starts", "Start a drive or a chain under several controllers and compare them."),
+    "simulate": ("starts", "Start a drive or a chain once under one controller."),
     "fatigue": (
         "starts",
         "Find how long the shaft line lasts under each controller: rainflow cycles, life, impacts.",

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from softstart.chain.model import Chain, is_chain, load_machine
 from softstart.cli.commands import did_you_mean
 from softstart.cli.completion import Keys, controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completion import settings as settings_of
@@ -161,6 +162,11 @@ def command_line() -> str:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
+    if is_chain(name):
+        raise InputError(
+            f'"{name}": this is a chain, and this command takes a drive; "softstart reduce {name} --out DIR" '
+            "writes the drive.toml that stands for it (simulate and compare take the chain itself)."
+        )
     drive = Drive.load(name)
     if settings:
         drive = drive.with_settings(settings)
@@ -170,6 +176,17 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
             "one at a time; give one value a key (softstart.simulate in Python takes batches)."
         )
     return drive
+
+
+def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
+    """The one drive, or the chain, asked for, with its changes."""
+    if is_chain(name):
+        return Chain.load(name, also=read_changes(settings))
+    try:
+        return read_drive(name, settings)
+    except InputError:
+        load_machine(name)  # names a chain that may be meant
+        raise
 
 
 def read_fitted_to(name: str | None) -> Drive | None:

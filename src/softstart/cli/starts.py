@@ -24,6 +24,7 @@ from softstart.cli.options import (
     param_option,
     read_drive,
     read_fitted_to,
+    read_machine,
     read_names,
     read_params,
     read_params_of,
@@ -32,6 +33,7 @@ from softstart.cli.options import (
     until_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
+from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.quantities import to_si, whole_number
@@ -51,13 +53,12 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.drive import Drive
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
-    from softstart.start.run import Run
+    from softstart.views import chains, starts
     from softstart.views import fatigue as lives
-    from softstart.views import starts
 else:
+    chains = late("softstart.views.chains")
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
     recommendation = late("softstart.start.recommendation")
 
@@ -102,16 +103,16 @@ def compare(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Start a drive under several controllers and compare them.
+    """Start a drive or a chain under several controllers and compare them.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. A controller is a name (see: softstart controllers), path/to/file.py:Class,
-    or a file of tuned gains.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
+    tractor-like); without it, the crane drive of the literature is taken. A controller is a name (see:
+    softstart controllers), path/to/file.py:Class, or a file of tuned gains.
     """
     mistakes = Mistakes()
     names: Sequence[str] = controller_names()
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_machine(drive, settings)
     with mistakes.noted():
         names = read_names(controllers) or names
     with mistakes.noted():
@@ -162,12 +163,13 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
     if by_peak:
         rows.sort(key=lambda row: row.run.k_dyn)
     best = [rows.index(row) for row in comparison.recommendation.shown]
-    print_lines(to, drive_lines(comparison.drive, comparison.fitted_to))
+    print_lines(to, starts.machine_lines(comparison.drive, comparison.fitted_to))
     to.print()
-    gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.AT_THE_GAP
+    gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.details(comparison.drive)
+    what = "What happens at the gap" if at_the_gap == starts.AT_THE_GAP else "What happens in the shafts"
     parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *quick, *at_the_gap))]
     if not fits(to, starts.comparison_table(rows)):
-        parts = [("How gentle, how quick", (*gentle, *quick)), ("What happens at the gap", at_the_gap)]
+        parts = [("How gentle, how quick", (*gentle, *quick)), (what, at_the_gap)]
         if not fits(to, starts.comparison_table(rows, parts[0][1])):
             parts[:1] = [("How gentle", gentle), ("How quick", quick)]
     for index, (title, figures) in enumerate(parts):
@@ -202,13 +204,14 @@ def simulate(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Start a drive once under one controller.
+    """Start a drive or a chain once under one controller.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives).
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
+    tractor-like).
     """
     mistakes = Mistakes()
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_machine(drive, settings)
     with mistakes.noted():
         check_name(controller, "--controller", "several are compared: softstart compare --controllers ")
     with mistakes.noted():
@@ -223,33 +226,43 @@ def simulate(
         with working("starting the drive ..."):
             (made,) = make_controllers([controller], {controller: given}, prefix=False)
             with Attributed():
-                run = softstart.simulate(one, made, end, fitted_to=nominal)
+                run: Any = softstart.simulate(one, made, end, fitted_to=nominal)
                 _ = run.settled_time  # it may ask the controller on
         if folder is not None:
             with working("drawing the figure ..."):
                 starts.write_start(run, folder, command_line(), nominal)
 
     if as_json:
-        stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
-        events = [asdict(event) for event in run.events]
         named = nominal.name if nominal else None
-        print_json({**run.summary(), "fitted_to": named, "stages": stages, "events": events})
+        if isinstance(run.drive, Drive):
+            stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
+            more = {"stages": stages, "events": [asdict(event) for event in run.events]}
+        else:
+            more = {"events": [event._asdict() for event in run.events]}
+        print_json({**run.summary(), "fitted_to": named, **more})
     else:
         _show_start(console(), run, nominal)
         if out is not None:
             print(f"\nWritten to {out}: report.md, figure, traces, stages and events.")
 
 
-def _show_start(to: Console, run: Run, fitted_to: Drive | None) -> None:
-    print_lines(to, drive_lines(run.drive, fitted_to))
+def _show_start(to: Console, run: Any, fitted_to: Drive | None) -> None:
+    print_lines(to, starts.machine_lines(run.drive, fitted_to))
     values = ", ".join(f"{key} = {_value(value)}" for key, value in run.controller.parameters.items())
     sentence(to, f"  under  {run.controller_name}{' (' + values + ')' if values else ''}")
     to.print()
     sentence(to, run.status.value, "bold")
-    print_figures(to, starts.figure_rows(run))
-    for table in (starts.stage_table(run, SHOWN), starts.event_table(run, SHOWN)):
+    if isinstance(run.drive, Drive):
+        print_figures(to, starts.figure_rows(run))
+        tables = [starts.stage_table(run, SHOWN), starts.event_table(run, SHOWN)]
+    else:
+        print_figures(to, chains.figure_rows(run))
+        tables = [chains.shaft_table(run), chains.event_table(run, SHOWN)]
+    for table in tables:
         to.print()
         print_table(to, table)
+    if not isinstance(run.drive, Drive):
+        print_conclusion(to, [], run.chain.warnings)
 
 
 def _value(value: object) -> str:

@@ -15,6 +15,7 @@ from softstart.drive.model import (
     ContactLaw,
     Drive,
     LoadKind,
+    Position,
     library,
 )  # fmt: skip
 
@@ -27,6 +28,7 @@ __all__ = [
     "Drive",
     "Limits",
     "LoadKind",
+    "Position",
     "SNCurve",
     "library",
 ]  # fmt: skip

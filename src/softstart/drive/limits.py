@@ -85,6 +85,8 @@ class Limits:
         Time that the shaft line must last, s.
     fatigue : SNCurve or None
         What it withstands.
+    used_torque : float or None
+        What a start may use of the permissible torques of the shafts of a chain, %: 100 where one is given.
     """
 
     shaft_torque: float | None = None
@@ -92,6 +94,7 @@ class Limits:
     starts_per_hour: float | None = None
     life: float | None = None
     fatigue: SNCurve | None = None
+    used_torque: float | None = None
 
     @property
     def starts(self) -> float | None:
@@ -106,7 +109,8 @@ class Limits:
 
     def __bool__(self) -> bool:
         """Whether a start can pass or fail: there is a limit of torque, time or life."""
-        return any(one is not None for one in (self.shaft_torque, self.start_time, self.life))
+        given = (self.shaft_torque, self.start_time, self.life, self.used_torque)
+        return any(one is not None for one in given)
 
 
 def limits_of(values: Mapping[str, Any]) -> Limits:

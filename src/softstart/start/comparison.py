@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
@@ -13,8 +13,8 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
-from softstart.start.run import Run
-from softstart.start.simulation import simulate
+from softstart.start.run import BaseRun
+from softstart.start.simulation import Startable, models, simulate
 
 DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
@@ -28,8 +28,8 @@ class Comparison:
 
     Attributes
     ----------
-    drive : Drive
-        The drive that is started.
+    drive : Drive or Chain
+        The drive, or the chain, that is started.
     rows : tuple of Row
         One for each strategy, in the order given: its `run`, `time_lost` (s), `k_dyn_worn_gap`,
         `k_dyn_light_load`, `flags`, and the `margins` to limits.
@@ -52,7 +52,7 @@ class Comparison:
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
 
-    drive: Drive
+    drive: Any
     rows: tuple[Row, ...]
     fitted_to: Drive | None = None
     worst_case: tuple[str, ...] = CASES
@@ -73,7 +73,7 @@ class Comparison:
 
 
 def compare(
-    drive: Drive | str = DEFAULT_DRIVE,
+    drive: Drive | Startable | str = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -81,12 +81,13 @@ def compare(
     fitted_to: Drive | None = None,
     worst_case: Sequence[str] | None = None,
 ) -> Comparison:
-    """Start the drive under each controller and compare K_dyn, start time and robustness.
+    """Start the drive or chain under each controller and compare K_dyn, start time and robustness.
 
     Parameters
     ----------
-    drive : Drive or str
-        One drive, or the name or file of one.
+    drive : Drive, Chain or str
+        One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
+        in `simulate_chain`.
     controllers : sequence of str or Controller, optional
         Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
         installed controllers that need no parameter, and those that are given parameters.
@@ -128,12 +129,12 @@ def compare(
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
     if isinstance(drive, str):
-        drive = Drive.load(drive)
-    if not isinstance(drive, Drive):
+        drive = cast("Drive | Startable", models.load_machine(drive))
+    if not isinstance(drive, Drive | Startable):
         raise InputError(
-            f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one."
+            f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
         )
-    if drive.shape != ():
+    if isinstance(drive, Drive) and drive.shape != ():
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
     if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
@@ -177,9 +178,9 @@ def make_controllers(
 
 
 def compared(
-    drive: Drive,
+    drive: Drive | Startable,
     controller: Controller,
-    direct: Run | None,
+    direct: BaseRun | None,
     until: float | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
@@ -192,14 +193,19 @@ def compared(
 
 
 def changed_case(
-    drive: Drive,
+    drive: Drive | Startable,
     controller: Controller,
     case: str,
     until: float | None = None,
     fitted_to: Drive | None = None,
 ) -> Case:
     """A controller set up for `drive` with 4 times its gap, or 0.4 of its load inertia."""
-    if case == "gap x4":
+    changed: Any
+    if not isinstance(drive, Drive):
+        changed = (
+            drive.changed(gaps=WORN_GAP) if case == "gap x4" else drive.changed(load_inertia=LIGHT_INERTIA)
+        )
+    elif case == "gap x4":
         changed = drive.with_gap(WORN_GAP * drive.gap)
     else:
         changed = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)

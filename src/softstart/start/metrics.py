@@ -25,6 +25,20 @@ else:
     optimize = late("scipy.optimize")
 
 
+class Settling(Protocol):
+    """What is needed of a start of a drive or a chain to say when its load has settled."""
+
+    @property
+    def drive(self) -> Any: ...
+    @property
+    def start_time(self) -> float: ...
+    @property
+    def end_time(self) -> float: ...
+    @property
+    def elastic_period(self) -> float: ...
+    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]: ...
+
+
 class Recorded(Protocol):
     """What is needed of a recorded start; `softstart.start.run.Run` has it."""
 
@@ -112,7 +126,7 @@ def settling_time(run: Recorded, band: float) -> float:
     return float(optimize.brentq(lambda time: float(excess(time)), grid[last], grid[last + 1], xtol=1e-12))
 
 
-def settled_time(run: Recorded, band: float = SETTLED_BAND) -> float:
+def settled_time(run: Settling, band: float = SETTLED_BAND) -> float:
     """First instant, not before the start time, from which on the load keeps its speed, s.
 
     It keeps it where w2 >= (1 - band) target to the end of the run; NaN if it is below at the end. The start
@@ -137,12 +151,12 @@ def settled_time(run: Recorded, band: float = SETTLED_BAND) -> float:
     floor = (1.0 - band) * float(drive.target_speed)
 
     def over(times: Any) -> Any:
-        return run.at(times)["w2"] - floor
+        return run.load_at(times)[0] - floor
 
     def push(times: Any) -> Any:
-        return run.at(times)["T"] - drive.Mc
+        return run.load_at(times)[1]
 
-    count = math.ceil((run.end_time - start) / float(drive.elastic_period) * POINTS_PER_PERIOD)
+    count = math.ceil((run.end_time - start) / run.elastic_period * POINTS_PER_PERIOD)
     grid = np.linspace(start, run.end_time, max(2, count))
     pushed = push(grid)
     turns = np.flatnonzero((pushed[:-1] < 0.0) & (pushed[1:] >= 0.0))

@@ -15,9 +15,9 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
-from softstart.drive import Drive, Limits
+from softstart.drive import Limits
 from softstart.start.fatigue import worst_damage
-from softstart.start.run import Run
+from softstart.start.run import BaseRun, Run
 
 SLOW: Final = 2.0  # times the time of `direct`
 HARDER: Final = 1.001  # times the K_dyn of `direct`
@@ -38,23 +38,26 @@ class Flag:
 class Case:
     """A start on a drive that has changed: N m, s, NaN where it fails; K_dyn over the mean torque before.
 
-    `used_life`: what the starts that the shaft line must last use of its life, %; 0 where no limit asks.
+    `used_life`: what the starts that the shaft line must last use of its life, %; `used_torque`: what the
+    start uses of the permissible torques of a chain's shafts, %. 0 where no limit asks.
     """
 
     k_dyn: float
     peak_torque: float
     start_time: float
     used_life: float
+    used_torque: float = 0.0
 
     @staticmethod
-    def of(run: Run | None) -> Case:
+    def of(run: BaseRun | None) -> Case:
         """That of a start; None is one that failed."""
         if run is None:
-            return Case(math.nan, math.nan, math.nan, math.nan)
+            return Case(math.nan, math.nan, math.nan, math.nan, math.nan)
         limits, used = checked_limits(run.drive), 0.0
         if limits.life is not None and limits.fatigue is not None:
+            assert isinstance(run, Run)  # chains have no limit of life
             used = 100.0 * (limits.starts or 0.0) * worst_damage(run, limits.fatigue).damage
-        return Case(run.k_dyn, run.peak_torque, run.start_time, used)
+        return Case(run.k_dyn, run.peak_torque, run.start_time, used, run.used_torque)
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,8 @@ class Row:
     `cases` that must keep the limits, besides the drive as it is.
     """
 
-    run: Run
-    direct: Run | None
+    run: Any  # Run, or ChainRun
+    direct: BaseRun | None
     cases: Mapping[str, Case] = field(default_factory=dict)
     worst_case: tuple[str, ...] = CASES
     label: str = ""  # a name of its own in tables
@@ -132,12 +135,12 @@ class Row:
     @property
     def time_lost(self) -> float:
         """Start time over that of `direct`, s."""
-        return self.run.start_time - (math.nan if self.direct is None else self.direct.start_time)
+        return float(self.run.start_time) - (math.nan if self.direct is None else self.direct.start_time)
 
     @property
     def settled_lost(self) -> float:
         """Settled time over that of `direct`, s."""
-        return self.run.settled_time - (math.nan if self.direct is None else self.direct.settled_time)
+        return float(self.run.settled_time) - (math.nan if self.direct is None else self.direct.settled_time)
 
     @property
     def k_dyn_worn_gap(self) -> float:
@@ -163,6 +166,7 @@ class Row:
         own = {"": self._own, **{case: self.cases[case] for case in self.worst_case}}
         figures = (
             ("shaft torque", "N m", limits.shaft_torque, "peak_torque"),
+            ("permissible torque", "%", limits.used_torque, "used_torque"),
             ("start time", "s", limits.start_time, "start_time"),
             ("used life", "%", None if limits.life is None else 100.0, "used_life"),
         )
@@ -189,7 +193,7 @@ class Row:
         }
 
 
-def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
+def flags(run: BaseRun, direct: BaseRun | None) -> tuple[Flag, ...]:
     """Why this strategy is never recommended; empty if it may be.
 
     Slow is what takes more than twice as long as `direct` until the load has settled, unless the drive has a
@@ -260,7 +264,7 @@ class Recommendation:
         }
 
 
-def recommend(drive: Drive, rows: Iterable[Row]) -> Recommendation:
+def recommend(drive: Any, rows: Iterable[Row]) -> Recommendation:
     """The recommendation among the strategies started on a drive."""
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
@@ -280,12 +284,13 @@ def _unbeaten(able: Sequence[Row]) -> tuple[Row, ...]:
     return tuple(found)
 
 
-def checked_limits(drive: Drive) -> Limits:
-    """The limits of a drive without a life that cannot be computed."""
-    return replace(drive.limits, life=None) if unchecked_life(drive) else drive.limits
+def checked_limits(drive: Any) -> Limits:
+    """The limits of a drive, or chain, without a life that cannot be computed."""
+    limits: Limits = drive.limits
+    return replace(limits, life=None) if unchecked_life(drive) else limits
 
 
-def unchecked_life(drive: Drive) -> str:
+def unchecked_life(drive: Any) -> str:
     """Why the life that is asked for is not checked; "" if it is, or if none is."""
     limits = drive.limits
     if limits.life is None:

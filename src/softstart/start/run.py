@@ -8,14 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.errors import InputError, SimulationError
+from softstart.errors import SimulationError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.plant import layout as at
@@ -35,6 +35,7 @@ EVENT_NAMES = {
     at.TARGET_REACHED: "target speed reached",
     at.RELEASED: "brake released",
 }
+AnyRun = TypeVar("AnyRun", bound="BaseRun")
 PLOT_POINTS = 1500
 SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a load must keep its speed
 
@@ -75,9 +76,29 @@ class Clipped(NamedTuple):
 class BaseRun(ABC):
     """What finished starts of drives and of chains have in common."""
 
+    drive: Any  # Drive or Chain
     controller: Controller | None
-    base: Drive | None
     status: Status
+    positions: Mapping[str, Any]
+
+    @property
+    @abstractmethod
+    def elastic_period(self) -> float:
+        """Its elastic period, s."""
+
+    @property
+    @abstractmethod
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16)."""
+
+    @property
+    @abstractmethod
+    def _continued(self) -> Self:
+        """The same start to the end of settling at least; this one where it fails beyond its own end."""
+
+    @abstractmethod
+    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
+        """Speed of the load, rad/s, and the torque that speeds it up, N m, at any instants of the run."""
 
     @property
     @abstractmethod
@@ -120,16 +141,43 @@ class BaseRun(ABC):
         return f"start time {self.start_time:.4f} s"
 
     @property
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the whole run, [G](16): peak torque over the mean torque of `base`."""
-        if self.base is None:
-            raise InputError("base: K_dyn refers to the mean torque of a drive; give base to simulate_chain.")
-        return float(metrics.k_dyn(self.peak_torque, self.base))
+    def position(self) -> str:
+        """Where the start begins, of an unknown position the worst for the shaft; "" for an angle."""
+        if self.positions:
+            return max(self.positions, key=lambda name: float(self.positions[name].peak_torque))
+        return str(next(iter(self.drive.positions)))
+
+    def _worst(self, figure: Callable[[Any], float], worst: Any = np.maximum) -> float:
+        """A figure of this start, or the largest of those from each position."""
+        runs = self.positions.values() or (self,)
+        return float(worst.reduce([figure(run) for run in runs]))
 
     @property
     def start_time(self) -> float:
-        """First instant at which the load has its target speed, s; NaN if it never has."""
-        return float(self._final[at.START_TIME])
+        """First instant at which the load has its target speed, s; NaN if it never has.
+
+        Counted from the command of the start, so that it includes what the torque takes to release a brake.
+        """
+        return self._worst(lambda run: float(run._final[at.START_TIME]))
+
+    @cached_property
+    def settled_time(self) -> float:
+        """From when on the load keeps its speed, not below 99.9 % of the target, s; NaN if it does not.
+
+        Never before the start time. It is judged over five elastic periods after that, for which the run is
+        computed further where it is shorter. See `metrics.settled_time` for the definition.
+        """
+        return self._worst(lambda run: metrics.settled_time(run._continued))
+
+    @property
+    def settling_end(self) -> float:
+        """Until when it is judged whether the load has settled, s."""
+        return self.start_time + SETTLING_PERIODS * self.elastic_period
+
+    @property
+    def used_torque(self) -> float:
+        """Largest |T| over the permissible torque of its shaft, %; 0 where none is given for it."""
+        return 0.0
 
     @property
     def end_time(self) -> float:
@@ -139,7 +187,8 @@ class BaseRun(ABC):
     @property
     def clipped(self) -> Clipped:
         """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
-        return Clipped(float(self._final[at.EXCESS]), float(self._final[at.EXCESS_TIME]))
+        excess = self._worst(lambda run: float(run._final[at.EXCESS]))
+        return Clipped(excess, self._worst(lambda run: float(run._final[at.EXCESS_TIME])))
 
     def _instants(self, times: ArrayLike) -> Vector:
         """The times as one row; raises ValueError for one outside of the run."""
@@ -180,6 +229,14 @@ class BaseRun(ABC):
             np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
 
         write_whole(Path(path), write)
+
+    def by_position(self) -> dict[str, Any]:
+        """K_dyn and start time from each position, and which is the worst for the shaft."""
+        each = {
+            name: {"k_dyn": run.k_dyn, "start_time": run.start_time, "settled_time": run.settled_time}
+            for name, run in self.positions.items()
+        }
+        return {"worst": self.position, **each}
 
     def _controller_and_status(self) -> dict[str, Any]:
         """What every summary says of them."""
@@ -296,38 +353,19 @@ class Run(BaseRun):
         return float(self.final[at.PEAK_TIME])
 
     @property
-    def position(self) -> str:
-        """Where the start begins, of an unknown position the worst for the shaft; "" for an angle."""
-        if self.positions:
-            return max(self.positions, key=lambda name: self.positions[name].peak_torque)
-        return next(iter(self.drive.positions))
-
-    def _worst(self, figure: Callable[[Run], float], worst: Any = np.maximum) -> float:
-        """A figure of this start, or the largest of those from each position."""
-        runs = self.positions.values() or (self,)
-        return float(worst.reduce([figure(run) for run in runs]))
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16): peak torque over the mean torque of `base`."""
+        return float(metrics.k_dyn(self.peak_torque, self.base))
 
     @property
-    def start_time(self) -> float:
-        """First instant at which the load has its target speed, s; NaN if it never has.
+    def elastic_period(self) -> float:
+        """The elastic period of the drive, 2 pi/Omega, s."""
+        return float(self.drive.elastic_period)
 
-        Counted from the command of the start, so that it includes what the torque takes to release a brake.
-        """
-        return self._worst(lambda run: float(run.final[at.START_TIME]))
-
-    @cached_property
-    def settled_time(self) -> float:
-        """From when on the load keeps its speed, not below 99.9 % of the target, s; NaN if it does not.
-
-        Never before the start time. It is judged over five elastic periods after that, for which the run is
-        computed further where it is shorter. See `metrics.settled_time` for the definition.
-        """
-        return self._worst(lambda run: metrics.settled_time(run._continued))
-
-    @property
-    def settling_end(self) -> float:
-        """Until when it is judged whether the load has settled, s."""
-        return self.start_time + SETTLING_PERIODS * float(self.drive.elastic_period)
+    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
+        """Speed of the load, rad/s, and the torque that speeds it up, N m, at any instants of the run."""
+        states = self.at(times)
+        return states["w2"], states["T"] - self.drive.Mc
 
     @property
     def _continued(self) -> Run:
@@ -346,12 +384,6 @@ class Run(BaseRun):
         segments, events, stages = recorder.rows()
         final = recorder.x.copy()
         return replace(self, final=final, segments=segments, event_rows=events, stage_rows=stages)
-
-    @property
-    def clipped(self) -> Clipped:
-        """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
-        excess = self._worst(lambda run: float(run.final[at.EXCESS]))
-        return Clipped(excess, self._worst(lambda run: float(run.final[at.EXCESS_TIME])))
 
     @property
     def release_time(self) -> float:
@@ -519,21 +551,16 @@ class Run(BaseRun):
             "energy": asdict(self.energy),
             "end_time": self.end_time,
             **({} if self.drive.brake == "none" else {"release_time": self.release_time}),
-            **({"positions": self._by_position()} if self.positions else {}),
+            **({"positions": self.by_position()} if self.positions else {}),
         }
 
-    def _by_position(self) -> dict[str, Any]:
-        """K_dyn and start time from each position, and which is the worst for the shaft."""
-        each = {
-            name: {"k_dyn": run.k_dyn, "start_time": run.start_time, "settled_time": run.settled_time}
-            for name, run in self.positions.items()
-        }
-        return {"worst": self.position, **each}
 
+def worst_run(runs: Mapping[str, AnyRun], **machine: Any) -> AnyRun:
+    """The start of a drive or chain whose position is unknown, from those of each position.
 
-def worst_run(drive: Drive, runs: Mapping[str, Run]) -> Run:
-    """The start of a drive whose position is unknown, from those of each position."""
+    `machine` is its field: `drive`, or `chain`.
+    """
     hardest = max(runs.values(), key=lambda run: run.peak_torque)
     statuses = [run.status for run in runs.values()]
     status = next((one for one in statuses if one is not Status.REACHED), Status.REACHED)
-    return replace(hardest, drive=drive, status=status, positions=dict(runs))
+    return replace(hardest, **machine, status=status, positions=dict(runs))  # type: ignore[type-var]

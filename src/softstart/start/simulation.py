@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, cast, overload, runtime_checkable
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.plant.vector import plant_vector
 from softstart.start.batch import simulate_many
 from softstart.start.engine import MAX_EVENTS, Recorder, check_limits, ended, run_one
@@ -16,6 +17,23 @@ from softstart.start.run import Run, worst_run
 
 if TYPE_CHECKING:
     import xarray
+
+models = late("softstart.chain.model")  # above this module; see softstart.late
+
+
+@runtime_checkable
+class Startable(Protocol):
+    """A machine other than a drive that `simulate` and `compare` start: `softstart.chain.Chain`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def positions(self) -> Mapping[str, Any]: ...
+    def start(self, controller: str | Controller, until: float | None = ..., **options: Any) -> Any:
+        """The start under a controller, with the options of `simulate`."""
+
+    def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
+        """The machine with so many times its gaps, and its load inertia."""
 
 
 @overload
@@ -42,14 +60,26 @@ def simulate(
     time_limit: float | None = ...,
     max_events: int = ...,
 ) -> xarray.Dataset: ...
+@overload
 def simulate(
-    drive: Drive | str | Sequence[Drive],
+    drive: Startable,
+    controller: str | Controller,
+    until: float | None = ...,
+    *,
+    parameters: Mapping[str, object] | None = ...,
+    fitted_to: Any = ...,
+    base: Any = ...,
+    time_limit: float | None = ...,
+    max_events: int = ...,
+) -> Any: ...
+def simulate(
+    drive: Drive | str | Sequence[Drive] | Startable,
     controller: str | Controller,
     until: float | None = None,
     *,
     parameters: Mapping[str, object] | None = None,
-    fitted_to: Drive | None = None,
-    base: Drive | None = None,
+    fitted_to: Any = None,
+    base: Any = None,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
 ) -> Any:
@@ -61,8 +91,9 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, sequence of Drive or str
-        A drive, one whose fields hold arrays, a list of drives, or the name or file of a drive.
+    drive : Drive, Chain, sequence of Drive or str
+        A drive, one whose fields hold arrays, a list of drives, a chain (see `simulate_chain`), or the name
+        or file of a drive or chain.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or a Controller object.
     until : float, optional
@@ -83,10 +114,10 @@ def simulate(
 
     Returns
     -------
-    Run or xarray.Dataset
-        A Run for one drive. For many a Dataset with one entry for each start: dimension `start`, or
-        `axis_0`, `axis_1`, ... for fields of more than one dimension; a start that cannot be finished has
-        a status of its own and NaN in every figure.
+    Run, ChainRun or xarray.Dataset
+        A Run for one drive, a ChainRun for a chain. For many a Dataset with one entry for each start:
+        dimension `start`, or `axis_0`, `axis_1`, ... for fields of more than one dimension; a start that
+        cannot be finished has a status of its own and NaN in every figure.
 
     Raises
     ------
@@ -108,7 +139,12 @@ def simulate(
     docs/theory/numerics.md.
     """
     if isinstance(drive, str):
-        drive = Drive.load(drive)
+        drive = cast("Drive | Startable", models.load_machine(drive))
+    if isinstance(drive, Startable):
+        return drive.start(
+            controller, until, parameters=parameters, fitted_to=fitted_to, base=base, time_limit=time_limit,
+            max_events=max_events,
+        )  # fmt: skip
     made = make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
@@ -118,7 +154,6 @@ def simulate(
     if len(drive.positions) > 1:
         told, counted = fitted_to or drive.assumed, base or drive
         return worst_run(
-            drive,
             {
                 name: simulate(
                     one,
@@ -131,6 +166,7 @@ def simulate(
                 )
                 for name, one in drive.positions.items()
             },
+            drive=drive,
         )
     fitted, own = made.set_up(fitted_to or drive)
     p = plant_vector(drive, time_limit, max_events)[0]

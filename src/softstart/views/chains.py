@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
-from softstart.views.numbers import Table, column_of, number, printable, short
+from softstart.views.drives import POSITIONS
+from softstart.views.numbers import Table, column_of, first_of, number, printable, short
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 MOST_MODES = 12
 FAR = 1.5  # times the K_dyn of the drive: from there on the two masses do not predict the load of the chain
+EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
+OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
 
 
@@ -39,9 +42,67 @@ def chain_lines(chain: Chain) -> list[str]:
         f"{short(float(arrays.Mc.sum()))} N m",
         f"  motor on {chain.masses[arrays.motor].name}, load {chain.load_mass}",
     ]
+    if chain.position != "mid-gap":
+        lines.append(f"  starts {POSITIONS[chain.position]}, of all gaps alike")
     if chain.assumed:
         lines.append(f"  assumed: {printable(chain.assumed)}")
     return lines
+
+
+def figure_rows(run: ChainRun) -> list[list[str]]:
+    """The figures of a start, as words and numbers."""
+
+    def with_unit(value: float, unit: str) -> str:
+        return f"{short(value)} {unit}" if not math.isnan(value) else "-"
+
+    worst = run.chain.shaft_names[run.worst_shaft]
+    rows = [
+        ["K_dyn", f"{number(run.k_dyn, 6)} in {worst}"],
+        ["largest torque", f"{short(run.peak_torque)} N m at the motor shaft, at {short(run.peak_time)} s"],
+        ["start time", with_unit(run.start_time, "s")],
+        ["settled time", with_unit(run.settled_time, "s")],
+        ["contacts", str(run.contacts)],
+        ["end of the run", with_unit(run.end_time, "s")],
+    ]
+    for name, one in run.positions.items():
+        time = with_unit(one.start_time, "s")
+        rows.append([f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {time}"])
+    return rows
+
+
+def shaft_table(run: ChainRun) -> Table:
+    """K_dyn and largest torque of each shaft, at the motor shaft and at its own, and what it may carry."""
+    own = run.peak_torques / run.chain.at_motor_shaft().torque_ratio
+    cells = {
+        "shaft": list(run.chain.shaft_names),
+        "K": [number(k, 4) for k in run.k_dyns.tolist()],
+        "torque at\nmotor shaft\nN m": column_of(run.peak_torques.tolist()),
+        "torque at\nown shaft\nN m": column_of(own.tolist()),
+        "at s": column_of(run.peak_times.tolist(), 5),
+    }
+    if run.chain.limits:
+        cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
+    return Table.of("Shafts", cells, ("shaft",))
+
+
+def event_rows(run: ChainRun) -> list[list[object]]:
+    """The events, full numbers, each with the shaft or mass on which it happened."""
+    masses, shafts = [mass.name for mass in run.chain.masses], run.chain.shaft_names
+    return [
+        [one.time, one.kind, (shafts if one.kind in OF_SHAFTS else masses)[one.place], one.value, one.impulse]
+        for one in run.events
+    ]
+
+
+def event_table(run: ChainRun, most: int) -> Table:
+    """The first events: time, what happened and where."""
+    rows = event_rows(run)
+    cells = {
+        "time s": column_of([float(str(row[0])) for row in rows[:most]], 6),
+        "event": [str(row[1]) for row in rows[:most]],
+        "at": [str(row[2]) for row in rows[:most]],
+    }
+    return Table.of(f"Events{first_of(len(rows), most)}", cells, ("event", "at"))
 
 
 def conclusion(found: Reduction) -> str:

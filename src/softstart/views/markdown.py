@@ -225,7 +225,7 @@ def write_report(folder: Path, parts: Sequence[str], command: str, about: str) -
 def write_drive_report(
     folder: Path,
     parts: Sequence[str],
-    drive: Drive,
+    drive: Any,
     command: str,
     fitted_to: Drive | None = None,
     *,
@@ -234,16 +234,22 @@ def write_drive_report(
 ) -> None:
     """report.md about a drive, whose data stand between `parts` and `behind`, and the files of the drives.
 
+    Of a chain its file is written, and no table of its parameters.
+
     `fitted_to` is the drive for which the controllers are set up, if another; `one`: no parameter is varied.
     """
-    write_text(folder / "drive.toml", drive.to_toml())
+    what = "drive" if isinstance(drive, Drive) else "chain"
+    write_text(folder / f"{what}.toml", drive.to_toml())
     about = (
-        f"on the drive of [drive.toml](drive.toml), which holds all changes:\n\n```toml\n{drive.to_toml()}```"
+        f"on the {what} of [{what}.toml]({what}.toml), which holds all changes:\n\n"
+        f"```toml\n{drive.to_toml()}```"
     )
     if fitted_to is not None:
         write_text(folder / FITTED_TO, fitted_to.to_toml())
+        set_up = controllers_set_up(drive if one and what == "drive" else None, fitted_to)
         about += (
-            f"\n\nThe {markdown(controllers_set_up(drive if one else None, fitted_to))}. That drive is in "
+            f"\n\nThe {markdown(set_up)}. That drive is in "
             f"[{FITTED_TO}]({FITTED_TO}):\n\n```toml\n{fitted_to.to_toml()}```"
         )
-    write_report(folder, [*parts, "## The drive", drive_table(drive), *behind], command, about)
+    data = ["## The drive", drive_table(drive)] if what == "drive" else []
+    write_report(folder, [*parts, *data, *behind], command, about)

@@ -7,11 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.start.comparison import Comparison
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import SETTLING_PERIODS, Run
+from softstart.views import chains
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -25,6 +27,7 @@ from softstart.views.drawing import (
     save_figure,
     shade_open_gap,
 )
+from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import (
     figure_table,
     file_stem,
@@ -39,6 +42,8 @@ from softstart.views.numbers import Table, column_of, first_of, number, short
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from softstart.chain.run import ChainRun
+
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "value")
 SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
@@ -46,6 +51,14 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 
 
 # one start -----------------------------------------------------------------------------------------------
+
+
+def machine_lines(machine: Drive | Chain, fitted_to: Drive | None = None) -> list[str]:
+    """The drive or chain in a few lines, and for which drive the controllers are set up if for another."""
+    if isinstance(machine, Drive):
+        return drive_lines(machine, fitted_to)
+    set_up = [] if fitted_to is None else [f"  {controllers_set_up(None, fitted_to)}"]
+    return [*chains.chain_lines(machine), *set_up]
 
 
 def figure_rows(run: Run) -> list[list[str]]:
@@ -77,14 +90,15 @@ def figure_rows(run: Run) -> list[list[str]]:
     ]
 
 
-def clipped_torque(run: Run) -> str:
+def clipped_torque(run: Any) -> str:
     """How far and how long the demand lay beyond the torque limits, "" if that need not be said.
 
     It is said of every controller that does not declare that it relies on the limits (`saturates`), and of
     each that answered with an infinite torque.
     """
     excess, time = run.clipped
-    low, high = float(run.drive.minimum_torque), float(run.drive.maximum_torque)
+    motor: Any = run.drive.motor if isinstance(run.drive, Chain) else run.drive
+    low, high = float(motor.minimum_torque), float(motor.maximum_torque)
     infinite = math.isinf(excess)
     if not infinite and (run.controller.saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
         return ""
@@ -177,30 +191,37 @@ def event_table(run: Run, most: int) -> Table:
     return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event",))
 
 
-def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
+def write_start(run: Run | ChainRun, folder: Path, command: str, fitted_to: Drive | None) -> None:
     """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
     stem = file_stem(run.controller_name)
     _write_run(run, folder, stem)
-    write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
-    write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
+    records = "Events: [events.csv](events.csv)."
+    if isinstance(run, Run):
+        write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
+        write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
+        records = f"Stages: [stages.csv](stages.csv). {records}"
+    else:
+        write_table(folder / "events.csv", chains.EVENT_COLUMNS, chains.event_rows(run))
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     write_rows(folder / "figures.csv", [summary])
     parts = [
         f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
         run.status.value,
-        figure_table(figure_rows(run)),
+        figure_table(figure_rows(run) if isinstance(run, Run) else chains.figure_rows(run)),
+        *([] if isinstance(run, Run) else [markdown_table(chains.shaft_table(run)), *run.chain.warnings]),
         _strategy(run, stem),
-        "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
+        records,
     ]
     write_drive_report(folder, parts, run.drive, command, fitted_to)
 
 
-def _write_run(run: Run, folder: Path, stem: str) -> None:
+def _write_run(run: Run | ChainRun, folder: Path, stem: str) -> None:
     save_figure(run.plot(), folder, f"run-{stem}")
     run.to_csv(folder / f"trace-{stem}.csv")
 
 
-def _strategy(run: Run, stem: str) -> str:
+def _strategy(run: Run | ChainRun, stem: str) -> str:
+    assert run.controller is not None
     cls = type(run.controller)
     values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())
     summary = f": {markdown(cls.summary)}" if cls.summary else ""
@@ -251,10 +272,23 @@ AT_THE_GAP = (
 )
 
 
-def comparison_table(
-    rows: Sequence[Row], figures: Sequence[Figure] = (*GENTLE, *QUICK, *AT_THE_GAP), title: str = ""
-) -> Table:
-    """The strategies and these figures of them; last columns for limits and flags, where there are any."""
+def details(machine: Drive | Chain) -> tuple[Figure, ...]:
+    """The figures of what happens at the gap; of a chain K_dyn of each shaft, if it has several."""
+    if isinstance(machine, Drive):
+        return AT_THE_GAP
+
+    def of_shaft(k: int) -> Callable[[Row], float]:
+        return lambda row: float(row.run.k_dyns[k])
+
+    names = machine.shaft_names if len(machine.shaft_names) > 1 else ()
+    shafts = (Figure("K\n" + name.replace(" - ", " -\n"), of_shaft(k), 3) for k, name in enumerate(names))
+    used = Figure("torque\nused %", lambda row: row.run.used_torque, 1)
+    return (*shafts, *([used] if machine.limits else []), AT_THE_GAP[-1])
+
+
+def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "") -> Table:
+    """The strategies and these figures, by default all; last columns for limits and flags, where needed."""
+    figures = figures or (*GENTLE, *QUICK, *details(rows[0].run.drive))
     cells = {"strategy": [row.run.controller_name for row in rows]}
     for figure in figures:
         values = [figure.of(row) for row in rows]
@@ -282,19 +316,24 @@ def notes(comparison: Comparison) -> list[str]:
     """What the columns mean, and which starts did not end as they should."""
     run = comparison.rows[0].run
     base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
-    own = "this drive" if comparison.fitted_to is None else f'"{comparison.fitted_to.name}"'
+    chain = isinstance(comparison.drive, Chain)
+    what, gap = ("chain", "all gaps are") if chain else ("drive", "the gap is")
+    own = f"this {what}" if comparison.fitted_to is None else f'"{comparison.fitted_to.name}"'
+    peak = "largest torque of all shafts at the motor shaft" if chain else "peak shaft torque"
     found = [
-        f"K_dyn = peak shaft torque / {base:.4g} N m, the mean shaft torque under full starting torque. "
-        f"K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or "
+        f"K_dyn = {peak} / {base:.4g} N m, the mean shaft torque under full starting torque. "
+        f"K gap x4, K J2 x0.4: the controller set up for {own}, when {gap} 4 times as wide or "
         "the load inertia 0.4 times as large.",
         f"settled: from then on the load speed is never more than {100.0 * SETTLED_BAND:g} % below the "
         f"target, for {SETTLING_PERIODS:g} elastic periods after the start time. "
         "lost: later than with direct start.",
     ]
+    if chain:
+        found += comparison.drive.warnings
     if checked_limits(comparison.drive):
         found.append(
             "limits: the least margin in the worst of "
-            f"{', '.join(['the drive as it is', *comparison.worst_case])}."
+            f"{', '.join([f'the {what} as it is', *comparison.worst_case])}."
         )
     worst = [f"{row.run.controller_name} {row.run.position}" for row in comparison.rows if row.run.positions]
     if worst:
@@ -302,7 +341,7 @@ def notes(comparison: Comparison) -> list[str]:
             "The start position is unknown: each figure is the worst of both flanks and mid-gap. "
             f"K_dyn is largest from: {', '.join(worst)}."
         )
-    if comparison.drive.brake == "motor":
+    if not chain and comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")
     found += [
         f"{row.run.controller_name}: {row.run.status.value}"
@@ -323,8 +362,13 @@ def notes(comparison: Comparison) -> list[str]:
 
 
 def comparison_figure(rows: Sequence[Row], title: str) -> Any:
-    """Shaft torque (above) and motor torque (below) of several starts, one row of panels each."""
+    """Motor torque and torque of each shaft of several starts, one panel each."""
     runs = [row.run for row in rows]
+    chain = isinstance(runs[0].drive, Chain)
+    names = ["shaft torque T"]
+    if chain:  # a few names fit above the first panel; of more shafts none
+        names = list(runs[0].drive.shaft_names)
+        names = names if len(names) < 4 else [f"_{name}" for name in names]
     with drawing():
         figure, axes = new_figure(
             len(runs), 1, (8.0, 1.0 + 1.35 * len(runs)), sharex=True, sharey=True, squeeze=False
@@ -332,9 +376,18 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
         longest = max(run.end_time for run in runs)
         for index, (panel, row) in enumerate(zip(axes[:, 0], rows, strict=True)):
             run = row.run
-            shade_open_gap(panel, run)
-            panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.1, label="motor torque u")
-            panel.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
+            if not chain:
+                shade_open_gap(panel, run)
+            panel.plot(
+                run.t,
+                run.u,
+                color=COLOURS[1],
+                ls=DASHES[1],
+                lw=1.1,
+                label="motor" if chain else "motor torque u",
+            )
+            for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
+                panel.plot(run.t, torque, color=COLOURS[2 * k % len(COLOURS)], label=name)
             panel.set_title(
                 f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
                 loc="left",
@@ -343,8 +396,8 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
             )
             panel.set_ylabel("N m")
             if index == 0:
-                legend_above(panel, 2)
-        axes[-1, 0].set_xlabel("time, s     (grey: gap open)")
+                legend_above(panel, 1 + sum(not name.startswith("_") for name in names))
+        axes[-1, 0].set_xlabel("time, s" if chain else "time, s     (grey: gap open)")
         axes[-1, 0].set_xlim(0.0, longest)
         entitle(figure, title)
     return figure
