@@ -24,13 +24,15 @@ BUDGET = {
     # 150 lines: damping ratios, mean torque and K_dyn of a chain, permissible torques; 180: where its start
     # begins, settled times, starts from an unknown position, as a drive has them
     "chain": (4960, 14, 3, 0),
-    "cli": (4440, 20, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    # 140 and a file: `init`
+    "cli": (4590, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     # 30 lines: S-N curves
-    "drive": (1075, 5, 1, 0),
+    # 420 and a file: `DataSheet`, from plates and drawings to a drive
+    "drive": (1495, 6, 1, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -40,7 +42,8 @@ BUDGET = {
     "optimal": (9020, 28, 7, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
-    "page": (4390, 18, 3, 0),
+    # 110 and a file: the form of the data sheet
+    "page": (4510, 19, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring

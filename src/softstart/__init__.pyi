@@ -22,6 +22,7 @@ from softstart.controller import Measured as Measured
 from softstart.controller import PlainController as PlainController
 from softstart.controller import Sensor as Sensor
 from softstart.drive import Drive as Drive
+from softstart.drive.data_sheet import DataSheet as DataSheet
 from softstart.errors import InputError as InputError
 from softstart.errors import SimulationError as SimulationError
 from softstart.linear.view import LinearView as LinearView

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from softstart import Drive, InputError, simulate
+from softstart import DataSheet, Drive, InputError, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 BROKEN = b"""name = "broken"
@@ -143,3 +143,28 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     name, content = saved(files, "export-again")
     assert (name, content.decode()) == (report.value.suggested_filename, html)
+
+
+def test_a_drive_from_its_data_sheet(page: Any) -> None:
+    """The sentences of what is missing, then the drive that `DataSheet` makes of the same numbers."""
+    page.get_by_role("tab", name="Data sheet", exact=True).click()
+    before = page.locator(".drive-name").inner_text()
+    page.get_by_test_id("sheet-use").click()
+    trouble = page.get_by_test_id("sheet-trouble")
+    trouble.get_by_text("[motor] power is missing").wait_for()
+    assert page.locator(".drive-name").inner_text() == before
+    assert page.get_by_test_id("sheet-load-reeving").is_hidden()
+    written = {
+        "motor.power": "3 kW", "motor.speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
+        "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
+        "gear.stiffness": "25 N*m/arcmin", "gear.backlash": "15 arcmin", "name": "gantry",
+    }  # fmt: skip
+    for path, text in written.items():
+        page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
+    page.get_by_test_id("sheet-use").click()
+    drive = DataSheet.from_settings(written | {"load.machine": "travel"}).drive
+    k_dyn(page, f"{simulate(drive, 'direct').k_dyn:.3f}")
+    assert page.locator(".drive-name").inner_text() == "gantry"
+    assert trouble.is_hidden()
+    name, content = saved(page, "sheet-save")
+    assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)

@@ -57,6 +57,10 @@ MOST_MEMORY = 3 * 2**30  # B, of one command
 MOST_TEXT = 20_000  # letters that a failed command may print
 CODES = {0, 2, 3, 130}
 
+SHEET = (
+    "load.machine=rotor", "motor.power=3 kW", "motor.speed=1430 rpm", "motor.inertia=0.01", "load.inertia=1",
+    "coupling.stiffness=900",
+)  # fmt: skip
 # The quickest form of each command; hostile words are added to it.
 QUICK: dict[str, list[str]] = {
     "compare": ["compare", "--controllers", "direct,ramp"],
@@ -75,6 +79,7 @@ QUICK: dict[str, list[str]] = {
     "balance": ["balance"],
     "report": ["report", "--json", "--budget", "0", "--controllers", "direct,ramp"],
     "serve": ["serve", "nowhere.toml", "--no-browser"],
+    "init": ["init", *(f"--set={one}" for one in SHEET)],
     "drives": ["drives"],
     "controllers": ["controllers"],
     "study": ["study"],
@@ -111,6 +116,7 @@ OPTIONS: dict[str, list[str]] = {
     "balance": ["--speed", "--set", "--json"],
     "report": ["--controllers", "--set", "--param", "--resolution", "--budget"],
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
+    "init": ["--set", "--json"],
     "drives": ["--json"],
     "controllers": ["--json"],
     "study": ["--list", "--json"],

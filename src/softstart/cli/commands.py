@@ -53,6 +53,7 @@ COMMANDS = {
         "serve",
         "Design a soft start in the browser: sliders, traces that follow, strategies side by side.",
     ),
+    "init": ("init", "Make a drive file from plates, catalogues and drawings."),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
     "study": ("study", "List the studies, or run one."),
@@ -60,6 +61,14 @@ COMMANDS = {
         "completion",
         "Print the script that completes commands, drives, controllers, keys and studies with the Tab key.",
     ),
+}
+
+PURPOSES = {
+    "A drive of your own": ("init", "drives", "reduce"),
+    "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
+    "The gentlest start": ("optimize", "pareto", "tune", "sweep"),
+    "Show it": ("serve", "report"),
+    "Other machines, and softstart itself": ("clutch", "balance", "study", "completion"),
 }
 
 GREETING = f"""\
@@ -70,7 +79,7 @@ softstart {__version__}: start a drive with a gap in its transmission gently and
   softstart serve                        see it and try it in the browser
 
 For a drive of your own, give its file to any of them:
-softstart drives crane-4amtkf > mine.toml makes one to edit.
+softstart init --out mine.toml         makes one from data sheets: it asks
 softstart --help lists all commands."""
 
 EPILOG = """\
@@ -134,10 +143,12 @@ class Commands(Command, click.Group):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list of commands in the help."""
+        """The list of commands in the help, by purpose."""
         limit = formatter.width - 6 - max(map(len, COMMANDS))
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, short_help(name, limit)) for name in COMMANDS])
+        wide = max(map(len, COMMANDS))
+        for purpose, names in PURPOSES.items():
+            with formatter.section(purpose):
+                formatter.write_dl([(f"{name:{wide}}", short_help(name, limit)) for name in names])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands and options that begin with `incomplete`."""

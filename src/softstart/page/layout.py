@@ -31,6 +31,7 @@ PANELS = (
     ("Optimum", "optimum_panel", "OptimumPanel"),
     ("Limit", "curve_panel", "CurvePanel"),
     ("Tuning", "tuning_panel", "TuningPanel"),
+    ("Data sheet", "data_sheet_panel", "DataSheetPanel"),
     ("Files", "files_panel", "FilesPanel"),
 )
 

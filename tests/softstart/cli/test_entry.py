@@ -107,7 +107,7 @@ def test_greeting_names_three_things_and_each_is_there(spawn):
     assert len(things) == 3
     for name in [*things, *re.findall(r"softstart ([a-z]+)", ended.stdout)]:
         assert name in COMMANDS
-    assert "softstart drives crane-4amtkf > mine.toml" in ended.stdout
+    assert "softstart init --out mine.toml" in ended.stdout
 
 
 def test_help_and_version(run):

@@ -1,0 +1,152 @@
+"""`softstart init`: a drive file from the numbers of plates, catalogues and drawings."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+from softstart.cli.commands import Command
+from softstart.cli.completion import files_only, table_keys
+from softstart.cli.options import changes_option, json_option, read_changes
+from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
+from softstart.errors import InputError
+from softstart.input.files import write_whole
+from softstart.input.parameters import Parameter, Wording, read_value
+from softstart.quantities import RefusedError
+from softstart.views.terminal import console, print_json, sentence
+
+# asked only where the other one was answered
+AFTER = {
+    "coupling_diameter": "coupling_play",
+    "play_diameter": "output_play",
+    "shaft_length": "shaft_diameter",
+}
+FIRST = ("name", "source", "machine")
+
+
+@click.command(cls=Command)
+@click.argument("sheet", required=False, metavar="[SHEET]", shell_complete=files_only(".toml"))
+@changes_option(
+    lambda: table_keys(DataSheet.TABLES),
+    "Give a value of the data sheet, as motor.power='3 kW' or gear.ratio=31.5.",
+)
+@click.option(
+    "--out",
+    metavar="FILE",
+    shell_complete=files_only(".toml"),
+    help="The drive file to write, as mine.toml; without it, the drive is printed.",
+)
+@click.option("--ask", is_flag=True, help="Ask for what is not given; on a terminal without SHEET it does.")
+@click.option("--template", is_flag=True, help="Print an empty data sheet to fill in, and nothing else.")
+@json_option
+def init(
+    *, sheet: str | None, settings: tuple[str, ...], out: str | None, ask: bool, template: bool, as_json: bool
+) -> None:
+    """Make a drive file from plates, catalogues and drawings.
+
+    Asks for rating plate, gearbox, shaft and load, each number at the part it belongs to, and refers all to
+    the motor shaft; comments in the file say what each number is from. SHEET is a TOML file with the
+    answers; --template prints one to fill in.
+    """
+    if template:
+        click.echo(template_text(), nl=False)
+        return
+    given = read_changes(settings)
+    if sheet is None and (ask or (sys.stdin.isatty() and not as_json)):
+        found = asked(given)
+    elif sheet is None:
+        found = DataSheet.from_settings(given)
+    else:
+        found = DataSheet.load(sheet, also=given)
+    text, drive = found.drive_toml(), found.drive  # what the drive refuses is said before anything is written
+    if out is not None:
+        if Path(out).exists():
+            raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
+        write_whole(Path(out), lambda stream: stream.write(text))
+    if as_json:
+        print_json({"data_sheet": found.summary(), "drive": drive.values()})
+    elif out is None:
+        click.echo(text, nl=False)
+    else:
+        sentence(console(), f"{out} is written. What next: softstart compare {out}")
+
+
+def asked(given: Mapping[str, object]) -> DataSheet:
+    """The data sheet from answers on standard input; what is in `given` by path is not asked."""
+    answers: dict[str, object] = {}
+    for p in sorted(DataSheet.PARAMETERS.values(), key=lambda p: p.name not in FIRST):
+        machine = answers.get("load.machine", given.get("load.machine"))
+        after = DataSheet.PARAMETERS[AFTER[p.name]] if p.name in AFTER else None
+        if p.path in given or machine not in ABOUT.get(p.name, (machine,)):
+            continue
+        if after is not None and not _number(after, answers.get(after.path, given.get(after.path))):
+            continue
+        answer = _answer(p, needed=p.required or (machine != "rotor" and p.name in ("mass", "radius")))
+        if answer:
+            answers[p.path] = answer
+    return DataSheet.from_settings({**answers, **given})
+
+
+def _number(p: Parameter, written: object) -> float:
+    """What was answered or given; 0 for nothing, and for what will be refused."""
+    try:
+        return 0.0 if written is None else float(read_value(p, written))
+    except RefusedError:
+        return 0.0
+
+
+def _answer(p: Parameter, needed: bool) -> str:
+    """What is typed for one parameter, asked again until it can be read; "" for nothing."""
+    while True:
+        click.echo(question(p, needed), nl=False, err=True)
+        line = sys.stdin.readline()
+        if not line:
+            click.echo(err=True)
+            raise InputError(
+                f"the answers end before {p.place} ({p.meaning}); give it with --set {p.path}={p.example}, "
+                "or in a file (softstart init --template prints one)."
+            )
+        text = line.strip()
+        if not text and not needed:
+            return ""
+        try:
+            if not text:
+                raise RefusedError(f"it is needed; write for example {p.example}")
+            read_value(p, text)
+        except RefusedError as refusal:
+            click.echo("  " + Wording(style="toml").refused(p, text, refusal), err=True)
+            continue
+        return text
+
+
+def question(p: Parameter, needed: bool = False) -> str:
+    """The question for one parameter, with what Enter stands for.
+
+    >>> question(DataSheet.PARAMETERS["backlash"])
+    'backlash of the gears at the output, as 15 arcmin [none]: '
+    """
+    hint = f" ({TYPICAL[p.name]})" if p.name in TYPICAL else ""
+    words = ", ".join(p.choices)
+    example = f" ({words})" if words else f", as {p.example.strip(chr(34))}"
+    nothing = "usual" if p.name in TYPICAL else "none" if p.unit != "1" else "not given"
+    default = "" if needed or p.required else f" [{p.default or nothing}]"
+    return f"{p.meaning}{example}{hint}{default}: "
+
+
+def template_text() -> str:
+    """An empty data sheet: every key in a comment, with an example."""
+    blocks = []
+    for table in DataSheet.TABLES:
+        rows = []
+        for p in table.parameters:
+            only = f"only for {', '.join(ABOUT[p.name])}" if p.name in ABOUT else ""
+            need = "needed" if p.required else only
+            said = (p.meaning, ", ".join(p.choices), TYPICAL.get(p.name, ""), need)
+            about = "; ".join(text for text in said if text)
+            row = f"{p.key} = {p.example}"
+            rows.append(f"{'' if p.required else '# '}{row}  # {about}")
+        blocks.append("\n".join([f"[{table.name}]", *rows] if table.name else rows))
+    return "\n\n".join(blocks) + "\n"

@@ -1,0 +1,107 @@
+"""A drive from its data sheet: a form of what plates and drawings say, and the drive that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Any
+
+from nicegui import ui
+
+from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
+from softstart.errors import InputError
+from softstart.input.parameters import Parameter
+from softstart.page.downloads import drive_file
+from softstart.page.files_panel import few
+from softstart.page.panel_parts import action, box, choice, field, guarded, hint, notify, save
+from softstart.page.sentences import clipped
+from softstart.page.session import Session
+
+TITLES = {
+    "load": "Machine",
+    "motor": "Motor, from its plate",
+    "coupling": "Coupling on the motor shaft",
+    "gear": "Gearbox",
+    "output": "Behind the gearbox",
+    "shaft": "Damping",
+}
+
+
+class DataSheetPanel:
+    """The form, what is wrong with it, and what follows from it; built in the current slot."""
+
+    def __init__(self, session: Session, user: Hashable) -> None:
+        self._session = session
+        self._fields: dict[str, Any] = {}
+        hint(
+            "Each number as its data sheet gives it, at its own part; all are referred to the motor shaft "
+            "here. What is not known stays empty; marked fields are needed."
+        )
+        tables = {table.name: table.parameters for table in DataSheet.TABLES}
+        for name, title in {"": "", **TITLES}.items():
+            if title:
+                ui.html(title, tag="h3", sanitize=False).classes("panel-title")
+            with box().classes("panel-form"):
+                for p in tables[name]:
+                    self._fields[p.name] = made(p)
+        machine = self._fields["machine"]
+        machine.on_value_change(lambda event: self._about(str(event.value)))
+        self._about(str(machine.value))
+        with box().classes("panel-actions"):
+            action("Use this drive", guarded(self._use), "sheet-use", main=True)
+            action("Save drive as TOML", guarded(self._save), "sheet-save")
+        with box().classes("troubles").props('role=alert data-testid="sheet-trouble"') as self._troubles:
+            pass
+        self._troubles.set_visibility(False)
+        self._text = ui.label().classes("command lines").props('data-testid="sheet-drive" tabindex=0')
+        self._text.set_visibility(False)
+
+    def _about(self, machine: str) -> None:
+        """Show the fields of this machine."""
+        for name, machines in ABOUT.items():
+            self._fields[name].parent_slot.parent.set_visibility(machine in machines)
+
+    def sheet(self) -> DataSheet | None:
+        """What is written in the form; None if something is wrong with it, which is said then."""
+        machine = str(self._fields["machine"].value)
+        written = {
+            p.path: text
+            for p in DataSheet.PARAMETERS.values()
+            if machine in ABOUT.get(p.name, (machine,)) and (text := str(self._fields[p.name].value).strip())
+        }
+        self._troubles.clear()
+        try:
+            found = DataSheet.from_settings(written)
+            _ = found.drive
+        except InputError as error:
+            self._troubles.set_visibility(True)
+            self._text.set_visibility(False)
+            with self._troubles:
+                ui.label("There is no drive yet.").classes("trouble-title")
+                for sentence in few(error.sentences):
+                    ui.label(sentence).classes("trouble")
+            return None
+        self._troubles.set_visibility(False)
+        self._text.set_text(found.drive_toml())
+        self._text.set_visibility(True)
+        return found
+
+    def _use(self) -> None:
+        if (found := self.sheet()) is not None:
+            self._session.take(found.drive)
+            notify(f"{clipped(found.name)} is loaded.")
+
+    def _save(self) -> None:
+        if (found := self.sheet()) is not None:
+            save(found.drive_toml(), drive_file(found.drive))
+
+
+def made(p: Parameter) -> Any:
+    """The field of one parameter, with an example of what to write in it."""
+    needed = p.required or p.name in ("mass", "radius")
+    label = p.meaning[0].upper() + p.meaning[1:] + (" *" if needed else "")
+    name = f"sheet-{p.path.replace('.', '-') or p.name}"
+    if p.choices:
+        return choice(label, list(p.choices), p.example.strip('"'), name)
+    example = p.example.strip('"')
+    one = field(label, "", name, f"{example}; {TYPICAL[p.name]}" if p.name in TYPICAL else example)
+    return one.props(f'placeholder="{example}" maxlength=200')

@@ -1,0 +1,143 @@
+"""A data sheet: the worked example of the documentation, and what must hold whatever is written in it."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import DataSheet, Drive, InputError
+
+GANTRY = {
+    "load.machine": "travel", "motor.power": "3 kW", "motor.speed": "1430 rpm",
+    "motor.inertia": "0.0119 kg*m^2", "motor.added_inertia": 0.0066, "motor.starting_ratio": 2.2,
+    "motor.maximum_ratio": 2.6, "motor.torque_lag": "2 ms", "coupling.stiffness": 1500,
+    "coupling.play": "0.1 mm",
+    "coupling.diameter": "60 mm", "gear.ratio": 31.5, "gear.efficiency": 0.94,
+    "gear.stiffness": "25 N*m/arcmin", "gear.backlash": "15 arcmin", "output.diameter": "55 mm",
+    "output.length": "0.9 m", "output.play": "0.4 mm", "output.play_diameter": "120 mm",
+    "load.mass": "12 t", "load.radius": "157.5 mm", "load.resistance": 0.008, "load.inertia": 1.2,
+}  # fmt: skip
+PAGE = Path(__file__).parents[3] / "docs" / "howto" / "own-drive.md"
+
+
+def test_the_example_of_the_page_comes_out_as_by_hand():
+    """Each number of the page's table, to the digits that it prints."""
+    sheet = DataSheet.from_settings(GANTRY)
+    found = dict(re.findall(r"^\| ([^|]+) \| [^|]+ \| ([0-9. ]+) ", PAGE.read_text(encoding="utf-8"), re.M))
+    drive = sheet.drive
+    for what, number in {
+        "rated torque": sheet.rated_torque,
+        "Ms": drive.Ms,
+        "maximum torque": drive.maximum_torque,
+        "J1": drive.J1,
+        "J2": drive.J2,
+        "Mc": drive.Mc,
+        "c": drive.c,
+        "gap": drive.gap,
+    }.items():
+        digits = len(found[what].partition(".")[2])
+        assert round(float(number), digits) == float(found[what]), what
+    shipped = Drive.load("long-travel-3kw")
+    for name in ("J1", "J2", "Mc", "c", "gap", "Ms", "d", "target_speed"):
+        assert getattr(drive, name) == pytest.approx(getattr(shipped, name), rel=0.011)
+    assert (drive.load_kind, drive.start_position) == (shipped.load_kind, shipped.start_position)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    mass=st.floats(10.0, 1e5), radius=st.floats(0.02, 2.0), reeving=st.integers(1, 8),
+    ratio=st.floats(1.0, 200.0), efficiency=st.floats(0.3, 1.0), stiffness=st.floats(1e2, 1e7),
+    backlash=st.floats(0.0, 0.05), power=st.floats(2e5, 1e7),
+)  # fmt: skip
+def test_work_and_energy_are_those_at_the_output(
+    mass, radius, reeving, ratio, efficiency, stiffness, backlash, power
+):
+    """The power that lifts, the kinetic energy and the wound-up energy are those of the load over eta."""
+    speed = 100.0
+    sheet = DataSheet(
+        machine="hoist", power=power, speed=speed, motor_inertia=0.1, starting_ratio=50.0, ratio=ratio,
+        efficiency=efficiency, mass=mass, radius=radius, reeving=reeving, gear_stiffness=stiffness,
+        backlash=backlash,
+    )  # fmt: skip
+    if mass * 9.80665 * radius / reeving / (ratio * efficiency) > 0.999 * 50.0 * power / speed:
+        with pytest.raises(InputError, match="torque"):  # a weight that this motor does not lift
+            _ = sheet.drive
+        return
+    drive = sheet.drive
+    lifting = speed / ratio * radius / reeving  # m/s, of the load
+    near = 6e-5  # five digits are written
+    assert drive.Mc * speed == pytest.approx(mass * 9.80665 * lifting / efficiency, rel=near)
+    assert drive.J2 * speed**2 == pytest.approx(mass * lifting**2 / efficiency, rel=near)
+    assert drive.c * ratio**2 == pytest.approx(stiffness / efficiency, rel=near)
+    assert drive.gap == pytest.approx(ratio * backlash, rel=near)
+    assert drive.Ms * speed == pytest.approx(50.0 * power, rel=near)
+    J = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
+    assert drive.d / (2.0 * math.sqrt(drive.c * J)) == pytest.approx(0.02, rel=3 * near)
+    assert (drive.load_kind, drive.start_position, drive.brake) == ("active", "hanging", "motor")
+
+
+@given(
+    stiffnesses=st.lists(st.floats(1.0, 1e5), min_size=3, max_size=3),
+    plays=st.lists(st.floats(1e-5, 1e-3), min_size=2, max_size=2),
+)
+@settings(max_examples=60, deadline=None)
+def test_parts_in_series(stiffnesses, plays):
+    """The softest part decides, and every part makes it softer and the gap wider."""
+    coupling, gears, _ = stiffnesses
+    sheet = DataSheet(
+        machine="rotor", power=1e3, speed=100.0, motor_inertia=0.1, output_inertia=1.0,
+        efficiency=1.0, ratio=1.0, coupling_stiffness=coupling, gear_stiffness=gears,
+        coupling_play=plays[0], coupling_diameter=0.1, output_play=plays[1], play_diameter=0.2,
+    )  # fmt: skip
+    c = float(sheet.drive.c)
+    assert c == pytest.approx(coupling * gears / (coupling + gears), rel=6e-5)
+    assert sheet.drive.gap == pytest.approx(20.0 * plays[0] + 10.0 * plays[1], rel=6e-5)
+
+
+def test_motors_share_the_load():
+    one = DataSheet.from_settings(GANTRY).drive
+    two = DataSheet.from_settings(GANTRY | {"load.motors": 2}).drive
+    assert pytest.approx(one.J2 / 2, rel=1e-4) == two.J2
+    assert two.Mc == pytest.approx(one.Mc / 2, rel=1e-4)
+    assert two.c == one.c
+
+
+def test_a_file_and_back():
+    sheet = DataSheet.from_settings(GANTRY)
+    assert DataSheet.from_toml(sheet.to_toml()) == sheet
+    assert sheet.drive == Drive.from_toml(sheet.drive_toml())
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"load.mass": None}, "[load] mass is missing: a travel needs the mass that is moved"),
+        ({"load.machine": "lift"}, "[load] machine"),
+        ({"motor.power": "3 N"}, "N is a force, not a power"),
+        ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
+        ({"output.length": None}, "[output] diameter says nothing without [output] length"),
+        ({"gear.ratio": -1}, "must be above 0"),
+        ({"gear.ration": 2}, "did you mean"),
+        ({"load.reeving": 2}, "[load] reeving is for a hoist, and this is a travel; leave it out"),
+        (
+            {
+                "coupling.stiffness": None,
+                "gear.stiffness": None,
+                "output.diameter": None,
+                "output.length": None,
+            },
+            "nothing here is elastic",
+        ),
+        ({"motor.starting_ratio": 0.01}, "the drive that follows"),
+    ],
+)
+def test_what_is_wrong_is_said_with_a_remedy(changes, sentence):
+    given_ = {path: value for path, value in (GANTRY | changes).items() if value is not None}
+    with pytest.raises(InputError) as refused:
+        _ = DataSheet.from_settings(given_).drive
+    assert sentence in str(refused.value)
