@@ -11,8 +11,7 @@ from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
-from softstart.page.files_panel import few
-from softstart.page.panel_parts import action, box, choice, field, guarded, hint, notify, save
+from softstart.page.panel_parts import action, box, choice, few, field, guarded, hint, notify, save
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 

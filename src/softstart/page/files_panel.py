@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from softstart.drive import Drive
-from softstart.errors import MORE_MISTAKES, InputError
+from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
 from softstart.page.panel_parts import (
@@ -18,6 +18,7 @@ from softstart.page.panel_parts import (
     action,
     box,
     choice,
+    few,
     guarded,
     hint,
     jobs_of,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
 LARGEST = 64 * 1024  # bytes of a drive file
 LONGEST_LINE = 2000  # letters; a key of thousands of parts is read for many seconds
-MOST_SENTENCES = 12  # about one file; whoever has mended these sees the next ones
 
 
 class FilesPanel:
@@ -127,18 +127,6 @@ class DriveFiles:
 
 
 TOO_LARGE = f"It has more than {LARGEST // 1024} kB; a drive file has one or two."
-
-
-def few(sentences: Sequence[str]) -> list[str]:
-    """The first sentences, and how many there are beside them.
-
-    >>> few(["a.", "b."]), few([f"{k}." for k in range(20_000)])[-2:]
-    (['a.', 'b.'], ['11.', 'There are 19,988 more of them.'])
-    """
-    left = len(sentences) - MOST_SENTENCES
-    if left > 0 and (rest := MORE_MISTAKES.fullmatch(sentences[-1])):  # an InputError counts some itself
-        left += int(rest[1]) - 1
-    return [*sentences[:MOST_SENTENCES], *([f"There are {left:,} more of them."] if left > 0 else [])]
 
 
 def drive_of(content: bytes, name: str) -> Drive:

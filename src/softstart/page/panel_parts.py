@@ -13,13 +13,14 @@ from typing import Any
 from nicegui import app, context, ui
 
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
 from softstart.page.sentences import changed_since, sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import NOTHING
 
 POLL = 0.2  # s between two checks of a job
+MOST_SENTENCES = 12  # about one input; whoever has mended these sees the next ones
 CLASS_OF = {
     State.WAITING: "job-waiting",
     State.RUNNING: "job-running",
@@ -111,6 +112,18 @@ def save(text: str, name: str) -> None:
     """Let the browser save a text as a file."""
     suffix = name[name.rindex(".") :]
     ui.download.content(text, name, f"{MEDIA.get(suffix, 'text/plain')}; charset=utf-8")
+
+
+def few(sentences: Sequence[str]) -> list[str]:
+    """The first sentences, and how many there are beside them.
+
+    >>> few(["a.", "b."]), few([f"{k}." for k in range(20_000)])[-2:]
+    (['a.', 'b.'], ['11.', 'There are 19,988 more of them.'])
+    """
+    left = len(sentences) - MOST_SENTENCES
+    if left > 0 and (rest := MORE_MISTAKES.fullmatch(sentences[-1])):  # an InputError counts some itself
+        left += int(rest[1]) - 1
+    return [*sentences[:MOST_SENTENCES], *([f"There are {left:,} more of them."] if left > 0 else [])]
 
 
 def notify(sentence: str) -> None:

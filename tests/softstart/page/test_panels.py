@@ -123,7 +123,8 @@ def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
 
 
 def test_a_file_of_mistakes_is_told_in_some_sentences_and_read_at_once() -> None:
-    from softstart.page.files_panel import LARGEST, MOST_SENTENCES, drive_of, few
+    from softstart.page.files_panel import LARGEST, drive_of
+    from softstart.page.panel_parts import MOST_SENTENCES, few
 
     with pytest.raises(InputError) as told:
         drive_of(b"\n".join(b"k%d = 1" % k for k in range(5000)), "mine.toml")
