@@ -25,7 +25,7 @@ BUDGET = {
     # begins, settled times, starts from an unknown position, as a drive has them
     "chain": (4960, 14, 3, 0),
     # 140 and a file: `init`
-    "cli": (4590, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    "cli": (4610, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
