@@ -70,7 +70,12 @@ QUESTIONS = ("schedule", "robust")
     "By default all that the controller offers.",
 )
 @param_option("KEY=VALUE", "Set a parameter of the controller; it is not tuned then. May be repeated.")
-@click.option("--metric", metavar="NAME", default="k_dyn", help="What is made small. By default k_dyn.")
+@click.option(
+    "--metric",
+    metavar="NAME",
+    default="k_dyn",
+    help="What is made small, by default k_dyn; margin: what is left of the [limits], made large.",
+)
 @click.option(
     "--start-time",
     metavar="TIME",

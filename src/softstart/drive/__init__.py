@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from softstart.drive.limits import LIMIT_TABLES, Limits, SNCurve
+from softstart.drive.limits import LIMIT_TABLES, Limit, Limits, SNCurve
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
@@ -26,6 +26,7 @@ __all__ = [
     "UNKNOWN_POSITIONS",
     "ContactLaw",
     "Drive",
+    "Limit",
     "Limits",
     "LoadKind",
     "Position",

@@ -70,6 +70,27 @@ class SNCurve:
 
 
 @dataclass(frozen=True)
+class Limit:
+    """One limit of a drive: its name and unit, the figure of a start that it bounds, how large that may be.
+
+    `most` is an array where the limit differs from start to start.
+    """
+
+    name: str
+    unit: str
+    figure: str
+    most: Any
+
+    def share_left(self, value: ArrayLike) -> NDArray[np.float64]:
+        """What such a figure leaves of the limit, a share: below 0 where it is exceeded.
+
+        >>> float(Limit("shaft torque", "N m", "peak_torque", 200.0).share_left(150.0))
+        0.25
+        """
+        return np.asarray(1.0 - np.asarray(value, dtype=np.float64) / self.most)
+
+
+@dataclass(frozen=True)
 class Limits:
     """The limits of a drive (`drive.limits`); None where a limit is not given.
 
@@ -106,6 +127,30 @@ class Limits:
         if self.life is None or self.starts_per_hour is None:
             return None
         return self.starts_per_hour * self.life / 3600.0
+
+    @property
+    def each(self) -> tuple[Limit, ...]:
+        """The limits that there are; of the life the share in per cent that the starts asked for use."""
+        found = (
+            Limit("shaft torque", "N m", "peak_torque", self.shaft_torque),
+            Limit("permissible torque", "%", "used_torque", self.used_torque),
+            Limit("start time", "s", "start_time", self.start_time),
+            Limit("used life", "%", "used_life", None if self.life is None else 100.0),
+        )
+        return tuple(one for one in found if one.most is not None)
+
+    def margin(self, figures: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+        """The least share left of those limits whose figure is given, one number a start.
+
+        NaN where a figure is NaN, and where none of these limits is there.
+
+        >>> Limits(shaft_torque=200.0, start_time=0.5).margin({"peak_torque": [150.0], "start_time": [0.3]})
+        array([0.25])
+        """
+        shares = [one.share_left(figures[one.figure]) for one in self.each if one.figure in figures]
+        return (
+            np.minimum.reduce(shares) if shares else np.full(np.shape(next(iter(figures.values()))), np.nan)
+        )
 
     def __bool__(self) -> bool:
         """Whether a start can pass or fail: there is a limit of torque, time or life."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from softstart import stages
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
-from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive
+from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.plant import layout as at
@@ -173,11 +174,13 @@ def _parts(count: int) -> Iterator[slice]:
         room = max(1, int(room * min(share, 4.0)))
 
 
-def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[str, tuple[Any, str, str]]:
+def figures(
+    results: at.Matrix, base: Any, until: float | None = None, limits: Limits | None = None
+) -> dict[str, tuple[Any, str, str]]:
     """The figures of `array_starts` as name -> (values, unit, meaning).
 
-    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start. Starts that
-    could not be finished have NaN.
+    `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start; `limits`
+    likewise, whose life is not checked. Starts that could not be finished have NaN.
     """
     reached = ~np.isnan(results[:, at.START_TIME])
     held = results[:, at.HELD] != 0.0
@@ -209,6 +212,11 @@ def figures(results: at.Matrix, base: Any, until: float | None = None) -> dict[s
     if np.any(results[:, at.POSITION]):
         names = np.array(["", *UNKNOWN_POSITIONS])[results[:, at.POSITION].astype(np.int64)]
         found["position"] = (names, "", "position with the largest |T|, of those that are possible")
+    if limits is not None and (limits.shaft_torque is not None or limits.start_time is not None):
+        timed = {name: found[name][0] for name in ("peak_torque", "start_time")}
+        margin = np.where(np.isnan(timed["start_time"]), np.nan, limits.margin(timed))
+        found["margin"] = (margin, "1", "least share left of the limits of shaft torque and start time")
+        found["keeps_limits"] = ((margin >= 0.0) * 1.0, "1", "1 where these limits are kept, else 0")
     found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return found
 
@@ -219,7 +227,7 @@ def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -
     per_start = np.broadcast_to(metrics.base_torque(base), shape).reshape(-1)
     data = {
         name: (dims, values.reshape(shape), {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in figures(results, per_start, until).items()
+        for name, (values, unit, meaning) in figures(results, per_start, until, limits_of_each(drive)).items()
     }
     coordinates = {
         name: (dims, np.broadcast_to(values, shape).copy())
@@ -229,13 +237,34 @@ def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -
     return xarray.Dataset(data, coords=coordinates)
 
 
+def limits_of_each(drive: Drive) -> Limits:
+    """The limits of a drive with array fields; those that differ, in the order of the starts."""
+
+    def flat(most: Any) -> Any:
+        return np.broadcast_to(most, drive.shape).ravel() if isinstance(most, np.ndarray) else most
+
+    limits = drive.limits
+    return replace(limits, shaft_torque=flat(limits.shaft_torque), start_time=flat(limits.start_time))
+
+
+def _limits_of_list(drives: list[Drive]) -> Limits:
+    """Those of each drive; a drive without one may have any figure."""
+
+    def each(name: str) -> Any:
+        own = [getattr(drive.limits, name) for drive in drives]
+        return None if all(one is None for one in own) else np.array([one or math.inf for one in own])
+
+    return Limits(each("shaft_torque"), each("start_time"))
+
+
 def _label_list(
     drives: list[Drive], results: at.Matrix, until: float | None, base: Drive | None
 ) -> xarray.Dataset:
     per_start = np.array([metrics.base_torque(base or drive) for drive in drives])
+    found = figures(results, per_start, until, _limits_of_list(drives))
     data = {
         name: (("start",), values, {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in figures(results, per_start, until).items()
+        for name, (values, unit, meaning) in found.items()
     }
     coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
     for name in PARAMETERS:

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
-from softstart.drive import Limits
+from softstart.drive import Limit, Limits
 from softstart.start.fatigue import worst_damage
 from softstart.start.run import BaseRun, Run
 
@@ -64,16 +64,29 @@ class Case:
 class Margin:
     """A limit and the worst value beside it; `case` says where that is, "" on the drive as it is."""
 
-    name: str
-    unit: str
+    of: Limit
     value: float
-    limit: float
     case: str
+
+    @property
+    def name(self) -> str:
+        """Name of the limit."""
+        return self.of.name
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and limit."""
+        return self.of.unit
+
+    @property
+    def limit(self) -> float:
+        """What is permitted."""
+        return float(self.of.most)
 
     @property
     def share(self) -> float:
         """What is left, as a share of the limit: below 0 where it is exceeded, NaN where the start fails."""
-        return 1.0 - self.value / self.limit
+        return float(self.of.share_left(self.value))
 
     @property
     def kept(self) -> bool:
@@ -164,18 +177,11 @@ class Row:
     def margins(self, limits: Limits) -> tuple[Margin, ...]:
         """The margin to each limit, in the worst of the drive as it is and of `worst_case`."""
         own = {"": self._own, **{case: self.cases[case] for case in self.worst_case}}
-        figures = (
-            ("shaft torque", "N m", limits.shaft_torque, "peak_torque"),
-            ("permissible torque", "%", limits.used_torque, "used_torque"),
-            ("start time", "s", limits.start_time, "start_time"),
-            ("used life", "%", None if limits.life is None else 100.0, "used_life"),
-        )
         found = []
-        for name, unit, limit, figure in figures:
-            if limit is not None:
-                values = {case: float(getattr(one, figure)) for case, one in own.items()}
-                worst = max(values, key=lambda case: (math.isnan(values[case]), values[case]))
-                found.append(Margin(name, unit, values[worst], limit, worst))
+        for limit in limits.each:
+            values = {case: float(getattr(one, limit.figure)) for case, one in own.items()}
+            worst = max(values, key=lambda case: (math.isnan(values[case]), values[case]))
+            found.append(Margin(limit, values[worst], worst))
         return tuple(found)
 
     def summary(self) -> dict[str, Any]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 FIGURES = ("k_dyn", "start_time", "peak_torque", "contacts")
+OF_LIMITS = ("margin", "keeps_limits")  # figures of a drive with limits
 
 
 def sweep(
@@ -42,7 +43,7 @@ def sweep(
     base: Drive | None = None,
     to: str | os.PathLike[str] | None = None,
     netcdf: str | os.PathLike[str] | None = None,
-    figures: tuple[str, ...] | list[str] = FIGURES,
+    figures: tuple[str, ...] | list[str] | None = None,
     chunk: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -74,8 +75,10 @@ def sweep(
         earlier one ended, however that ended. Without it the results are kept in memory.
     netcdf : path, optional
         Also write the finished results into this netCDF file.
-    figures : sequence of str
-        Those to keep, by name; the status always is.
+    figures : sequence of str, optional
+        Those to keep, by name; the status always is. By default K_dyn, start time, peak torque and contacts;
+        of a drive with limits also `margin`, the least share left of the limits of shaft torque and start
+        time (below 0 where one is exceeded, NaN without a start), and `keeps_limits`, 1 or 0.
     chunk : int, optional
         Most starts of a chunk; memory and what an interruption loses go with it.
     workers : int, optional
@@ -117,9 +120,8 @@ def sweep(
         drive = Drive.load(drive)
     maker = _maker(controller, parameters, allow_code)
     axes = _checked(drive, maker, grid, until, time_limit, fitted_to, base, figures)
-    question = Question(
-        drive, maker, tuple(dict.fromkeys(figures)), _time(until), fitted_to, base, _time(time_limit)
-    )
+    kept = _figures_kept(drive, figures)
+    question = Question(drive, maker, kept, _time(until), fitted_to, base, _time(time_limit))
     most, count = checked_chunk(chunk), checked_workers(workers, scheduler)
     target = None if to is None else target_of(Path(to))
     if netcdf is not None:
@@ -241,7 +243,23 @@ def _checked(
     return axes
 
 
+def _figures_kept(drive: Drive, figures: tuple[str, ...] | list[str] | None) -> tuple[str, ...]:
+    """The figures asked for, or the usual ones; InputError for a margin where there are no limits."""
+    limited = drive.limits.shaft_torque is not None or drive.limits.start_time is not None
+    if figures is None:
+        return FIGURES + OF_LIMITS if limited else FIGURES
+    wrong = [name for name in figures if name in OF_LIMITS and not limited]
+    if wrong:
+        raise InputError(
+            f"figures = {wrong[0]}: the drive has no limits that it could refer to; give "
+            'limits.shaft_torque, as "175 N*m", or limits.start_time in its file.'
+        )
+    return tuple(dict.fromkeys(figures))
+
+
 def _figure_mistakes(figures: object) -> list[str]:
+    if figures is None:
+        return []
     if isinstance(figures, str) or not isinstance(figures, tuple | list) or not figures:
         return [f"figures = {show(figures)}: name figures in a list, as ['k_dyn', 'start_time']."]
     known = list(known_figures())

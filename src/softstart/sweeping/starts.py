@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from softstart.controller.base import CompiledController
-from softstart.drive import Drive
+from softstart.drive import Drive, Limits
 from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import array_starts, figures, limits_of_each
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
 from softstart.sweeping.maker import Maker
@@ -35,7 +35,7 @@ def known_figures() -> dict[str, tuple[str, str]]:
     """
     notes = np.zeros((1, at.N_X))
     notes[:, at.RELEASE_TIME] = np.nan
-    found = figures(notes, 1.0)
+    found = figures(notes, 1.0, limits=Limits(shaft_torque=1.0))
     return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
 
 
@@ -94,7 +94,7 @@ def compute(task: Task) -> Block:
     drive = question.drive.with_gap(**changes) if swept else question.drive.replace(**changes)
     notes = _notes(question, drive, parameters, controller)
     base = np.broadcast_to(metrics.base_torque(question.base or drive), (count,))
-    found = figures(notes, base, question.until)
+    found = figures(notes, base, question.until, limits_of_each(drive))
     block: Block = {name: found[name][0].reshape(shape) for name in question.figures if name != "status"}
     names, which = np.unique(found["status"][0], return_inverse=True)
     codes = np.array([CODES[name] for name in names.tolist()], dtype=np.int8)

@@ -51,12 +51,19 @@ class Summary:
         """Share of the starts that brought the load to its target speed."""
         return self.statuses.get(Status.REACHED.name, 0) / self.starts
 
+    @property
+    def share_kept(self) -> float | None:
+        """Share of the starts that keep the limits; None where that was not computed."""
+        kept = self.spreads.get("keeps_limits")
+        return None if kept is None else (kept.mean * kept.count if kept.count else 0.0) / self.starts
+
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""
         return {
             "starts": self.starts,
             "status": dict(self.statuses),
             "share_reached": self.share_reached,
+            **({} if self.share_kept is None else {"share_keeping_limits": self.share_kept}),
             "figures": {name: spread.summary() for name, spread in self.spreads.items()},
             "worst": {"figure": self.judged, "at": dict(self.worst)},
         }

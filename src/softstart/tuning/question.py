@@ -24,12 +24,16 @@ from softstart.quantities import nearest, to_si
 from softstart.tuning.ranges import Range, latin
 
 Metric = str | Callable[[Mapping[str, Any]], Any]
+MARGIN = "margin"  # a metric that is made large
 
 
 class Bound(NamedTuple):
-    """The bound on the start time: that of the defaults, a multiple of that of `direct`, or seconds."""
+    """The bound on the start time: that of the defaults, a multiple of that of `direct`, or seconds.
 
-    kind: Literal["defaults", "direct", "seconds"]
+    Of kind `limits` there is none: the permissible start time is part of the margin that is made large.
+    """
+
+    kind: Literal["defaults", "direct", "seconds", "limits"]
     value: float = 1.0
 
     def text(self) -> str:
@@ -38,17 +42,20 @@ class Bound(NamedTuple):
             return "no slower than with the defaults"
         if self.kind == "direct":
             return f"at most {self.value:g} times the start time of direct"
+        if self.kind == "limits":
+            return "by the limits of the drive"
         return f"at most {self.value:g} s"
 
 
-def bound_of(start_time: object) -> Bound:
+def bound_of(start_time: object, drive: Drive | None = None, metric: object = "") -> Bound:
     """The bound asked for: None, seconds, or "1.2x" as a multiple of the start time of `direct`.
 
     >>> bound_of(None).kind, bound_of("1.2x"), bound_of("300 ms")
     ('defaults', Bound(kind='direct', value=1.2), Bound(kind='seconds', value=0.3))
     """
     if start_time is None:
-        return Bound("defaults")
+        limited = metric == MARGIN and drive is not None and drive.limits.start_time is not None
+        return Bound("limits", math.inf) if limited else Bound("defaults")
     asked = StartTime.of(start_time)
     return Bound("direct" if asked.multiple else "seconds", asked.value)
 
@@ -84,7 +91,9 @@ class Question:
 
     @property
     def metric_name(self) -> str:
-        """Name of the figure that is made small."""
+        """Name of the figure that is made small; for the margin, which is made large, what is not left."""
+        if self.metric == MARGIN:
+            return "limit_share"
         return self.metric if isinstance(self.metric, str) else getattr(self.metric, "__name__", "metric")
 
     def drive_of(self, cell: int) -> Drive:

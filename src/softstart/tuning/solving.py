@@ -15,6 +15,7 @@ from softstart.tuning.gains import robust_set
 from softstart.tuning.gains import schedule as tuned_schedule
 from softstart.tuning.outcome import Tuning
 from softstart.tuning.question import (
+    MARGIN,
     Metric,
     Question,
     bound_of,
@@ -94,10 +95,13 @@ def tune(
         that it names.
     metric : str or callable
         What is minimised: a figure of a start, or a function of the mapping of all figures (arrays, one value
-        a start) that returns one number a start.
+        a start) that returns one number a start. "margin" is made large: the least share left of the limits
+        of the drive, shaft torque and start time; the tables have its complement `limit_share`, the largest
+        share of a limit that a start takes.
     start_time : float or str, optional
         Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
-        default each start is to be no slower than with the controller's own defaults.
+        default each start is to be no slower than with the controller's own defaults; for the margin to a
+        permissible start time there is no other bound.
     tolerances : mapping, optional
         What drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity, or a
         list of values. Every candidate is judged by all of these scenarios.
@@ -228,7 +232,7 @@ def _question(
     recipe = read(recipe_of, controller, parameters)
     ranges = read(lambda: ranges_of(recipe.make(), free)) if recipe is not None else None
     rows, columns = read(gaps_of, drive, gaps), read(inertias_of, drive, inertias)
-    bound = read(bound_of, start_time)
+    bound = read(bound_of, start_time, drive, metric)
     share = read(check_number, "quantile", quantile, 0.0, 1.0, "a share of the starts above 0, at most 1")
     first = read(_whole, "seed", seed, 0)
     again = read(_whole, "restarts", restarts, 1)
@@ -242,6 +246,11 @@ def _question(
         wrong.append(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
     if not isinstance(metric, str) and not callable(metric):
         wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
+    if metric == MARGIN and drive.limits.shaft_torque is None and drive.limits.start_time is None:
+        wrong.append(
+            "metric = margin: the drive has no limits; give limits.shaft_torque in its file, as "
+            '"175 N*m", or limits.start_time.'
+        )
     if wrong or ranges is None or room is None:
         raise InputError(wrong)
     return Question(

@@ -20,7 +20,7 @@ from softstart.errors import InputError
 from softstart.quantities import nearest
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
-from softstart.tuning.question import Question
+from softstart.tuning.question import MARGIN, Question
 
 Cells = NDArray[np.int64]  # axes: candidate, cell
 Values = Mapping[str, Any]  # name -> one value a candidate
@@ -113,7 +113,7 @@ class Trials:
         bound = self.question.bound
         own = self.of_pairs({}, range(self.gap.size))
         nominal = Judged(*(part[0] for part in self.of_set({})))
-        if bound.kind == "seconds":
+        if bound.kind in ("seconds", "limits"):
             both = [np.full(own.start_time.shape, bound.value)] * 2
         elif bound.kind == "direct":
             both = [bound.value * self._direct()] * 2
@@ -214,8 +214,11 @@ class Trials:
     def _read(self, notes: Vector, which: Cells) -> Judged:
         shape = (*which.shape, len(self.question.scenarios))
         base = np.broadcast_to(self.base_torque[which][..., None], shape).ravel()
-        found = {name: values for name, (values, _, _) in figures(notes, base).items()}
+        limits = self.question.drive.limits
+        found = {name: values for name, (values, _, _) in figures(notes, base, limits=limits).items()}
         metric = self.question.metric
+        if metric == MARGIN:
+            return Judged((1.0 - found[MARGIN]).reshape(shape), found["start_time"].reshape(shape))
         if isinstance(metric, str) and metric not in found:
             near = nearest(metric, found)
             hint = f"did you mean {near}?" if near else f"choose one of {', '.join(found)}."

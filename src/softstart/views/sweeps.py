@@ -68,7 +68,7 @@ def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Any:
     """A figure of the starts over the grid, or None where nothing can be drawn.
 
     Two long axes of numbers make a map; further axes make panels, or, if these were too many, the map shows
-    the largest value over them. One axis of numbers makes curves.
+    the largest value over them, of a margin the least. One axis of numbers makes curves.
     """
     field = results[name]
     long = [str(dim) for dim in field.dims if field.sizes[dim] > 1]
@@ -81,12 +81,14 @@ def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Any:
     if len(across) == 1:
         if combinations > MOST_LINES:
             return _curves(
-                results, name, across[0], [("largest over the rest", _largest(results, name, across))]
+                results, name, across[0], [(f"{_end(name)} over the rest", _largest(results, name, across))]
             )
         return _curves(results, name, across[0], _each(results, name, across, rest))
     if combinations > MOST_PANELS:
         others = ", ".join(_shown(dim) for dim in rest)
-        return _maps(results, name, across, [(f"largest over {others}", _largest(results, name, across))])
+        return _maps(
+            results, name, across, [(f"{_end(name)} over {others}", _largest(results, name, across))]
+        )
     return _maps(results, name, across, _each(results, name, across, rest))
 
 
@@ -107,7 +109,8 @@ def _each(results: xarray.Dataset, name: str, across: list[str], rest: list[str]
 
 
 def _largest(results: xarray.Dataset, name: str, across: list[str]) -> Any:
-    """The largest value over all axes that are not drawn, read piece by piece."""
+    """The largest value over all axes that are not drawn, of a margin the least, read piece by piece."""
+    worse = np.fmin if name == "margin" else np.fmax
     field, plan = results[name], plan_of(results)
     kept = [list(field.dims).index(dim) for dim in across]
     away = tuple(i for i in range(field.ndim) if i not in kept)
@@ -116,8 +119,12 @@ def _largest(results: xarray.Dataset, name: str, across: list[str]) -> Any:
         place = plan.place(chunk)
         part = tuple(place[i] for i in kept)
         values = field[place].values
-        found[part] = np.fmax(found[part], np.fmax.reduce(values, axis=away) if away else values)
+        found[part] = worse(found[part], worse.reduce(values, axis=away) if away else values)
     return found
+
+
+def _end(name: str) -> str:
+    return "least" if name == "margin" else "largest"
 
 
 def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Any:
@@ -141,7 +148,7 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
         for panel in axes.flat[len(parts) :]:
             panel.set_visible(False)
         for panel, (title, values) in zip(axes.flat, parts, strict=False):
-            drawn = _map(panel, x, y, values[np.ix_(*orders)], scale)
+            drawn = _map(panel, x, y, values[np.ix_(*orders)], scale, name == "margin")
             panel.set_title(title, loc="left", fontsize=SMALL)
             for axis, values_of, set_scale in (("x", x, panel.set_xscale), ("y", y, panel.set_yscale)):
                 if _geometric(values_of):
@@ -160,18 +167,20 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
     return figure
 
 
-def _map(panel: Axes, x: Any, y: Any, values: Any, scale: Any) -> Any:
+def _map(panel: Axes, x: Any, y: Any, values: Any, scale: Any, margin: bool) -> Any:
     panel.set_facecolor(MISSING)
     panel.grid(visible=False)
     drawn = panel.pcolormesh(x, y, values, norm=scale, cmap=COLOUR_MAP, shading="nearest", rasterized=True)
     if min(values.shape) > 2 and np.isfinite(values).all() and float(np.ptp(values)) > 0.0:
         around: list[Any] = [patheffects.withStroke(linewidth=2.0, foreground="#333333")]
-        lines = panel.contour(*_coarse(x, y, values), levels=6, colors="white", linewidths=0.9)
+        levels = [0.0] if margin else 6  # where the limits are just kept
+        lines = panel.contour(*_coarse(x, y, values), levels=levels, colors="white", linewidths=0.9)
         for text in panel.clabel(lines, fontsize=8, fmt="%.3g"):
             text.set_path_effects(around)
         lines.set_path_effects(around)
     if np.isfinite(values).any():
-        i, j = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        worst = np.nanargmin(values) if margin else np.nanargmax(values)
+        i, j = np.unravel_index(int(worst), values.shape)
         panel.plot([x[j]], [y[i]], "X", ms=8, color=COLOURS[1], mec="white", clip_on=False)
         panel.annotate(
             f"{values[i, j]:.3g}", (x[j], y[i]), xytext=(-7 if j > len(x) / 2 else 7, -4), color="white",
@@ -209,7 +218,10 @@ def _curves(results: xarray.Dataset, name: str, along: str, parts: list[Part]) -
             _plain_ticks(axes.xaxis)
         if name == "k_dyn":
             axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
-        axes.set_ylim(bottom=0.0)
+        if name == "margin":
+            axes.axhline(0.0, color=COLOURS[3], lw=1.0, ls=DASHES[1])
+        else:
+            axes.set_ylim(bottom=0.0)
         axes.set_xlabel(_label(results, along))
         axes.set_ylabel(_label(results, name))
         axes.set_title(_title(results), loc="left")
@@ -298,8 +310,8 @@ def cell_table(results: xarray.Dataset, to: Console | None = None) -> Table:
     cells = [
         [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
         if index < axes
-        else _figures([float(value) for value in values])
-        for index, values in enumerate(columns.values())
+        else _figures(name, [float(value) for value in values])
+        for index, (name, values) in enumerate(columns.items())
     ]
     headings = [_with_unit(results, name, "\n") for name in columns]
     if any(name != Status.REACHED.name for name in ended):
@@ -324,8 +336,9 @@ def write_cells(results: xarray.Dataset, folder: Path) -> bool:
     return True
 
 
-def _figures(values: list[float]) -> list[str]:
-
+def _figures(name: str, values: list[float]) -> list[str]:
+    if name == "keeps_limits":
+        return ["yes" if value == 1.0 else "no" for value in values]
     whole = all(math.isnan(value) or value.is_integer() for value in values)
     return [number(value, 0) for value in values] if whole else column_of(values, 5)
 
@@ -389,6 +402,8 @@ def conclusion(results: xarray.Dataset, summary: Summary) -> str:
         if summary.share_reached == 1.0
         else f"A share of {share} of the starts reached the target speed."
     )
+    if summary.share_kept is not None:
+        reached += _limits_kept(summary, summary.share_kept)
     if not summary.worst:
         return reached
     most = summary.spreads[summary.judged].most
@@ -399,6 +414,20 @@ def conclusion(results: xarray.Dataset, summary: Summary) -> str:
     )
     name = "K_dyn" if summary.judged == "k_dyn" else summary.judged.replace("_", " ")
     return f"Largest {name} {most:.4g}{'' if unit == '1' else ' ' + unit} at {places}. {reached}"
+
+
+def _limits_kept(summary: Summary, share: float) -> str:
+    """How many starts keep the limits, and the least margin."""
+    kept = "All" if share == 1.0 else "None" if share == 0.0 else f"A share of {share:.4g}"
+    text = (
+        f" {kept} of the starts keep{'' if share == 1.0 else 's'} the limits of shaft torque and start time"
+    )
+    least = summary.spreads.get("margin")
+    return (
+        f"{text}, least margin {100.0 * least.least:.3g} %."
+        if least is not None and least.count
+        else f"{text}."
+    )
 
 
 def endings(summary: Summary) -> list[str]:
@@ -461,9 +490,11 @@ def write_sweep(
     fitted_to: Drive | None,
 ) -> None:
     """Everything that sums a sweep up."""
-    picture = sweep_figure(results, summary.judged) if summary.judged else None
-    if picture is not None:
-        save_figure(picture, folder, "sweep")
+    drawn = {"sweep": summary.judged, "margin": "margin" if "margin" in results else ""}
+    pictures = {file: sweep_figure(results, name) for file, name in drawn.items() if name}
+    pictures = {file: picture for file, picture in pictures.items() if picture is not None}
+    for file, picture in pictures.items():
+        save_figure(picture, folder, file)
     rows = [
         [name, results[name].attrs.get("units", ""), *spread.summary().values()]
         for name, spread in summary.spreads.items()
@@ -474,7 +505,7 @@ def write_sweep(
         f"# {markdown(drive.name)}: {summary.starts:,} starts",
         markdown(conclusion(results, summary)),
         *map(markdown, endings(summary)),
-        *(["![sweep](sweep.svg)"] if picture is not None else []),
+        *[f"![{file}]({file}.svg)" for file in pictures],
         *table_sections(_tables(results, summary)),
     ]
     written = f", each start in [{FILE}]({FILE})" if write_cells(results, folder) else ""

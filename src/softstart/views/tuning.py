@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.views.drawing import drawing, entitle, new_figure, save_figure
 from softstart.views.drives import drive_lines
 from softstart.views.markdown import markdown, markdown_table, write_columns, write_drive_report
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from xarray import Dataset
 
+    from softstart.tuning import question as questions
     from softstart.tuning.outcome import Tuning
+else:
+    questions = late("softstart.tuning.question")
 
 MAP = "cividis"  # even in lightness for colour-blind and grey readers alike
 SMALL = 9.0
@@ -180,7 +184,11 @@ def _texts(values: Any) -> list[list[str]]:
 
 
 SHOWN = 24  # cells shown; files and JSON hold all
-NAMES = {"k_dyn": "K_dyn", "k_dyn_first_contact": "K_dyn of the first contact"}
+NAMES = {
+    "limit_share": "share of the limits",
+    "k_dyn": "K_dyn",
+    "k_dyn_first_contact": "K_dyn of the first contact",
+}
 
 
 def any_in_time(tuning: Tuning) -> bool:
@@ -222,7 +230,7 @@ def cell_table(tuning: Tuning) -> Table:
         f"{_metric(tuning)}\ndefault": column_of(_flat(table[f"{tuning.metric}_default"])),
         f"{_metric(tuning)}\ntuned": column_of(_flat(table[tuning.metric])),
         "start\ntime s": column_of(_flat(table["start_time" if "start_time" in table else tuning.metric])),
-        "at most\ns": column_of(_flat(table["start_time_bound"])),
+        "at most\ns": [one.replace("inf", "-") for one in column_of(_flat(table["start_time_bound"]))],
         "in\ntime": ["yes" if good else "no" for good in _flat(table["in_time"])],
         "searches\nagree": [f"{n} of {tuning.question.restarts}" for n in _flat(table["agreement"])],
     }
@@ -299,6 +307,7 @@ def conclusions(tuning: Tuning) -> list[str]:
             f"One set for all: {metric} {kind} {one.worst:.3f}, with the defaults of the nominal drive "
             f"{one.worst_default:.3f}; {late_text}; {one.agreement} of {one.restarts} searches agree."
         )
+    found += _margins(tuning)
     price = tuning.price
     if price is not None and "robust_over_schedule" in price:
         found.append(
@@ -313,6 +322,26 @@ def conclusions(tuning: Tuning) -> list[str]:
                 + (f" ({missing} of {ratio.size} cells without an optimum)." if missing else ".")
             )
     return found
+
+
+def _margins(tuning: Tuning) -> list[str]:
+    """What is left of the limits in the worst start, tuned and with the defaults."""
+    if tuning.question.metric != questions.MARGIN:
+        return []
+    name, found = tuning.metric, []
+    if tuning.schedule is not None:
+        most = [float(np.max(tuning.schedule[one])) for one in (name, f"{name}_default")]
+        found.append(_margin("gains for each cell", *most))
+    if tuning.robust is not None:
+        found.append(_margin("one set for all", tuning.robust.worst, tuning.robust.worst_default))
+    life = " The life is not part of it: see compare." if tuning.drive.limits.life is not None else ""
+    return [f"Least margin to the limits: {'; '.join(found)}.{life}"]
+
+
+def _margin(what: str, share: float, by_default: float) -> str:
+    verdict = "kept" if share <= 1.0 else "not kept"
+    left, before = (f"{100.0 * (1.0 - one):.3g} %" for one in (share, by_default))
+    return f"{what} {left}, {verdict} (with the defaults {before})"
 
 
 def notes(tuning: Tuning) -> list[str]:

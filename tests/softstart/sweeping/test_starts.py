@@ -12,9 +12,14 @@ from hypothesis import strategies as st
 from softstart import Command, Drive, InputError, PlainController, Status, simulate, sweep
 from softstart.controller import make_controller, parameter, ready_controller_names
 from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.start.recommendation import Row
 from softstart.sweeping.starts import known_figures
+from softstart.sweeping.summary import summarise
+from softstart.views.sweeps import conclusion, sweep_figure
 
-CRANE = Drive.load("crane-4amtkf").replace(torque_lag="2 ms", damping=0.3)
+CRANE = Drive.load("crane-4amtkf").replace(
+    torque_lag="2 ms", damping=0.3, permissible_torque=130.0, permissible_start_time=0.5
+)
 FIGURES = tuple(known_figures())
 POOL = {
     "gap": [0.03, 0.5, 3.1],
@@ -38,6 +43,10 @@ def same(results, index, one):
         elif name in (summary := one.summary()):
             expected = np.nan if summary[name] is None else summary[name]
             np.testing.assert_equal(float(results[name][index]), float(expected), err_msg=name)
+    margins = [margin.share for margin in Row(one, None, worst_case=()).margins(one.drive.limits)]
+    least = np.nan if np.isnan(one.start_time) else min(margins)
+    np.testing.assert_equal(float(results["margin"][index]), least)
+    assert results["keeps_limits"][index] == (least >= 0.0)
 
 
 def single(results, index, controller="", **options):
@@ -93,6 +102,24 @@ def test_parameters_of_every_controller_as_axes(name, fitted_to):
         results = sweep(CRANE, name, grid, figures=FIGURES, workers=1, fitted_to=fitted_to)
         for index in [(0, 0, 1), (2, 1, 0)]:
             same(results, index, single(results, index, name, fitted_to=fitted_to))
+
+
+def test_only_limits_make_a_margin():
+    grid = {"gap": [0.1, 0.5, 2.0, 4.0], "load.inertia": [0.07, 0.1, 0.175, 0.3]}
+    found = sweep(CRANE, "direct", grid, workers=1)
+    assert {"margin", "keeps_limits"} <= set(found)
+    free = CRANE.replace(permissible_torque=None, permissible_start_time=None)
+    many = [CRANE.replace(permissible_torque=torque) for torque in (80.0, 200.0)]
+    margins = simulate([*many, free], "direct").margin.values
+    peak = simulate(free, "direct").peak_torque
+    assert margins[0] == 1.0 - peak / 80.0
+    assert margins[2] == 1.0  # no limit, nothing used
+    assert 0.0 < summarise(found).share_kept < 1.0
+    assert "the limits of shaft torque and start time, least margin -" in conclusion(found, summarise(found))
+    assert sweep_figure(found, "margin") is not None
+    assert "margin" not in sweep(free, "direct", {"gap": [0.5]}, workers=1)
+    with pytest.raises(InputError, match="figures = margin: the drive has no limits that it could refer to"):
+        sweep(free, "direct", {"gap": [0.5]}, figures=["margin"], workers=1)
 
 
 def test_samples_vary_together():

@@ -11,7 +11,9 @@ from scipy.optimize import brentq
 from softstart import Command, Drive, InputError, PlainController, optimize, simulate, stages, tune
 from softstart.controller import controller_class, controller_names, make_controller, parameter
 from softstart.processes import Pool
+from softstart.start.recommendation import Row
 from softstart.tuning.ranges import tunable
+from softstart.views.tuning import conclusions
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 GRID = {"gaps": [0.5, 2.0], "inertias": ["2 J1", "5 J1"]}
@@ -411,3 +413,37 @@ def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(tm
     )
     before = np.array([p["place"] for p in best])
     assert roughness(after) < roughness(before)
+
+
+# the margin to the limits -----------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("position", ["mid-gap", "unknown"])
+@pytest.mark.parametrize("name", ["ramp", "current-limit-feedback"])
+def test_a_tuned_margin_is_never_below_that_of_the_defaults(name, position):
+    """The margin is that of `compare`, of an unknown position the worst; the start time is part of it."""
+    drive = CRANE.replace(start_position=position, permissible_torque=90.0, permissible_start_time=0.32)
+    tuned = tune(drive, name, gaps=[0.5, 1.0], inertias=["5 J1"], metric="margin", **SMALL)
+
+    def margin(run):
+        return min(one.share for one in Row(run, None, worst_case=()).margins(drive.limits))
+
+    gained = 0
+    for gap in (0.5, 1.0):
+        cell = tuned.schedule.sel(gap=gap).isel(load_inertia=0)
+        own = drive.replace(gap=gap)
+        after, before = simulate(own, tuned.scheduled), simulate(own, name)
+        assert 1.0 - float(cell.limit_share) == pytest.approx(margin(after), abs=1e-12)
+        assert margin(after) >= margin(before)
+        gained += margin(after) > margin(before) + 0.01
+    assert gained
+    assert tuned.robust.worst <= tuned.robust.worst_default
+    said = "\n".join(conclusions(tuned))
+    assert "Least margin to the limits: gains for each cell" in said
+    assert tuned.summary()["start_time_bound"] == "by the limits of the drive"
+
+
+def test_a_margin_needs_limits():
+    with pytest.raises(InputError, match="metric = margin: the drive has no limits"):
+        tune(CRANE, "ramp", metric="margin", **GRID, **SMALL)
