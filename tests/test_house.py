@@ -30,9 +30,9 @@ BUDGET = {
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
-    # 30 lines: S-N curves
+    # 30 lines: S-N curves; 50: one limit and what a figure leaves of it
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
-    "drive": (1495, 6, 1, 0),
+    "drive": (1545, 6, 1, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -53,13 +53,14 @@ BUDGET = {
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,
     # margins to limits, the rule of what is recommended, that reporting and views had
-    "start": (2680, 10, 1, 0),  # 20: what starts of drives and of chains have in common
-    "sweeping": (1770, 8, 0, 0),  # 100 lines: damaged chunks and descriptions are found, named and made again
-    "tuning": (2320, 10, 1, 0),
+    "start": (2730, 10, 1, 0),  # 20: what starts of drives and of chains have in common; 50: margins
+    # 100 lines: damaged chunks and descriptions are found, named and made again; 20: margins to limits
+    "sweeping": (1790, 8, 0, 0),
+    "tuning": (2340, 10, 1, 0),  # 15: the margin to limits
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
-    # 20: what a sensor of the start position is worth; 80: starts, sweeps and gains against limits
+    # 20: what a sensor of the start position is worth; 120: starts, sweeps and gains against limits
     # 70: starts and comparisons of chains
-    "views": (4670, 17, 6, 0),
+    "views": (4740, 17, 6, 0),
 }
 
 
