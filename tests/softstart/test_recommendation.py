@@ -165,13 +165,25 @@ def test_limits_that_nothing_keeps():
     ids=["none", "crane", "hoist", "too low"],
 )  # fmt: skip
 def test_compare_page_and_report_say_the_same(drive):
-    said = compare(drive).recommendation.text
+    found = compare(drive)
+    said = found.recommendation.text
     assert Session(drive).recommendation().text == said
     frames = list(Screen(Session(drive)).at_rest())
+    shown = {row["name"]: row for one in frames for row in (one or {}).get("rows", ())}
+    for row in found.rows:
+        assert shown[row.name].get("limits", "") == row.against_limits
+        assert bool(row.against_limits) == bool(drive.limits)
+        least = min((one.share for one in row.margins(drive.limits)), default=math.nan)
+        assert row.against_limits[:4] == ("" if math.isnan(least) else "kept" if least >= 0.0 else "exce")
     assert [one["recommendation"] for one in frames if one and "recommendation" in one] == [said]
     made = report(drive, budget=0.0)
     assert made.summary()["recommendation"] == said
-    assert said in html.unescape(made.to_html())
+    page = html.unescape(made.to_html())
+    assert said in page
+    for row in found.rows:
+        assert f">{row.against_limits}<" in page
+        for flag in row.flags:
+            assert flag.word in page
 
 
 def test_the_life_is_a_limit_like_the_others():

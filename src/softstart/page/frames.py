@@ -412,7 +412,7 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
 
 
 def row(session: Session, found: Strategy) -> dict[str, Any]:
-    """One line of the table; `worn`, `settled` and `flag` are left out while they are not computed."""
+    """One line of the table; `worn`, `settled`, `limits` and `flag` are left out until they are known."""
     line = judged(session, found)
     line["trouble"] = found.trouble or ("" if math.isfinite(found.start_time) else found.status)
     worn = session.worn_ready(found.name)
@@ -422,6 +422,7 @@ def row(session: Session, found: Strategy) -> dict[str, Any]:
     if known is not None:
         line["settled"] = number(known.run.settled_time)
         line["flag"] = ", ".join(flag.word for flag in known.flags)
+        line["limits"] = known.against_limits
         line["trouble"] = line["trouble"] or "; ".join(flag.text for flag in known.flags)
     return line
 

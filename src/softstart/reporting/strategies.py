@@ -98,6 +98,7 @@ def strategies_section(
 ) -> Html:
     """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
     rows = ordered(compared)
+    limited = any(row.against_limits for row in rows)
     cells, needs = [], []
     for row in rows:
         run, name, means = row.run, label_of(row.run.controller), means_of(row.run.controller)
@@ -106,7 +107,7 @@ def strategies_section(
             digits(run.peak_torque), digits(run.start_time), digits(run.settled_time),
             fixed(row.time_lost, _decimals(run.start_time)),
             fixed(row.settled_lost, _decimals(run.start_time)), str(run.contacts),
-            ", ".join(flag.word for flag in row.flags),
+            *([row.against_limits] if limited else []), ", ".join(flag.word for flag in row.flags),
         ])  # fmt: skip
         needs.append([name, run.controller.summary, means.measures, means.inverter])
     strong = [rows.index(row) for row in chosen]
@@ -121,6 +122,7 @@ def strategies_section(
         f"large.",
         f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below the "
         "target. Time lost: start time, and settled time, beyond that of direct start.",
+        *([_limits_note(rows[0])] if limited else []),
         *(
             f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
             for row in rows
@@ -142,9 +144,10 @@ def strategies_section(
         [
             "strategy", "K_dyn", f"K_dyn, gap × {short(WORN_GAP)}", f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
             "peak torque, N m", "start time, s", "settled, s", "time lost, s", "settled, lost, s", "contacts",
-            "flag",
+            *(["limits, least margin"] if limited else []), "flag",
         ],
-        cells, caption="Strategies on this drive, the gentlest first", text_columns=(0, 10),
+        cells, caption="Strategies on this drive, the gentlest first",
+        text_columns=(0, 10, 11) if limited else (0, 10),
         strong=strong, class_="names",
     )  # fmt: skip
     second = table(
@@ -152,6 +155,11 @@ def strategies_section(
         caption="What each strategy needs", text_columns=(0, 1, 2, 3), strong=strong, class_="words",
     )  # fmt: skip
     return html(first, tag("ul", joined(tag("li", one) for one in notes), class_="notes"), second)
+
+
+def _limits_note(row: Row) -> str:
+    worst = ["the drive as it is", *row.worst_case]
+    return f"Limits: the least share left of any limit, in the worst of {listed(worst)}."
 
 
 def _decimals(start_time: float) -> int:
@@ -163,7 +171,8 @@ def _decimals(start_time: float) -> int:
 
 def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
     """Torques and speeds of all strategies."""
-    runs = [row.run for row in ordered(rows)]
+    rows = ordered(rows)
+    runs = [row.run for row in rows]
     times = [run.start_time for run in runs if not math.isnan(run.start_time)]
     ends = [run.end_time for run in runs if not math.isnan(run.start_time)]
     shown = min(max(ends), LATE * float(np.median(times))) if times else max(run.end_time for run in runs)
@@ -175,8 +184,8 @@ def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
     pieces = -(-len(runs) // AT_ONCE)
     size = -(-len(runs) // pieces)
     for first in range(0, len(runs), size):
-        some = runs[first : first + size]
-        names = ", ".join(label_of(run.controller) for run in some)
+        some = rows[first : first + size]
+        names = ", ".join(row.marked for row in some)
         caption = (
             f"Torques (left) and speeds (right) under {names}. Grey: the gap is open; numbers: stages, odd "
             f"with the "
@@ -185,9 +194,9 @@ def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
             f"have one scale.{cut}"
         )
         title = "; ".join(
-            f"{label_of(run.controller)}: peak shaft torque {digits(run.peak_torque)} N m, start time "
-            f"{digits(run.start_time)} s"
-            for run in some
+            f"{row.marked}: peak shaft torque {digits(row.run.peak_torque)} N m, start time "
+            f"{digits(row.run.start_time)} s"
+            for row in some
         )
         parts.append(
             figures.drawn(traces_figure(some, shown, lowest, highest), f"Traces over time. {title}.", caption)
@@ -195,15 +204,16 @@ def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
     return html(*parts)
 
 
-def traces_figure(runs: Sequence[Run], longest: float, lowest: float, highest: float) -> Any:
-    """Torques (left) and speeds (right) of several starts; grey where the gap is open.
+def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: float) -> Any:
+    """Torques (left) and speeds (right) of several starts, with their flags; grey where the gap is open.
 
     Up to `longest` s; torques from `lowest` to `highest` N m, with some room, in all panels.
     """
     with drawing():
-        size = (WIDE, 0.55 + 1.72 * len(runs))
-        figure, axes = new_figure(len(runs), 2, size, sharex=True, squeeze=False)
-        for index, run in enumerate(runs):
+        size = (WIDE, 0.55 + 1.72 * len(rows))
+        figure, axes = new_figure(len(rows), 2, size, sharex=True, squeeze=False)
+        for index, row in enumerate(rows):
+            run = row.run
             torque, speed = axes[index]
             for panel in (torque, speed):
                 shade_open_gap(panel, run)
@@ -213,7 +223,7 @@ def traces_figure(runs: Sequence[Run], longest: float, lowest: float, highest: f
             torque.set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
             torque.set_ylabel("N m", fontsize=SMALL)
             torque.set_title(
-                f"{name_in_figure(label_of(run.controller))}: K_dyn {run.k_dyn:.3f}",
+                f"{name_in_figure(row.marked)}: K_dyn {run.k_dyn:.3f}",
                 loc="left",
                 fontsize=SMALL + 0.5,
                 pad=3,

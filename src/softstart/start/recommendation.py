@@ -184,6 +184,21 @@ class Row:
             found.append(Margin(limit, values[worst], worst))
         return tuple(found)
 
+    @property
+    def least_margin(self) -> Margin | None:
+        """The margin that decides, to the limits that are checked: the least; None without limits."""
+        margins = self.margins(checked_limits(self.run.drive))
+        return min(margins, key=lambda one: (not math.isnan(one.share), one.share), default=None)
+
+    @property
+    def against_limits(self) -> str:
+        """Whether it keeps the limits, and the margin: "kept 28.3 %", "exceeded -4.2 %"; "" without any."""
+        least = self.least_margin
+        if least is None:
+            return ""
+        left = "-" if math.isnan(least.share) else f"{100.0 * least.share:.1f} %"
+        return f"{'kept' if least.kept else 'exceeded'} {left}"
+
     def summary(self) -> dict[str, Any]:
         """The figures of the run and of this row under the names used everywhere."""
         limits = checked_limits(self.run.drive)

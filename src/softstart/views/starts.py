@@ -296,20 +296,11 @@ def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title:
             cells[figure.heading] = column_of(values, figure.digits)
         else:
             cells[figure.heading] = [number(value, figure.decimals) for value in values]
-    limits = checked_limits(rows[0].run.drive)
-    if limits and GENTLE[0] in figures:
-        cells["limits"] = [_least_margin(row) for row in rows]
+    if any(row.against_limits for row in rows) and GENTLE[0] in figures:
+        cells["limits"] = [row.against_limits for row in rows]
     if any(row.flags for row in rows):
         cells["flag"] = [", ".join(flag.word for flag in row.flags) for row in rows]
     return Table.of(title, cells, ("strategy", "limits", "flag"))
-
-
-def _least_margin(row: Row) -> str:
-    """Whether a strategy keeps the limits, and its least margin."""
-    margins = row.margins(checked_limits(row.run.drive))
-    broken = [one for one in margins if not one.kept]
-    least = min(broken or margins, key=lambda one: one.share)
-    return f"{'exceeded' if broken else 'kept'} {number(100.0 * least.share, 1)} %"
 
 
 def notes(comparison: Comparison) -> list[str]:
@@ -447,6 +438,10 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
         _write_run(row.run, folder, stems[-1])
 
     summaries = [row.summary() | {"flags": "; ".join(flag.text for flag in row.flags)} for row in rows]
+    for one in summaries:
+        one |= {
+            f"margin_{limit['limit'].replace(' ', '_')}": limit["margin"] for limit in one.get("limits", ())
+        }
     keys = [key for key in summaries[0] if key not in ("parameters", "status_text", "limits")]
     write_table(folder / "comparison.csv", keys, [[one[key] for key in keys] for one in summaries])
 

@@ -48,8 +48,7 @@ def test_names_in_figures_are_taken_literally():
     gains = [RobustGains(label, make_controller("ramp"), CRANE) for label in labels]
     made = report(CRANE, controllers=["direct", *gains], budget=0.0)
     page = made.to_html()  # warnings are errors here
-    runs = [row.run for row in made.comparison.rows[1:]]
-    figure = traces_figure(runs, 0.3, 0.0, 100.0)
+    figure = traces_figure(made.comparison.rows[1:], 0.3, 0.0, 100.0)
     for label, axes in zip(labels, figure.axes[::2], strict=True):
         assert label in page
         shown = axes.get_title(loc="left").replace("\\$", "$").partition(":")[0]

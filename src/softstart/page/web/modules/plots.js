@@ -192,9 +192,10 @@ export class Plots {
 
   // lines of legend entries: those of the selected start last, names before them, as many lines as they need
   named(pen, w, state, others) {
-    const entries = others.map((name) => [`T, ${name}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
+    const flagged = (name) => (state.rows.get(name)?.flag ? ` (${state.rows.get(name).flag})` : "");
+    const entries = others.map((name) => [`T, ${name}${flagged(name)}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
     if (state.traces.get(state.selected).allowed) entries.push(["permissible", this.theme.colours.warn, [], 1]);
-    entries.push(["motor u", this.theme.colours.ink, [5, 3], 1.2], ["shaft T", this.own(state), [], 2.4]);
+    entries.push(["motor u", this.theme.colours.ink, [5, 3], 1.2], [`shaft T${flagged(state.selected)}`, this.own(state), [], 2.4]);
     const lines = [[]];
     let free = w - 90; // the heading stands in the lowest line
     for (const entry of entries.reverse()) {

@@ -63,7 +63,9 @@ export class Table {
         const text = COLUMNS[index + 1][3](row);
         if (cell.textContent !== text) cell.textContent = text;
       });
-      if (line.flag.textContent !== (row.flag ?? "")) line.flag.textContent = row.flag ?? "";
+      const said = [row.limits, row.flag].filter(Boolean).join(", ");
+      if (line.flag.textContent !== said) line.flag.textContent = said;
+      line.flag.classList.toggle("kept", !row.flag && Boolean(row.limits?.startsWith("kept")));
       line.tr.title = row.trouble;
       line.tr.classList.toggle("trouble", Boolean(row.trouble));
       line.bar.style.setProperty("--share", `${(100 * (row.k_dyn ?? 0)) / largest}%`);
@@ -102,7 +104,7 @@ export class Table {
     const eye = element("input", { type: "checkbox", "aria-label": `draw ${name}` });
     const radio = element("input", { type: "radio", name: "strategy", value: name, id: `strategy-${this.lines.size}-${name}` });
     const cells = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
-    const flag = element("span", { class: "flag", title: "Why it is never recommended: slow, not settled, harder than direct start" });
+    const flag = element("span", { class: "flag", title: "Whether it keeps the limits, by the least margin; why it is never recommended: slow, not settled, harder than direct start" });
     const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
     const out = element("button", { type: "button", class: "out", title: `Take ${name} out`, "aria-label": `take ${name} out`, hidden: true }, "\u00d7");
     out.addEventListener("click", () => this.say({ what: "remove", name }));
