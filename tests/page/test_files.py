@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from softstart import DataSheet, Drive, InputError, simulate
+from softstart import DataSheet, Drive, InputError, compare, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 BROKEN = b"""name = "broken"
@@ -87,6 +87,17 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
     files.get_by_test_id("drive-shipped").click()
     files.get_by_role("option", name=Drive.load("servo-axis-small").name).click()
     k_dyn(files, f"{simulate('servo-axis-small', 'direct').k_dyn:.3f}")
+
+
+def test_a_drive_with_limits_has_pass_or_fail_and_margin_of_each_strategy(files: Any) -> None:
+    """The words are those of `compare`; so is the flag, which the legend of the plots has too."""
+    own = Drive.load("hoist-15kw").replace(permissible_torque=170.0)
+    put(files, "hoist.toml", own.to_toml().encode())
+    for row in compare(own, ["direct", "shaped", "s-curve"]).rows:
+        said = [row.against_limits, *[flag.word for flag in row.flags]]
+        mark = files.locator(f'.strategies tr[data-name="{row.name}"] .flag')
+        mark.get_by_text(", ".join(said), exact=True).wait_for()
+        assert ("kept" in mark.get_attribute("class")) == (row.name == "s-curve")
 
 
 def test_an_own_drive_is_given_its_own_name(files: Any, tmp_path: Path) -> None:
