@@ -76,10 +76,10 @@ def bounds_from_start(m: Motion, s: float, end: float, z: float, v: float) -> Qu
     twice = 2.0 * m.zeta
     if m.form == SERIES:  # too short for the spring: z and z' hardly change but for the push
         speed = abs(v) + push * length
-        y2 = push + 1.01 * (twice * speed + w0sq * (abs(z) + speed * length))
-        y3 = jolt + twice * y2 + w0sq * 1.01 * speed
+        y2 = push + 1.05 * (twice * speed + w0sq * (abs(z) + speed * length))
+        y3 = jolt + twice * y2 + w0sq * 1.05 * speed
         y4 = bend + twice * y3 + w0sq * y2
-        return 1.01 * speed, y2, y3, y4, rate * bend + twice * y4 + w0sq * y3
+        return 1.05 * speed, y2, y3, y4, rate * bend + twice * y4 + w0sq * y3
     slow, speed, _ = slow_part(m, s)
     y = z - m.p0 - m.p1 * s - slow
     yv = v - m.p1 - speed

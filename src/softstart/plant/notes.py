@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 
+from numba import from_dtype, types
+
 from softstart.plant.crossing import RISING, WATCH, first_crossing
-from softstart.plant.jit import inlined
+from softstart.plant.jit import apart, inlined
 from softstart.plant.layout import (
-    ASK, EVENT, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
+    ASK, EVENT, MOTION, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import SERIES, derivatives, forcing_tail, motion
 from softstart.plant.terms import ROUNDING, terms
@@ -22,6 +24,14 @@ def keep_peak(x: State, torque: float, time: float) -> None:
     if abs(torque) > abs(x.stage_peak):
         x.stage_peak = torque
         x.stage_peak_time = time
+
+
+@apart(types.float64(from_dtype(MOTION), types.float64, types.float64))
+def slope_by_terms(m: Motion, begin: float, s: float) -> float:
+    """T' at `begin`, or T'' where it is zero."""
+    no_load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, m.k, m.dd, 0.0, no_load, begin, s)
+    return bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
 
 
 @inlined
@@ -37,8 +47,8 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
     for _ in range(3):  # once more, with its signs, if the search by terms takes over within this one
         by_terms = m.by_terms
         if by_terms != 0.0 and m.form != SERIES:  # k v and dd a may cancel to their last digits
-            f, bend, _, _, _, size, _ = terms(m, 0.0, 0.0, k, dd, 0.0, load, begin, s)
-            slope = bend if begin > 0.0 or abs(f) <= ROUNDING * size else f
+            slope = slope_by_terms(m, begin, s)
+            bend = slope
         else:
             a, jerk, _ = derivatives(m, begin, z, v, forcing_tail(m, begin))
             slope = k * v + dd * a

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 
+from numba import from_dtype, types
+
 from softstart.plant.crossing import (
     LOST, NO_CROSSING, RISING, ROUNDING, WATCH, bounds, first_crossing,
 )  # fmt: skip
-from softstart.plant.jit import inlined
+from softstart.plant.jit import apart, inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
-    LEFT_UPPER, LOWER, MODELICA, NO_EVENT, REACHED, REJOIN, REJOINED, RELEASE, STOP, SWITCH, SWITCHED,
-    UNSOLVED, UPPER,
+    LEFT_UPPER, LOWER, MODELICA, MOTION, NO_EVENT, PLANT, REACHED, REJOIN, REJOINED, RELEASE, STATE, STOP,
+    SWITCH, SWITCHED, UNSOLVED, UPPER,
     Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import (
@@ -76,15 +78,15 @@ def lag_is_slow(p: Plant, m: Motion) -> bool:
 
 
 @inlined
-def too_fast_for_the_spring(p: Plant, x: State, m: Motion, horizon: float) -> bool:
-    """Whether the torque rises so fast that the particular solution of the spring is far larger than z."""
-    if m.ub == 0.0 or x.side == 0.0:
+def series_serves(p: Plant, x: State, m: Motion, horizon: float) -> bool:
+    """Whether the closed form of a short span would cancel: a slow lag, a torque too fast for the spring."""
+    if x.side == 0.0 or (m.ub == 0.0 and m.slow_lag == 0.0):
         return False
     stiff = 1.0 + (x.doubled if x.doubled > 0.0 else 0.0)
     rates = math.sqrt(stiff * p.w0sq_slip) + p.d * (p.inv_J1 + p.inv_J2)  # above those of the span
     return (
-        abs(m.ub) > MUCH_FASTER * rates * (abs(p.u_min) + abs(p.u_max))
-        and rates * horizon < 1e-3
+        (m.slow_lag != 0.0 or abs(m.ub) > MUCH_FASTER * rates * (abs(p.u_min) + abs(p.u_max)))
+        and rates * horizon < 1e-2
         and horizon < MOST_PARTS * (p.lag if p.lag > 0.0 else math.inf)
     )
 
@@ -149,12 +151,12 @@ def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
             m.k = k
             m.dd = dd
     slope = (x.ref - x.u) * rate if p.lag > 0.0 else ub
-    fast = too_fast_for_the_spring(p, x, m, horizon)
-    if (m.slow_lag != 0.0 or fast) and not held:
+    series = series_serves(p, x, m, horizon)
+    if (m.slow_lag != 0.0 or series) and not held:
         f0 = x.u * inv_J1
         if not stuck:
             f0 += friction * p.inv_J2
-        write_without_cancelling(m, side * f0, side * slope * inv_J1, fast)
+        write_without_cancelling(m, side * f0, side * slope * inv_J1, series)
     if stuck:
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if held:
@@ -322,7 +324,7 @@ def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: f
     return (event, end) if s >= -1.0 else (UNSOLVED, 0.0)
 
 
-@inlined
+@apart(types.float64(from_dtype(PLANT), from_dtype(STATE), from_dtype(MOTION), types.float64))
 def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
     """When the motor torque, rising, meets the shaft torque of a motor that is held, if before `end`.
 

@@ -25,8 +25,10 @@ from __future__ import annotations
 
 import math
 
-from softstart.plant.jit import compiled, inlined
-from softstart.plant.layout import Motion, Septuple
+from numba import from_dtype, types
+
+from softstart.plant.jit import apart, compiled, inlined
+from softstart.plant.layout import MOTION, Motion, Septuple
 from softstart.plant.motion import (
     IN_PARTS, PARTICULAR, decaying_pair, derivatives, exponential_response, forcing_from_start, forcing_tail,
     motion, remainders, slow_part,
@@ -269,12 +271,25 @@ def terms(
     return f, slope, curve, lowest - ROUNDING * bent, third, size, steep
 
 
-@compiled
+@inlined
 def crossing_by_terms(
     m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float, load: Septuple,
     rising: bool, begin: float, end: float,
 ) -> float:  # fmt: skip
     """As `crossing.first_crossing`: first s at which f falls through zero, -1 without one, -2 if lost."""
+    a, b, c, d, e, f, g = load
+    return search(m, c0, alpha, beta, gamma, kappa, a, b, c, d, e, f, g, 1.0 if rising else 0.0, begin, end)
+
+
+@apart(types.float64(from_dtype(MOTION), *[types.float64] * 15))
+def search(
+    m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float, w2: float, by_a: float,
+    by_b: float, by_e: float, ratio: float, factor: float, offset: float, begun: float, begin: float,
+    end: float,
+) -> float:  # fmt: skip
+    """The search by terms; the load's numbers one by one."""
+    load = (w2, by_a, by_b, by_e, ratio, factor, offset)
+    rising = begun != 0.0
     s = begin
     window = end - begin
     shift = 0.0
