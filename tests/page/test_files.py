@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.page.conftest import SOFTSTART
 
 from softstart import DataSheet, Drive, InputError, compare, simulate
 
@@ -179,3 +180,16 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     assert trouble.is_hidden()
     name, content = saved(page, "sheet-save")
     assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)
+
+
+def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
+    words = ("report", "--controllers", "direct,ramp", "--budget", "0", "--pdf", str(tmp_path / "r.pdf"))
+    subprocess.run([SOFTSTART, *words], check=True, capture_output=True, cwd=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["r.pdf"]
+    printed = (tmp_path / "r.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-")
+    sheets = re.findall(rb"/MediaBox \[0 0 ([0-9.]+) ([0-9.]+)\]", printed)
+    assert 4 <= len(sheets) <= 14
+    for width, height in sheets:  # A4 in points
+        assert float(width) == pytest.approx(595.3, abs=1.0)
+        assert float(height) == pytest.approx(841.9, abs=1.0)

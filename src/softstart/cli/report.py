@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,6 +44,15 @@ if TYPE_CHECKING:
 else:
     reporting, document = late("softstart.reporting"), late("softstart.reporting.document")
 
+BROWSERS = (
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+    "/Applications/Chromium.app/Contents/MacOS/Chromium",
+    "C:/Program Files/Google/Chrome/Application/chrome.exe",
+    "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
+)
+PRINTING = 120.0  # s for a browser to print a report
+
 
 @click.command(cls=Command)
 @drive_argument(default=DEFAULT_DRIVE)
@@ -48,6 +60,11 @@ else:
     "--out",
     metavar="FILE",
     help="The HTML file to write, as report.html. Without it (then give --json) only the numbers are made.",
+)
+@click.option(
+    "--pdf",
+    metavar="FILE",
+    help="The PDF file to write, as report.pdf; Chromium, Chrome or Edge prints it.",
 )
 @controller_option(
     "--controllers",
@@ -75,6 +92,7 @@ def report(
     *,
     drive: str,
     out: str | None,
+    pdf: str | None,
     controllers: str | None,
     settings: tuple[str, ...],
     params: tuple[str, ...],
@@ -93,8 +111,16 @@ def report(
     names: Sequence[str] | None = None
     given: dict[str, dict[str, str]] = {}
     asked: dict[str, Any] = {}
+    browser = ""
     with mistakes.noted():
-        _check_out(out, as_json)
+        if out is None and pdf is None and not as_json:
+            raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
+        for option, path in (("--out", out), ("--pdf", pdf)):
+            if path is not None:
+                _check_file(option, path)
+    if pdf is not None:
+        with mistakes.noted():
+            browser = _browser()
     with mistakes.noted():
         one = read_drive(drive, settings)
     with mistakes.noted():
@@ -110,14 +136,18 @@ def report(
     mistakes.settle()
     assert one is not None
 
-    made, page = _made(one, names, given, asked, out is not None)
+    made, page = _made(one, names, given, asked, out is not None or pdf is not None)
     if out is not None:
         write_whole(Path(out), lambda stream: stream.write(page))
+    if pdf is not None:
+        with working("printing ..."):
+            printed = _printed(page, browser)
+        write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
 
     if as_json:
         print_json(made.summary())
     else:
-        _show(console(), made, str(out))
+        _show(console(), made, " and ".join(path for path in (out, pdf) if path is not None))
 
 
 def _made(
@@ -144,30 +174,64 @@ def _made(
         return made, made.to_html() if drawn else ""
 
 
-def _check_out(out: str | None, as_json: bool) -> None:
+def _check_file(option: str, out: str) -> None:
     """Whether the file can be written, found before anything is computed."""
-    if out is None:
-        if not as_json:
-            raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
-        return
+    example = "report.pdf" if option == "--pdf" else "report.html"
     if not out.strip() or "\0" in out:
-        raise InputError(f"--out = {out!r}: this cannot be the name of a file; write one, as report.html.")
+        raise InputError(f"{option} = {out!r}: this cannot be the name of a file; write one, as {example}.")
     path = Path(out)
     try:
         if path.is_dir():
-            raise InputError(
-                f'--out = "{out}": this is a folder; name a file in it, as {path / "report.html"}.'
-            )
+            raise InputError(f'{option} = "{out}": this is a folder; name a file in it, as {path / example}.')
         if path.exists() and not path.is_file():  # a device or a pipe would be replaced by the file
-            raise InputError(f'--out = "{out}": this is no ordinary file; name one, as report.html.')
+            raise InputError(f'{option} = "{out}": this is no ordinary file; name one, as {example}.')
         with tempfile.TemporaryFile(dir=path.parent, prefix=f".{path.name}."):
             pass
     except OSError as error:
         reason = error.strerror or error
         raise InputError(
-            f'--out = "{out}": the file cannot be written there ({reason}); name one in a folder that is '
+            f'{option} = "{out}": the file cannot be written there ({reason}); name one in a folder that is '
             "there and that you may write to."
         ) from None
+
+
+def _browser() -> str:
+    """The browser that prints: that of SOFTSTART_CHROMIUM, or one that is installed."""
+    if named := os.environ.get("SOFTSTART_CHROMIUM"):
+        if shutil.which(named) is None:
+            raise InputError(
+                f'SOFTSTART_CHROMIUM = "{named}": there is no such program; name a Chromium or a Chrome.'
+            )
+        return named
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        raise InputError(
+            "--pdf: no Chromium, Chrome or Edge was found to print with; install one (Debian: apt-get install "
+            "chromium), name it in SOFTSTART_CHROMIUM, or print the HTML file of --out in any browser."
+        )
+    return browser
+
+
+def _printed(page: str, browser: str) -> bytes:
+    """The page as PDF, printed by the browser without a window."""
+    with tempfile.TemporaryDirectory(prefix="softstart-print-", ignore_cleanup_errors=True) as folder:
+        source, target = Path(folder, "report.html"), Path(folder, "report.pdf")
+        source.write_text(page, encoding="utf-8")
+        words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+        words += [f"--user-data-dir={folder}/profile", f"--print-to-pdf={target}"]
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            words.append("--no-sandbox")  # which root cannot have
+        try:
+            done = subprocess.run(
+                [*words, source.as_uri()], capture_output=True, timeout=PRINTING, check=False
+            )
+            said = " ".join(done.stderr.decode(errors="replace").split()[-20:])
+            why = said or f"exit code {done.returncode}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            why = str(error)
+        if not target.exists():
+            raise InputError(f"--pdf: {browser} did not print ({why}); print the HTML file of --out instead.")
+        return target.read_bytes()
 
 
 def _seconds(text: str) -> float:
@@ -195,4 +259,4 @@ def _show(to: Console, made: reporting.Report, out: str) -> None:
     for name, reason in made.failed:
         sentence(to, f"{name} was left out: {reason}", "dim")
     to.print()
-    sentence(to, f"Written to {out}: open it in a browser, or print it to A4.")
+    sentence(to, f"Written to {out}.")

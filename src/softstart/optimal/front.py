@@ -27,6 +27,7 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.store import Records, Target
 
+notebook = late("softstart.views.notebook")
 optima = late("softstart.views.optima")  # it draws results of this module
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
@@ -247,6 +248,10 @@ class Front:
             table.writerows([cell(row.get(name)) for name in columns] for row in rows)
 
         write_whole(Path(path), write)
+
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        return notebook.of_front(self)
 
     def plot(self) -> Any:
         """The curve with its bound, and the controllers as points."""

@@ -10,11 +10,14 @@ import numpy as np
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
+from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.start import metrics
 from softstart.start.recommendation import Margin
 from softstart.start.run import Run
+
+notebook = late("softstart.views.notebook")
 
 Method = Literal["closed-form", "lp", "collocation", "robust"]
 BoundKind = Literal["certificate", "momentum", "none"]
@@ -207,6 +210,10 @@ class Optimum:
     def heat(self) -> float:
         """I2t heat of the realised torque from 0 to t_f, in s: integral of (u/Ms)^2."""
         return heat_of(self.run, self.end_time)
+
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        return notebook.of_optimum(self)
 
     def __repr__(self) -> str:
         """One line with the main figures."""

@@ -11,10 +11,13 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
 from softstart.start.run import BaseRun
 from softstart.start.simulation import Startable, models, simulate
+
+notebook = late("softstart.views.notebook")
 
 DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
@@ -61,6 +64,10 @@ class Comparison:
     def recommendation(self) -> Recommendation:
         """What is recommended, and why."""
         return recommend(self.drive, self.rows)
+
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        return notebook.of_comparison(self)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON."""

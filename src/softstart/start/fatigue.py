@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 else:
     rainflow = late("rainflow")
 
+notebook = late("softstart.views.notebook")
 views = late("softstart.views.fatigue")  # above this module; see softstart.late
 
 # pitting of case-hardened gears: the life factor of ISO 6336-2 falls as N^-0.0756, the torque as its square
@@ -177,6 +178,10 @@ class Fatigue:
             "worn_gap": self.worn_gap,
             "strategies": [row.summary() for row in self.rows],
         }
+
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        return notebook.of_fatigue(self)
 
     def plot(self) -> Any:
         """Ranges of the cycles over how many there are, for each strategy."""

@@ -25,6 +25,7 @@ from softstart.start.engine import MAX_EVENTS, Recorder, run_one
 from softstart.start.status import Status, status_of
 
 Vector = NDArray[np.float64]
+notebook = late("softstart.views.notebook")
 starts = late("softstart.views.starts")  # above this module; see softstart.late
 
 EVENT_NAMES = {
@@ -80,6 +81,10 @@ class BaseRun(ABC):
     controller: Controller | None
     status: Status
     positions: Mapping[str, Any]
+
+    def _repr_html_(self) -> Any:
+        """What a notebook shows."""
+        return notebook.of_run(self)
 
     @property
     @abstractmethod

@@ -73,3 +73,25 @@ def test_a_place_that_cannot_be_written_is_told_first(run, nothing_left, out, sa
     assert err.count("\n") == 1
     assert says in err
     nothing_left()
+
+
+def test_without_a_browser_the_pdf_is_refused_before_anything_is_computed(run, monkeypatch, nothing_left):
+    monkeypatch.delenv("SOFTSTART_CHROMIUM", raising=False)
+    monkeypatch.setenv("PATH", "")
+    code, out, err = run("report", "good.toml", *CHEAP, "--pdf", "r.pdf")
+    assert (code, out) == (2, "")
+    assert "apt-get install chromium" in err
+    monkeypatch.setenv("SOFTSTART_CHROMIUM", "no-such-browser")
+    code, out, err = run("report", "good.toml", *CHEAP, "--pdf", "r.pdf")
+    assert (code, out) == (2, "")
+    assert 'SOFTSTART_CHROMIUM = "no-such-browser": there is no such program' in err
+    nothing_left()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs the program false")
+def test_a_browser_that_does_not_print_is_named(run, monkeypatch, nothing_left):
+    monkeypatch.setenv("SOFTSTART_CHROMIUM", "false")
+    code, out, err = run("report", "good.toml", *CHEAP, "--pdf", "r.pdf")
+    assert (code, out) == (2, "")
+    assert "--pdf: false did not print (exit code 1); print the HTML file of --out instead." in err
+    nothing_left()
