@@ -206,8 +206,8 @@ def _browser() -> str:
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         raise InputError(
-            "--pdf: no Chromium, Chrome or Edge was found to print with; install one (Debian: apt-get install "
-            "chromium), name it in SOFTSTART_CHROMIUM, or print the HTML file of --out in any browser."
+            "--pdf: no Chromium, Chrome or Edge was found to print with; install one (Debian: apt-get "
+            "install chromium), name it in SOFTSTART_CHROMIUM, or print the file of --out in any browser."
         )
     return browser
 
