@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POSITIONS = ("mid-gap", "driving-flank", "opposite-flank", "hanging")
+TURNS = 5  # of which the least time of each contender counts
 SLOWER = 1.2  # start time allowed to an optimum, over that of direct from there
 KEPT = 1.05  # K_dyn from the worst position over that from mid-gap, up to which a promise is kept
 ALIKE = 0.01  # relative differences below this decide no order
@@ -234,7 +235,7 @@ def claims(found: Findings) -> tuple[Claim, ...]:
         made.append(strategies_reach_the_optimum(found))
     if found.unknown:
         made.append(a_sensor_is_worth_it(found))
-    return (*made, life_ranks_as_k_dyn(found), life_costs_little(found))
+    return (*made, life_ranks_as_k_dyn(found), life_costs_little(found), unknown_costs_three(found))
 
 
 def position_decides(found: Findings) -> Claim:
@@ -372,6 +373,35 @@ def life_costs_little(found: Findings) -> Claim:
         + ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in ratios.items())
         + ".",
     )
+
+
+def unknown_costs_three(found: Findings) -> Claim:
+    """The time of starts from an unknown position, beside that of the three known ones, in turns."""
+    ratios = {}
+    for name in found.drives:
+        own = found.of(name)
+        unknown = next(iter(own.values())).drive.replace(start_position="unknown")
+        strategies = list(next(iter(own.values())).runs)
+        turns = [
+            [_processor_time(one, strategies) for one in (unknown, *unknown.positions.values())]
+            for _ in range(TURNS)
+        ]
+        worst, *known = (min(column) for column in zip(*turns, strict=True))
+        ratios[name] = len(known) * worst / sum(known)
+    return Claim(
+        "The worst of three positions takes at most 3.2 times the time of one.",
+        Verdict.of(*(value <= 3.2 for value in ratios.values())),
+        "Processor time of the starts of all strategies, over the mean of the three positions by themselves: "
+        + ", ".join(f"{name} {value:.2f}" for name, value in ratios.items())
+        + ".",
+    )
+
+
+def _processor_time(drive: Drive, strategies: Sequence[str]) -> float:
+    begun = time.process_time()
+    for name in strategies:
+        simulate(drive, name)
+    return time.process_time() - begun
 
 
 # pictures ------------------------------------------------------------------------------------------------

@@ -201,6 +201,15 @@ def run_column(name: str) -> int:
     return int(getattr(layout, name))
 
 
+def test_each_position_is_the_drive_with_that_position() -> None:
+    for drive in (Drive.load("long-travel-3kw"), HOIST.replace(start_position="unknown", brake="none")):
+        for where, one in drive.positions.items():
+            same = drive.replace(start_position=where)
+            assert (one, one.given(), one.theta0) == (same, same.given(), same.theta0)
+            assert one.to_toml() == same.to_toml()
+        assert drive.assumed == drive.replace(start_position="mid-gap")
+
+
 def test_a_question_for_one_position_says_so() -> None:
     with pytest.raises(InputError, match="takes one position"):
         CRANE.replace(start_position="unknown").theta0  # noqa: B018

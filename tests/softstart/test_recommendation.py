@@ -76,7 +76,7 @@ def test_no_shipped_strategy_is_slow_on_a_shipped_drive_without_a_flag():
     for name in library.names():
         drive = Drive.load(name)
         hangs = drive.load_kind == "active" and drive.Mc != 0.0
-        for position in (*POSITIONS, *(["hanging"] if hangs else [])):
+        for position in (*POSITIONS, "unknown", *(["hanging"] if hangs else [])):
             started = drive.replace(start_position=position)
             direct = simulate(started, "direct")
             assert not flags(direct, direct)

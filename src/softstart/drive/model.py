@@ -422,13 +422,20 @@ class Drive(ParameterSet):
         where = self.start_position
         if not isinstance(where, str) or where != "unknown":
             return {where if isinstance(where, str) else "": self}
-        return {one: self.replace(start_position=one) for one in UNKNOWN_POSITIONS}
+        return {one: self._at(one) for one in UNKNOWN_POSITIONS}
+
+    def _at(self, where: str) -> Self:
+        """The drive, whose position is unknown, at one that it may have: there is nothing more to check."""
+        one = type(self).__new__(type(self))
+        vars(one).update(vars(self))
+        one._derive(start_position=where)
+        return one
 
     @property
     def assumed(self) -> Self:
         """The drive that controllers are set up for: where the position is unknown, the middle of the gap."""
-        unknown = len(self.positions) > 1
-        return self.replace(start_position="mid-gap") if unknown else self
+        where = self.start_position
+        return self._at("mid-gap") if isinstance(where, str) and where == "unknown" else self
 
     @property
     def release_time(self) -> Value:

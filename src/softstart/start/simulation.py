@@ -151,7 +151,8 @@ def simulate(
         _check_other(name, other, drive)
     if not isinstance(drive, Drive) or drive.shape != ():
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
-    if len(drive.positions) > 1:
+    positions = drive.positions
+    if len(positions) > 1:
         told, counted = fitted_to or drive.assumed, base or drive
         return worst_run(
             {
@@ -164,7 +165,7 @@ def simulate(
                     time_limit=time_limit,
                     max_events=max_events,
                 )
-                for name, one in drive.positions.items()
+                for name, one in positions.items()
             },
             drive=drive,
         )
