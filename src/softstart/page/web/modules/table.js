@@ -63,8 +63,10 @@ export class Table {
         const text = COLUMNS[index + 1][3](row);
         if (cell.textContent !== text) cell.textContent = text;
       });
-      const said = [row.limits, row.flag].filter(Boolean).join(", ");
+      const words = [row.limits, row.flag].filter(Boolean);
+      const said = words.join("\n");
       if (line.flag.textContent !== said) line.flag.textContent = said;
+      line.flag.classList.toggle("two", words.length > 1);
       line.flag.classList.toggle("kept", !row.flag && Boolean(row.limits?.startsWith("kept")));
       line.tr.title = row.trouble;
       line.tr.classList.toggle("trouble", Boolean(row.trouble));
