@@ -133,12 +133,7 @@ def clutch(
 
 
 def _optimize(one: Clutch, points: int, nondecreasing: bool) -> EngagementFront:
-    with working("looking for the best laws ...") as status:
-
-        def progress(doing: str) -> None:
-            if status is not None:
-                status.update(f"{doing} ...")
-
+    with working("looking for the best laws ...") as progress:
         law_class = "nondecreasing" if nondecreasing else "any"
         return optimize_engagement(one, points, law_class=law_class, progress=progress)
 

@@ -252,16 +252,10 @@ def _optimize_for_all(
 ) -> None:
     """One profile for all combinations of the values given, blind and with a contact sensor."""
     with no_solution_reported(as_json), output_folder(out) as folder:
-        with working("looking for the gentlest start of all drives ...") as status:
-
-            def progress(doing: str) -> None:
-                if status is not None:
-                    status.update(f"{doing} ...")
-
-            with named_as_options():
-                scenarios = robust.scenarios_of(drive, **varied)
-                seconds = asked.seconds(lambda: shortest.start_time_of_direct(drive))
-                worth = robust.worth_of_contact_sensor(scenarios, seconds, progress=progress)
+        with working("looking for the gentlest start of all drives ...") as progress, named_as_options():
+            scenarios = robust.scenarios_of(drive, **varied)
+            seconds = asked.seconds(lambda: shortest.start_time_of_direct(drive))
+            worth = robust.worth_of_contact_sensor(scenarios, seconds, progress=progress)
         if folder is not None:
             with working("drawing the figure ..."):
                 views.write_worth(worth, folder, command_line())

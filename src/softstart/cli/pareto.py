@@ -153,12 +153,8 @@ def _computed(
     bounds: dict[str, Any],
     state: Path | None,
 ) -> softstart.Front:
-    with working("starting the drive ...") as status:
+    with working("starting the drive ...") as progress:
         made = make_controllers(names, {}, prefix=True)
-
-        def progress(doing: str) -> None:
-            if status is not None:
-                status.update(f"{doing} ...")
 
         times = None
         if asked is not None:

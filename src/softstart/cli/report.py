@@ -158,19 +158,17 @@ def _made(
     drawn: bool,
 ) -> tuple[reporting.Report, str]:
     """The report and, if it is `drawn`, its page."""
-    with working("starting the drive ...") as status:
+    with working("starting the drive ...") as tell:
         controllers = make_controllers(names, given, prefix=True)
 
         def progress(share: float, what: str) -> None:
-            if status is not None:
-                status.update(f"{100.0 * share:.0f} %: {what} ...")
+            tell(f"{100.0 * share:.0f} %: {what}")
 
         with Attributed():
             made = reporting.report(
                 drive, controllers=controllers, progress=progress, command=command_line(), **asked
             )
-        if status is not None:
-            status.update("drawing the figures ...")
+        tell("drawing the figures")
         return made, made.to_html() if drawn else ""
 
 

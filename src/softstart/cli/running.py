@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -24,23 +25,41 @@ else:
     controller = late("softstart.controller")
 
 LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
+EVERY = 30.0  # s between two lines of progress in a pipe
 COMPILING = "compiling the simulation kernel: this may take half a minute, once, and is kept on disk ..."
 
 
+Tell = Callable[[str], None]
+
+
 @contextmanager
-def working(doing: str) -> Iterator[Status | None]:
+def working(doing: str) -> Iterator[Tell]:
     """A status line on a terminal while something is done; what anyone prints goes to standard error.
 
-    Whatever is compiled meanwhile is announced, on a terminal or not: a first start takes a while.
+    Gives what changes the line. In a pipe, where there is none, what is being done is a line of its own, at
+    first after `EVERY` seconds and then as seldom. Whatever is compiled meanwhile is announced in both.
     """
     console = rich_console.Console(stderr=True, highlight=False, markup=False)
     with redirect_stdout(sys.stderr):
         if not console.is_terminal:
             with _announced(None):
-                yield None
+                yield _seldom()
             return
         with console.status(doing) as status, _announced(status):
-            yield status
+            yield lambda now: status.update(f"{now} ...")
+
+
+def _seldom() -> Tell:
+    """Prints what is being done, and since when."""
+    began = said = time.monotonic()
+
+    def tell(now: str) -> None:
+        nonlocal said
+        if (at := time.monotonic()) - said >= EVERY:
+            said = at
+            print(f"softstart: {now} ... ({at - began:.0f} s)", file=sys.stderr, flush=True)
+
+    return tell
 
 
 @contextmanager

@@ -46,11 +46,10 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
         _list(as_json)
         return
     found = find_study(name)
-    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as status:
+    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as tell:
 
         def progress(doing: str) -> None:
-            if status is not None:
-                status.update(f"{found.name}: {doing} ...")
+            tell(f"{found.name}: {doing}")
 
         result = found.run(folder, progress)
         if folder is not None:

@@ -188,7 +188,7 @@ def _computed(
     to: Path | None,
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
-    with working("starting the first drive ...") as status, Attributed():
+    with working("starting the first drive ...") as tell, Attributed():
         grid = read_axes(axes, makers.Maker(controller or "", values, code_allowed()))
         last: Progress | None = None
         shown = 0.0
@@ -196,9 +196,9 @@ def _computed(
         def progress(now: Progress) -> None:
             nonlocal last, shown
             last = now
-            if status is not None and time.monotonic() - shown > 1.0 / AT_MOST:
+            if time.monotonic() - shown > 1.0 / AT_MOST:
                 shown = time.monotonic()
-                status.update(f"{now} ...")
+                tell(str(now))
 
         return softstart.sweep(
             drive,

@@ -186,12 +186,8 @@ def tune(
 
 def _computed(drive: Drive, controller: str, state: Path | None, asked: dict[str, Any]) -> Tuning:
 
-    with working("starting the drive ...") as status:
+    with working("starting the drive ...") as progress:
         make_controllers([controller], {controller: asked["parameters"]}, prefix=False)
-
-        def progress(doing: str) -> None:
-            if status is not None:
-                status.update(f"{doing} ...")
 
         with Attributed(), named_as_options():
             return softstart.tune(drive, controller, save_to=state, progress=progress, **asked)

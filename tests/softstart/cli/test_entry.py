@@ -216,6 +216,22 @@ def test_compiling_is_announced_once(capfd):
     assert capfd.readouterr().err == ""
 
 
+def test_in_a_pipe_progress_is_a_line_now_and_then(capfd, monkeypatch):
+    with working("looking") as tell:
+        tell("first")
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.setattr("softstart.cli.running.EVERY", 0.2)
+    with working("looking") as tell:
+        for number in range(12):
+            time.sleep(0.05)
+            tell(f"point {number}")
+    out, err = capfd.readouterr()
+    assert out == ""
+    lines = err.splitlines()
+    assert 2 <= len(lines) <= 3
+    assert all(re.fullmatch(r"softstart: point \d+ \.\.\. \([01] s\)", line) for line in lines)
+
+
 def test_on_a_terminal_progress_goes_to_standard_error(command, place):
     leader, follower = pty.openpty()
     process = subprocess.Popen(
