@@ -286,8 +286,13 @@ class _Run:
         """Changes that follow at once from where the drive is: flank touched, stuck load overcome."""
         self.release_if_due()
         if self.mode.form == "open":
-            grows = 0.0 if self.mode.held else self.path.torque(self.t, self.span)[1] / self.drive.J1
-            heading = next((x for x in (self.y[1], self.rhs()(self.t, self.y)[1], grows) if x != 0), 0.0)
+            grows = bends = 0.0
+            if not self.mode.held:
+                grows = self.path.torque(self.t, self.span)[1]
+                if self.path.lag > 0.0:  # a ramp behind a lag begins with u = u' = 0
+                    bends = (self.span[3] - grows) / self.path.lag
+            changes = (self.y[1], self.rhs()(self.t, self.y)[1], grows, bends)
+            heading = next((x for x in changes if x != 0), 0.0)
             for side in (1, -1):
                 if side * self.y[0] >= self.drive.gap / 2 and side * heading > 0:
                     self.touch(side)
