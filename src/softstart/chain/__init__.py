@@ -14,6 +14,7 @@ from softstart.chain.elements import Mass, Motor, Shaft
 from softstart.chain.model import Chain, ChainArrays
 
 if TYPE_CHECKING:
+    from softstart.chain.batch import simulate_chains
     from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
     from softstart.chain.simulation import Verification, simulate_chain, verify_on_chain
@@ -37,6 +38,7 @@ __all__ = [
     "natural_vibration",
     "reduce_chain",
     "simulate_chain",
+    "simulate_chains",
     "verify_on_chain",
 ]
 
@@ -53,6 +55,7 @@ _HOME = {
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",
+    "simulate_chains": "softstart.chain.batch",
     "verify_on_chain": "softstart.chain.simulation",
 }
 

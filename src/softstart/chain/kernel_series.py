@@ -23,12 +23,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from softstart.chain.kernel_records import CONTACT, DOUBLED, JOINED, ORDERS, PRESSED, WELDED, Record, Start
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import MOTION, PLANT, STATE
 
 REACH = 3.0
 TRUNCATION = 1e-18
+LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
 
 
 # bodies and gears -----------------------------------------------------------------------------------
@@ -178,15 +181,35 @@ def fastest_rate(start: Start) -> float:
     return rate
 
 
-@compiled
-def orders(reach: float) -> int:
+def needed(reach: float) -> int:
     """How many coefficients a span of so many inverse rates needs."""
     n = 0
     term = 1.0
-    while term > TRUNCATION and n < ORDERS - 4:
+    while term > TRUNCATION and n < MOST - 2:
         n += 1
         term *= reach / n
-    return max(n + 2, 4)
+    return max(n + 2, LEAST)
+
+
+def largest_reach(n: int) -> float:
+    """The largest reach for which n coefficients are enough."""
+    low, high = 0.0, 2.0 * REACH
+    while math.nextafter(low, high) < high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if needed(middle) <= n else (low, middle)
+    return low
+
+
+REACHES = np.array([largest_reach(n) for n in range(LEAST, MOST)])
+
+
+@compiled
+def orders(reach: float) -> int:
+    """How many coefficients a span of so many inverse rates needs: `needed`, from a table."""
+    n = MOST
+    while n > LEAST and reach <= REACHES[n - 1 - LEAST]:
+        n -= 1
+    return n
 
 
 # the series -----------------------------------------------------------------------------------------
@@ -231,6 +254,68 @@ def expand_torques(start: Start, h: float, n: int) -> None:
                 odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
 
 
+@inlined
+def each_alone(masses: Record, shafts: Record) -> bool:
+    """Whether no masses move as one and no gear has losses."""
+    alone = True
+    for i in range(1, masses.size):
+        if masses[i].first != i or shafts[i - 1].eta != 1.0:
+            alone = False
+    return alone
+
+
+@inlined
+def expand_alone(start: Start, h: float, n: int) -> None:
+    """As `expand` where each mass moves alone: the same operations, without those for bodies and gears."""
+    masses, shafts, u = start.masses, start.shafts, start.u
+    count = masses.size
+    motor = start.place.motor
+    for o in range(n + 1):
+        share = h / (o + 1.0)
+        before = 0.0
+        for i in range(count):
+            mass = masses[i]
+            w = mass.speed[o]
+            q = mass.outside[o]
+            if i == motor:
+                q += u[o]
+            if mass.ground != 0.0:
+                q -= mass.ground * w
+            if o == 0:
+                q -= mass.direction * mass.Mc + mass.active
+            mass.outside[o] = q
+            total = 0.0 + q
+            if i > 0:
+                total += before
+            after = 0.0
+            if i + 1 < count:
+                shaft = shafts[i]
+                v = w - masses[i + 1].speed[o]
+                if shaft.mode in (CONTACT, JOINED, DOUBLED):
+                    z = shaft.twist[o]
+                    if o == 0:
+                        z -= shaft.side * shaft.half
+                    if shaft.mode == DOUBLED:
+                        after = 2.0 * shaft.c * z
+                    else:
+                        after = shaft.c * z
+                        if shaft.d != 0.0:
+                            after += shaft.d * v
+                shaft.torque[o] = after
+                shaft.twist[o + 1] = share * v
+                total -= after
+            stuck = mass.stuck != 0
+            mass.held[o] = total if stuck else 0.0
+            mass.speed[o + 1] = (0.0 if stuck else total / mass.body_J) * share
+            if o == 0:
+                if stuck:
+                    mass.used = total / mass.hold if mass.hold > 0.0 else 0.0
+                mass.size = abs(q) + abs(before) + abs(after)
+                mass.influence = mass.size / mass.body_J
+            before = after
+        start.phi[o + 1] = share * masses[motor].speed[o]
+
+
 @compiled
 def expand(start: Start, h: float, n: int) -> None:
     """All coefficients of the span of length h that begins with the present state and modes."""
@@ -244,6 +329,9 @@ def expand(start: Start, h: float, n: int) -> None:
         mass.speed[0] = mass.w
     for shaft in shafts:
         shaft.twist[0] = shaft.theta
+    if each_alone(masses, shafts):
+        expand_alone(start, h, n)
+        return
     for o in range(n + 1):
         share = h / (o + 1.0)
         for k in range(count - 1):

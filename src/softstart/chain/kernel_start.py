@@ -16,10 +16,12 @@ from softstart.chain.kernel_records import (
     DOUBLED,
     JOINED,
     LOWER,
+    MASSES_TYPE,
     NO_EVENT,
     ORDERS,
     PRESSED,
     SETTLE,
+    SHAFTS_TYPE,
     START_TYPE,
     UNSOLVED,
     UPPER,
@@ -50,6 +52,7 @@ from softstart.plant.span import lag_is_slow, torque_after, torque_course
 from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, sample, take_answer
 
 _A = types.Array(types.float64, 1, "C")
+_M = types.Array(types.float64, 2, "C")
 _STEP = types.FunctionType(STEP_SIGNATURE)
 
 
@@ -105,12 +108,21 @@ def record(start: Start, h: float) -> None:
 def move_masses(start: Start, n: int, s: float) -> None:
     """Speeds, twists and the motor's angle at s on [0, 1]."""
     x = start.x.view(STATE)[0]
-    for mass in start.masses:
-        mass.w = value(mass.speed, n, s)
-    for shaft in start.shafts:
+    masses, shafts, phi = start.masses, start.shafts, start.phi
+    angle = phi[n]
+    for mass in masses:
+        mass.w = mass.speed[n]
+    for shaft in shafts:
         if shaft.mode not in (PRESSED, WELDED):
-            shaft.theta = value(shaft.twist, n, s)
-    x.phi2 = value(start.phi, n, s)
+            shaft.theta = shaft.twist[n]
+    for o in range(n - 1, -1, -1):  # all polynomials at once: each alone waits for its last step
+        angle = angle * s + phi[o]
+        for mass in masses:
+            mass.w = mass.w * s + mass.speed[o]
+        for shaft in shafts:
+            if shaft.mode not in (PRESSED, WELDED):
+                shaft.theta = shaft.theta * s + shaft.twist[o]
+    x.phi2 = angle
 
 
 @inlined
@@ -276,6 +288,42 @@ def run(step, parameters, sees, start, measured, state, command):  # type: ignor
             return taken
         for i in range(state.shape[0]):
             state[i] = new_state[i]
+
+
+@compiled_as(
+    types.void(
+        _STEP, _M, MASSES_TYPE, SHAFTS_TYPE, _M, types.int64, types.boolean, types.float64, _M, SHAFTS_TYPE,
+        START_TYPE, _A, _A, _A,
+    )
+)  # fmt: skip
+def run_many(  # type: ignore[no-untyped-def]
+    step, p, masses, shafts, parameters, sees, on_gap, until, results, ends, start, measured, state, command
+):
+    """Start i has row i of p, masses, shafts and parameters (one row serves all); its x goes to results[i].
+
+    Its shafts as they are at the end go to ends[i]. `start` and the arrays behind it are scratch.
+    """
+    own = parameters[0]
+    for i in range(results.shape[0]):
+        if parameters.shape[0] > 1:
+            own = parameters[i]
+        for j in range(start.p.shape[0]):
+            start.p[j] = p[i, j]
+        for j in range(start.m.shape[0]):
+            start.m[j] = 0.0
+        for j in range(start.masses.size):
+            start.masses[j] = masses[i, j]
+        for k in range(start.shafts.size):
+            start.shafts[k] = shafts[i, k]
+        for j in range(state.shape[0]):
+            state[j] = 0.0
+        begin(start, until)
+        start.x.view(STATE)[0].ask_on_gap = 1.0 if on_gap else 0.0
+        run(step, own, sees, start, measured, state, command)
+        for j in range(start.x.shape[0]):
+            results[i, j] = start.x[j]
+        for k in range(start.shafts.size):
+            ends[i, k] = start.shafts[k]
 
 
 # the record -----------------------------------------------------------------------------------------

@@ -232,9 +232,7 @@ class ChainRun(BaseRun):
     @property
     def base_torque(self) -> float:
         """The mean torque to which K_dyn refers, N m: that of `base`, or of the chain itself."""
-        if isinstance(self.base, Drive):
-            return float(metrics.base_torque(self.base))
-        return (self.base or self.chain).mean_torque
+        return mean_torque_of(self.base or self.chain)
 
     @property
     def k_dyn(self) -> float:
@@ -427,9 +425,9 @@ class ChainRun(BaseRun):
 class ChainRecorder(Recorder):
     """One start of a chain in the kernel."""
 
-    def __init__(self, given: Numbers, sees: int) -> None:
+    def __init__(self, given: Numbers, sees: int, rows: int = FIRST_ROWS) -> None:
         super().__init__(given.p, sees, recording=False)
-        self.start = given.start(FIRST_ROWS)
+        self.start = given.start(rows)
         self.x, self.m = self.start.x, self.start.m
 
     def begin(self, until: float) -> None:
@@ -471,6 +469,11 @@ class ChainRecorder(Recorder):
 
 def _doubled(rows: Record) -> Record:
     return np.concatenate([rows, np.zeros_like(rows)])
+
+
+def mean_torque_of(machine: Drive | Chain) -> float:
+    """M12avg of a drive or a chain under its starting torque, N m."""
+    return machine.mean_torque if isinstance(machine, Chain) else float(metrics.base_torque(machine))
 
 
 def _stored(given: Numbers, rows: Record) -> float:

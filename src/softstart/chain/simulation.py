@@ -100,7 +100,7 @@ def simulate_chain(
             raise InputError(f"{name} = {other!r}: give a single Drive, or a Chain.")
     made = None if controller is None else make_controller(controller, parameters)
     if len(chain.positions) > 1:
-        _check_end(chain, made, until, numbers(chain, excitation, time_limit, max_events))
+        check_end(chain, made, until, numbers(chain, excitation, time_limit, max_events))
         told = fitted_to or (None if made is None else chain)
         return worst_run(
             {
@@ -113,7 +113,7 @@ def simulate_chain(
             chain=chain,
         )  # fmt: skip
     given = numbers(chain, excitation, time_limit, max_events)
-    _check_end(chain, controller, until, given)
+    check_end(chain, controller, until, given)
     fitted, own = None, None
     if made is None:
         recorder = ChainRecorder(given, 0)
@@ -139,7 +139,7 @@ def drive_of(chain: Chain) -> Drive:
         raise InputError(sentences) from None
 
 
-def _check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
+def check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
     """A run needs an end."""
     if controller is not None and chain.motor is None:
         raise InputError(

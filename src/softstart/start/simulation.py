@@ -18,7 +18,8 @@ from softstart.start.run import Run, worst_run
 if TYPE_CHECKING:
     import xarray
 
-models = late("softstart.chain.model")  # above this module; see softstart.late
+# above this module; see softstart.late
+models, batches = late("softstart.chain.model"), late("softstart.chain.batch")
 
 
 @runtime_checkable
@@ -91,9 +92,9 @@ def simulate(
 
     Parameters
     ----------
-    drive : Drive, Chain, sequence of Drive or str
-        A drive, one whose fields hold arrays, a list of drives, a chain (see `simulate_chain`), or the name
-        or file of a drive or chain.
+    drive : Drive, Chain, sequence of them or str
+        A drive, one whose fields hold arrays, a list of drives, a chain (see `simulate_chain`), a list of
+        chains (see `simulate_chains`), or the name or file of a drive or chain.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or a Controller object.
     until : float, optional
@@ -144,6 +145,11 @@ def simulate(
         return drive.start(
             controller, until, parameters=parameters, fitted_to=fitted_to, base=base, time_limit=time_limit,
             max_events=max_events,
+        )  # fmt: skip
+    if isinstance(drive, Sequence) and drive and isinstance(drive[0], Startable):
+        return batches.simulate_chains(
+            drive, controller, until, fitted_to=fitted_to, parameters=parameters, base=base,
+            time_limit=time_limit, max_events=max_events,
         )  # fmt: skip
     made = make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
