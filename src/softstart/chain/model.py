@@ -599,6 +599,6 @@ def is_chain(given: str | os.PathLike[str]) -> bool:
     if not isinstance(given, str | os.PathLike) or not os.fspath(given) or refusal_of(given) is not None:
         return False
     try:
-        return bool(re.search(r"^\s*\[\[\s*mass\s*\]\]", read_text(given), re.MULTILINE))
+        return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", read_text(given), re.MULTILINE))
     except RefusedError:
         return False
