@@ -15,10 +15,10 @@ ONE_SENTENCE = {
         ["zzzzzz"],
         [
             "there are compare, simulate, fatigue, optimize, pareto, tune, sweep, linear, reduce, clutch, "
-            "balance, report, serve, drives, controllers, study and completion"
+            "balance, report, serve, init, drives, controllers, study and completion"
         ],
     ),
-    "command by its subject": (["chain"], ['"chain"', "did you mean softstart reduce?"]),
+    "command by its subject": (["chain"], ['"chain"', "did you mean softstart compare?"]),
     "command by a controller": (["shaper"], ["did you mean softstart simulate DRIVE --controller shaped?"]),
     "command by what it finds": (["gains"], ["did you mean softstart tune?"]),
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
