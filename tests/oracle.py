@@ -145,8 +145,10 @@ class _Run:
         self.scale = np.array([speed / Omega, speed, speed])
         self.t, self.span = 0.0, path.spans[0]
         self.y = np.array([theta, v, w2, 0.0] + [0.0] * (3 if energy else 0))
-        self.atol = 1e-14 * np.array(
-            [speed / Omega, speed, speed, speed / Omega] + [torque * speed / Omega] * 3
+        self.atol = (
+            1e-3
+            * rtol
+            * np.array([speed / Omega, speed, speed, speed / Omega] + [torque * speed / Omega] * 3)
         )
         self.atol = self.atol[: len(self.y)]
         self.held_until = release
