@@ -28,8 +28,9 @@ AIM = 1.0 - 2e-6  # of a limit: an answer on the near side of it
 WITHIN = 1e-5  # of the start time
 WITHIN_SEVERAL = 1e-3  # the same where one profile serves several positions: each try takes long
 EDGE = 1e-4  # so much longer than the shortest start, its program is sure to find one
-LONGEST = 100.0  # times the first start time that is not ruled out: no longer one is tried
+LONGEST = 100.0  # times what the inertia alone takes at full torque: no longer start time is tried
 MOST_TRIALS = 30
+NO_TIME = 1e-3  # elastic periods: where momentum rules out nothing, the search begins there
 PROOFS = 4  # shorter start times whose certificates are asked for, after the answer
 
 
@@ -77,16 +78,21 @@ class _Search:
         self.allowed = math.inf if most is None else most / problem.base_torque
         self.tried: list[Optimum] = []
         self.shortest = 0.0  # no start with one contact is quicker, as far as that is known, s
+        drive = problem.drive
+        alone = float(drive.J1 + drive.J2) * problem.target / problem.highest_torque
+        released = float(drive.release_time) if math.isfinite(drive.release_time) else 0.0
+        self.no_time = NO_TIME * float(drive.elastic_period)
+        self.longest = LONGEST * (released + alone + float(drive.elastic_period))
         self.soonest = self._soonest()
 
     def _soonest(self) -> float:
         """No start keeps the permissible torque in less time, s, however often the gap closes."""
-        low = momentum_shortest_time(self.problem)
+        low = max(momentum_shortest_time(self.problem), self.no_time)
         if not self._too_hard(low):
             return low
         high = 2.0 * low
         while self._too_hard(high):
-            if high > LONGEST * low:
+            if high > self.longest:
                 least = self._bound(high) * self.problem.base_torque
                 raise self._none(f"within {high:.4g} s no start has a peak below {least:.4g} N m")
             high *= 2.0
@@ -116,7 +122,7 @@ class _Search:
             bracket.take(end, end * min(max(share - AIM, -0.5), 1.0) if best else math.inf)
             bracket.low = max(bracket.low, min(self.shortest, bracket.high))
             late = found is not None and time.perf_counter() > until
-            if late or bracket.high - bracket.low <= within * end or end > LONGEST * self.soonest:
+            if late or bracket.high - bracket.low <= within * end or end > self.longest:
                 break
             end = bracket.next()
             if end <= self.shortest:
@@ -148,7 +154,8 @@ class _Search:
 
     def proved(self, found: Optimum) -> tuple[float, str]:
         """No start that keeps the permissible torque takes less time than this, s; what that covers."""
-        by_momentum = self.soonest, momentum_bound(found.problem).covers
+        least = self.soonest if self.soonest > self.no_time else 0.0
+        by_momentum = least, momentum_bound(found.problem).covers
         if found.bound.kind != "certificate" or math.isinf(self.allowed):
             return by_momentum
         # K_dyn falls so many times as fast as the time rises; the certificate lies as far below it as here
@@ -172,7 +179,7 @@ class _Search:
 
     def _nearest(self) -> str:
         if not self.tried:
-            return f"no start of up to {LONGEST * self.soonest:.4g} s was found at all"
+            return f"no start of up to {self.longest:.4g} s was found at all"
         nearest = min(self.tried, key=self._share)
         worst = min(self.margins(nearest, self.limits), key=lambda one: one.share)
         return f"the nearest start that was found takes {nearest.end_time:.4g} s, {worst}"

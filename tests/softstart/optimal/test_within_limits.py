@@ -142,6 +142,17 @@ def test_what_cannot_be_asked_is_refused(drive: Drive, given: dict[str, Any], sa
         optimize(drive, limits=True, **given)
 
 
+@pytest.mark.parametrize("share", [0.4, 1.5])
+def test_a_brake_that_is_released_late_is_no_bound_on_the_start_time(share: float) -> None:
+    """Momentum rules out no start time beforehand; the answer is later than the release all the same."""
+    drive = HELD.replace(release=share * HELD.elastic_period, target_speed=20.0, permissible_torque=180.0)
+    best = optimize(drive, limits=True, time_limit=0.0)
+    assert best.kept is not None
+    assert best.run.peak_torque <= 180.0
+    assert 0.0 <= best.kept.at_least <= best.end_time
+    assert best.end_time > drive.release
+
+
 def test_a_torque_that_no_start_keeps_is_proved_so() -> None:
     """The active load falls back through half the gap and hits harder than 9 N m by itself."""
     with pytest.raises(
