@@ -41,7 +41,8 @@ BUDGET = {
     "linear": (2120, 8, 1, 0),
     # ends before the bound; shared bounds; 230: brake, unknown position; 80: two methods where a bound is far
     # 250 and a file: the quickest start that keeps the limits
-    "optimal": (9020, 28, 7, 0),
+    # 930 and a file: the certificate of the whole start, behind lag, rate limit and friction
+    "optimal": (9950, 29, 8, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet

@@ -29,6 +29,8 @@ from softstart.optimal.result import (
     Trial,
 )
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
+from softstart.optimal.whole_certificate import not_certified as no_whole
+from softstart.optimal.whole_certificate import whole_bound
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -334,14 +336,21 @@ def _bound(hold: Hold, candidate: Candidate, run: Run) -> LowerBound:
     if problem.start_time is None:
         timed = replace(problem, start_time=candidate.end_time, minimise="k_dyn", k_dyn=None)
     by_momentum = momentum_bound(timed)
-    if problem.minimise != "k_dyn" or not_certified(problem):
-        return by_momentum
-    if run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
+    if problem.minimise != "k_dyn" or run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
         return by_momentum  # nothing better can be proved
-    k_dyn, entry = (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
-    within = 5e-4 if problem.ideal_torque else 2e-3  # what a lag costs it does not know anyway
-    bound = certified_bound(problem, k_dyn, entry_near=entry, within=within)
-    return bound if bound.k_dyn >= by_momentum.k_dyn else by_momentum
+    known = [by_momentum]
+    if not (problem.ideal_torque and not not_certified(problem)) and not no_whole(problem):
+        entry = _entry_of(run, hold.until)
+        contact = run.first_contact - hold.until if problem.drive.theta0 < 0.5 * problem.drive.gap else 0.0
+        known.append(whole_bound(problem, run.k_dyn, (contact, max(entry, contact), candidate.end_time)))
+    best = max(known, key=lambda one: one.k_dyn)
+    if not not_certified(problem) and (problem.ideal_torque or run.k_dyn > best.k_dyn * (1.0 + TOLERANCE)):
+        k_dyn, start = (
+            (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
+        )
+        within = 5e-4 if problem.ideal_torque else 2e-3  # what a lag costs it does not know anyway
+        known.append(certified_bound(problem, k_dyn, entry_near=start, within=within))
+    return max(known, key=lambda one: one.k_dyn)
 
 
 def _ideal(problem: Problem, run: Run) -> tuple[float, float | None]:

@@ -32,6 +32,7 @@ from scipy import sparse
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
+from softstart.drive import Drive
 from softstart.optimal.lp.rows import (
     AIM,
     MARGIN,
@@ -129,6 +130,28 @@ def phase_ends(grid: Grid, at: Instants) -> list[float]:
     return [0.0, *(ends[kind] for kind, _ in grid)]
 
 
+def phase_rates(drive: Drive, kind: Kind) -> Matrix:
+    """Rates of (z, z', w2, u, r, r', 1) of a drive in a phase."""
+    J1, J2, c, d, Mc, lag = (
+        float(value) for value in (drive.J1, drive.J2, drive.c, drive.d, drive.Mc, drive.torque_lag)
+    )
+    A = np.zeros((7, 7))
+    A[Z, V] = 1.0
+    A[R, SLOPE] = 1.0
+    A[V, U if lag > 0.0 else R] = 1.0 / J1
+    if lag > 0.0:
+        A[U, U], A[U, R] = -1.0 / lag, 1.0 / lag
+    if kind == "gap":
+        A[V, ONE], A[W2, ONE] = Mc / J2, -Mc / J2
+    elif kind == "stuck":
+        A[V, [Z, V]] = -c / J1, -d / J1
+    elif kind == "contact":
+        inverse = 1.0 / J1 + 1.0 / J2
+        A[V, [Z, V, ONE]] = -c * inverse, -d * inverse, Mc / J2
+        A[W2, [Z, V, ONE]] = c / J2, d / J2, -Mc / J2
+    return A
+
+
 class WholeProgram:
     """The least P, or the greatest speed, of a whole start with given instants on a grid.
 
@@ -192,21 +215,7 @@ class WholeProgram:
 
     def matrix(self, kind: Kind) -> Matrix:
         """Rates of (z, z', w2, u, r, r', 1) in a phase."""
-        A = np.zeros((7, 7))
-        A[Z, V] = 1.0
-        A[R, SLOPE] = 1.0
-        A[V, U if self.lag > 0.0 else R] = 1.0 / self.J1
-        if self.lag > 0.0:
-            A[U, U], A[U, R] = -1.0 / self.lag, 1.0 / self.lag
-        if kind == "gap":
-            A[V, ONE], A[W2, ONE] = self.Mc / self.J2, -self.Mc / self.J2
-        elif kind == "stuck":
-            A[V, [Z, V]] = -self.c / self.J1, -self.d / self.J1
-        elif kind == "contact":
-            inverse = 1.0 / self.J1 + 1.0 / self.J2
-            A[V, [Z, V, ONE]] = -self.c * inverse, -self.d * inverse, self.Mc / self.J2
-            A[W2, [Z, V, ONE]] = self.c / self.J2, self.d / self.J2, -self.Mc / self.J2
-        return A
+        return phase_rates(self.problem.drive, kind)
 
     def moved(self, step: Steps, s: Vector) -> Matrix:
         """How (z, z', w2, u, r, r', 1) moves within s of the given steps, shape (..., 7, 7)."""
