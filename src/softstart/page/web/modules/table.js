@@ -63,7 +63,7 @@ export class Table {
         const text = COLUMNS[index + 1][3](row);
         if (cell.textContent !== text) cell.textContent = text;
       });
-      const words = [row.limits, row.flag].filter(Boolean);
+      const words = [row.limits?.replace("exceeded -", "over "), row.flag].filter(Boolean); // a narrow column
       const said = words.join("\n");
       if (line.flag.textContent !== said) line.flag.textContent = said;
       line.flag.classList.toggle("two", words.length > 1);
