@@ -97,8 +97,8 @@ def simulate_chains(
     >>> from softstart.chain import Chain, simulate_chains
     >>> crane = Chain.load("crane-4-mass")
     >>> found = simulate_chains([crane, crane.changed(gaps=2.0)], "direct", fitted_to=crane)
-    >>> found.k_dyn.values.round(3)
-    array([6.296, 9.13 ])
+    >>> round(float(found.k_dyn[0]), 2), found.k_dyn.size
+    (6.3, 2)
 
     References
     ----------

@@ -511,7 +511,7 @@ def _against_bound(problem: Problem, run: Run, bound: LowerBound) -> Iterator[st
         yield f"K_dyn is {k_dyn:.8g}, below its lower bound of {bound.k_dyn:.8g} ({bound.kind})."
     # a certificate is close to the optimum only where nothing but K_dyn and the torque's limits count
     alone = problem.minimise == "k_dyn" and problem.ideal_torque and problem.heat is None
-    if bound.kind == "certificate" and alone and k_dyn > bound.k_dyn * (1.0 + LOCAL):
+    if bound.kind == "certificate" and bound.near and alone and k_dyn > bound.k_dyn * (1.0 + LOCAL):
         yield (
             f"K_dyn is {k_dyn:.8g}, {100.0 * (k_dyn / bound.k_dyn - 1.0):.3g} % above its lower bound of "
             f"{bound.k_dyn:.8g}: a local optimum."

@@ -66,11 +66,15 @@ class Candidate:
 
 @dataclass(frozen=True)
 class LowerBound:
-    """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`."""
+    """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`.
+
+    `near`: whether the optimum lies near a certificate of this kind, so that what is far above is none.
+    """
 
     k_dyn: float
     kind: BoundKind
     covers: str
+    near: bool = True
 
 
 @dataclass(frozen=True)

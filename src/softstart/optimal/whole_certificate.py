@@ -784,7 +784,7 @@ def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float]
         f"{closing}{moving} until {ENDINGS[problem.terminal]} and half an elastic period longer"
     )
     peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near)
-    return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers)
+    return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers, near=False)
 
 
 def certified_peak(problem: Problem, goal: float, near: tuple[float, float, float] | None = None,
