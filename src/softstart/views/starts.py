@@ -365,7 +365,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
             len(runs), 1, (8.0, 1.0 + 1.35 * len(runs)), sharex=True, sharey=True, squeeze=False
         )
         longest = max(run.end_time for run in runs)
-        for index, (panel, row) in enumerate(zip(axes[:, 0], rows, strict=True)):
+        for panel, row in zip(axes[:, 0], rows, strict=True):
             run = row.run
             if not chain:
                 shade_open_gap(panel, run)
@@ -386,8 +386,12 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
                 pad=3,
             )
             panel.set_ylabel("N m")
-            if index == 0:
-                legend_above(panel, 1 + sum(not name.startswith("_") for name in names))
+        named = 1 + sum(not name.startswith("_") for name in names)
+        if named > 2:  # too wide to stand beside the title of a panel
+            handles, labels = axes[0, 0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside lower right", ncols=named)
+        else:
+            legend_above(axes[0, 0], named)
         axes[-1, 0].set_xlabel("time, s" if chain else "time, s     (grey: gap open)")
         axes[-1, 0].set_xlim(0.0, longest)
         entitle(figure, title)

@@ -10,7 +10,7 @@ import pytest
 
 from softstart import Drive, compare, simulate
 from softstart.views.numbers import column_of, number, printable, short
-from softstart.views.starts import share_lost
+from softstart.views.starts import comparison_figure, share_lost
 
 THREE = ("--controllers", "direct,reduced-first-stage,reduced-two-stage")
 
@@ -209,3 +209,16 @@ def test_compare_tells_limits_and_flags(run):
     code, out, err = run("compare", "--worst-case", "gap")
     assert code == 2
     assert "write gap x4, J2 x0.4" in err
+
+
+@pytest.mark.parametrize("machine", ["crane-4amtkf", "crane-4-mass"])
+def test_the_legend_of_the_picture_hides_no_title(machine):
+    found = compare(machine, ["direct", "reduced-first-stage"])
+    figure = comparison_figure(found.rows, "a title")
+    figure.canvas.draw()
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    assert len(legends) == 1
+    space = legends[0].get_window_extent()
+    for axes in figure.axes:
+        assert not space.overlaps(axes._left_title.get_window_extent())
+        assert not space.overlaps(axes.xaxis.label.get_window_extent()) or not axes.get_xlabel()
