@@ -52,6 +52,15 @@ def chain() -> None:
     assert simulate_chain(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
 
 
+def sensitivities() -> None:
+    """How a start of a chain answers to its demand."""
+    from softstart import Chain, TorqueProfile
+    from softstart.optimal.chains.starts import Player
+
+    played = Player(Chain.load("crane-4-mass")).play(TorqueProfile([0.0, 0.1], [20.0, 40.0]), 0.1)
+    assert played.answer([0.1]).torques.shape == (1, 3, 2)
+
+
 def robust() -> None:
     """Optima over several drives."""
     from softstart import Drive, optimize_robust
@@ -66,6 +75,7 @@ PARTS: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
     "chain": (("drive",), chain),
     "controllers": (("drive",), controllers),
     "robust": (("controllers",), robust),
+    "sensitivities": (("chain", "controllers"), sensitivities),
     "plain": (("controllers",), plain),
 }
 

@@ -24,7 +24,8 @@ BUDGET = {
     # 150 lines: damping ratios, mean torque and K_dyn of a chain, permissible torques; 180: where its start
     # begins, settled times, starts from an unknown position, as a drive has them; 370 and a file that
     # __init__ alone imports: batches, and spans of masses that move alone
-    "chain": (5325, 15, 3, 0),
+    # 285 and a file: sensitivities of starts, for the optimum
+    "chain": (5620, 16, 4, 0),
     # 140 and a file: `init`
     # 60: a report is printed to A4
     "cli": (4680, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
@@ -42,7 +43,8 @@ BUDGET = {
     # ends before the bound; shared bounds; 230: brake, unknown position; 80: two methods where a bound is far
     # 250 and a file: the quickest start that keeps the limits
     # 930 and a file: the certificate of the whole start, behind lag, rate limit and friction
-    "optimal": (9950, 29, 8, 0),
+    # 130 and two files: open-loop starts of chains, for their optimum
+    "optimal": (10090, 31, 9, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet

@@ -1,0 +1,1 @@
+"""Optimal starts of chains, through several gaps."""
