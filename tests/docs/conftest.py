@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+import pytest
+from tests.docs.reader import end_warm
+
 SHOWN = 12
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _ends() -> Iterator[None]:
+    """Leave no process behind."""
+    yield
+    end_warm()
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
