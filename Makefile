@@ -6,7 +6,7 @@
 #   make check                 lint, types, layers and the tests of what has changed: under two minutes
 #   make lint types layers     ruff, mypy, import-linter
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
-#   make page                  tests of the page in a real browser (needs chromium)
+#   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': some of them
 #   make pictures              the pictures of the README (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
 #   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
@@ -58,7 +58,7 @@ serve: $(VENV)/.installed-ui
 	$(BIN)/softstart serve
 
 page: $(VENV)/.installed-page
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page $(ONLY)
 
 pictures: $(VENV)/.installed-page
 	SOFTSTART_PICTURES=docs/_static $(BIN)/python -m pytest -q tests/page/test_pictures.py --page

@@ -82,6 +82,7 @@ def test_a_slider_moved_by_mouse_gives_the_k_dyn_of_simulate(page):
         assert shown == f"{simulate(CRANE.replace(gap=gap), name).k_dyn:.3f}"
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("strategy", ["direct", "state-feedback"])  # the quickest, and the slowest to design
 def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy):
     opened(page)
