@@ -121,3 +121,11 @@ def small_search() -> Iterator[None]:
         patch.setattr(solving, "PURSUED", 2)
         patch.setattr(solving, "FINE", 60)
         yield
+
+
+@pytest.fixture
+def small_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Certificates of the whole start from their first grid: where it is not the claim how near they come."""
+    from softstart.optimal import whole_certificate
+
+    monkeypatch.setattr(whole_certificate, "GRIDS", 1)

@@ -16,7 +16,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
 @pytest.mark.slow
-def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run):
+def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, small_search):
     code, out, err = run(
         "optimize", "crane-4amtkf", "--set", "start.position=unknown", "--start-time", "1.3x"
     )

@@ -240,7 +240,7 @@ def wrong_in(found: dict[str, float]) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_unknown_is_the_robust_optimum_and_its_bound_the_largest() -> None:
+def test_unknown_is_the_robust_optimum_and_its_bound_the_largest(small_search: None) -> None:
     drive = CRANE.replace(start_position="unknown")
     best = optimize(drive, 0.35)
     assert (best.method, best.problem.terminal) == ("robust", "reached")
@@ -260,7 +260,7 @@ def test_unknown_is_the_robust_optimum_and_its_bound_the_largest() -> None:
 
 
 @pytest.mark.slow
-def test_a_random_drive_of_unknown_position() -> None:
+def test_a_random_drive_of_unknown_position(small_search: None, small_certificate: None) -> None:
     assert not wrong_in(answered(0))
 
 

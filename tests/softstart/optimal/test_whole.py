@@ -51,7 +51,9 @@ CASES: dict[str, tuple[Drive, float, Terminal, tuple[tuple[float, float], ...]]]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_others_see_the_same_start(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_others_see_the_same_start(
+    case: str, monkeypatch: pytest.MonkeyPatch, small_certificate: None
+) -> None:
     """An independent integrator, the exact plant with every limit, and for some cases collocation.
 
     `optimize` takes what the program finds, and holds it to all its promises: limits, contacts, terminal,
@@ -220,7 +222,7 @@ def test_what_is_not_linear_is_named(drive: Drive, options: dict[str, Any], why:
 
 
 @pytest.mark.parametrize("name", ["servo-axis-small", "nordin-servo-60kw"])
-def test_the_drives_with_a_lag_that_come_along_have_optima(name: str) -> None:
+def test_the_drives_with_a_lag_that_come_along_have_optima(name: str, small_certificate: None) -> None:
     drive = Drive.load(name)
     shortest = shortest_start_time(Problem(drive, terminal="reached", minimise="start_time"))
     ratios = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,21 @@ from tests.softstart.plant.test_brake import HOIST
 from softstart import Drive, InputError, TorqueProfile, compare, optimize, simulate
 from softstart.controller import ready_controller_names
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
-from softstart.optimal.result import InfeasibleError
+from softstart.optimal.result import InfeasibleError, Optimum
 from softstart.start import metrics
 from softstart.views.optima import bound_sentence, comparison, question
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 HELD = HOIST.replace(brake="motor", start_position="hanging", permissible_torque=175.0)
+# a permissible start time is held against the answer only: tests of other limits share it
+IN_TIME = HELD.replace(permissible_start_time=0.3)
+TOO_LATE = HELD.replace(permissible_torque=153.0, permissible_start_time=0.2)
+
+
+@cache
+def quickest(drive: Drive) -> Optimum:
+    """The answer, which several tests look at."""
+    return optimize(drive, limits=True)
 
 
 @pytest.mark.parametrize("torque", [25.0, 40.0, 50.0])
@@ -35,7 +45,7 @@ def test_where_a_formula_is_exact_the_bound_is_reached(torque: float) -> None:
 @pytest.mark.slow
 def test_it_is_the_least_start_time_that_collocation_finds() -> None:
     torque = 60.0
-    best = optimize(CRANE.replace(permissible_torque=torque), limits=True)
+    best = quickest(CRANE.replace(permissible_torque=torque))
     k_dyn = torque / float(metrics.base_torque(CRANE))
     other = optimize(CRANE, minimise="start_time", k_dyn=k_dyn)
     assert other.method == "collocation"
@@ -46,16 +56,16 @@ def test_it_is_the_least_start_time_that_collocation_finds() -> None:
 @pytest.mark.parametrize(
     "drive",
     [
-        HELD,
+        IN_TIME,
         HELD.replace(torque_lag=0.005),
-        HELD.replace(permissible_torque=153.0),
-        CRANE.replace(permissible_torque=70.0),
+        TOO_LATE,
+        CRANE.replace(permissible_torque=60.0),
         CRANE.replace(permissible_torque=45.0, load_kind="reactive"),
     ],
 )
 def test_nothing_keeps_the_limits_in_less_time(drive: Drive) -> None:
     """Shorter optima, the answer's own torque shaken, and all shipped strategies."""
-    best = optimize(drive, limits=True)
+    best = quickest(drive)
     assert best.kept is not None
     most = drive.limits.shaft_torque
     assert most is not None
@@ -88,21 +98,19 @@ def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
     assert used["used life"] == pytest.approx(100.0, rel=2e-4)
     assert used["used life"] <= 100.0
     assert used["shaft torque"] < 170.0
-    assert best.end_time > optimize(HELD, limits=True).end_time
+    assert best.end_time > quickest(IN_TIME).end_time
 
 
 def test_margins_are_those_of_compare() -> None:
-    drive = HELD.replace(permissible_start_time=0.3)
-    best = optimize(drive, limits=True)
-    played = compare(drive, [best.run.controller], worst_case=[]).rows[0].margins(drive.limits)
+    best = quickest(IN_TIME)
+    played = compare(IN_TIME, [best.run.controller], worst_case=[]).rows[0].margins(IN_TIME.limits)
     assert best.kept is not None
     assert [str(one) for one in best.kept.margins] == [str(one) for one in played]
     assert best.summary()["limits"]["margins"] == [one.summary() for one in best.kept.margins]
 
 
 def test_a_start_time_that_cannot_be_kept_is_said() -> None:
-    drive = HELD.replace(permissible_torque=153.0, permissible_start_time=0.2)
-    best = optimize(drive, limits=True)
+    best = quickest(TOO_LATE)
     assert best.kept is not None
     assert not best.kept.kept
     assert best.kept.at_least > 0.2  # a proof that no start with one contact keeps both
