@@ -9,11 +9,13 @@ import pytest
 from tests.oracle import integrate
 from tests.softstart.plant.test_brake import HOIST
 
-from softstart import Drive, InputError, compare, simulate
+from softstart import Chain, Drive, InputError, compare, linear_view, simulate
+from softstart.chain import reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.plant import layout
 from softstart.start.batch import array_starts
+from softstart.views import starts
 
 CRANE = Drive.load("crane-4amtkf")
 STRATEGIES = ("direct", "s-curve", "shaped")
@@ -44,8 +46,17 @@ def test_defaults() -> None:
     assert plain.start_position == "mid-gap"
     assert plain.replace(brake="motor").start_position == "hanging"
     assert plain.replace(brake="motor").replace(brake="none").start_position == "mid-gap"
-    assert plain.replace(brake="motor", load_kind="reactive").start_position == "mid-gap"
-    assert CRANE.start_position == "mid-gap"
+    held = plain.replace(load_kind="reactive")  # by friction, wherever it came to rest
+    assert held.start_position == held.replace(brake="motor").start_position == "unknown"
+    assert held.replace(gap=[0.0, 0.1]).start_position == "unknown"
+    for no_doubt in ({"gap": 0.0}, {"initial_load_speed": -1.0}, {"initial_motor_speed": [0.0, 1.0]}):
+        assert held.replace(**no_doubt).start_position == "mid-gap"
+    assert held.replace(initial_speed="reversal").start_position == "opposite-flank"
+    assert held.replace(start_position="mid-gap").start_position == "mid-gap"
+    assert "start_position" not in held.given()
+    assert Drive.from_toml(held.to_toml()) == held
+    assert held.with_gap(0.0).with_gap(0.2).start_position == "unknown"
+    assert CRANE.start_position == CRANE.replace(load_kind="reactive").start_position == "mid-gap"
     assert "start_position" in CRANE.given()
 
 
@@ -208,6 +219,30 @@ def test_each_position_is_the_drive_with_that_position() -> None:
             assert (one, one.given(), one.theta0) == (same, same.given(), same.theta0)
             assert one.to_toml() == same.to_toml()
         assert drive.assumed == drive.replace(start_position="mid-gap")
+
+
+def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
+    """As if it had been named, in a start, a table, a batch, a chain, and a linear view."""
+    given = CRANE.replace(load_kind="reactive", damping=0.3).given()
+    plain = Drive(**{key: value for key, value in given.items() if key != "start_position"})
+    named = plain.replace(start_position="unknown")
+    assert plain == named
+    run, same = simulate(plain, "ramp"), simulate(named, "ramp")
+    assert (run.k_dyn, run.start_time, run.position) == (same.k_dyn, same.start_time, same.position)
+    assert list(run.positions) == list(UNKNOWN_POSITIONS)
+    found = simulate(plain.replace(gap=[0.0, 0.5]), "ramp")
+    assert float(found.k_dyn[1]) == run.k_dyn
+    alone = simulate(plain.replace(gap=0.0), "ramp")
+    assert float(found.k_dyn[0]) == alone.k_dyn
+    notes = starts.notes(compare(plain, ["ramp"]))
+    assert any(f"ramp {run.position}" in note for note in notes)
+    assert any("give start.position" in note for note in notes)
+    chain = Chain.from_drive(plain)
+    assert chain.position == "unknown"
+    assert reduce_chain(chain, to=2).to_drive().start_position == "unknown"
+    view, mid = (linear_view(one, "state-feedback") for one in (plain, named.replace(start_position=0.0)))
+    assert view.margins == mid.margins
+    assert view.margins is not None
 
 
 def test_a_question_for_one_position_says_so() -> None:

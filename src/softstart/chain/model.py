@@ -190,13 +190,14 @@ class Chain:
         of: Any = drive  # one number for each parameter
         rotor = Mass(of.J1, name="motor", initial_speed=of.initial_motor_speed)
         load = Mass(of.J2, name="load", torque=of.Mc, kind=of.load_kind, initial_speed=of.initial_load_speed)
-        shaft = Shaft(
-            of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=of.theta0 or None
-        )
+        unknown = len(drive.positions) > 1
+        where = None if unknown else of.theta0 or None
+        shaft = Shaft(of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=where)
         motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key != "mass"})
         return cls(
-            (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source
-        )
+            (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source,
+            position="unknown" if unknown else "mid-gap",
+        )  # fmt: skip
 
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""

@@ -112,7 +112,8 @@ class Reduction:
         """The two-mass drive, for `compare`, `optimize` and `tune`.
 
         All load torques act on its load, under the kind of the larger part; damping to the ground and the
-        efficiencies of gears, which a drive does not have, are left out.
+        efficiencies of gears, which a drive does not have, are left out. It starts where the chain does, in
+        mid-gap if the chain does not say otherwise.
 
         >>> from softstart.chain import reduce_chain
         >>> drive = reduce_chain(Chain.load("crane-4-mass"), to=2).to_drive()
@@ -144,7 +145,7 @@ class Reduction:
             damping=shaft.damping,
             gap=shaft.gap,
             contact_law=shaft.contact_law,
-            start_position="unknown" if unknown else sign * (shaft.start_position or 0.0),
+            start_position="unknown" if unknown else sign * (shaft.start_position or 0.0) or "mid-gap",
             target_speed=chain.target_speed,
             initial_motor_speed=motor.initial_speed,
             initial_load_speed=load.initial_speed,

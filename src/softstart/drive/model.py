@@ -40,6 +40,7 @@ Position = Literal["mid-gap", "driving-flank", "opposite-flank", "hanging", "unk
 Brake = Literal["none", "motor"]
 # where a start whose position is unknown may begin; the worst of them counts
 UNKNOWN_POSITIONS: Final = ("driving-flank", "mid-gap", "opposite-flank")
+SPEEDS: Final = ("initial_load_speed", "initial_motor_speed")
 
 library = Library("softstart.drive", "a drive", "drives")
 
@@ -50,6 +51,10 @@ class Drive(ParameterSet):
     Each quantity is a number in SI, a string with a unit, or an array of such (a batch: arrays broadcast
     together to `shape`). Angles are in rad at the motor shaft. A drive is frozen and its arrays are
     read-only; equal drives hash alike.
+
+    Without `start_position`, an active load behind a brake hangs, a reversal begins on the opposite flank,
+    and a reactive load at rest with a gap is at an unknown position: friction holds it wherever the last stop
+    left it. Any other start begins in mid-gap.
 
     Parameters
     ----------
@@ -222,15 +227,21 @@ class Drive(ParameterSet):
         vars(self).update(self._derived(vars(self)))
 
     def _derived(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Where and how fast the start begins, if that is not given: by brake, load and reversal."""
+        """Where and how fast the start begins, if that is not given: by brake, load and reversal.
+
+        An array of initial speeds counts as motion, so that no start of a batch depends on those beside it.
+        """
         given, found = vars(self)["_given"], dict[str, Any]()
         reversal = isinstance(values.get("initial_speed"), str)
         if reversal and values.get("target_speed") is not None:
-            speeds = ("initial_load_speed", "initial_motor_speed")
-            found = {name: -values["target_speed"] for name in speeds if name not in given}
+            found = {name: -values["target_speed"] for name in SPEEDS if name not in given}
         if "start_position" not in given:
             hangs = values.get("brake") == "motor" and values.get("load_kind") == "active"
-            found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else "mid-gap"
+            gap = np.asarray(values.get("gap", 0.0))
+            anywhere = values.get("load_kind") == "reactive" and np.any(gap > 0.0)
+            moves = any(np.ndim(values.get(name, 0.0)) or values.get(name, 0.0) != 0.0 for name in SPEEDS)
+            at_rest = "unknown" if anywhere and not moves else "mid-gap"
+            found["start_position"] = "hanging" if hangs else "opposite-flank" if reversal else at_rest
         return found
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:

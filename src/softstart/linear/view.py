@@ -319,7 +319,7 @@ def linear_view(
         drive = Drive.load(drive)
     made = make_controller(controller, parameters)
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
-    start = SampledStart.of(drive, made, fitted_to)
+    start = SampledStart.of(drive.assumed, made, fitted_to)  # the loop in contact is the same from anywhere
     run = run_until_steady(start)
     name = label_of(start.controller)
     points = operating_points(start, run)

@@ -28,6 +28,7 @@ from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.run import Run
 from softstart.views.printed import unit
+from softstart.views.starts import position_notes
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
@@ -407,6 +408,7 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
             "contacts": run.contacts,
             "impact_speed": number(run.impact_speed),
             "end_time": number(run.end_time),
+            "position": "".join(position_notes([run])),
         }
     return facts
 

@@ -383,6 +383,8 @@ def _times(times: Sequence[float]) -> str:
 
 
 def _why_hard(drive: Drive) -> str:
+    if len(drive.positions) > 1:
+        return "the start position is unknown, and one torque for every position has a search of its own"
     problem = Problem(drive, 1.0, "reached")
     if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
         return f"they need a numerical search (direct collocation), because {reason}"

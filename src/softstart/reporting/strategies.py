@@ -20,7 +20,7 @@ from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.views.printed import digits, fixed, listed, short
-from softstart.views.starts import clipped_torque
+from softstart.views.starts import clipped_torque, position_notes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,6 +123,7 @@ def strategies_section(
         f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below the "
         "target. Time lost: start time, and settled time, beyond that of direct start.",
         *([_limits_note(rows[0])] if limited else []),
+        *position_notes([row.run for row in rows]),
         *(
             f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
             for row in rows

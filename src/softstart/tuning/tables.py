@@ -247,15 +247,22 @@ def optima(
 
 
 def optimum_of(asked: Asked) -> dict[str, Any]:
-    """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick."""
+    """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick.
+
+    Where the start position is unknown, that of the hardest one as if it were known: no gains beat it.
+    """
     ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
-        best = optimize(ideal, asked.bound, terminal="reached", base=asked.base, time_limit=0.0)
+        each = [
+            optimize(one, asked.bound, terminal="reached", base=asked.base, time_limit=0.0)
+            for one in ideal.positions.values()
+        ]
     except InfeasibleError:
         return {**nothing, "status": "INFEASIBLE"}
     except (OptimumError, NotConverged, InputError):
         return {**nothing, "status": "NOT_FOUND"}
+    best = max(each, key=lambda one: one.k_dyn)
     low = best.k_dyn_lower_bound
     return {
         "k_dyn": best.k_dyn,

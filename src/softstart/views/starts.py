@@ -90,6 +90,20 @@ def figure_rows(run: Run) -> list[list[str]]:
     ]
 
 
+def position_notes(runs: Sequence[Run] | Sequence[ChainRun]) -> list[str]:
+    """From where each start is the worst, if the position is unknown, and what to do if it is not."""
+    worst = [f"{run.controller_name} {run.position}" for run in runs if run.positions]
+    if not worst:
+        return []
+    drive = runs[0].drive
+    unnamed = isinstance(drive, Drive) and "start_position" not in drive.given()
+    known = " Friction holds the load anywhere; give start.position if it is always the same."
+    return [
+        "The start position is unknown: each figure is the worst of both flanks and mid-gap. "
+        f"K_dyn is largest from: {', '.join(worst)}.{known if unnamed else ''}"
+    ]
+
+
 def clipped_torque(run: Any) -> str:
     """How far and how long the demand lay beyond the torque limits, "" if that need not be said.
 
@@ -326,12 +340,7 @@ def notes(comparison: Comparison) -> list[str]:
             "limits: the least margin in the worst of "
             f"{', '.join([f'the {what} as it is', *comparison.worst_case])}."
         )
-    worst = [f"{row.run.controller_name} {row.run.position}" for row in comparison.rows if row.run.positions]
-    if worst:
-        found.append(
-            "The start position is unknown: each figure is the worst of both flanks and mid-gap. "
-            f"K_dyn is largest from: {', '.join(worst)}."
-        )
+    found += position_notes([row.run for row in comparison.rows])
     if not chain and comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")
     found += [

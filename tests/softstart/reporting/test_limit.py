@@ -103,3 +103,14 @@ def test_a_drive_of_no_class_that_is_solved_is_an_answer_not_a_crash():
     points = [message.content for message in sent]
     assert [p.status for p in points] == ["NOT_FOUND", "NOT_FOUND"]
     assert "modelica" in points[0].status_text
+
+
+def test_an_unknown_position_is_reported_with_where_it_is_worst():
+    drive = LAGGING.replace(load_kind="reactive", start_position="unknown")
+    made = report(drive, controllers=["direct", "s-curve"], budget=0.0)
+    runs = {row.name: row.run for row in made.choice.rows}
+    text = " ".join("".join(Page(made.to_html()).text).split())
+    assert "the start position is unknown, and one torque for every position" in text
+    for name, run in runs.items():
+        assert f"{name} {run.position}" in text
+        assert run.k_dyn == max(one.k_dyn for one in run.positions.values())

@@ -36,7 +36,7 @@ export class Figure {
       const shown = text(figure);
       if (place.textContent !== shown) place.textContent = shown;
     }
-    this.said = figure.reached ? "" : figure.status;
+    this.said = figure.reached ? figure.position : figure.status;
     this.tell();
   }
 
