@@ -29,8 +29,8 @@ from softstart.optimal.result import (
     Trial,
 )
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
+from softstart.optimal.whole_certificate import LITTLE_WORK, MOST_WORK, whole_bound
 from softstart.optimal.whole_certificate import not_certified as no_whole
-from softstart.optimal.whole_certificate import whole_bound
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -96,7 +96,8 @@ def optimize(
         the CasADi problem too, from its own guess and from the answer, and keeps the better one.
     time_limit : float
         s of the clock for further searches of `auto`, of which none is begun after this; by default without
-        limit, so that the answer does not depend on the machine; 0 takes the first answer.
+        limit, so that the answer does not depend on the machine; 0 takes the first answer, and a bound that
+        is quick to compute and may lie lower.
     confirm : bool
         Solve the CasADi problem in any case, from its own guess; `tried` has both answers.
     limits : bool
@@ -174,7 +175,8 @@ def solve(
         return _over_positions(problem, method)
     hold = hold_of(problem)
     candidate, why = _candidate(hold.free, method, warm) if hold.until == 0.0 else _after(hold, method, warm)
-    best = _checked(hold, candidate, why, began)
+    work = MOST_WORK if time_limit > 0.0 else LITTLE_WORK
+    best = _checked(hold, candidate, why, began, work)
     tried = [_trial(best)]
     goes_on = method == "auto" and best.method == "lp" and best.gap_percent > 100.0 * tolerance
     until = time.perf_counter() + time_limit
@@ -186,7 +188,7 @@ def solve(
         start = time.perf_counter()
         try:
             other = collocation.solve(hold.free, contact_guess=contact, until=None if confirm else until)
-            found = _checked(hold, other, f"gentler than that of {best.method}", start)
+            found = _checked(hold, other, f"gentler than that of {best.method}", start, work)
         except (NotConverged, OptimumError) as failed:
             tried.append(Trial("collocation", None, time.perf_counter() - start, str(failed)))
             continue
@@ -201,12 +203,12 @@ def _trial(found: Optimum) -> Trial:
     return Trial(found.method, found.minimised, found.seconds, "")
 
 
-def _checked(hold: Hold, candidate: Candidate, why: str, began: float) -> Optimum:
-    """A candidate that has passed the exact plant, with its bound."""
+def _checked(hold: Hold, candidate: Candidate, why: str, began: float, work: float) -> Optimum:
+    """A candidate that has passed the exact plant, with its bound for so much work."""
     problem = hold.problem
     end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
     profile = with_tail(problem, hold.before(candidate.profile), end)
-    bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base))
+    bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base), work)
     run = check(problem, profile, end, claimed, bound)
     return Optimum(
         problem=problem,
@@ -326,7 +328,7 @@ def _refusal(problem: Problem) -> InfeasibleError | OptimumError:
     return InfeasibleError(verdict)
 
 
-def _bound(hold: Hold, candidate: Candidate, run: Run) -> LowerBound:
+def _bound(hold: Hold, candidate: Candidate, run: Run, work: float) -> LowerBound:
     """The certificate where there is one for this class of problems, else the bound by momentum.
 
     It is that of the motor without its brake, in the time that is left after the earliest release.
@@ -342,9 +344,11 @@ def _bound(hold: Hold, candidate: Candidate, run: Run) -> LowerBound:
     if not (problem.ideal_torque and not not_certified(problem)) and not no_whole(problem):
         entry = _entry_of(run, hold.until)
         contact = run.first_contact - hold.until if problem.drive.theta0 < 0.5 * problem.drive.gap else 0.0
-        known.append(whole_bound(problem, run.k_dyn, (contact, max(entry, contact), candidate.end_time)))
+        near = contact, max(entry, contact), candidate.end_time
+        known.append(whole_bound(problem, run.k_dyn, near, work=work))
     best = max(known, key=lambda one: one.k_dyn)
-    if not not_certified(problem) and (problem.ideal_torque or run.k_dyn > best.k_dyn * (1.0 + TOLERANCE)):
+    far = run.k_dyn > best.k_dyn * (1.0 + TOLERANCE) and (work == MOST_WORK or len(known) == 1)
+    if not not_certified(problem) and (problem.ideal_torque or far):
         k_dyn, start = (
             (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
         )

@@ -9,8 +9,10 @@ the breakaway, and for any psi(x) that is 0 at the end (for |dr/dt| <= R), each 
     P >= L(te, tau, w; r) = constants + integral (q(x) - psi'(x)) r dx - R integral |psi| dx + psi(te) r(0)
 
 with the adjoint state p' = p A + (m - n) T + ..., q = p b. The minimum over all demands r between their
-limits takes q apart from r: phi(q) = min(q lowest, q highest). Since the multipliers are fixed in x, one pass
-gives the adjoint state of all contact times, and from each of them one pass through the earlier phases.
+limits takes q apart from r: phi(q) = min(q lowest, q highest). psi is the best for the program's own start:
+psi' = q where the rate limit decides, so that nothing of q is left there, and psi = 0 elsewhere. Since the
+multipliers are fixed in x, one pass gives the adjoint state of all contact times, and from each of them one
+pass through the earlier phases.
 
 From points to cells. The bound f is computed at the nodes of an even grid of two durations: (te, tau) where
 the load is free to move at once, (w, tau) with te = start_time where it rests at first, since it can wait.
@@ -27,18 +29,18 @@ the torque-speed curve before it, and |T| <= P where the dead zone pulls.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import expm
-from scipy.optimize import linprog
 
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.certificate import ENDINGS
 from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import no_linear_objective
+from softstart.optimal.lp.rows import Limits, Solution, WarmStarts, no_linear_objective
 from softstart.optimal.lp.whole import ONE, SLOPE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
@@ -46,13 +48,20 @@ from softstart.optimal.result import LowerBound
 
 ACROSS = 8.0  # steps of the first grid in a radian of the elastic oscillation
 FEWEST, MOST, MOST_RESTING = 150, 1000, 300  # steps of the first grid in the start
+RESTING = 200.0  # of them, in what momentum leaves of the start of a load at rest
 LONGEST = 200.0  # radians of the elastic oscillation in the start
-FINER, GRIDS = 3, 3  # each grid has so many times the steps of the one before
+FINER, GRIDS = 3, 6  # each grid has so many times the steps of the one before
 SUBSTEPS = 3  # of the torque in a span over which T is averaged
+GAP_STEPS, WINDING_STEPS = 24, 16  # of the torque
 SPANS = 60  # at least, and at least two a radian
 PRICES = (4.0, 40.0, 400.0)  # of missing an equation by as much as its unit, in units of the torque
 PROGRAMS = 12  # on a grid
-MOST_WORK = 1.2e8  # numbers computed in all; a drive is judged alike on every machine
+FAILURES, APART = (
+    3,
+    2,
+)  # programs on a grid that may raise nothing, and how many cells from these others are tried
+KEPT = 8  # sets of multipliers that the next grid begins with
+MOST_WORK, LITTLE_WORK = 1.2e8, 1.5e7  # numbers computed in all; a drive is judged alike on every machine
 ROUNDING = 1e-9
 GAINED = 1e-4  # relative: a program that raises the least bound by less is the last on its grid
 CURVED = 1.1  # a rate is between nodes no greater than so many times that at the nodes
@@ -93,7 +102,6 @@ class _Multipliers:
     torque: Vector  # net of T <= P and T >= 0
     closed: Vector  # of c z >= 0 where the dead zone pulls
     curve: Matrix  # (lines, steps)
-    psi: Vector  # at the nodes, N m per N m/s
     speed: float
     rate: float
     end_torque: float
@@ -101,11 +109,25 @@ class _Multipliers:
     breakaway: float
     durations: tuple[int, int, int]  # of the program: in the gap, winding up, in contact, in steps
 
+    def finer(self, start: _Start) -> _Multipliers:
+        """The same on a grid with FINER times the steps."""
+        wide = start.tail + start.n - FINER * self.torque.size  # at the end of the swing
+
+        def cut(values: Any) -> Any:
+            fine = np.repeat(values, FINER, axis=-1)
+            return np.concatenate([np.zeros((*fine.shape[:-1], wide)), fine], axis=-1)
+
+        gap, winding, contact = (FINER * steps for steps in self.durations)
+        return replace(
+            self, torque=cut(self.torque), closed=cut(self.closed), curve=cut(self.curve),
+            durations=(gap, winding, contact),
+        )  # fmt: skip
+
 
 class _Start:
     """The problem on an even grid of x = te - t: `n` steps of h s in the start, `tail` after its end."""
 
-    def __init__(self, problem: Problem, steps: int = 0) -> None:
+    def __init__(self, problem: Problem, steps: int = 0, goal: float = math.inf) -> None:
         assert problem.start_time is not None
         drive: Any = problem.drive
         self.problem, self.drive = problem, drive
@@ -122,7 +144,7 @@ class _Start:
         self.contact = Contact.of(drive)
         self.Omega = self.contact.Omega
         self.earliest = min(order.tc for order in phase_orders(problem)) if self.open else 0.0
-        self.n = steps or self._steps()
+        self.n = steps or self._steps(goal)
         self.h = self.end / self.n
         self.n0 = int(min(max(self.earliest / self.h - 1e-9, 0.0), self.n))
         if 0.0 < drive.torque_lag < 3.0 * self.h:
@@ -147,12 +169,18 @@ class _Start:
             ((u_b - u_a) / (w_b - w_a), w_a, u_a) for (w_a, u_a), (w_b, u_b) in pairwise(problem.torque_speed)
         ]
 
-    def _steps(self) -> int:
-        """How many: the earliest contact is to be just after a node."""
-        most = MOST_RESTING if self.rests else MOST
+    def _steps(self, goal: float) -> int:
+        """How many: the earliest contact is to be just after a node.
+
+        A load at rest takes the cube of those left by momentum.
+        """
+        most: float = MOST
+        if self.rests:
+            least = min(self.J2 * self.problem.target / max(goal - self.Mc, 1e-300) / self.end, 1.0)
+            most = min(max(MOST_RESTING, RESTING / max(1.0 - least, 1e-3)), MOST)
         wanted = int(min(max(ACROSS * self.Omega * self.end, FEWEST), most))
         counts = np.arange(wanted, int(1.15 * wanted) + 2)
-        after = FINER ** (GRIDS - 1) * self.earliest / self.end * counts
+        after = FINER**2 * self.earliest / self.end * counts
         return int(counts[np.argmin(after - np.floor(after - 1e-9))])
 
     def curve_sources(self) -> tuple[Matrix, Vector]:
@@ -216,29 +244,61 @@ class _Dual:
         if s.tail:
             ends[s.tail - 1] = after_end
         direct = by.curve.sum(axis=0) if s.lag == 0.0 else np.zeros(n)
-        slope = np.diff(by.psi) / h
-        self.slope = slope
-        q = [side[:, :STATES] @ s.b + direct - slope for side in (starts, ends)]
+        q = [side[:, :STATES] @ s.b + direct for side in (starts, ends)]
         d1 = [side[:, :STATES] @ s.A + sources[:, :STATES] for side in (starts, ends)]
         d2 = [one @ s.A for one in d1]
         bend = _around(np.maximum(*(np.abs(one @ s.b) for one in d2)))
-        area = 0.5 * h * (self.phi(q[0]) + self.phi(q[1])) - s.most * bend * h**3 / 12.0
-        if s.rate < math.inf:
-            area = area - s.rate * 0.5 * h * (np.abs(by.psi[:-1]) + np.abs(by.psi[1:]))
-        total = np.concatenate([[0.0], np.cumsum(area)])
         self.p = p[s.tail :, :STATES]
+        self.mu = by.contact + self._on_twist()
+        self._pay_for_rate(q)
+        area = 0.5 * h * (self.phi(q[0] - self.slope[0]) + self.phi(q[1] - self.slope[1]))
+        area = area - s.most * bend * h**3 / 12.0 - self.by_rate
+        total = np.concatenate([[0.0], np.cumsum(area)])
         self.gathered = p[s.tail :, STATES] + total[s.tail :]
         self.gathered += by.speed * s.problem.target + by.end_torque * s.Mc - by.breakaway * s.Mc
-        self.mu = by.contact + self._on_twist()
         here = slice(s.tail, None)
         self.d1_ends = d1[0][here], d1[1][here]
         self.d2 = _around(np.maximum(*(np.abs(one[here]) for one in d2)))
         self.d2_ends = d2[0][here], d2[1][here]
         self.K2 = _around(np.maximum(*(np.abs(one[here] @ s.b0) for one in d1)))
         self.q1 = _around(np.maximum(*(np.abs(one[here] @ s.b) for one in d1)))
-        psi = by.psi[s.tail :]
-        self.by_first = psi * s.problem.first_demand if s.rate < math.inf else np.zeros(s.n + 1)
-        self.psi_slope = np.abs(slope[here])
+        first = s.problem.first_demand if s.rate < math.inf else 0.0
+        self.by_first = self.psi[here] * first
+        slope = self.slope[:, here]
+        turned = (s.most + abs(first)) * np.abs(slope[1] - slope[0]) / h
+        self.by_te = (s.rate * np.abs(slope).max(axis=0) + turned) if s.rate < math.inf else np.zeros(s.n)
+
+    def _pay_for_rate(self, q: list[Vector]) -> None:
+        """Choose psi: best for the start of the program, with psi' = q where the rate limit decides."""
+        s, n = self.start, self.start.tail + self.start.n
+        self.psi, self.slope, self.by_rate = np.zeros(n + 1), np.zeros((2, n)), np.zeros(n)
+        if s.rate == math.inf:
+            return
+        here = s.tail + sum(self.by.durations)
+        on_demand = self._along_program(q)
+        psi = _rate_multipliers(0.5 * (on_demand[0] + on_demand[1]), s)
+        # q - psi' is constant in a step, 0 where neither limit of the torque holds
+        self.psi[: here + 1], self.psi[here:] = psi, psi[-1]
+        self.slope[:, :here] = on_demand - 0.5 * on_demand.sum(axis=0) + np.diff(psi) / s.h
+        bent = np.abs(self.slope[1] - self.slope[0]) / 6.0
+        self.by_rate = s.rate * 0.5 * s.h * (np.abs(self.psi[:-1]) + np.abs(self.psi[1:]) + s.h * bent)
+
+    def _along_program(self, q: list[Vector]) -> Matrix:
+        """Q at both ends of the steps of the program's own start, from the end on."""
+        s, (gap, winding, contact) = self.start, self.by.durations
+        p = self.p[contact] + (self.by.breakaway * s.T if winding else 0.0)
+        E = expm(s.rates["stuck"][:STATES, :STATES] * s.h)
+        wound = [p @ s.b]
+        for _ in range(winding):
+            p = p @ E
+            wound.append(p @ s.b)
+        crossed, _ = self._in_gap(np.array([p[V]]), np.array([p[U]]), gap)
+        parts = [
+            np.array(q)[:, : s.tail + contact],
+            np.array([wound[:-1], wound[1:]]),
+            np.array([crossed[0, :-1], crossed[0, 1:]]),
+        ]
+        return np.concatenate(parts, axis=1)
 
     def _on_twist(self) -> float:
         """What the program's start makes of z at the contact, N m/rad."""
@@ -251,65 +311,145 @@ class _Dual:
     def gap(self, a_v: Vector, a_u: Vector, first: Any, steps: int) -> Matrix:
         """Integrals of phi over the gap, (lines, steps + 1), from below; lines begin at the nodes `first`."""
         s = self.start
-        y = s.h * np.arange(steps + 1)
-        mu = self.mu
-        if s.lag > 0.0:
-            E = np.exp(-y / s.lag)
-            by_E = a_u / s.lag - a_v / s.J1 + mu * s.lag / s.J1
-            q = (a_v / s.J1)[:, None] + mu / s.J1 * (y - s.lag) + by_E[:, None] * E
-            bend = np.abs(by_E)[:, None] / s.lag**2 * E[:-1]
-        else:
-            q = ((a_v / s.J1)[:, None] + mu / s.J1 * y) + np.zeros((a_v.size, 1))
-            bend = np.zeros((1, 1))
+        q, bend = self._in_gap(a_v, a_u, steps)
         low, high = q[:, :-1], q[:, 1:]
         if s.rate < math.inf:
-            index = np.minimum(np.asarray(first)[:, None] + np.arange(steps), s.n - 1)
-            slope = self.slope[s.tail + index]
-            low, high = low - slope, high - slope
+            index = s.tail + np.minimum(np.asarray(first)[:, None] + np.arange(steps), s.n - 1)
+            low, high = low - self.slope[0][index], high - self.slope[1][index]
         area = 0.5 * s.h * (self.phi(low) + self.phi(high)) - s.most * bend * s.h**3 / 12.0
         if s.rate < math.inf:
-            psi = np.abs(self.by.psi[s.tail :])
-            area = area - s.rate * 0.5 * s.h * (psi[index] + psi[index + 1])
+            area -= self.by_rate[index]
         out = np.zeros((a_v.size, steps + 1))
         np.cumsum(area, axis=1, out=out[:, 1:])
         return out
+
+    def _in_gap(self, a_v: Vector, a_u: Vector, steps: int) -> tuple[Matrix, Matrix]:
+        """Q at the nodes before the contact, (lines, steps + 1), and bounds of its |q''| in the steps."""
+        s, mu = self.start, self.mu
+        y = s.h * np.arange(steps + 1)
+        if s.lag == 0.0:
+            return ((a_v / s.J1)[:, None] + mu / s.J1 * y) + np.zeros((a_v.size, 1)), np.zeros((1, 1))
+        E = np.exp(-y / s.lag)
+        by_E = a_u / s.lag - a_v / s.J1 + mu * s.lag / s.J1
+        q = (a_v / s.J1)[:, None] + mu / s.J1 * (y - s.lag) + by_E[:, None] * E
+        return q, np.abs(by_E)[:, None] / s.lag**2 * E[:-1]
+
+
+def _rate_multipliers(q: Vector, start: _Start) -> Vector:
+    """The values of psi at the nodes of the demand that makes the sum of q r least within its limits."""
+    n, rise = q.size, start.rate * start.h
+    D = sparse.diags([np.ones(n), -np.ones(n - 1)], [0, -1], format="csr")[1:]  # from step to step
+    D = sparse.vstack([D, sparse.csr_array(([-1.0], ([0], [n - 1])), shape=(1, n))], format="csr")
+    limit = np.full(n, rise)
+    limit[-1] = 0.5 * rise
+    first = np.zeros(n)
+    first[-1] = start.problem.first_demand
+    unit, most = max(float(np.abs(q).max()), 1e-300), start.most
+    rights = np.concatenate([limit - first, limit + first]) / most
+    none = sparse.csr_array((0, n)), np.zeros(0)
+    bounds = np.tile([start.low / most, start.high / most], (n, 1))
+    found = Limits(q / unit, sparse.vstack([D, -D], format="csr"), rights, *none).solved(bounds)
+    if found is None:
+        return np.zeros(n + 1)
+    return np.concatenate([[0.0], (found.above[n:] - found.above[:n]) * start.h * unit])
 
 
 # a load that is free to move at once -----------------------------------------------------------------------
 
 
-class _Free:
+class _Cells:
+    """Cells of two durations, on the first grid all, on a finer one those that a coarser one leaves open.
+
+    The cell [i, k] of `lowest` is the one that begins at node first[0] + i of one axis and first[1] + k of
+    the other; the bounds of all others are at least `outside`.
+    """
+
+    def __init__(self, start: _Start, columns: int, coarse: Any, goal: float, before: int) -> None:
+        self.start, self.columns = start, columns
+        self.first, last, self.outside = (0, 0), (start.n, columns), math.inf
+        if coarse is not None:
+            alive = coarse.lowest < goal
+            found = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
+            begins = [int(at[0]) + first for at, first in zip(found, coarse.first, strict=True)]
+            ends = [int(at[-1]) + 1 + first for at, first in zip(found, coarse.first, strict=True)]
+            self.first = FINER * begins[0], max(FINER * begins[1] - before, 0)
+            last = min(FINER * ends[0], start.n), min(FINER * ends[1], columns)
+            box = np.zeros(alive.shape, dtype=bool)
+            box[found[0][0] : found[0][-1] + 1, found[1][0] : found[1][-1] + 1] = True
+            rest = coarse.lowest[~box]
+            self.outside = min(coarse.outside, float(rest.min()) if rest.size else math.inf)
+        self.tau = np.arange(self.first[0], last[0])
+        self.other = np.arange(self.first[1], last[1])
+
+    lowest: Matrix
+
+    def take(self, coarse: Any, rows: Any, columns: Any) -> None:
+        """What a coarser grid knows of the cells around ours, by its numbers there."""
+        i, k = rows - coarse.first[0], columns - coarse.first[1]
+        inside = (i >= 0) & (i < coarse.lowest.shape[0]) & (k >= 0) & (k < coarse.lowest.shape[1])
+        top, right = coarse.lowest.shape[0] - 1, coarse.lowest.shape[1] - 1
+        parent = coarse.lowest[np.clip(i, 0, top), np.clip(k, 0, right)]
+        parent = np.where(inside, parent, coarse.outside)
+        self.lowest = np.maximum(self.lowest, np.where(np.isfinite(parent), parent, -math.inf))
+
+    @property
+    def least(self) -> float:
+        """The least bound of all cells, N m."""
+        return min(self.outside, float(self.lowest.min()))
+
+    def worst(self, but: list[tuple[int, int]]) -> tuple[int, int]:
+        """The cell of ours with the least bound, not near any of `but`."""
+        lowest = self.lowest.copy() if but else self.lowest
+        for i, k in but:
+            row, column = i - self.first[0], k - self.first[1]
+            lowest[max(row - APART, 0) : row + APART + 1, max(column - APART, 0) : column + APART + 1] = (
+                math.inf
+            )
+        row, column = divmod(int(np.argmin(lowest)), lowest.shape[1])
+        return row + self.first[0], column + self.first[1]
+
+    def at(self, cell: tuple[int, int]) -> float:
+        """The bound of a cell, N m."""
+        return float(self.lowest[cell[0] - self.first[0], cell[1] - self.first[1]])
+
+    def open_box(self, goal: float) -> tuple[int, int, int, int] | None:
+        """(First row, end of rows, first column, end of columns) of the cells below `goal`, if any."""
+        alive = self.lowest < goal
+        if not alive.any():
+            return None
+        rows, columns = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
+        i, k = self.first
+        return int(rows[0]) + i, int(rows[-1]) + 1 + i, int(columns[0]) + k, int(columns[-1]) + 1 + k
+
+    def keep(self, rows: tuple[int, int], columns: tuple[int, int], found: Matrix) -> None:
+        """Take the larger ones of what is known and what has been proved."""
+        i, k = self.first
+        known = self.lowest[rows[0] - i : rows[1] - i, columns[0] - k : columns[1] - k]
+        np.maximum(known, np.where(np.isfinite(found), found, -math.inf), out=known)
+
+
+class _Free(_Cells):
     """Cells of (te, tau): `lowest[i, j]` bounds tau from i to i + 1 and te from i + j to i + j + 1 steps."""
 
-    def __init__(self, start: _Start, coarse: _Free | None = None) -> None:
-        self.start = start
+    def __init__(self, start: _Start, coarse: _Free | None = None, goal: float = math.inf) -> None:
+        super().__init__(start, start.n + 1 if start.open else 1, coarse, goal, FINER - 1)
         s = start
-        self.gap_steps = s.n if s.open else 0
-        self.tau = np.arange(s.n)
-        te = s.h * (self.tau[:, None] + np.arange(self.gap_steps + 1))  # at the beginning of a cell
+        te = s.h * (self.tau[:, None] + self.other)  # at the beginning of a cell
         missing = s.problem.target - s.first[W2]
         plain = (s.J2 * missing + s.Mc * te) / (s.h * (self.tau[:, None] + 1.0))
         self.lowest = np.where(self.inside(), plain, math.inf)
         if coarse is not None:
-            i = self.tau // FINER
-            j = (
-                (self.tau[:, None] + np.arange(self.gap_steps + 1)) // FINER - i[:, None]
-                if s.open
-                else 0 * i[:, None]
+            i = self.tau[:, None] // FINER
+            self.take(
+                coarse, i + 0 * self.other, (self.tau[:, None] + self.other) // FINER - i if s.open else 0 * i
             )
-            parent = coarse.lowest[i[:, None], np.minimum(j, coarse.gap_steps)]
-            self.lowest = np.maximum(self.lowest, np.where(np.isfinite(parent), parent, -math.inf))
 
     def inside(self) -> Any:
         """Which cells hold a start."""
-        s, j = self.start, np.arange(self.gap_steps + 1)
+        s, j = self.start, self.other
         if not s.open:
-            return np.ones((s.n, 1), dtype=bool)
+            return np.ones((self.tau.size, 1), dtype=bool)
         return (self.tau[:, None] + j + 1 <= s.n) & (j >= s.n0)
-
-    def worst(self) -> tuple[int, int]:
-        i, j = np.unravel_index(int(np.argmin(self.lowest)), self.lowest.shape)
-        return int(i), int(j)
 
     def instants(self, cell: tuple[int, int]) -> tuple[int, int, int]:
         """(steps in the gap, winding up, in contact) of a start in a cell."""
@@ -320,22 +460,19 @@ class _Free:
 
     def raise_by(self, dual: _Dual, goal: float) -> None:
         """Take the larger one of what is known and what a set of multipliers proves."""
-        s = self.start
-        alive = self.lowest < goal
-        if not alive.any():
+        s, box = self.start, self.open_box(goal)
+        if box is None:
             return
-        rows, columns = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
-        i0, i1 = int(rows[0]), int(rows[-1]) + 1
+        i0, i1, j0, j1 = box
         if not s.open:
             f = dual.gathered + dual.p @ s.first + dual.by_first
             most = dual.K2 + s.most * dual.q1 + dual.d2 @ np.abs(s.first)
             if s.rate < math.inf:
-                most = most + s.rate * dual.psi_slope
+                most = most + dual.by_te
             cell = np.minimum(f[:-1], f[1:]) - most * s.h**2 / 8.0
-            self._keep(slice(0, s.n), slice(0, 1), cell[:, None])
+            self.keep((i0, i1), (0, 1), cell[i0:i1, None])
             return
-        j1 = min(int(columns[-1]) + 1, s.n)
-        j0 = max(int(columns[0]) - 1, 0)
+        j1 = min(j1, s.n)
         nodes = np.arange(i0, i1 + 1)
         y = s.h * np.arange(j1 + 1)
         p = dual.p[nodes]
@@ -372,7 +509,7 @@ class _Free:
                 along_te = along_te + abs(u0) * CURVED * by_E[:, None] * here / s.lag
         if s.rate < math.inf:
             index = np.minimum(steps[:, None] + np.arange(j1), s.n - 1)
-            along_te = along_te + s.rate * dual.psi_slope[index]
+            along_te = along_te + dual.by_te[index]
         left = np.full((steps.size, j1), math.inf)
         left[:, 1:] = f[1:, : j1 - 1]
         if s.rate == math.inf and s.n0 < j1:  # no contact before the earliest one: half of the cell
@@ -383,41 +520,36 @@ class _Free:
             along_tau[:, at] = np.maximum(along_tau[:, at], diagonal[steps] + dual.d2[steps][:, W2] * abs(w2))
         corners = np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(left, f[1:, :-1]))
         cell = corners - (along_tau + along_te) * s.h**2 / 8.0
-        self._keep(slice(i0, i1), slice(j0, j1), cell[:, j0:])
-
-    def _keep(self, rows: slice, columns: slice, found: Matrix) -> None:
-        known = self.lowest[rows, columns]
-        np.maximum(known, np.where(np.isfinite(found), found, -math.inf), out=known)
+        self.keep((i0, i1), (j0, j1), cell[:, j0:])
 
 
 # a reactive load at rest ------------------------------------------------------------------------------------
 
 
-class _Resting:
+class _Resting(_Cells):
     """Cells of (tau, w), te = start_time: `lowest[i, k]` bounds tau from i to i + 1, w from k to k + 1 steps.
 
     Without `winds` the damped contact moves the load at once: w = 0, and T there is above Mc, not more.
     """
 
-    def __init__(self, start: _Start, winds: bool, coarse: _Resting | None = None) -> None:
-        self.start, self.winds = start, winds
+    def __init__(
+        self, start: _Start, winds: bool, coarse: _Resting | None = None, goal: float = math.inf
+    ) -> None:
+        super().__init__(start, start.n if winds and start.open else 1, coarse, goal, 0)
+        self.winds = winds
         s = start
-        self.tau = np.arange(s.n)
-        self.windings = s.n if winds and s.open else 1
         plain = s.Mc + s.J2 * s.problem.target / (s.h * (self.tau + 1.0))
-        left = s.n - self.tau[:, None] - np.arange(self.windings) - 1  # steps before the contact, at most
+        left = s.n - self.tau[:, None] - self.other - 1  # steps before the contact, at most
         fits = left >= s.n0 if s.open else left >= 0
         if not winds:
             fits = left + 1 >= s.n0
         self.lowest = np.where(fits, plain[:, None], math.inf)
         if coarse is not None:
-            k = np.arange(self.windings) // FINER
-            parent = coarse.lowest[(self.tau // FINER)[:, None], k]
-            self.lowest = np.maximum(self.lowest, np.where(np.isfinite(parent), parent, -math.inf))
-
-    def worst(self) -> tuple[int, int]:
-        i, k = np.unravel_index(int(np.argmin(self.lowest)), self.lowest.shape)
-        return int(i), int(k)
+            self.take(
+                coarse,
+                self.tau[:, None] // FINER + 0 * self.other,
+                self.other // FINER + 0 * self.tau[:, None],
+            )
 
     def instants(self, cell: tuple[int, int]) -> tuple[int, int, int]:
         """(steps in the gap, winding up, in contact) of a start in a cell."""
@@ -433,13 +565,10 @@ class _Resting:
 
     def raise_by(self, dual: _Dual, goal: float) -> None:
         """Take the larger one of what is known and what a set of multipliers proves."""
-        s, by = self.start, dual.by
-        alive = self.lowest < goal
-        if not alive.any():
+        s, by, box = self.start, dual.by, self.open_box(goal)
+        if box is None:
             return
-        rows, columns = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
-        i0, i1 = int(rows[0]), int(rows[-1]) + 1
-        k0, k1 = int(columns[0]), int(columns[-1]) + 1
+        i0, i1, k0, k1 = box
         pb = by.breakaway if self.winds else 0.0
         A = s.rates["stuck"][:STATES, :STATES]
         E = expm(A * s.h)
@@ -464,7 +593,7 @@ class _Resting:
                 if k == last:
                     bend = s.most * (at_first + np.maximum(*(one[4] for one in sides))) + own
                     found = np.minimum(known[:-1], known[1:]) - bend * s.h**2 / 8.0 - jump
-                    self._keep(slice(i0, i1), 0, found)
+                    self.keep((i0, i1), (0, 1), found[:, None])
                     return
             elif k >= k0:
                 gap = dual.gap(S[:, V], S[:, U], nodes + k, max(int(left.max()), 0))
@@ -475,7 +604,8 @@ class _Resting:
                 bends[0] += s.most * at_first + own
                 bends[2] += s.most * at_first + own
                 if not self.winds:
-                    self._keep(slice(i0, i1), 0, np.minimum(f[:-1], f[1:]) - bends[0] * s.h**2 / 8.0)
+                    found = np.minimum(f[:-1], f[1:]) - bends[0] * s.h**2 / 8.0
+                    self.keep((i0, i1), (0, 1), found[:, None])
                     return
                 if before is not None:
                     f_old, old = before
@@ -484,7 +614,8 @@ class _Resting:
                     corners = np.minimum(np.minimum(f_old[:-1], f_old[1:]), np.minimum(f[:-1], corner))
                     along, w_most, diagonal = (np.maximum(*pair) for pair in zip(old, bends, strict=True))
                     along = np.where(cut, np.maximum(along, diagonal), along) + w_most
-                    self._keep(slice(i0, i1), k - 1, corners - along * s.h**2 / 8.0 - jump)
+                    found = corners - along * s.h**2 / 8.0 - jump
+                    self.keep((i0, i1), (k - 1, k), found[:, None])
                 before = f, bends
             if k < last:
                 wound, S, sides = self._wind(dual, wound, S, sides, A, E, nodes + k)
@@ -494,14 +625,13 @@ class _Resting:
         """One step further back along the winding up."""
         s = self.start
         index = np.minimum(node, s.n - 1)
-        slope = dual.slope[s.tail + index]
+        slope = dual.slope[:, s.tail + index]
         later = S @ E
         bend = np.maximum(np.abs(S @ A @ A @ s.b), np.abs(later @ A @ A @ s.b)) * CURVED
-        area = 0.5 * s.h * (dual.phi(S @ s.b - slope) + dual.phi(later @ s.b - slope))
+        area = 0.5 * s.h * (dual.phi(S @ s.b - slope[0]) + dual.phi(later @ s.b - slope[1]))
         area = area - s.most * bend * s.h**3 / 12.0
         if s.rate < math.inf:
-            psi = np.abs(dual.by.psi[s.tail :])
-            area = area - s.rate * 0.5 * s.h * (psi[index] + psi[index + 1])
+            area = area - dual.by_rate[s.tail + index]
         moved = []
         for P1, P2, S1, S2, total in sides:
             S2_later = S2 @ E
@@ -534,10 +664,6 @@ class _Resting:
             bends = [np.maximum(*pair) for pair in zip(bends, here, strict=True)]
         return bends
 
-    def _keep(self, rows: slice, column: int, found: Vector) -> None:
-        known = self.lowest[rows, column]
-        np.maximum(known, np.where(np.isfinite(found), found, -math.inf), out=known)
-
 
 # the linear program ----------------------------------------------------------------------------------------
 
@@ -545,17 +671,19 @@ class _Resting:
 class _Program:
     """Good multipliers for given durations: T and the curve by means over spans and at their ends."""
 
-    def __init__(self, start: _Start, durations: tuple[int, int, int]) -> None:
-        self.start = start
+    def __init__(
+        self, start: _Start, durations: tuple[int, int, int], warm: WarmStarts | None = None
+    ) -> None:
+        self.start, self.warm = start, warm or WarmStarts()
         gap, winding, contact = durations
         s = self.start
         spans = max(SPANS, int(2.0 * s.Omega * s.h * contact))
         inner = _even(contact, spans * SUBSTEPS)
         self.parts: list[tuple[Kind, Vector]] = []
         if gap:
-            self.parts.append(("resting" if s.rests else "gap", _even(gap, 24)))
+            self.parts.append(("resting" if s.rests else "gap", np.linspace(0.0, gap, GAP_STEPS + 1)))
         if winding:
-            self.parts.append(("stuck", _even(winding, 16)))
+            self.parts.append(("stuck", np.linspace(0.0, winding, WINDING_STEPS + 1)))
         self.parts += [("contact", inner), ("contact", _even(s.tail, 12))]
         self.durations = durations
         self.P = math.nan
@@ -564,19 +692,19 @@ class _Program:
         """Multipliers whose bound is above `goal` N m, or the largest; None where HiGHS finds none."""
         s = self.start
         scale_z, scale_v = s.c / s.most, s.c / (s.Omega * s.most)
-        steps = np.concatenate([np.diff(edges) for _, edges in self.parts]).astype(int)
+        steps = np.concatenate([np.diff(edges) for _, edges in self.parts]).round(9)  # in h
         kinds = [kind for kind, edges in self.parts for _ in range(edges.size - 1)]
         m = steps.size
         bent = s.rate < math.inf
         demands = m + 1 if bent else m
         X = np.zeros((STATES + 3, demands + 1))
         X[:STATES, -1] = s.first
-        flows: dict[tuple[Kind, int], Matrix] = {}
+        flows: dict[tuple[Kind, float], Matrix] = {}
         T_now, T_sum, z_now, curve = [], [], [], []
         equal: list[tuple[str, Vector]] = []
         ends = np.cumsum([edges.size - 1 for _, edges in self.parts])
         for k in range(m):
-            key = (kinds[k], int(steps[k]))
+            key = (kinds[k], float(steps[k]))
             if key not in flows:
                 flows[key] = _with_means(s, key[0], key[1] * s.h)
             F = flows[key]
@@ -655,24 +783,24 @@ class _Program:
         bounds[:demands] = s.low / s.most, s.high / s.most
         if s.rate < math.inf:
             bounds[0] = s.problem.first_demand / s.most
-        found: Any = None
+        above, equations = sparse.csr_array(ub[:, :-1]), sparse.csr_array(eq[:, :-1])
+        found: Solution | None = None
         for price in PRICES:
             cost = np.full(columns, price)
             cost[:demands] = 0.0
             cost[-1] = 1.0
-            found = linprog(
-                cost, ub[:, :-1], -ub[:, -1], eq[:, :-1], -eq[:, -1], bounds=bounds, method="highs-ds"
-            )
-            if found.status != 0:
+            found = Limits(cost, above, -ub[:, -1], equations, -eq[:, -1]).solved(bounds, self.warm)
+            if found is None:
                 return None
-            self.P = float(found.fun) * s.most
+            self.P = found.cost * s.most
             if 1.02 * goal < self.P or np.all(found.x[demands:-1] < 1e-9):
                 break
+        assert found is not None
         parts = np.split(
-            np.maximum(-np.asarray(found.ineqlin.marginals), 0.0),
+            np.maximum(-found.above, 0.0),
             np.cumsum([len(one) for one in blocks])[:-1],
         )
-        names = dict(zip([name for name, _ in equal], np.asarray(found.eqlin.marginals), strict=True))
+        names = dict(zip([name for name, _ in equal], found.equal, strict=True))
         return self._multipliers(parts, names, steps, first, at_ends, inner, after)
 
     def _multipliers(self, parts: list[Vector], names: dict[str, float], steps: Any, first: Any,
@@ -685,7 +813,7 @@ class _Program:
         parts = [part / total for part in parts]
         n = s.tail + s.n
         # index on the grid of the node after each step of the program
-        edges = np.concatenate([[0], np.cumsum(steps)])
+        edges = np.concatenate([[0], np.cumsum(steps)]).round().astype(int)  # exact from the contact on
         node = s.tail + (self.durations[0] + self.durations[1] + self.durations[2]) - edges
         torque, closed = np.zeros(n), np.zeros(n)
         curve = np.zeros((len(s.lines), n))
@@ -717,20 +845,13 @@ class _Program:
             torque -= minus
         for k in range(len(s.lines)):
             spread(curve[k], parts[2 + k])
-        psi = np.zeros(n + 1)
-        if s.rate < math.inf:
-            slope = parts[-2] - parts[-1]
-            middle = 0.5 * (node[:-1] + node[1:])[::-1]
-            psi = np.interp(
-                np.arange(n + 1), np.concatenate([[0], middle]), np.concatenate([[0.0], slope[::-1]])
-            )
         units = {
             "speed": s.most / s.problem.target, "rate": s.c / s.Omega, "torque": 1.0, "contact": s.c,
             "breakaway": 1.0,
         }  # fmt: skip
         value = {name: names.get(name, 0.0) * unit / total for name, unit in units.items()}
         return _Multipliers(
-            torque, closed, curve, psi, value["speed"], value["rate"], value["torque"], -value["contact"],
+            torque, closed, curve, value["speed"], value["rate"], value["torque"], -value["contact"],
             -value["breakaway"], self.durations,
         )  # fmt: skip
 
@@ -759,15 +880,12 @@ def _with_means(start: _Start, kind: Kind, dt: float) -> Matrix:
     return np.asarray(expm(M * dt))
 
 
-Cells = _Free | _Resting
-
-
 def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float] | None = None,
-                within: float = 1e-3) -> LowerBound:  # fmt: skip
+                within: float = 1e-3, work: float = MOST_WORK) -> LowerBound:  # fmt: skip
     """The largest lower bound found on K_dyn of a problem for which `not_certified` has nothing to say.
 
     `k_dyn` is what is to be judged: the work ends once the bound is within that share of it. `near`, the
-    instants of contact, breakaway and end in s of the best start known, make it quicker.
+    instants of contact, breakaway and end in s of the best start known, make it quicker. `work` limits it.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.005)
@@ -783,79 +901,90 @@ def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float]
         f"every torque demand from {low:g} to {high:g} N m over time, by whatever controller, "
         f"{closing}{moving} until {ENDINGS[problem.terminal]} and half an elastic period longer"
     )
-    peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near)
+    peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near, work)
     return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers, near=False)
 
 
 def certified_peak(problem: Problem, goal: float, near: tuple[float, float, float] | None = None,
-                   report: Any = None) -> float:  # fmt: skip
+                   work: float = MOST_WORK, report: Any = None) -> float:  # fmt: skip
     """The least bound over all cells, N m; the search ends at `goal`.
 
     `near`, the instants of contact, breakaway and end in s of the best start known, make it quicker.
     """
-    start = _Start(problem)
+    start = _Start(problem, goal=goal)
     if start.earliest >= start.end:
         return math.inf
     if not start.rests:
-        return _least(start, goal, near, report, _Free)
-    least = _least(start, goal, near, report, lambda *at: _Resting(at[0], True, *at[1:]))
+        return _least(start, goal, near, work, report, _Free)
+    least = _least(start, goal, near, work, report, lambda *at: _Resting(at[0], True, *at[1:]))
     if start.open and len(list(phase_orders(problem))) > 1:
-        least = min(least, _least(start, goal, near, report, lambda *at: _Resting(at[0], False, *at[1:])))
+        at_once = _least(start, goal, near, work, report, lambda *at: _Resting(at[0], False, *at[1:]))
+        least = min(least, at_once)
     return least
 
 
 def _least(
-    start: _Start, goal: float, near: tuple[float, float, float] | None, report: Any, kind: Any
+    start: _Start, goal: float, near: tuple[float, float, float] | None, left: float, report: Any, kind: Any
 ) -> float:
     """The least bound over the cells, each raised by multipliers found where it is least, on finer grids."""
-    cells: Cells = kind(start)
-    left = MOST_WORK
-    for _ in range(GRIDS):
-        left = _raise(cells, goal, near, left, report)
-        if float(cells.lowest.min()) >= goal or left < 3.0 * FINER**2 * _work(cells, goal):
+    cells: _Free | _Resting = kind(start)
+    used: list[_Multipliers] = []
+    for finer in range(GRIDS):
+        if finer:
+            start = _Start(start.problem, FINER * start.n)
+            cells = kind(start, cells, goal)
+            used = [by.finer(start) for by in used[-KEPT:]]
+            for by in used:
+                left -= _work(cells, goal)
+                cells.raise_by(_Dual(start, by), goal)
+        left = _raise(cells, goal, near, left, used, report)
+        if cells.least >= goal or left < 3.0 * FINER**2 * _work(cells, goal):
             break
-        start = _Start(start.problem, FINER * start.n)
-        cells = kind(start, cells)
-    return float(cells.lowest.min())
+    return cells.least
 
 
-def _work(cells: Cells, goal: float) -> float:
+def _work(cells: Any, goal: float) -> float:
     """How many numbers a set of multipliers takes."""
-    alive = cells.lowest < goal
-    rows, columns = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
-    if rows.size == 0:
+    found = cells.open_box(goal)
+    if found is None:
         return 0.0
-    box = float((np.ptp(rows) + 1) * (columns[-1] + 1))
-    return box if isinstance(cells, _Free) else box * float(cells.start.n - rows[0])
+    box = float((found[1] - found[0]) * found[3])
+    return box if isinstance(cells, _Free) else box * float(cells.start.n - found[0])
 
 
 def _raise(
-    cells: Cells, goal: float, near: tuple[float, float, float] | None, left: float, report: Any
-) -> float:
+    cells: Any, goal: float, near: tuple[float, float, float] | None, left: float, used: list[_Multipliers],
+    report: Any,
+) -> float:  # fmt: skip
     """On one grid, until the least bound is at the goal or stays; what is left of the work."""
     start = cells.start
     known = None if near is None else _durations(cells, near)
+    warm = WarmStarts()
+    failures: list[tuple[int, int]] = []
     for _ in range(PROGRAMS):
-        cell = cells.worst()
-        value = float(cells.lowest[cell])
+        cell = cells.worst(failures)
+        value = cells.at(cell)
         left -= _work(cells, goal)
         if value >= goal or left < 0.0:
             break
-        program = _Program(start, known or cells.instants(cell))
+        program = _Program(start, known or cells.instants(cell), warm)
         by = program.solve(goal)
         left -= 20.0 * float(sum(edges.size for _, edges in program.parts)) ** 2
         if by is not None:
             cells.raise_by(_Dual(start, by), goal)
+            used.append(by)
         if report:
-            now = float(cells.lowest[cell])
-            report(start.n, cell, known, value, now, program.P, float(cells.lowest.min()))
-        if known is None and (by is None or cells.lowest[cell] <= value * (1.0 + GAINED)):
-            break
+            now = cells.at(cell)
+            report(start.n, cell, known, value, now, program.P, cells.least)
+        if known is None and (by is None or cells.at(cell) <= value * (1.0 + GAINED)):
+            failures.append(cell)
+            if len(failures) > FAILURES:
+                break
         known = None
     return left
 
 
-def _durations(cells: Cells, near: tuple[float, float, float]) -> tuple[int, int, int] | None:
+def _durations(cells: Any, near: tuple[float, float, float]) -> tuple[int, int, int] | None:
     """Those of a known start on the grid."""
     s = cells.start
     tc, tb, te = near

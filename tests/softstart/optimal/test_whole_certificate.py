@@ -181,6 +181,7 @@ def below_curve(run: Run, te: float, problem: Problem) -> bool:
     [
         ({"torque_lag": 0.005}, 0.2883042, {}),
         ({"torque_lag": 0.005, "damping": 1.0}, 0.27, {}),
+        ({"torque_lag": 0.005, "damping": 0.5, "torque_rate": 2500.0}, 0.3, {}),
         ({"torque_lag": 0.005, "damping": 1.0, "minimum_torque": -20.0}, 0.29, {"terminal": "reached"}),
         ({"load_kind": "reactive", "damping": 1.0}, 0.2883042, {}),
         (

@@ -41,7 +41,9 @@ from softstart.optimal.lp.rows import (
     Refinement,
     RowList,
     Rows,
+    Solution,
     Steps,
+    WarmStarts,
     below,
     checked_instants,
     contact_grid,
@@ -150,6 +152,7 @@ class ContactProgram:
         self.share = (self.edges[checked] + s) / tau
         self.T, self.kept = (self._mixed(rows, mix) for rows in self._limited(checked, s))
         self.mix = mix
+        self.warm = WarmStarts()
         # the exact plant must not part the flanks by rounding; at first T is 0
         self.least = np.where(np.arange(self.kept[1].size) < 2 * len(checks), 0.0, margin)
         reach = min(contact.half_period, np.pi / contact.Omega)
@@ -298,15 +301,15 @@ class ContactProgram:
         if found is None:
             return None
         start = float(self.entry.load_speed(np.array([te]))[0])
-        return start + self.W * (constant - float(found.fun))
+        return start + self.W * (constant - found.cost)
 
     def _kept_closed(self) -> Rows:
         return -1.0 * self.kept[0], self.kept[1] - self.least
 
     def _solved(
         self, te: float, cost: Vector, blocks: list[Rows], terminal: list[tuple[Any, float]], elastic: float
-    ) -> Any:
-        """SciPy's result; with `elastic` there are slack variables of the terminal equations behind ours."""
+    ) -> Solution | None:
+        """The solution; with `elastic` there are slack variables of the terminal equations behind ours."""
         above, equal = RowList(), RowList()
         for rows, right in blocks:
             above.add(rows, right)
@@ -324,7 +327,7 @@ class ContactProgram:
             A_ub = sparse.hstack([A_ub, sparse.csr_array((b_ub.size, 2 * missed))]).tocsr()
             cost = np.concatenate([cost, np.full(2 * missed, elastic)])
             bounds = np.concatenate([bounds, np.tile([0.0, np.inf], (2 * missed, 1))])
-        return Limits(cost, A_ub, b_ub, A_eq, b_eq).solved(bounds, "highs")
+        return Limits(cost, A_ub, b_ub, A_eq, b_eq).solved(bounds, self.warm)
 
     def _bounds(self, te: float) -> Vector:
         """Limits of each variable, shape (columns, 2): torques 0 to 1, and the entry."""
@@ -339,16 +342,16 @@ class ContactProgram:
         bounds[self.P] = 0.0, np.inf
         return bounds
 
-    def _multipliers(self, found: Any, sizes: list[int]) -> Multipliers:
+    def _multipliers(self, found: Solution, sizes: list[int]) -> Multipliers:
         """HiGHS's marginals in N m per unit of each limit; signs so that a larger left side raises P."""
-        least = np.maximum(-np.asarray(found.ineqlin.marginals), 0.0)
+        least = np.maximum(-found.above, 0.0)
         parts = np.split(least, np.cumsum(sizes)[:-1])[:4]
         total = float(parts[0].sum() + parts[1].sum() + parts[3].sum()) or 1.0
         peak, trough, closed, tail = (part / total for part in parts)
         none = np.zeros(self.share.size)
         if self.mix is not None:
             peak, trough, closed = (part @ self.mix if part.size else part for part in (peak, trough, closed))
-        equal = np.asarray(found.eqlin.marginals)[2 * self.n :] / total
+        equal = found.equal[2 * self.n :] / total
         terminal = self.problem.terminal
         return Multipliers(
             self.share,

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
+
+try:  # SciPy's own HiGHS: linprog takes no basis to start from
+    from scipy.optimize._highspy import _core as highs
+except ImportError:  # SciPy before 1.15
+    highs = None
 
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.lp.motion import Contact
@@ -27,6 +32,7 @@ FINE_ENDS = 30.0  # radians of the elastic oscillation at either end of a long c
 LONG_STEPS = 4  # between them
 ROUNDS = 3  # of finer grids where the torque switches
 FIRST_WIDTH = 4e-3  # of t_f: how far instants may move on the first finer grid
+FEW_ITERATIONS = 2000  # of the simplex method, beside one for each variable and row
 SWITCH = 0.02  # of the largest torque: a larger change between two steps is a switch
 
 
@@ -55,6 +61,47 @@ class RowList:
 
 
 @dataclass(frozen=True, eq=False)
+class Solution:
+    """The best x, its cost, and the marginals of the inequalities and of the equations."""
+
+    x: Vector
+    cost: float
+    above: Vector
+    equal: Vector
+
+
+Size = tuple[int, int, int]  # of a program: variables, inequalities, equations
+
+
+@dataclass
+class WarmStarts:
+    """The last basis of programs of each size: the next one of that size starts from it.
+
+    Neighbouring programs - another instant of contact, the same grid - share nearly all of it, and take a few
+    iterations of the simplex method instead of thousands.
+    """
+
+    bases: dict[Size, Any] = field(default_factory=dict)
+
+    def begin(self, size: Size) -> Any:
+        """A basis for a program of this size, or of a smaller one with variables and inequalities added."""
+        if size in self.bases:
+            return self.bases[size]
+        inside = [one for one in self.bases if one[0] < size[0] and one[1] < size[1] and one[2] == size[2]]
+        if not inside:
+            return None
+        smaller = max(inside)
+        known, basis = self.bases[smaller], highs.HighsBasis()
+        status = highs.HighsBasisStatus
+        rows = list(known.row_status)
+        basis.col_status = list(known.col_status) + [status.kLower] * (size[0] - smaller[0])
+        more = [status.kBasic] * (size[1] - smaller[1])
+        basis.row_status = rows[: smaller[1]] + more + rows[smaller[1] :]
+        basis.valid = True
+        return basis
+
+
+@dataclass(frozen=True, eq=False)
 class Limits:
     """Minimise cost @ x subject to A_ub x <= b_ub, A_eq x = b_eq."""
 
@@ -64,10 +111,59 @@ class Limits:
     A_eq: Any
     b_eq: Vector
 
-    def solved(self, bounds: Matrix, method: str = "highs-ds") -> Any:
-        """SciPy's result for the best x within the bounds (columns, 2); None where there is none."""
-        found = linprog(self.cost, self.A_ub, self.b_ub, self.A_eq, self.b_eq, bounds, method=method)
-        return found if found.status == 0 else None
+    def solved(self, bounds: Matrix, warm: WarmStarts | None = None) -> Solution | None:
+        """The best x within the bounds (columns, 2); None where there is none.
+
+        By the dual simplex method, from the last basis of `warm`; where that takes far longer than usual, by
+        the interior point method.
+        """
+        if highs is None:
+            found = linprog(self.cost, self.A_ub, self.b_ub, self.A_eq, self.b_eq, bounds, method="highs-ds")
+            if found.status != 0:
+                return None
+            above, equal = np.asarray(found.ineqlin.marginals), np.asarray(found.eqlin.marginals)
+            return Solution(np.asarray(found.x), float(found.fun), above, equal)
+        size = self.cost.size, self.b_ub.size, self.b_eq.size
+        program = self._program(bounds)
+        basis = None if warm is None else warm.begin(size)
+        for solver, start in (("simplex", basis), ("ipm", None)):
+            engine = highs._Highs()
+            engine.setOptionValue("output_flag", False)
+            engine.setOptionValue("solver", solver)
+            engine.setOptionValue("simplex_iteration_limit", int(FEW_ITERATIONS + sum(size)))
+            engine.passModel(program)
+            if start is not None:
+                engine.setBasis(start)
+            engine.run()
+            status = engine.getModelStatus()
+            if status == highs.HighsModelStatus.kOptimal:
+                basis = engine.getBasis()
+                if warm is not None:
+                    warm.bases[size] = basis
+                solution = engine.getSolution()
+                marginals = np.array(solution.row_dual)
+                cost = float(engine.getInfo().objective_function_value)
+                return Solution(
+                    np.array(solution.col_value), cost, marginals[: size[1]], marginals[size[1] :]
+                )
+            if status == highs.HighsModelStatus.kInfeasible:
+                return None
+        return None
+
+    def _program(self, bounds: Matrix) -> Any:
+        """The program as HiGHS takes it."""
+        A = sparse.vstack([self.A_ub, self.A_eq], format="csc")
+        program = highs.HighsLp()
+        program.num_col_, program.num_row_ = A.shape[1], A.shape[0]
+        program.col_cost_ = self.cost
+        program.col_lower_, program.col_upper_ = bounds[:, 0].copy(), bounds[:, 1].copy()
+        program.row_lower_ = np.concatenate([np.full(self.b_ub.size, -np.inf), self.b_eq])
+        program.row_upper_ = np.concatenate([self.b_ub, self.b_eq])
+        matrix = program.a_matrix_
+        matrix.num_col_, matrix.num_row_ = A.shape[1], A.shape[0]
+        matrix.format_ = highs.MatrixFormat.kColwise
+        matrix.start_, matrix.index_, matrix.value_ = A.indptr, A.indices, A.data
+        return program
 
 
 def single_row(weights: dict[int, float], columns: int) -> Any:

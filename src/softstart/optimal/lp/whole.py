@@ -43,6 +43,7 @@ from softstart.optimal.lp.rows import (
     RowList,
     Rows,
     Steps,
+    WarmStarts,
     below,
     checked_instants,
     single_row,
@@ -162,9 +163,13 @@ class WholeProgram:
     speed. With a rate limit and `reached`, a few steps follow after t_f, in which only T <= P is asked for.
     """
 
-    def __init__(self, problem: Problem, at: Instants, grid: Grid, full_tail: bool = False) -> None:
+    def __init__(
+        self, problem: Problem, at: Instants, grid: Grid, full_tail: bool = False,
+        warm: tuple[WarmStarts, WarmStarts] | None = None,
+    ) -> None:  # fmt: skip
         drive: Any = problem.drive
         self.problem, self.at, self.grid, self.full_tail = problem, at, grid, full_tail
+        self.warm = warm or (WarmStarts(), WarmStarts())  # of the least P, of the greatest speed
         self.J1, self.J2, self.c, self.d, self.Mc = (
             float(value) for value in (drive.J1, drive.J2, drive.c, drive.d, drive.Mc)
         )
@@ -438,7 +443,7 @@ class WholeProgram:
 
     def solve(self) -> WholeAnswer | None:
         """The least P; None where there is no start with these instants."""
-        found = self._solved(self.least_P)
+        found = self._solved(self.least_P, self.warm[0])
         if found is None:
             return None
         demand = np.column_stack([found[self.first], found[self.second]])[: self.steps] * self.U
@@ -452,7 +457,7 @@ class WholeProgram:
 
     def greatest_speed(self) -> tuple[float, Vector | None]:
         """The greatest w2(t_f) whatever T, rad/s, and the variables; -inf and None where no start fits."""
-        found = self._solved(self.most_speed)
+        found = self._solved(self.most_speed, self.warm[1])
         if found is None:
             return -math.inf, None
         return float(found[STATES * self.steps + W2]) * self.problem.target, found
@@ -473,9 +478,9 @@ class WholeProgram:
         A_eq, b_eq = self._equations().all(self.columns)
         return Limits(cost, *self._limits(with_P=False).all(self.columns), A_eq[:-1], b_eq[:-1])
 
-    def _solved(self, limits: Limits) -> Vector | None:
-        found = limits.solved(self._bounds())
-        return None if found is None else np.asarray(found.x)
+    def _solved(self, limits: Limits, warm: WarmStarts) -> Vector | None:
+        found = limits.solved(self._bounds(), warm)
+        return None if found is None else found.x
 
     def shifted(self, fast: bool, found: Vector, near: list[WholeProgram], by: Vector, ends: Matrix,
                 order: tuple[Vector, float]) -> Vector | None:  # fmt: skip
@@ -507,8 +512,8 @@ class WholeProgram:
             ).tocsr(),
             own.b_eq,
         )  # fmt: skip
-        best = limits.solved(np.vstack([self._bounds(), ends / size[:, None]]))
-        return None if best is None else np.asarray(best.x)[self.columns :] * size
+        best = limits.solved(np.vstack([self._bounds(), ends / size[:, None]]), self.warm[fast])
+        return None if best is None else best.x[self.columns :] * size
 
     def _broken(self, found: Vector, P: float) -> Marks:
         """Steps between whose checks T goes above P or off the flank, or the torque above its curve."""

@@ -17,7 +17,7 @@ import numpy as np
 from softstart.arrays import Vector
 from softstart.optimal.exact import replay
 from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import Refinement, contact_grid, no_linear_objective, refined
+from softstart.optimal.lp.rows import Refinement, WarmStarts, contact_grid, no_linear_objective, refined
 from softstart.optimal.lp.whole import Grid, Instants, Kind, WholeAnswer, WholeProgram
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate
@@ -201,6 +201,7 @@ class _Timings:
         self.waits = "gap" in order.kinds or "resting" in order.kinds
         self.answers: dict[Timing, WholeAnswer | None] = {}
         self.speeds: dict[Timing, tuple[float, Vector | None]] = {}
+        self.warm = WarmStarts(), WarmStarts()
         self.shortest_winding = max(order.tb - order.tc, 1e-9 * latest) if self.winds else 0.0
 
     def program(self, at: Timing, grid: Grid | None = None) -> WholeProgram | None:
@@ -211,7 +212,7 @@ class _Timings:
             return None
         instants = Instants(tc, x, end)
         grid = grid or self.grid or first_grid(self.problem, self.order, instants, self.steps)
-        return WholeProgram(self.problem, instants, grid, self.full_tail)
+        return WholeProgram(self.problem, instants, grid, self.full_tail, self.warm)
 
     def peak(self, at: Timing) -> float:
         """P, N m; inf where there is no start."""
