@@ -28,7 +28,8 @@ BUDGET = {
     "chain": (5620, 16, 4, 0),
     # 140 and a file: `init`
     # 60: a report is printed to A4
-    "cli": (4680, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    # 40: optima of chains
+    "cli": (4720, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -45,7 +46,8 @@ BUDGET = {
     # 930 and a file: the certificate of the whole start, behind lag, rate limit and friction
     # 130 and two files: open-loop starts of chains, for their optimum
     # 210: HiGHS from the last basis, rate limits in the certificate, cells where they are open
-    "optimal": (10300, 31, 9, 0),
+    # 1000 and six files: the optimum on a chain (starts, problem, search, seeds) and its bounds
+    "optimal": (11300, 35, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet
@@ -69,7 +71,8 @@ BUDGET = {
     # 70: starts and comparisons of chains
     # 75 and a file: results as notebooks show them
     # 10: the worst of several positions, named by the page and the report too
-    "views": (4830, 18, 6, 0),
+    # 40: optima of chains
+    "views": (4875, 18, 6, 0),
 }
 
 

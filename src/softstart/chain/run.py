@@ -261,6 +261,12 @@ class ChainRun(BaseRun):
         return int(np.isin(self.recorded.events["kind"], [CLOSED, IMPACT]).sum())
 
     @property
+    def first_contact(self) -> float:
+        """Instant of the first contact of any gap, s; NaN if none closes."""
+        times = self._edges()[np.isin(self.recorded.events["kind"], [CLOSED, IMPACT])]
+        return float(times.min()) if times.size else math.nan
+
+    @property
     def stages(self) -> int:
         """The number of the last stage: odd while a gap from motor to load is open, even while none is."""
         return int(self._final[layout.STAGE])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import softstart
+from softstart.chain.model import Chain
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
@@ -34,7 +35,8 @@ from softstart.cli.options import (
     drive_argument,
     json_option,
     out_option,
-    read_drive,
+    read_machine,
+    read_names,
     set_option,
 )
 from softstart.cli.running import Attributed, working
@@ -43,7 +45,6 @@ from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import OBJECTIVES, TERMINALS, USUAL, Problem, StartTime, usual_terminal
 from softstart.quantities import to_si
-from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
     console,
@@ -59,16 +60,20 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart import controller
-    from softstart.optimal import robust, shortest
+    from softstart.optimal import robust, shortest, solving
+    from softstart.optimal.chains import problem as chains
     from softstart.optimal.result import Optimum, SensorWorth
     from softstart.start.run import Run
     from softstart.views import optima as views
+    from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
     controller, robust = late("softstart.controller"), late("softstart.optimal.robust")
     shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
+    solving, starts = late("softstart.optimal.solving"), late("softstart.views.starts")
+    chains = late("softstart.optimal.chains.problem")
 
 
-SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits")  # how, not what
+SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits", "seeds")  # how, not what
 
 
 @click.command(cls=Command)
@@ -98,6 +103,12 @@ SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits")  # how, not 
     "--confirm", is_flag=True, help="Solve the CasADi problem too, from its own guess, and show both."
 )
 @click.option(
+    "--seeds",
+    metavar="A,B,...",
+    help="Of a chain: strategies whose torque the search starts from, and cma for a global search (package "
+    "cma). By default all strategies that need no parameter.",
+)
+@click.option(
     "--gaps", metavar="GAP,...", help="One profile for these gaps, with a contact sensor and without."
 )
 @click.option("--inertias", metavar="INERTIA,...", help="... for these load inertias.")
@@ -115,6 +126,7 @@ def optimize(
     settings: tuple[str, ...],
     confirm: bool,
     limits: bool,
+    seeds: str | None,
     as_json: bool,
     out: str | None,
     **texts: str | None,
@@ -123,13 +135,14 @@ def optimize(
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
     of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
+    Of a chain (crane-4-mass) the largest torque of all its shafts is minimised.
     """
     mistakes = Mistakes()
-    one: Drive | None = None
+    one: Drive | Chain | None = None
     asked: StartTime | None = None
     varied: dict[str, list[float]] = {}
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_machine(drive, settings)
     if start_time is not None:
         with mistakes.noted():
             asked = StartTime.of(start_time, "--start-time")
@@ -139,10 +152,16 @@ def optimize(
     for name, text, unit in lists:
         with mistakes.noted():
             varied[name] = read_quantities(text, f"--{name.replace('_', '-')}", unit)
+    if seeds is not None:
+        with mistakes.noted():
+            bounds["seeds"] = _read_seeds(seeds)
     several = any(text is not None for _, text, _ in lists)
     if several:
         mistakes.sentences += not_for_several(bounds)
-    if one is not None and not mistakes.sentences:
+    if isinstance(one, Chain):
+        with mistakes.noted(), named_as_options():
+            _check_chain(one, several, bounds)
+    elif one is not None and not mistakes.sentences:
         with mistakes.noted(), named_as_options():
             Problem(
                 one,
@@ -154,10 +173,29 @@ def optimize(
             )
     mistakes.settle()
     assert one is not None
-    if several:
+    if several and isinstance(one, Drive):
         _optimize_for_all(one, asked or USUAL, varied, as_json, out)
     else:
         _optimize_one(one, start_time, bounds, as_json, out)
+
+
+def _read_seeds(text: str) -> list[str]:
+    """Names of controllers, and cma for the global search, which is none."""
+    names = [name.strip() for name in text.split(",")]
+    controllers = ",".join(name for name in names if name != "cma")
+    return [*(read_names(controllers or None, "--seeds") or ()), *(["cma"] if "cma" in names else [])]
+
+
+def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None:
+    """What an optimum of a chain does not take."""
+    if several:
+        raise InputError(
+            "--gaps, --inertias and --load-torques are for drives: on a chain one profile for several is not "
+            "found; leave them out, or reduce the chain to a drive."
+        )
+    given = {"method": "auto", "confirm": False, "limits": False, **bounds}
+    solving.refuse_for_chain(given["method"], given["confirm"], given["limits"])
+    chains.ChainProblem(chain, 1.0, **{name: value for name, value in bounds.items() if name not in SEARCH})
 
 
 def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, Any]:
@@ -205,7 +243,7 @@ def _from_zero(text: str, option: str, unit: str, what: str) -> float:
 
 
 def _optimize_one(
-    drive: Drive, start_time: str | None, bounds: dict[str, Any], as_json: bool, out: str | None
+    drive: Drive | Chain, start_time: str | None, bounds: dict[str, Any], as_json: bool, out: str | None
 ) -> None:
     with no_solution_reported(as_json), output_folder(out) as folder:
         with working("looking for the gentlest start ..."), named_as_options():
@@ -235,7 +273,7 @@ def runs_beside(best: Optimum) -> list[Run]:
 
 
 def _show(to: Console, best: Optimum, others: Sequence[Run]) -> None:
-    print_lines(to, drive_lines(best.problem.drive))
+    print_lines(to, starts.machine_lines(best.problem.drive))
     sentence(to, f"  asked  {views.question(best)}")
     sentence(to, f"  method {best.method}: {best.why}")
     to.print()
@@ -270,7 +308,7 @@ def _optimize_for_all(
 
 def _show_worth(to: Console, worth: SensorWorth) -> None:
     blind = worth.blind
-    print_lines(to, drive_lines(blind.base))
+    print_lines(to, starts.machine_lines(blind.base))
     sentence(to, f"  asked  {views.robust_question(blind)}")
     to.print()
     print_table(to, views.scenario_table(worth), bold=[blind.worst])

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Literal, get_args
 
+from softstart.chain.model import Chain, load_machine
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -36,6 +37,7 @@ from softstart.start.simulation import simulate
 
 robust = late("softstart.optimal.robust.solving")  # compiled kernels of its own
 collocation = late("softstart.optimal.collocation.search")
+chains = late("softstart.optimal.chains.solving")
 
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)
@@ -44,7 +46,7 @@ TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
 
 def optimize(
-    drive: Drive | str,
+    drive: Drive | Chain | str,
     start_time: float | str | None = None,
     *,
     terminal: Terminal | None = None,
@@ -54,14 +56,18 @@ def optimize(
     torque_speed: Sequence[Sequence[float]] = (),
     smoothness: float = 0.0,
     method: Choice = "auto",
-    base: Drive | None = None,
+    base: Drive | Chain | None = None,
     warm: Any = None,
     tolerance: float = TOLERANCE,
     time_limit: float = math.inf,
     confirm: bool = False,
     limits: bool = False,
+    seeds: Sequence[str] | None = None,
 ) -> Optimum:
     """Find the torque over time that starts a drive most gently within a given time, and prove how gently.
+
+    Of a chain the largest torque of all its shafts is minimised, through all its gaps: a local optimum by
+    successive linear programs on its exact start, from several first demands.
 
     The figures are those of the exact plant running the profile; the bound says how much better any other
     start could be. Where the start position is unknown, one profile serves all (`optimize_robust`), the worst
@@ -69,14 +75,16 @@ def optimize(
 
     Parameters
     ----------
-    drive : Drive or str
-        The drive, or the name or file of one.
+    drive : Drive, Chain or str
+        The drive or the chain, or the name or file of one. On a chain start_time, terminal, base, warm,
+        tolerance, time_limit and seeds count.
     start_time : float or str, optional
         Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
         ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
     terminal : {"synchronous", "steady", "reached"}, optional
         What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed. By default
-        synchronous; reached, and nothing else, where the start position is unknown.
+        synchronous; reached, and nothing else, where the start position is unknown. On a chain all masses
+        have the target speed, by default only its load (reached).
     minimise : {"k_dyn", "heat", "start_time"}
         `heat` is the integral of (u/Ms)^2 from 0 to t_f, s.
     k_dyn, heat : float, optional
@@ -87,8 +95,8 @@ def optimize(
         Weight in s of integral (du/dt)^2 dt / Ms^2; makes the torque continuous.
     method : {"auto", "closed-form", "lp", "collocation"}
         `closed-form` is pulse, coast, hold; `lp` linear programs; `auto` the cheapest that is exact here.
-    base : Drive, optional
-        The drive to whose mean shaft torque K_dyn refers, if not `drive`.
+    base : Drive or Chain, optional
+        To whose mean shaft torque K_dyn refers, if not `drive`.
     warm : object, optional
         `warm` of the optimum of a similar problem, from which the collocation starts.
     tolerance : float
@@ -104,6 +112,9 @@ def optimize(
         Find instead the least start time at which the gentlest start keeps the limits of the drive: the
         permissible shaft torque and the life, from whichever position. `kept` has the margin to each limit,
         that of the start time too, and a lower bound of the start time.
+    seeds : sequence of str, optional
+        Of a chain, what the search starts from: names of controllers, and "cma" for a global search over a
+        dozen numbers (package cma). By default all controllers that need no parameter.
 
     Returns
     -------
@@ -134,18 +145,34 @@ def optimize(
     CasADi: Andersson et al., Math. Prog. Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
     """
     if isinstance(drive, str):
-        drive = Drive.load(drive)
+        drive = load_machine(drive)
     if method not in METHODS:
         raise InputError(f"method = {method!r}: choose one of {', '.join(METHODS)}.")
+    for name, number in (("tolerance", tolerance), ("time_limit", time_limit)):
+        if not number >= 0.0:
+            raise InputError(f"{name} = {number:g}: give a number that is 0 or more.")
     corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
+    if isinstance(drive, Chain):
+        refuse_for_chain(method, confirm, limits)
+        asked, why = chains.asked_of_chain(
+            drive, start_time, terminal, base, minimise=minimise, k_dyn=k_dyn, heat=heat,
+            torque_speed=corners, smoothness=smoothness,
+        )  # fmt: skip
+        found: Optimum = chains.optimize_chain(
+            asked, tolerance=tolerance, time_limit=time_limit, seeds=seeds, warm=warm, why=why
+        )
+        return found
+    if seeds is not None:
+        raise InputError(
+            f"seeds = {seeds!r}: they are for the search on a chain; leave them out for a drive."
+        )
+    if isinstance(base, Chain):
+        raise InputError("base: K_dyn of a drive refers to a drive; give a Drive.")
     usual = start_time is None and minimise != "start_time"
     bound = USUAL if usual else None if start_time is None else StartTime.of(start_time)
     some = None if bound is None else 1.0  # any time: what is wrong with the others is said first
     ending = usual_terminal(drive) if terminal is None else terminal
     about = Problem(drive, some, ending, minimise, k_dyn, heat, corners, smoothness, base)
-    for name, number in (("tolerance", tolerance), ("time_limit", time_limit)):
-        if not number >= 0.0:
-            raise InputError(f"{name} = {number:g}: give a number that is 0 or more.")
     if limits:
         given = {"start_time": start_time, "k_dyn": k_dyn, "confirm": confirm or None}
         given["minimise"] = None if minimise == "k_dyn" else minimise
@@ -159,6 +186,21 @@ def optimize(
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
     best = solve(replace(about, start_time=seconds), method, warm, tolerance, time_limit, confirm)
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
+
+
+def refuse_for_chain(method: str, confirm: bool, limits: bool) -> None:
+    """What cannot be asked of an optimum of a chain."""
+    wrong = []
+    if method != "auto":
+        wrong.append(
+            f"method = {method}: on a chain the optimum is found by successive linear programs on its exact "
+            "start; use method = auto."
+        )
+    for name, given in (("confirm", confirm), ("limits", limits)):
+        if given:
+            wrong.append(f"{name}: this is for drives; leave it out, or reduce the chain to a drive.")
+    if wrong:
+        raise InputError(wrong)
 
 
 def solve(

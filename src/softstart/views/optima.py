@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
 from softstart.optimal.result import Kept, Optimum, RobustOptimum, SensorWorth
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import Run
+from softstart.views import chains
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -73,6 +75,7 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
         ["gap between them", f"{best.gap_percent:.3g} %" if bounded else NOTHING],
         ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
+        *_of_shafts(best),
         ["start time", f"{short(best.end_time)} s{allowed}"],
         *([["least start time", f"{short(best.kept.at_least)} s"]] if best.kept is not None else []),
         ["I2t heat", f"{short(best.heat)} s of starting torque{hottest}"],
@@ -83,6 +86,15 @@ def figure_rows(best: Optimum) -> list[list[str]]:
         *([["answers of the searches", _searches(best)]] if len(best.tried) > 1 else []),
         ["computed in", f"{best.seconds:.2g} s"],
     ]
+
+
+def _of_shafts(best: Optimum) -> list[list[str]]:
+    """K_dyn of each shaft of a chain."""
+    run: Any = best.run
+    if isinstance(best.problem.drive, Drive):
+        return []
+    names = run.chain.shaft_names
+    return [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(names, run.k_dyns, strict=True)]
 
 
 def _searches(best: Optimum) -> str:
@@ -193,6 +205,8 @@ def bound_sentence(best: Optimum) -> str:
 def optimum_figure(best: Optimum) -> Any:
     """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
     run = best.run
+    if not isinstance(run.drive, Drive):
+        return _chain_figure(best)
     with drawing():
         figure, panels = new_figure(4, 1, (8.0, 9.0), sharex=True)
         for axes in panels:
@@ -208,6 +222,24 @@ def optimum_figure(best: Optimum) -> Any:
         aim = AIMS[best.problem.minimise] if best.kept is None else "start time within limits"
         asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
+    return figure
+
+
+def _chain_figure(best: Optimum) -> Any:
+    """The start of the chain, with peak and bound of its shaft torques and the end of the start."""
+    figure = chains.run_figure(best.run)  # type: ignore[arg-type]
+    torque, speed, twist = figure.axes
+    with drawing():
+        for sign in (1.0, -1.0) if float(best.run.T.min()) < -0.5 * best.run.peak_torque else (1.0,):
+            torque.axhline(sign * best.run.peak_torque, color=GREY, lw=0.9, ls=DASHES[1])
+        if best.bound.kind != "none":
+            least = best.bound.k_dyn * best.problem.base_torque
+            torque.axhline(least, color=COLOURS[4], lw=1.4, ls=DASHES[3], label="bound of the peak")
+        speed.axhline(best.problem.target, color=GREY, lw=0.8, ls=":")
+        for axes in (torque, speed, twist):
+            axes.axvline(best.end_time, color=GREY, lw=0.8, ls=":")
+        torque.legend(fontsize=7.5, ncols=2, loc="best")
+        torque.set_title(f"{best.run.drive.name}: K_dyn {best.k_dyn:.4f} in {best.end_time:.4f} s")
     return figure
 
 
@@ -310,6 +342,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "K_dyn": [number(run.k_dyn, 4) for run in others],
         "start time s": [number(run.start_time, 5) for run in others],
     }
+    replay = REPLAY.replace("drive.toml", "chain.toml") if isinstance(drive, Chain) else REPLAY
     parts = [
         f"# {markdown(drive.name)}: optimal start",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
@@ -320,7 +353,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
         "![optimum](optimum.svg)",
         "## The profile",
         "[profile.csv](profile.csv), [profile.toml](profile.toml) and, as an interpolating function in C, "
-        f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{REPLAY}\n```\n\n"
+        f"[profile.c](profile.c). Played again it gives the same K\\_dyn:\n\n```sh\n{replay}\n```\n\n"
         "Traces of the start: [trace-optimum.csv](trace-optimum.csv).",
         "## The controllers on this drive",
         markdown_table(Table.of("", beside, ("strategy",))),

@@ -1,0 +1,212 @@
+"""The best start of a chain: seeds from strategies or a global search, then `search`, then a check."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softstart.arrays import Vector
+from softstart.chain.model import Chain
+from softstart.chain.run import ChainRun
+from softstart.chain.simulation import simulate_chain
+from softstart.controller import make_controller, ready_controller_names
+from softstart.errors import InputError, SimulationError
+from softstart.late import late
+from softstart.optimal.chains.problem import ChainOptimum, ChainProblem, check, earliest_pull, momentum_bound
+from softstart.optimal.chains.search import Found, Search
+from softstart.optimal.chains.starts import Player
+from softstart.optimal.problem import USUAL, StartTime
+from softstart.optimal.result import InfeasibleError, OptimumError, Trial, Verdict
+
+global_search = late("softstart.optimal.chains.global_search")
+
+CMA = "cma"
+TRACE = 20_001  # instants of a trace that becomes a first demand
+TASTE = 6  # programs from each of the first seeds before one of them is chosen
+TASTED = 3
+PROMISE = 0.1  # of the tolerance: a program that promises less ends the search
+METHOD = "successive linear programs on the exact start, from {}"
+
+
+@dataclass(frozen=True, eq=False)
+class Warm:
+    """The demand of an optimum, from which a similar problem can start."""
+
+    end: float
+    time: Vector
+    torque: Vector
+
+
+def optimize_chain(
+    problem: ChainProblem,
+    *,
+    tolerance: float = 0.005,
+    time_limit: float = math.inf,
+    seeds: Sequence[str] | None = None,
+    warm: Any = None,
+    why: str = "",
+) -> ChainOptimum:
+    """The start of a chain with the least largest torque of all its shafts; see `softstart.optimize`."""
+    began = time.perf_counter()
+    bound = momentum_bound(problem)
+    if math.isinf(bound.k_dyn):
+        raise InfeasibleError(_too_short(problem))
+    names = checked_seeds(seeds)
+    player = Player(problem.drive)
+    search = Search(problem, player)
+    first = _first_demands(search, names, warm)
+    until = began + time_limit
+    least = PROMISE * tolerance
+    # a few programs from the best seeds, then all the way from the best of these
+    tasted: list[tuple[str, Found]] = []
+    for name, found in first[: TASTED if time_limit > 0.0 else 1]:
+        if tasted and time.perf_counter() > until:
+            break
+        down = search.descended(found.torques, TASTE, least)
+        tasted.append((name, found if down is None else down))
+    tasted.sort(key=lambda one: one[1].merit)
+    tried: list[Trial] = []
+    best: tuple[str, Found] | None = None
+    for name, start in tasted:
+        if best is not None and (best[1].miss.max() == 0.0 or time.perf_counter() > until):
+            break  # the next one only where this one missed the terminal condition
+        since = time.perf_counter()
+        done = search.descended(start.torques, least=least)
+        done = None if done is None else search.finished(done)
+        value = None if done is None else done.played.peak / problem.base_torque
+        failure = "" if done is not None and done.miss.max() <= 1e-6 else "the terminal condition is missed"
+        tried.append(Trial("slp", value, time.perf_counter() - since, failure))
+        if done is not None and (best is None or _rank(done) < _rank(best[1])):
+            best = (name, done)
+    if best is None or best[1].miss.max() > 1e-6:
+        raise OptimumError(_none_found(problem))
+    return _checked(search, *best, bound, tried, began, why)
+
+
+def _rank(found: Found) -> tuple[bool, float]:
+    return found.miss.max() > 1e-6, found.merit
+
+
+def _checked(
+    search: Search, name: str, found: Found, bound: Any, tried: list[Trial], began: float, why: str
+) -> ChainOptimum:
+    """The answer as the exact chain runs it under the `profile` controller."""
+    problem = search.problem
+    profile = search.profile(found.torques).simplified()
+    player = make_controller("profile", {"profile": profile})
+    run = simulate_chain(problem.drive, player, search.until, base=problem.base or problem.drive)
+    end = search.end
+    if problem.terminal == "reached" and run.start_time <= end:
+        end = run.start_time
+    claimed = found.played.peak / problem.base_torque
+    check(problem, run, profile, end, claimed, bound)
+    return ChainOptimum(
+        problem=problem,
+        profile=profile,
+        run=run,
+        bound=bound,
+        method="slp",
+        why=METHOD.format(name) + why,
+        claimed=claimed,
+        end_time=end,
+        seconds=time.perf_counter() - began,
+        warm=Warm(search.end, search.knots, found.torques),
+        tried=tuple(tried),
+    )
+
+
+# first demands ---------------------------------------------------------------------------------------------
+
+
+def checked_seeds(seeds: Sequence[str] | None) -> list[str]:
+    """The names of the seeds: by default all controllers that need no parameter."""
+    if seeds is None:
+        return list(ready_controller_names())
+    names = [seeds] if isinstance(seeds, str) else list(seeds)
+    if not names:
+        raise InputError("seeds: the list is empty; name controllers, or cma for a global search.")
+    for name in names:
+        if name != CMA:
+            make_controller(name)
+    return names
+
+
+def _first_demands(search: Search, names: Sequence[str], warm: Any) -> list[tuple[str, Found]]:
+    """The seeds, the best first."""
+    problem, found = search.problem, []
+    demands: list[tuple[str, Callable[[], Vector]]] = [(name, _demand(search, name)) for name in names]
+    if isinstance(warm, Warm):
+        scaled = warm.time * (search.end / warm.end)
+        demands.insert(0, ("the demand of a similar problem", lambda: search.sampled(scaled, warm.torque)))
+    for name, demand in demands:
+        try:
+            played = search.play(demand())
+        except SimulationError:
+            continue
+        if played is not None:
+            found.append((name, played))
+    if not found:
+        raise OptimumError(
+            f"{problem.drive.name}: no strategy could be simulated that the search starts from."
+        )
+    return sorted(found, key=lambda one: one[1].merit)
+
+
+def _demand(search: Search, name: str) -> Callable[[], Vector]:
+    """The torque of a strategy on this chain, or of the global search."""
+
+    def demand() -> Vector:
+        if name == CMA:
+            time, torque = global_search.found(search)
+            return search.sampled(time, torque)
+        run = simulate_chain(search.problem.drive, name)
+        times = np.linspace(0.0, min(run.end_time, search.until), TRACE)
+        return search.sampled(times, run.at(times)["u"])
+
+    return demand
+
+
+# where there is none ---------------------------------------------------------------------------------------
+
+
+def _too_short(problem: ChainProblem) -> Verdict:
+    """No shaft can drive the load before the start is to be over."""
+    shortest = earliest_pull(problem)
+    return Verdict(
+        problem,
+        shortest,
+        "the gaps, even under full torque",
+        f"No start of {problem.drive.name} ends within {problem.start_time:g} s: no shaft drives the load "
+        f"before {shortest:.6g} s, whatever the torque.",
+    )
+
+
+def _none_found(problem: ChainProblem) -> str:
+    direct = start_time_of_direct(problem.drive)
+    return (
+        f"No start within {problem.start_time:g} s with terminal {problem.terminal} was found. The constant "
+        f"starting torque (direct) reaches the target speed after {direct:.6g} s; give more time."
+    )
+
+
+def start_time_of_direct(chain: Chain) -> float:
+    """The start time of the chain under its constant starting torque, s."""
+    run: ChainRun = simulate_chain(chain, "direct")
+    return run.start_time
+
+
+def asked_of_chain(
+    chain: Chain, start_time: float | str | None, terminal: Any, base: Any, **others: Any
+) -> tuple[ChainProblem, str]:
+    """The problem as `optimize` was asked for it, and what its start time is if none was given."""
+    bound = USUAL if start_time is None else StartTime.of(start_time)
+    options = {name: value for name, value in others.items() if value is not None}
+    ChainProblem(chain, 1.0, terminal or "reached", base=base, **options)
+    seconds = bound.seconds(lambda: start_time_of_direct(chain))
+    problem = ChainProblem(chain, seconds, terminal or "reached", base=base, **options)
+    return problem, f"; no start time given: {bound} that of direct" if start_time is None else ""
