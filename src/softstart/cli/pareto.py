@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import softstart
+from softstart.chain.model import Chain
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
@@ -32,7 +33,7 @@ from softstart.cli.options import (
     json_option,
     out_option,
     read_count,
-    read_drive,
+    read_machine,
     read_names,
     scheduler_option,
     set_option,
@@ -42,17 +43,18 @@ from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
 from softstart.optimal.problem import TERMINALS, Problem, StartTime
-from softstart.views.drives import drive_lines
 from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.optimal import shortest
+    from softstart.optimal.chains import problem as chains
     from softstart.views import optima as views
+    from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
-    shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
+    chains, views = late("softstart.optimal.chains.problem"), late("softstart.views.optima")
+    starts = late("softstart.views.starts")
 
 STATE = "pareto.jsonl"
 
@@ -96,15 +98,16 @@ def pareto(
     """Find the least K_dyn for many start times, and show how near the controllers come to it.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. Each controller is judged by the optimum at its own start time.
+    of the literature is taken; or that of a chain (crane-4-mass). Each controller is judged by the optimum at
+    its own start time.
     """
     mistakes = Mistakes()
-    one: Drive | None = None
+    one: Drive | Chain | None = None
     names: Sequence[str] | None = None
     asked: list[StartTime] | None = None
     bounds: dict[str, Any] = {"scheduler": scheduler}
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_machine(drive, settings)
     with mistakes.noted():
         names = read_names(controllers)
     if start_times is not None:
@@ -122,7 +125,8 @@ def pareto(
         bounds["workers"] = read_count(workers, "--workers") or 1
     if one is not None and not mistakes.sentences:
         with mistakes.noted(), named_as_options():
-            Problem(one, 1.0, bounds["terminal"], torque_speed=bounds["torque_speed"])
+            about: Any = chains.ChainProblem if isinstance(one, Chain) else Problem
+            about(one, 1.0, bounds["terminal"], torque_speed=bounds["torque_speed"])
     mistakes.settle()
     assert one is not None
 
@@ -147,7 +151,7 @@ def pareto(
 
 
 def _computed(
-    drive: Drive,
+    drive: Drive | Chain,
     asked: Sequence[StartTime] | None,
     names: Sequence[str] | None,
     bounds: dict[str, Any],
@@ -158,7 +162,7 @@ def _computed(
 
         times = None
         if asked is not None:
-            direct = cache(lambda: shortest.start_time_of_direct(drive))
+            direct = cache(lambda: softstart.simulate(drive, "direct").start_time)
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return softstart.pareto(
@@ -167,6 +171,6 @@ def _computed(
 
 
 def _show(to: Console, found: softstart.Front) -> None:
-    print_lines(to, drive_lines(found.drive))
+    print_lines(to, starts.machine_lines(found.drive))
     print_tables(to, views.front_tables(found))
     print_conclusion(to, [views.front_conclusion(found)], views.footnotes(found))

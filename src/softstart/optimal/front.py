@@ -13,6 +13,7 @@ from typing import IO, Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
+from softstart.chain.model import Chain
 from softstart.controller import Controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -21,7 +22,7 @@ from softstart.late import late
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError, Verdict
 from softstart.optimal.shortest import shortest_start_time
-from softstart.optimal.solving import optimize
+from softstart.optimal.solving import optimize, refuse_for_chain
 from softstart.processes import Pool, checked_workers
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -29,12 +30,14 @@ from softstart.store import Records, Target
 
 notebook = late("softstart.views.notebook")
 optima = late("softstart.views.optima")  # it draws results of this module
+chains = late("softstart.optimal.chains.problem")
 
 Status = Literal["OPTIMAL", "INFEASIBLE", "NOT_FOUND"]
 Progress = Callable[[str], object]
 
 YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
 SHORT, LONG, COUNT = 1.02, 1.6, 12
+QUICKEST = 1.08  # first start time of a chain over that of direct: what is shortest is not known there
 
 
 @dataclass(frozen=True)
@@ -178,8 +181,8 @@ class Front:
 
     Parameters
     ----------
-    drive : Drive
-        The drive.
+    drive : Drive or Chain
+        The drive or the chain.
     terminal : {"synchronous", "steady", "reached"}
         What holds at the end of each optimal start.
     points : tuple of FrontPoint
@@ -201,7 +204,7 @@ class Front:
     docs/optimal-starts.md; the optimum at each start time: docs/theory/optimum.md.
     """
 
-    drive: Drive
+    drive: Any  # Drive or Chain
     terminal: Terminal
     points: tuple[FrontPoint, ...]
     controllers: tuple[ControllerPoint, ...]
@@ -259,7 +262,7 @@ class Front:
 
 
 def pareto(
-    drive: Drive,
+    drive: Drive | Chain,
     start_times: Sequence[float] | None = None,
     *,
     terminal: Terminal = "reached",
@@ -267,7 +270,7 @@ def pareto(
     method: str = "auto",
     torque_speed: tuple[tuple[float, float], ...] = (),
     smoothness: float = 0.0,
-    base: Drive | None = None,
+    base: Drive | Chain | None = None,
     save_to: str | Path | None = None,
     progress: Progress | None = None,
     each: Callable[[FrontPoint], object] | None = None,
@@ -282,8 +285,9 @@ def pareto(
 
     Parameters
     ----------
-    drive : Drive
-        The drive.
+    drive : Drive or Chain
+        The drive, or the chain: of its local optima each starts from that of the next longer start time and
+        from the strategies, the best of these.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
     terminal : {"synchronous", "steady", "reached"}
@@ -338,7 +342,11 @@ def pareto(
     ----------
     docs/optimal-starts.md; each point: `optimize`.
     """
-    Problem(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
+    about: Any = Problem
+    if isinstance(drive, Chain):
+        refuse_for_chain(method, False, False)
+        about = chains.ChainProblem
+    about(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
     times = None if start_times is None else _checked(start_times)
     made = [
         make_controller(one) for one in (ready_controller_names() if controllers is None else controllers)
@@ -346,7 +354,8 @@ def pareto(
     inputs = _inputs(drive, base, terminal, method, torque_speed, smoothness)
     count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
-    runs = [simulate(drive, one, base=base) for one in made]
+    start: Any = simulate  # of drives and of chains
+    runs = [start(drive, one, base=base) for one in made]
     if times is None:
         _tell(progress, "looking for the shortest start time")
         times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
@@ -365,15 +374,18 @@ def pareto(
 
 
 def default_start_times(
-    drive: Drive, terminal: Terminal = "reached", count: int = COUNT, **options: Any
+    drive: Drive | Chain, terminal: Terminal = "reached", count: int = COUNT, **options: Any
 ) -> list[float]:
     """`count` start times in s, from 1.02 of the shortest feasible one to 1.6 of that of `direct`.
 
-    Where the shortest one cannot be found, that of `direct` stands for it. Closer together towards the short
-    end, where the curve is steep. `options` go to `Problem`.
+    Where the shortest one cannot be found, that of `direct` stands for it; on a chain 1.08 of that. Closer
+    together towards the short end, where the curve is steep. `options` go to `Problem`.
     """
-    shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time", **options))
     direct = simulate(drive, "direct").start_time
+    if isinstance(drive, Chain):
+        shortest = direct * QUICKEST / SHORT
+    else:
+        shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time", **options))
     if not math.isfinite(shortest):
         shortest = direct
     if not math.isfinite(shortest):
@@ -397,7 +409,7 @@ def even_start_times(first: float, last: float, count: int) -> list[float]:
 class _Point(NamedTuple):
     """A point to be computed, and the optimum from which collocation may start."""
 
-    drive: Drive
+    drive: Drive | Chain
     options: dict[str, Any]
     terminal: Terminal
     start_time: float
@@ -429,7 +441,7 @@ def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
 class _Sweep:
     """Optima for many start times, the longest first."""
 
-    drive: Drive
+    drive: Drive | Chain
     options: dict[str, Any]
     saved: Records
     progress: Progress | None
@@ -546,7 +558,12 @@ def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> Contro
 
 
 def _inputs(
-    drive: Drive, base: Drive | None, terminal: str, method: str, corners: Any, smoothness: float
+    drive: Drive | Chain,
+    base: Drive | Chain | None,
+    terminal: str,
+    method: str,
+    corners: Any,
+    smoothness: float,
 ) -> dict[str, Any]:
     """All that a point depends on besides its start time, as plain data."""
     return {
