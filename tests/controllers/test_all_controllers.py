@@ -27,6 +27,7 @@ ALL = (
     "pulse-coast-hold",
     "shaped",
     "state-feedback",
+    "take-up",
 )
 SAMPLED = (
     "acceleration-delay",
@@ -36,6 +37,7 @@ SAMPLED = (
     "pulse-coast-hold",
     "shaped",
     "state-feedback",
+    "take-up",
 )
 DRIVES = [Drive.load(name) for name in library.names()]
 

@@ -31,6 +31,7 @@ DOCUMENTED = (
     "pulse-coast-hold",
     "shaped",
     "state-feedback",
+    "take-up",
 )
 _DATA = {
     "motor_inertia": "J1",

@@ -1,0 +1,349 @@
+"""Taking up all gaps of a driveline at low speed, and a damped rise once the load is met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
+from softstart.drive import Drive
+from softstart_controllers.sampled import (
+    PATIENCE_DEFAULT,
+    PERIOD_DEFAULT,
+    check,
+    mean_torque,
+    number,
+    patience,
+    pulling_load,
+    sample_period,
+)
+from softstart_controllers.shaft_observer import observer, predict
+
+SPEED_SHARE = 0.16  # of Ms/sqrt(c J1), the speed whose impact on a held load makes a shaft torque of Ms
+SLOWING = 2.0
+SLOWEST = 0.3  # of the take-up speed
+SPEED_LOOP_SHARE = 2.4  # of sqrt(c J1)
+CONTACT_SHARE = 0.56
+CONTACT_TIME = 0.16  # of the elastic period
+RISE = 0.72  # of the elastic period
+DAMPING_RATIO = 0.28
+RATE_DAMPING_RATIO = 0.23
+ALL_LEFT, NONE_LEFT = 0.5, 1.0  # rad that Omega turns in the delay: all of the damping by T', none of it
+LATE_RISE, LATE_SHARE = 1.5, 0.6  # rise in elastic periods and share of damping_ratio, with none of it
+CORNER = 0.073  # of Omega
+FOLLOWING = 0.7  # damping ratio of the follower
+UNCERTAINTY = 0.18
+CALM = 0.1  # of the uncertainty, once the load is met
+HELD = 4.0  # times the impulse that means the load gathers while a load holds the motor
+SLEWED_SHARE = 0.25  # of Ms
+CERTAINTY = 3.0  # standard deviations of the estimated torque that are no load
+
+TAKING_UP, RISING, IMPATIENT = 0.0, 1.0, 2.0  # phases
+
+
+class Parameters:
+    """Speeds, gains and times of `TakeUp`, and the gains k, l of the observer before and after the load."""
+
+    period: float
+    J1: float
+    c: float
+    Mc: float
+    load_share: float
+    load_speed: float
+    speed: float
+    slowest: float
+    slowing: float
+    speed_gain: float
+    contact: float
+    leak: float
+    full: float
+    Ms: float
+    rise: float
+    damping: float
+    rate_damping: float
+    corner: float
+    patience: float
+    k_angle: float
+    k_speed: float
+    k_torque: float
+    k_rate: float
+    l_angle: float
+    l_speed: float
+    l_torque: float
+    l_rate: float
+
+
+class State:
+    """The estimate of motor angle and speed, T and T'; the impulse; the load's speed w2, as corrected."""
+
+    sample: float
+    phase: float
+    angle: float
+    speed: float
+    T: float
+    rate: float
+    impulse: float
+    w2: float
+    least: float
+    correction: float
+    low: float
+    progress: float
+    demand: float
+    realised: float
+
+
+PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, State)
+
+
+@compiled_step
+def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
+    """Estimate w1, T and T', tell whether the load is met, set the torque."""
+    p = parameters.view(PARAMETERS)[0]
+    m = measured.view(MEASURED)[0]
+    x = state.view(STATE)[0]
+    y = command.view(COMMAND)[0]
+    keep_state(state, command)
+    t, u, h = m.time, m.motor_torque, p.period
+    phase = x.phase
+    if x.sample == 0.0:
+        y.angle = m.motor_angle
+        y.speed = m.motor_speed
+    else:
+        mean = mean_torque(x.realised, u, x.demand)
+        angle, speed, T, rate = predict(x.angle, x.speed, x.T, x.rate, 0.0, mean, p.J1, h)
+        error = m.motor_angle - angle
+        if phase == TAKING_UP:
+            y.angle = angle + p.k_angle * error
+            y.speed = speed + p.k_speed * error
+            y.T = T + p.k_torque * error
+            y.rate = rate + p.k_rate * error
+        else:
+            y.angle = angle + p.l_angle * error
+            y.speed = speed + p.l_speed * error
+            y.T = T + p.l_torque * error
+            y.rate = rate + p.l_rate * error
+
+    demand = 0.0
+    if phase == TAKING_UP:
+        wanted = p.load_speed + max(p.speed - p.slowing * t, p.slowest)
+        demand = min(max(p.speed_gain * (wanted - y.speed), 0.0), p.full)
+        y.impulse = max(x.impulse * p.leak + h * y.T, 0.0)
+        if y.impulse > p.contact:
+            phase = RISING
+            y.w2 = y.speed - max(y.rate, 0.0) / p.c
+            y.least = y.w2
+            y.low = demand
+    elif phase == RISING:
+        error = y.speed - x.w2
+        gained = p.load_share * (y.T - p.Mc) + x.correction + 2.0 * FOLLOWING * p.corner * error
+        y.w2 = max(x.w2 + h * gained, x.least)  # it has been met: it falls back no more
+        y.correction = x.correction + h * p.corner * p.corner * error
+        y.progress = min(1.0, x.progress + p.rise)
+    if t >= p.patience and phase != IMPATIENT:
+        phase = IMPATIENT
+        y.low = x.demand
+        y.progress = 0.0
+    if phase == RISING:
+        demand = y.low + (p.full - y.low) * y.progress
+        demand -= p.damping * (y.speed - y.w2) + p.rate_damping * y.rate
+    elif phase == IMPATIENT:
+        y.progress = min(1.0, y.progress + p.rise)
+        demand = y.low + (p.full - y.low) * y.progress
+
+    y.torque = min(max(demand, 0.0), p.Ms)
+    y.ask_again = (x.sample + 1.0) * h
+    y.sample = x.sample + 1.0
+    y.demand = y.torque
+    y.realised = u
+    y.phase = phase
+
+
+@dataclass(frozen=True)
+class TakeUp(CompiledController):
+    """Take up all gaps at low speed, tell the load from light parts, raise the torque with damping.
+
+    For drivelines with several gaps, where the first contact is not that with the load. It measures the motor
+    angle (encoder) and the motor torque. Gaps, positions and light parts are nowhere among its numbers.
+
+    *Observer.* Every `period` the estimates of phi1, w1, T and T' go on under the torque realised and are
+    corrected by the encoder (`shaft_observer`), T being the torque that the motor shaft passes on. The model
+    of the chain behind it is T'' = 0, with an unknown part of `uncertainty` Omega^2 Ms while the gaps are
+    taken up, and a tenth of that afterwards: then it is to see the first mode only.
+
+    *Taking up.* A stiff speed loop, u = clip(`speed_gain` (v - w1), 0, full_torque), brings the motor to
+    v = `take_up_speed` above the initial speed of the load. Under an active load v falls by `slowing` Mc t/J2
+    to 0.3 of it, since the load itself closes a wide gap by then. A part between two gaps that a load falling
+    at w2 hits leaves at up to twice that speed and hits the next one: hence the low speed.
+
+    *The load is met* when the impulse of the shaft, int T dt with a memory of `contact_time`, exceeds
+    `contact_share` J1 take_up_speed. A light part of inertia J takes 2 J v at most, and is swept along. A
+    load that stops the motor is always noticed: the memory is at least four times as long as the speed loop
+    needs for that impulse.
+
+    *Rise.* From the torque of then on, in the time `rise`, with two dampers that share the work:
+
+        u = clip(low + (full_torque - low) s - D1 (w1 - w2) - D2 T'/c, 0, Ms),   D = 2 zeta J1 Omega
+
+    zeta is `damping_ratio` and `rate_damping_ratio`. D2 damps the first mode; D1 also holds a motor that runs
+    ahead of the load in a gap that is still open. w2 is the estimated speed of the load: it begins at
+    w1 - T'/c, accelerates by (T - Mc)/J2 and follows w1 by a loop of the bandwidth `corner`, so that a wrong
+    J2 does not matter. It falls back no more. The start takes longer where D1 holds the motor back.
+
+    *Late torque.* With the delay tau = lag + dead time + period + a quarter of the time that the rate limit
+    takes to Ms, speed_gain and D1 are at most J1/tau. A derivative that comes late drives the second mode:
+    D2 is full up to Omega tau = 0.5 and gone from 1 on, D1 0.6 of itself then, and the rise slower. A coarse
+    encoder raises contact_share to 3 standard deviations of the estimated motor speed. After `patience` the
+    torque is just raised.
+
+    Source: docs/take-up.md, with the worth of each part.
+
+    >>> from softstart import simulate
+    >>> from softstart.chain import Chain
+    >>> damped = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
+    >>> chain = Chain.load("crane-4-mass", also=damped)
+    >>> [round(simulate(chain, name).k_dyn, 1) for name in ("take-up", "pulse-coast-hold")]
+    [1.1, 1.8]
+    """
+
+    name: ClassVar[str] = "take-up"
+    summary: ClassVar[str] = "all gaps taken up at low speed, then a damped rise once the load is met"
+    source: ClassVar[str] = "softstart: docs/take-up.md"
+    effort: ClassVar[Effort | None] = Effort.ENCODER
+    kernel: ClassVar[Any] = step
+    state_size: ClassVar[int] = size(STATE)
+
+    take_up_speed: float | None = parameter(
+        "rad/s",
+        "motor speed, over that of the load at first, at which the gaps are taken up",
+        "0.16 Ms/sqrt(c J1)",
+        multiples=(0.3, 3.0),
+    )
+    slowing: float | None = parameter(
+        "1",
+        "how far that speed is lowered, as a multiple of the speed at which an active load falls back",
+        "2",
+        between=(0.0, 8.0),
+    )
+    speed_gain: float | None = parameter(
+        "N*m*s/rad",
+        "motor torque per missing speed while the gaps are taken up",
+        "2.4 sqrt(c J1), at most J1 over the delay",
+        multiples=(0.3, 4.0),
+    )
+    contact_share: float | None = parameter(
+        "1",
+        "impulse of the shaft that means the load, as a share of J1 take_up_speed",
+        "0.56, more for a coarse encoder",
+        between=(0.1, 1.5),
+    )
+    contact_time: float | None = parameter(
+        "s", "time in which that impulse is forgotten", "0.16 elastic periods, or longer, see the text", multiples=(0.2, 5.0)
+    )
+    full_torque: float | None = parameter(
+        "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
+    )
+    rise: float | None = parameter(
+        "s",
+        "time in which the torque rises once the load is met",
+        "0.72 elastic periods, 1.5 for a late torque",
+        multiples=(0.3, 5.0),
+    )
+    damping_ratio: float | None = parameter(
+        "1",
+        "damping ratio added by w1 less the estimated speed of the load",
+        "0.28, less for a late torque",
+        between=(0.0, 1.5),
+    )
+    rate_damping_ratio: float | None = parameter(
+        "1", "damping ratio added by the estimated T'", "0.23, down to 0 for a late torque", between=(0.0, 1.5)
+    )
+    corner: float | None = parameter(
+        "rad/s",
+        "bandwidth at which the estimated speed of the load follows the motor",
+        "0.073 Omega",
+        multiples=(0.2, 5.0),
+    )
+    uncertainty: float | None = parameter(
+        "1",
+        "unknown part of T'' that the observer reckons with, as a share of Omega^2 Ms",
+        "0.18",
+        multiples=(0.1, 10.0),
+    )
+    patience: float | None = parameter("s", "latest instant for the feedback to act", PATIENCE_DEFAULT)
+    period: float | None = parameter("s", "sample period", PERIOD_DEFAULT)
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            above_zero=(
+                "take_up_speed",
+                "speed_gain",
+                "contact_share",
+                "contact_time",
+                "full_torque",
+                "uncertainty",
+                "period",
+            ),
+            not_negative=(
+                "slowing",
+                "rise",
+                "damping_ratio",
+                "rate_damping_ratio",
+                "corner",
+                "patience",
+            ),
+        )
+
+    def defaults(self, drive: Drive) -> dict[str, Any]:
+        """From motor, load torque and the elastic period; neither gap nor start position enter."""
+        period = sample_period(drive) if self.period is None else self.period
+        impedance = np.sqrt(drive.c * drive.J1)
+        speed = SPEED_SHARE * drive.Ms / impedance if self.take_up_speed is None else self.take_up_speed
+        eyes = observer(drive, period, UNCERTAINTY if self.uncertainty is None else self.uncertainty)
+        delay = drive.torque_lag + drive.computing_delay + np.asarray(period)
+        delay = delay + SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
+        most = drive.J1 / delay  # a loop gain of one at 1 rad of phase lag
+        gain = np.minimum(SPEED_LOOP_SHARE * impedance, most) if self.speed_gain is None else self.speed_gain
+        share = CERTAINTY * np.asarray(eyes.torque_deviation) * eyes.rate_lag / (drive.J1 * np.asarray(speed))
+        share = np.maximum(CONTACT_SHARE, share) if self.contact_share is None else self.contact_share
+        held = HELD * np.asarray(share) * drive.J1 / np.asarray(gain)
+        left = np.clip((NONE_LEFT - drive.Omega * delay) / (NONE_LEFT - ALL_LEFT), 0.0, 1.0)
+        late = most / (2.0 * drive.J1 * drive.Omega)  # the damping ratio that is a loop gain of one at 1 rad
+        damping = np.minimum(DAMPING_RATIO * (LATE_SHARE + (1.0 - LATE_SHARE) * left), late)
+        return {
+            "take_up_speed": number(speed),
+            "slowing": SLOWING,
+            "speed_gain": number(gain),
+            "contact_share": number(share),
+            "contact_time": number(np.maximum(CONTACT_TIME * drive.elastic_period, held)),
+            "full_torque": drive.Ms,
+            "rise": number((LATE_RISE + (RISE - LATE_RISE) * left) * drive.elastic_period),
+            "damping_ratio": number(damping),
+            "rate_damping_ratio": number(RATE_DAMPING_RATIO * left),
+            "corner": number(CORNER * drive.Omega),
+            "uncertainty": UNCERTAINTY,
+            "patience": patience(drive),
+            "period": period,
+        }
+
+    def vector(self, drive: Drive) -> Vector:
+        """The numbers of `Parameters`."""
+        period = np.asarray(self.period, float)
+        first = observer(drive, period, self.uncertainty)
+        later = observer(drive, period, CALM * np.asarray(self.uncertainty))
+        unit = 2.0 * drive.J1 * drive.Omega
+        falling = pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0
+        return stack(
+            drive, period, drive.J1, drive.c, drive.Mc, 1.0 / drive.J2, drive.initial_load_speed,
+            self.take_up_speed, SLOWEST * np.asarray(self.take_up_speed),
+            np.asarray(self.slowing) * falling, self.speed_gain,
+            np.asarray(self.contact_share) * drive.J1 * self.take_up_speed,
+            np.exp(-period / np.asarray(self.contact_time)), self.full_torque, drive.Ms,
+            period / np.maximum(np.asarray(self.rise, float), period), unit * self.damping_ratio,
+            unit * self.rate_damping_ratio / drive.c, self.corner, self.patience,
+            first.angle_gain, first.speed_gain, first.torque_gain, first.rate_gain,
+            later.angle_gain, later.speed_gain, later.torque_gain, later.rate_gain,
+        )  # fmt: skip

@@ -1,0 +1,161 @@
+"""take-up: several gaps, motor-side measurements, one set of gains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.controllers.several_gaps import (
+    CRANE,
+    NOMINAL,
+    crane_cells,
+    played,
+    random_chains,
+    rigid_time,
+    seen,
+)
+
+from softstart import Drive, InputError, compare, simulate, simulate_chain
+from softstart.chain.simulation import drive_of
+from softstart.controller import make_controller
+from softstart.drive import library
+
+FIT = drive_of(NOMINAL)
+
+
+@pytest.fixture(scope="module")
+def groups() -> dict[str, Any]:
+    return {name: (cells, *played(cells, "take-up", NOMINAL)) for name, cells in crane_cells(5, 3).items()}
+
+
+def test_nominal_chain():
+    """Near the optimum found for this start time, which has no lag, no encoder and knows the chain: 1.02."""
+    K, time = played([NOMINAL], "take-up", NOMINAL)
+    assert K[0] <= 1.10
+    assert time[0] * rigid_time(NOMINAL) <= 0.49
+
+
+def test_unknown_gaps_positions_loads_and_phases(groups):
+    """One set of gains; a wide gap behind a light load costs what the falling load brings along."""
+    for name, most in (("gaps x0.5", 1.3), ("driving flank", 1.2), ("undamped", 2.5)):
+        assert groups[name][1].max() <= most, name
+    assert np.mean(groups["gaps x1"][1]) <= 1.25
+    assert groups["stiffness or J1 20 % off"][1].max() <= 1.5
+    assert all(np.isfinite(time).all() and time.max() < 2.6 for _, _, time in groups.values())
+
+
+def test_gentler_than_every_other_feedback_once_gaps_are_open(groups):
+    for name in ("gaps x0.5", "gaps x1", "gaps x2"):
+        cells, ours, _ = groups[name]
+        for other in ("pulse-coast-hold", "current-limit-feedback"):
+            theirs, _ = played(cells, other, NOMINAL)
+            assert ours.mean() < 0.9 * theirs.mean(), (name, other)
+
+
+def test_never_rattles_once_the_load_is_met():
+    """From the torque's rise on no flank is left for longer than the light parts bounce.
+
+    The load's own shaft opens at most twice, in the bounce of the first contact.
+    """
+    for chain in crane_cells(6, 2)["gaps x1"]:
+        run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+        after = run.at(np.linspace(0.5 * run.start_time, run.end_time, 4000))["T"]
+        assert (after > 0.0).all()
+
+
+def test_batch_has_the_bits_of_single_starts():
+    chains = [*crane_cells(7, 1)["gaps x2"], NOMINAL]
+    K, _ = played(chains, "take-up", NOMINAL)
+    for chain, of_batch in zip(chains, K, strict=True):
+        run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+        assert run.peak_torque / chain.mean_torque == of_batch
+
+
+def test_plain_twin_on_a_chain_gives_the_same_bits():
+    controller = make_controller("take-up")
+    compiled = simulate_chain(NOMINAL, controller, fitted_to=NOMINAL)
+    plain = simulate_chain(NOMINAL, controller.as_plain(FIT), fitted_to=NOMINAL)
+    assert plain.k_dyns.tolist() == compiled.k_dyns.tolist()
+    assert plain.start_time == compiled.start_time
+
+
+def test_a_light_part_is_no_load():
+    """A motor whose only partner is light until a gap far behind it stays at its low speed."""
+    far = replace(
+        NOMINAL,
+        shafts=(*NOMINAL.shafts[:2], NOMINAL.shafts[2].replace(gap="4 rad", start_position=-1.9)),
+        masses=(*NOMINAL.masses[:3], NOMINAL.masses[3].replace(torque=0.0)),
+    )
+    own = make_controller("take-up").fitted(FIT).parameters
+    run = simulate_chain(far, "take-up", until=0.3, fitted_to=NOMINAL)
+    w1 = run.at(np.linspace(0.05, 0.3, 500))["w"][:, 0]
+    assert w1.max() < 1.5 * own["take_up_speed"]
+
+
+def test_defaults_from_the_drive():
+    """SI numbers of the drive; the gap and the start position are nowhere among them."""
+    own = make_controller("take-up").fitted(FIT).parameters
+    wider = FIT.replace(gap=2.0 * float(FIT.gap))
+    assert make_controller("take-up").fitted(wider).parameters == own
+    assert own["take_up_speed"] * np.sqrt(FIT.c * FIT.J1) < 0.3 * FIT.Ms
+    assert own["rise"] < FIT.elastic_period
+    delay = FIT.torque_lag + FIT.computing_delay + own["period"]
+    assert own["speed_gain"] <= FIT.J1 / delay
+    late = FIT.replace(torque_lag=0.02)
+    slow = make_controller("take-up").fitted(late).parameters
+    assert slow["speed_gain"] <= late.J1 / 0.02
+    unit = 2.0 * late.J1 * late.Omega
+    assert unit * (slow["damping_ratio"] + slow["rate_damping_ratio"]) <= late.J1 / 0.02
+    coarse = make_controller("take-up").fitted(FIT.replace(encoder_lines=32)).parameters
+    assert coarse["contact_share"] > own["contact_share"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"take_up_speed": 0.0},
+        {"slowing": -1.0},
+        {"speed_gain": 0.0},
+        {"contact_share": -0.1},
+        {"contact_time": 0.0},
+        {"rise": -0.1},
+        {"damping_ratio": -0.1},
+        {"corner": float("nan")},
+        {"uncertainty": 0.0},
+    ],
+)
+def test_refuses_impossible_parameters(wrong):
+    with pytest.raises(InputError, match=next(iter(wrong))):
+        make_controller("take-up", wrong)
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_on_two_masses_it_is_as_gentle_as_pulse_coast_hold(name):
+    drive = Drive.load(name)
+    ours, theirs = simulate(drive, "take-up"), simulate(drive, "pulse-coast-hold")
+    assert ours.k_dyn <= 1.05 * theirs.k_dyn
+    assert ours.start_time <= 1.4 * theirs.start_time
+
+
+def test_other_chains():
+    """Three to five masses, one gap to three, light parts in between, active and reactive loads."""
+    for chain in random_chains(2, 9):
+        K, time = played([chain], "take-up")
+        direct, _ = played([chain], "direct")
+        assert K[0] < 0.75 * direct[0]
+        assert time[0] < 3.0
+
+
+def test_compare_recommends_it_on_a_chain_with_limits():
+    """The simplest that keeps the limit, by the same rule as on a drive."""
+    limited = replace(
+        seen(CRANE), shafts=tuple(s.replace(permissible_torque=None) for s in seen(CRANE).shafts)
+    )
+    first = limited.shafts[0].replace(permissible_torque=1.2 * NOMINAL.mean_torque)
+    limited = replace(limited, shafts=(first, *limited.shafts[1:]))
+    names = ["direct", "ramp", "s-curve", "pulse-coast-hold", "current-limit-feedback", "take-up"]
+    found = compare(limited, names).recommendation
+    assert found.recommended is not None
+    assert found.recommended.name == "take-up"
