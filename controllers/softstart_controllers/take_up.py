@@ -240,7 +240,10 @@ class TakeUp(CompiledController):
         between=(0.1, 1.5),
     )
     contact_time: float | None = parameter(
-        "s", "time in which that impulse is forgotten", "0.16 elastic periods, or longer, see the text", multiples=(0.2, 5.0)
+        "s",
+        "time in which that impulse is forgotten",
+        "0.16 elastic periods, or longer, see the text",
+        multiples=(0.2, 5.0),
     )
     full_torque: float | None = parameter(
         "N*m", "torque after the rise", "starting torque Ms", multiples=(0.4, 1.0)
@@ -258,7 +261,10 @@ class TakeUp(CompiledController):
         between=(0.0, 1.5),
     )
     rate_damping_ratio: float | None = parameter(
-        "1", "damping ratio added by the estimated T'", "0.23, down to 0 for a late torque", between=(0.0, 1.5)
+        "1",
+        "damping ratio added by the estimated T'",
+        "0.23, down to 0 for a late torque",
+        between=(0.0, 1.5),
     )
     corner: float | None = parameter(
         "rad/s",
