@@ -33,6 +33,7 @@ DAMPING_RATIO = 0.28
 RATE_DAMPING_RATIO = 0.23
 ALL_LEFT, NONE_LEFT = 0.5, 1.0  # rad that Omega turns in the delay: all of the damping by T', none of it
 LATE_RISE, LATE_SHARE = 1.5, 0.6  # rise in elastic periods and share of damping_ratio, with none of it
+FADING, NO_DAMPING = 1.5, 2.5  # rad likewise, from which on damping_ratio fades, and is gone
 CORNER = 0.073  # of Omega
 FOLLOWING = 0.7  # damping ratio of the follower
 UNCERTAINTY = 0.18
@@ -194,9 +195,9 @@ class TakeUp(CompiledController):
 
     *Late torque.* With the delay tau = lag + dead time + period + a quarter of the time that the rate limit
     takes to Ms, speed_gain and D1 are at most J1/tau. A derivative that comes late drives the second mode:
-    D2 is full up to Omega tau = 0.5 and gone from 1 on, D1 0.6 of itself then, and the rise slower. A coarse
-    encoder raises contact_share to 3 standard deviations of the estimated motor speed. After `patience` the
-    torque is just raised.
+    D2 is full up to Omega tau = 0.5 and gone from 1 on, D1 0.6 of itself then and gone from 2.5 on, and the
+    rise slower. A coarse encoder raises contact_share to 3 standard deviations of the estimated motor speed.
+    After `patience` the torque is just raised.
 
     Source: docs/take-up.md, with the worth of each part.
 
@@ -319,6 +320,7 @@ class TakeUp(CompiledController):
         left = np.clip((NONE_LEFT - drive.Omega * delay) / (NONE_LEFT - ALL_LEFT), 0.0, 1.0)
         late = most / (2.0 * drive.J1 * drive.Omega)  # the damping ratio that is a loop gain of one at 1 rad
         damping = np.minimum(DAMPING_RATIO * (LATE_SHARE + (1.0 - LATE_SHARE) * left), late)
+        damping = damping * np.clip((NO_DAMPING - drive.Omega * delay) / (NO_DAMPING - FADING), 0.0, 1.0)
         return {
             "take_up_speed": number(speed),
             "slowing": SLOWING,
