@@ -342,16 +342,18 @@ class TakeUp(CompiledController):
         period = np.asarray(self.period, float)
         first = observer(drive, period, self.uncertainty)
         later = observer(drive, period, CALM * np.asarray(self.uncertainty))
+        speed, share = np.asarray(self.take_up_speed, float), np.asarray(self.contact_share, float)
+        added, by_rate = np.asarray(self.damping_ratio, float), np.asarray(self.rate_damping_ratio, float)
         unit = 2.0 * drive.J1 * drive.Omega
         falling = pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0
         return stack(
             drive, period, drive.J1, drive.c, drive.Mc, 1.0 / drive.J2, drive.initial_load_speed,
-            self.take_up_speed, SLOWEST * np.asarray(self.take_up_speed),
+            speed, SLOWEST * speed,
             np.asarray(self.slowing) * falling, self.speed_gain,
-            np.asarray(self.contact_share) * drive.J1 * self.take_up_speed,
+            share * drive.J1 * speed,
             np.exp(-period / np.asarray(self.contact_time)), self.full_torque, drive.Ms,
-            period / np.maximum(np.asarray(self.rise, float), period), unit * self.damping_ratio,
-            unit * self.rate_damping_ratio / drive.c, self.corner, self.patience,
+            period / np.maximum(np.asarray(self.rise, float), period), unit * added,
+            unit * by_rate / drive.c, self.corner, self.patience,
             first.angle_gain, first.speed_gain, first.torque_gain, first.rate_gain,
             later.angle_gain, later.speed_gain, later.torque_gain, later.rate_gain,
         )  # fmt: skip
