@@ -1,9 +1,9 @@
-"""The two errors that softstart raises, and its one warning."""
+"""The two errors that softstart raises, its one warning, and what sentences are made of."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
 MOST, LONGEST = 30, 1500  # sentences of one error, and letters of one sentence: more would fill pages
@@ -60,3 +60,12 @@ class SimulationError(RuntimeError):
 
 class DamagedWarning(UserWarning):
     """Saved results are not as they were written; the sentence names the part, which is computed again."""
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words in a sentence.
+
+    >>> listed(["a", "b", "c"]), listed(["a"])
+    ('a, b and c', 'a')
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -27,7 +27,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from softstart.errors import DamagedWarning, InputError
+from softstart.errors import DamagedWarning, InputError, listed
 from softstart.input.files import write_whole
 from softstart.processes import undone
 
@@ -166,15 +166,6 @@ class Target(NamedTuple):
 
     def _error(self, sentence: str) -> InputError:
         return InputError(f"{self.option} = {self.path}: {sentence}")
-
-
-def listed(names: list[str]) -> str:
-    """Names in a sentence.
-
-    >>> listed(["drive", "seed", "gaps"])
-    'drive, seed and gaps'
-    """
-    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 
 class Records:

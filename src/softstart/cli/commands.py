@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
@@ -12,6 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from softstart import __version__
+from softstart.errors import listed
 from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
@@ -54,6 +55,10 @@ COMMANDS = {
         "Design a soft start in the browser: sliders, traces that follow, strategies side by side.",
     ),
     "init": ("init", "Make a drive file from plates, catalogues and drawings."),
+    "identify": (
+        "identify",
+        "Find the parameters of a drive, with intervals, from what an inverter logged of its starts.",
+    ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
     "study": ("study", "List the studies, or run one."),
@@ -64,7 +69,7 @@ COMMANDS = {
 }
 
 PURPOSES = {
-    "A drive of your own": ("init", "drives", "reduce"),
+    "A drive of your own": ("init", "identify", "drives", "reduce"),
     "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
     "The gentlest start": ("optimize", "pareto", "tune", "sweep"),
     "Show it": ("serve", "report"),
@@ -212,15 +217,6 @@ def _by_subject(name: str) -> str | None:
         return f"did you mean softstart {about[0]}?"
     near = get_close_matches(name.lower(), registered(CONTROLLERS), n=1, cutoff=0.6)
     return f"did you mean softstart simulate DRIVE --controller {near[0]}?" if near else None
-
-
-def listed(words: Sequence[str]) -> str:
-    """Words as a list in a sentence.
-
-    >>> listed(["a", "b", "c"]), listed(["a"])
-    ('a, b and c', 'a')
-    """
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def usage_sentence(error: click.UsageError) -> str:

@@ -34,14 +34,17 @@ class Columns(NamedTuple):
     values: list[Vector]
 
 
-def read_columns(text: str, where: str, wanted: Sequence[Wanted], *, headed: Heading = "any") -> Columns:
+def read_columns(
+    text: str, where: str, wanted: Sequence[Wanted], *, headed: Heading = "any", missing: bool = False
+) -> Columns:
     """The columns of a text in SI; `where` is put before each sentence of an `InputError`.
 
     Semicolons, tabs or commas divide columns; between semicolons and tabs, or in quotes, numbers may have
     decimal commas. Blank lines and lines that begin with # are passed over. A first line without numbers
     names the columns, with units as `torque [kN*m]`; if there are no more columns than wanted, other names
     will do, in this order. Without it there are exactly the columns wanted, in SI. `headed`: it must be there
-    and give "names", or names and "units". What can be read in two ways is refused.
+    and give "names", or names and "units". `missing`: an empty cell, or "nan", is NaN. What can be read in
+    two ways is refused.
 
     >>> time, torque = Wanted(("time", "t"), "s"), Wanted(("torque", "u"), "N*m")
     >>> read_columns("t [ms];u [N*m]\\n0;1,5\\n9;2,5", "here", [time, torque])
@@ -77,6 +80,9 @@ def read_columns(text: str, where: str, wanted: Sequence[Wanted], *, headed: Hea
         own = cells[index * len(rows) : (index + 1) * len(rows)]
         column = np.empty(len(rows))
         for row_index, (cell, (number, _)) in enumerate(zip(own, rows, strict=True)):
+            if missing and cell.lower() in ("", "nan"):
+                column[row_index] = math.nan
+                continue
             try:
                 column[row_index] = _number(cell, unit, one.unit)
             except RefusedError as refusal:

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from softstart.errors import listed
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import Means, means_of
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import SLOW, Recommendation, Row
-from softstart.views.printed import digits, fixed, listed, short
+from softstart.views.printed import digits, fixed, short
 
 MOST_MAPS = 4
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.controller.base import label_of
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, listed
 from softstart.late import late
 from softstart.optimal.front import FrontPoint
 from softstart.optimal.lp import ideal, whole_search
@@ -30,7 +30,7 @@ from softstart.reporting.strategies import GREY, SMALL, WIDE, name_in_figure, or
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import Row
 from softstart.views.drawing import COLOURS, DASHES, MARKERS, drawing, name_points, new_figure, plain_ticks
-from softstart.views.printed import digits, fixed, listed, percent, short
+from softstart.views.printed import digits, fixed, percent, short
 
 if TYPE_CHECKING:
     from matplotlib import ticker

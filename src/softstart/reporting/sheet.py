@@ -13,7 +13,7 @@ import numpy as np
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError, SimulationError, listed
 from softstart.reporting.markup import Html, html, joined, table, tag
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, kind_of
@@ -21,7 +21,7 @@ from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.views.printed import RPM, decimals_of, digits, fixed, listed, short, unit
+from softstart.views.printed import RPM, decimals_of, digits, fixed, short, unit
 
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started

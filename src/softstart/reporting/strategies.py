@@ -12,6 +12,7 @@ import numpy as np
 from softstart.controller import Controller, Sensor
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive
+from softstart.errors import listed
 from softstart.reporting.markup import Figures, Html, html, joined, table, tag
 from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
@@ -19,7 +20,7 @@ from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
-from softstart.views.printed import digits, fixed, listed, short
+from softstart.views.printed import digits, fixed, short
 from softstart.views.starts import clipped_torque, position_notes
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 
 from softstart.drive import Drive
 from softstart.start.comparison import Comparison
-from softstart.views import chains, fatigue, optima, starts
+from softstart.views import chains, fatigue, identification, optima, starts
 from softstart.views.drawing import drawing
 from softstart.views.numbers import Column, Table
 
@@ -35,6 +35,12 @@ def of_optimum(best: Any) -> str:
     return _cell(
         optima.question(best), [_figures(optima.figure_rows(best))], optima.optimum_figure(best), notes
     )
+
+
+def of_identification(found: Any) -> str:
+    """An identification: its table, what was left, and the notes."""
+    lines = identification.headline(found)
+    return _cell(lines[0], [identification.estimates_table(found)], identification.figure(found), found.notes)
 
 
 def of_front(front: Any) -> str:

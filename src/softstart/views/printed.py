@@ -78,12 +78,3 @@ def decimals_of(step: float) -> int:
         if abs(step * 10**count - round(step * 10**count)) < 1e-9 * max(1.0, step * 10**count):
             return count
     return 9
-
-
-def listed(words: list[str]) -> str:
-    """Words in a row.
-
-    >>> listed(["a", "b", "c"])
-    'a, b and c'
-    """
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

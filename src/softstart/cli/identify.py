@@ -1,0 +1,242 @@
+"""`softstart identify`: the drive from logs of its starts, and experiments that would tell it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+import numpy as np
+
+import softstart
+from softstart.cli.commands import Command
+from softstart.cli.completion import names_or_files
+from softstart.cli.options import (
+    Mistakes,
+    command_line,
+    drive_names,
+    json_option,
+    out_option,
+    read_count,
+    read_drive,
+    read_names,
+    read_params,
+    set_option,
+)
+from softstart.cli.running import working
+from softstart.errors import InputError
+from softstart.late import late
+from softstart.views.drawing import save_figure
+from softstart.views.markdown import (
+    markdown,
+    output_folder,
+    table_sections,
+    write_columns,
+    write_drive_report,
+    write_table,
+    write_text,
+)
+from softstart.views.numbers import plain
+from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
+
+if TYPE_CHECKING:
+    from softstart.identification.logs import TorqueIs
+    from softstart.identification.planning import Plan
+    from softstart.identification.result import Identification
+    from softstart.views import identification as views
+else:  # no numba for a help, a wrong option or the Tab key
+    views = late("softstart.views.identification")
+
+STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold")
+
+
+@click.command(cls=Command)
+@click.argument("logs", metavar="[LOG]...", nargs=-1)
+@click.option(
+    "--drive", metavar="GUESS", shell_complete=names_or_files(drive_names, ".toml"),
+    help="The drive as it is thought to be, by a factor of 3 if need be: a file or shipped name.",
+)  # fmt: skip
+@set_option
+@click.option(
+    "--columns", metavar="SIGNAL=NAME,...",
+    help="What the log calls them, as time=t,torque=-M_act,speed=n_act; a minus turns the sign.",
+)  # fmt: skip
+@click.option(
+    "--torque-is", metavar="measured|demand", default="measured", help="What the torque of the log is."
+)
+@click.option(
+    "--free",
+    metavar="NAME,...",
+    help="What to find, as gap,stiffness,position. By default all that is usual.",
+)
+@click.option("--searches", metavar="N", help="At most so many searches for the best fit; 12 by default.")
+@click.option(
+    "--controllers",
+    metavar="NAME,...",
+    help=f"Strategies whose K_dyn is shown; {','.join(STRATEGIES)} by default.",
+)
+@click.option(
+    "--plan", metavar="DRIVE", shell_complete=names_or_files(drive_names, ".toml"),
+    help="No log yet: show what experiments with this drive would tell, and look for a better one.",
+)  # fmt: skip
+@click.option(
+    "--log-period", metavar="TIME", help="Sample period of the log for --plan, as '4 ms' (the default)."
+)
+@click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
+@click.option(
+    "--most-torque", metavar="TORQUE", help="Largest shaft torque that a planned experiment may have."
+)
+@click.option(
+    "--most-travel", metavar="ANGLE", help="How far a planned experiment may move the load, at the motor."
+)
+@json_option
+@out_option(
+    "Write the drive found (drive.toml), figures and report.md, or the planned torques, into this folder."
+)
+def identify(
+    *,
+    logs: tuple[str, ...],
+    drive: str | None,
+    settings: tuple[str, ...],
+    columns: str | None,
+    torque_is: str,
+    free: str | None,
+    searches: str | None,
+    controllers: str | None,
+    plan: str | None,
+    log_period: str | None,
+    ripple: str | None,
+    most_torque: str | None,
+    most_travel: str | None,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Find the parameters of a drive, with intervals, from what an inverter logged of its starts.
+
+    LOG is a CSV file with the columns time, torque, and angle or speed of the motor, units in its first line
+    as in "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs are of one drive. With
+    --plan DRIVE no log is read: it shows what each experiment would tell before it is run.
+    """
+    mistakes = Mistakes()
+    with mistakes.noted():
+        if plan is None and not logs:
+            raise InputError(
+                "LOG is missing: name the CSV file of a log, or plan an experiment with --plan DRIVE."
+            )
+        if plan is not None and logs:
+            raise InputError(f'--plan = "{plan}": it reads no log; leave out {logs[0]}, or --plan.')
+        if plan is None and drive is None:
+            raise InputError("--drive is missing: the search begins from a guess; softstart init writes one.")
+    mistakes.settle()
+    with mistakes.noted():
+        one = read_drive(str(plan or drive), settings)
+    with mistakes.noted():
+        if torque_is not in ("measured", "demand"):
+            raise InputError(f'--torque-is = "{torque_is}": write measured or demand.')
+    with mistakes.noted():
+        names = [name.strip() for name in free.split(",")] if free else None
+    with mistakes.noted():
+        most = read_count(searches, "--searches")
+    with mistakes.noted():
+        strategies = read_names(controllers)
+    with mistakes.noted():
+        called = read_params(tuple(columns.split(","))) if columns else {}
+    mistakes.settle()
+
+    with output_folder(out) as folder:
+        if plan is not None:
+            with working("planning experiments ...") as tell:
+                made = softstart.plan_experiments(
+                    one, log_period=log_period or "4 ms", ripple=ripple, free=names, most_torque=most_torque,
+                    most_travel=most_travel, tell=tell,
+                )  # fmt: skip
+                if folder is not None:
+                    write_plan(made, folder, command_line())
+            if as_json:
+                print_json(made.summary())
+            else:
+                to = console()
+                print_lines(to, views.plan_headline(made))
+                print_tables(to, [views.plan_table(made)])
+                print_conclusion(to, [views.plan_conclusion(made)], [])
+        else:
+            with working("fitting the drive to the logs ...") as tell:
+                found = softstart.identify(
+                    list(logs),
+                    one,
+                    free=names,
+                    torque_is=cast("TorqueIs", torque_is),
+                    columns=called,
+                    searches=most or 12,
+                    tell=tell,
+                )
+                each = found.k_dyn(strategies or STRATEGIES)
+                if folder is not None:
+                    write_identification(found, each, folder, command_line())
+            if as_json:
+                print_json(
+                    found.summary()
+                    | {
+                        "k_dyn": {
+                            name: dict(zip(("value", "lower", "upper"), three, strict=True))
+                            for name, three in each.items()
+                        }
+                    }
+                )
+            else:
+                to = console()
+                print_lines(to, views.headline(found))
+                print_tables(to, [views.estimates_table(found), views.k_dyn_table(each)])
+                print_conclusion(to, [], found.notes)
+    if out is not None and not as_json:
+        what = (
+            "a torque profile for each experiment, figure"
+            if plan is not None
+            else "drive.toml, residuals, figure"
+        )
+        print(f"\nWritten to {out}: report.md, {what}.")
+
+
+def write_identification(
+    found: Identification, each: dict[str, tuple[float, float, float]], folder: Path, command: str
+) -> None:
+    """The files of --out."""
+    write_text(folder / "drive.toml", found.drive.to_toml())
+    write_text(folder / "identification.json", json.dumps(plain(found.summary()), indent=2) + "\n")
+    save_figure(found.plot(), folder, "logs")
+    for number, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True), 1):
+        seen = np.isfinite(log.values)
+        write_columns(
+            folder / f"residuals-{number}.csv",
+            {"time [s]": log.time[seen].tolist(), "drive - log": left.tolist()},
+        )
+    parts = [
+        f"# {markdown(found.drive.name)}: identified from its logs",
+        *map(markdown, views.headline(found)[1:]),
+        *table_sections([views.estimates_table(found), views.k_dyn_table(each)]),
+        "![the logs and the drive found](logs.svg)",
+        *map(markdown, found.notes),
+    ]
+    write_drive_report(folder, parts, found.drive, command)
+
+
+def write_plan(made: Plan, folder: Path, command: str) -> None:
+    """The files of --out for a plan."""
+    for one in made.experiments:
+        stem = one.name.replace(", ", "-").replace(" ", "-")
+        one.profile.to_csv(folder / f"{stem}.csv")
+        one.profile.to_toml(folder / f"{stem}.toml")
+    save_figure(views.plan_figure(made), folder, "experiments")
+    table = views.plan_table(made)
+    write_table(
+        folder / "plan.csv", [column.heading.replace("\n", " ") for column in table.columns], table.rows
+    )
+    parts = [
+        f"# {markdown(made.drive.name)}: what an experiment would tell",
+        *map(markdown, views.plan_headline(made)[1:]),
+        *table_sections([table]),
+        markdown(views.plan_conclusion(made)),
+        "![torque of each experiment](experiments.svg)",
+    ]
+    write_drive_report(folder, parts, made.drive, command)

@@ -1,0 +1,415 @@
+"""The fit: a search that needs no good guess, then least squares weighted by what the errors do.
+
+The log is y = f(x) + G e + n: f the exact plant under the torque of the log, G its response to an error of
+the torque, e independent with the standard deviation `ripple` in each sample, n what the encoder rounds, with
+the covariance B (`rounding`). So y has the covariance V = noise^2 B + ripple^2 G G'. Least squares without G
+is far too sure of itself: a torque error is integrated twice and stays in all later samples. Both deviations
+follow from restricted maximum likelihood,
+
+    ln|V| + ln|J' V^-1 J| + r' P r -> min,    P = V^-1 - V^-1 J (J' V^-1 J)^-1 J' V^-1
+
+seen through L^-1 (B = L L') and the singular vectors of L^-1 G, where V is diagonal (D. A. Harville, J.
+Amer. Statist. Assoc. 72 (1977) 320-338).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import least_squares, minimize
+from scipy.stats import qmc
+
+from softstart.arrays import Matrix, Vector
+from softstart.errors import InputError, SimulationError
+from softstart.identification.model import POSITION, LogModel
+
+FREE: Final = (
+    "motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque",
+    "torque_lag", "computing_delay", "speed_filter",
+)  # fmt: skip
+HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
+FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 times as far
+STEP: Final = 1e-6
+ROUNDS: Final = 5  # of weights and fit
+# beforehand a torque error of 1.5 % of the largest torque, within a factor of 3: a log that cannot tell how
+# large it is (coarse encoder, few samples) must not conclude that there is none
+RIPPLE, RIPPLE_FACTOR = 0.015, 3.0
+AGREED: Final = 2  # searches that end at the best minimum before it is believed
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Space:
+    """The unknowns as a vector x: logarithms of what is above 0, positions in the gap, offsets of angles.
+
+    First come the parameters that all logs share, then for each log its position (where that is free) and its
+    offset (where it holds angles).
+    """
+
+    shared: tuple[str, ...]
+    positions: tuple[bool, ...]
+    offsets: tuple[bool, ...]
+    signs: tuple[float, ...]  # of the shared ones
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each number of x stands for."""
+        own = [f"{POSITION} {i}" for i, free in enumerate(self.positions, 1) if free]
+        return (*self.shared, *own, *(f"offset {i}" for i, free in enumerate(self.offsets, 1) if free))
+
+    def place(self, log: int) -> tuple[int | None, int | None]:
+        """Where in x the position and the offset of a log stand."""
+        first, second = len(self.shared), len(self.shared) + sum(self.positions)
+        return (
+            first + sum(self.positions[:log]) if self.positions[log] else None,
+            second + sum(self.offsets[:log]) if self.offsets[log] else None,
+        )
+
+    def values(self, x: Vector, log: int) -> dict[str, float]:
+        """The parameters of the model of one log."""
+        found = {
+            name: sign * math.exp(value)
+            for name, sign, value in zip(self.shared, self.signs, x.tolist(), strict=False)
+        }
+        position, _ = self.place(log)
+        return found if position is None else found | {POSITION: float(x[position])}
+
+
+class Part(NamedTuple):
+    """What a log gives at one x: its residual and the derivatives of its signal, in the rows that count."""
+
+    residual: Vector
+    jacobian: Matrix
+
+
+class Weights(NamedTuple):
+    """The covariance of one log, diagonal where it is seen through a matrix: noise^2 + ripple^2 "
+    "eigenvalues.
+    """
+
+    rotation: Matrix
+    eigenvalues: Vector
+    root: Matrix  # of the covariance of the measurement, L L' = B
+
+
+class Errors(NamedTuple):
+    """How large the errors are: noise in units of what the encoder rounds, ripple of the torque in N m."""
+
+    weights: Sequence[Weights]
+    noise: float
+    ripple: float
+
+
+class Solution(NamedTuple):
+    """Where the fit ended, within which bounds, and how sure it is."""
+
+    x: Vector
+    errors: Errors
+    freedom: Vector  # degrees of freedom of the variance of each number of x
+    part: Part
+    lower: Vector
+    upper: Vector
+
+    @property
+    def least(self) -> float:
+        """The weighted squares."""
+        return float(self.part.residual @ self.part.residual)
+
+
+def rounding(angle: Vector, response: Matrix, ripple: float, count: float) -> Matrix:
+    """Covariance of what an encoder rounds along a motion, its phase being equally likely everywhere.
+
+    The error is a sawtooth of the angle; over the phase, E e(a) e(b) = count^2 (1/12 - x (1 - x)/2) with
+    x = (a - b)/count modulo 1. While the motor creeps, neighbours so have nearly the same error. Between
+    samples whose distance the torque error makes uncertain, with the variance v, exp(-2 pi^2 v/count^2) is
+    left of it: the weight of the first harmonic.
+
+    >>> rounding(np.array([0.0, 0.5, 1.0, 1.5]), np.zeros((4, 1)), 0.0, 1.0)[0].round(4).tolist()
+    [0.0858, -0.0417, 0.0833, -0.0417]
+    """
+    distance = (angle[:, None] - angle[None, :]) / count
+    x = distance - np.floor(distance)
+    moved = ripple**2 * (response @ response.T)
+    spread = np.diag(moved)[:, None] + np.diag(moved)[None, :] - 2.0 * moved
+    left = np.exp(-2.0 * math.pi**2 * np.maximum(spread, 0.0) / count**2)
+    covariance: Matrix = count**2 * ((1.0 / 12.0 - 0.5 * x * (1.0 - x)) * left + 0.0025 * np.eye(angle.size))
+    return covariance
+
+
+class Fitter:
+    """Logs, their models and which of their samples count."""
+
+    def __init__(self, models: Sequence[LogModel], space: Space, tell: Tell | None = None) -> None:
+        self.models, self.space = list(models), space
+        self.counts = [np.isfinite(one.log.values) for one in models]
+        self.tell = tell or (lambda _: None)
+
+    @property
+    def largest_torque(self) -> float:
+        """The largest torque of the logs, N m."""
+        return max(float(np.max(np.abs(one.log.torque))) for one in self.models)
+
+    # ---- residuals ---------------------------------------------------------------------------------------
+
+    def part(self, x: Vector, log: int, share: float = 1.0, derivatives: bool = True) -> Part:
+        """Residual (model minus log) and derivatives over the first `share` of a log."""
+        model, space = self.models[log], self.space
+        short = model if share >= 1.0 else model.first(share)
+        rows = self.counts[log][: short.times.size]
+        position, offset = space.place(log)
+        moved = [*range(len(space.shared)), *([] if position is None else [position])]
+        points = [space.values(x, log)]
+        steps = []
+        for i in moved if derivatives else ():
+            step = -STEP if i == position and x[i] > 0.0 else STEP
+            other = x.copy()
+            other[i] += step
+            steps.append(step)
+            points.append(space.values(other, log))
+        signals = short.signals(points)
+        base = signals[0] - short.log.values
+        if offset is not None:
+            base = base + x[offset]
+        jacobian = np.zeros((int(rows.sum()), x.size))
+        for column, i, step in zip(signals[1:], moved, steps, strict=False):
+            jacobian[:, i] = ((column - signals[0]) / step)[rows]
+        if offset is not None:
+            jacobian[:, offset] = 1.0
+        return Part(base[rows], jacobian)
+
+    def parts(self, x: Vector, share: float = 1.0, derivatives: bool = True) -> list[Part]:
+        """Residuals and derivatives of every log."""
+        return [self.part(x, i, share, derivatives) for i in range(len(self.models))]
+
+    # ---- the search --------------------------------------------------------------------------------------
+
+    def search(
+        self, guess: Vector, lower: Vector, upper: Vector, most: int, seed: int
+    ) -> list[tuple[Vector, float]]:
+        """Minima of the plain squares, best first: from the guess, then from points all over the range.
+
+        Each search follows the logs from their beginning, over longer and longer parts: what comes early is
+        explained before errors can pile up, which is what makes the basin wide.
+        """
+        free = [i for i, name in enumerate(self.space.names) if not name.startswith("offset")]
+        draws = qmc.Sobol(len(free), seed=seed).random_base2(max(1, math.ceil(math.log2(max(most, 2)))))
+        found: list[tuple[Vector, float]] = []
+        for number in range(most):
+            start = guess.copy()
+            for i, draw in zip(free, draws[number - 1], strict=True) if number else ():
+                spread = math.log(FACTOR) if i < len(self.space.shared) else 1.0
+                start[i] = guess[i] + spread * (2.0 * draw - 1.0)
+            self.tell(f"search {number + 1}")
+            try:
+                found.append(self._follow(np.clip(start, lower, upper), lower, upper))
+            except (InputError, SimulationError):
+                continue
+            found.sort(key=lambda one: one[1])
+            best = found[0][1]
+            if sum(cost <= 1.01 * best + 1e-300 for _, cost in found) >= AGREED:
+                break
+        if not found:
+            raise InputError("The logs cannot be computed with any of the values tried; check their units.")
+        return found
+
+    def _follow(self, x: Vector, lower: Vector, upper: Vector) -> tuple[Vector, float]:
+        scales = [one.log.scale for one in self.models]
+        for share in HORIZONS:
+            anchor, last = x.copy(), share == HORIZONS[-1]
+            pull = 0.0 if last else 1.0
+
+            def residual(
+                x: Vector, share: float = share, anchor: Vector = anchor, pull: float = pull
+            ) -> Vector:
+                rows = [p.residual / s for p, s in zip(self.parts(x, share, False), scales, strict=True)]
+                return np.concatenate([*rows, pull * (x - anchor)])
+
+            def jacobian(x: Vector, share: float = share, pull: float = pull) -> Matrix:
+                rows = [p.jacobian / s for p, s in zip(self.parts(x, share), scales, strict=True)]
+                return np.vstack([*rows, pull * np.eye(x.size)])
+
+            found = least_squares(
+                residual, x, jac=jacobian, bounds=(lower, upper), max_nfev=60 if last else 25, xtol=1e-10
+            )
+            x = found.x
+        return x, float(2.0 * found.cost)
+
+    # ---- weights -----------------------------------------------------------------------------------------
+
+    def weights(self, x: Vector, ripple: float) -> list[Weights]:
+        """The shape of each log's covariance at x, about a torque error of this size."""
+        made = []
+        for i, model in enumerate(self.models):
+            rows = self.counts[i]
+            response = model.torque_responses(self.space.values(x, i))[rows]
+            if model.log.kind == "angle" and model.log.count > 0.0:
+                angle = model.signals([self.space.values(x, i)])[0][rows]
+                root = cholesky(rounding(angle, response, ripple, model.log.count), lower=True)
+            else:
+                root = max(model.log.floor, 1e-3 * model.log.scale) * np.eye(int(rows.sum()))
+            vectors, singular, _ = np.linalg.svd(
+                solve_triangular(root, response, lower=True), full_matrices=True
+            )
+            eigenvalues = np.zeros(vectors.shape[0])
+            eigenvalues[: singular.size] = singular**2
+            made.append(Weights(solve_triangular(root, vectors, lower=True, trans="T").T, eigenvalues, root))
+        return made
+
+    def deviations(self, parts: Sequence[Part], before: Errors) -> tuple[Errors, Vector]:
+        """Noise and ripple by restricted maximum likelihood, from where they stood, and how sure they are."""
+        weights, noise, ripple = before
+        turned = [
+            (w.rotation @ p.residual, w.rotation @ p.jacobian, w.eigenvalues)
+            for p, w in zip(parts, weights, strict=True)
+        ]
+        least = 1.0  # what the encoder rounds is a floor below the noise
+        usual = math.log(RIPPLE * self.largest_torque)
+
+        def gathered(logs: Vector) -> tuple[Matrix, Vector, float]:
+            s, u = np.exp(np.clip(logs, -60.0, 60.0))
+            information, pulled, rest = np.zeros((1, 1)), np.zeros(1), 0.0
+            for r, jacobian, eigenvalues in turned:
+                variance = least + s * s + u * u * eigenvalues
+                weighted = jacobian / variance[:, None]
+                information = information + jacobian.T @ weighted
+                pulled = pulled + weighted.T @ r
+                rest += float(np.log(variance).sum()) + float(r @ (r / variance))
+            return information, pulled, rest
+
+        def loss(logs: Vector) -> float:
+            information, pulled, rest = gathered(logs)
+            values, vectors = np.linalg.eigh(information)
+            kept = values > 1e-12 * values[-1]
+            along = (vectors.T @ pulled)[kept]
+            before = ((float(logs[1]) - usual) / math.log(RIPPLE_FACTOR)) ** 2
+            return rest + before + float(np.log(values[kept]).sum() - np.sum(along**2 / values[kept]))
+
+        starts = [np.log([one * noise, two * ripple]) for one, two in ((1.0, 1.0), (1.0, 10.0), (0.1, 1.0))]
+        tried = [
+            minimize(loss, one, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-4})
+            for one in starts
+        ]
+        best: Vector = min(tried, key=lambda one: float(one.fun)).x
+        s, u = np.exp(best)
+
+        def log_variances(logs: Vector) -> Vector:
+            found: Vector = np.log(
+                np.maximum(np.diag(np.linalg.pinv(gathered(logs)[0], rcond=1e-14)), 1e-300)
+            )
+            return found
+
+        # Satterthwaite: a variance that rests on uncertain deviations has as many degrees of freedom as make
+        # its own spread right
+        which = [1] if s * s < 0.01 * least else [0, 1]
+        steps = 0.1 * np.eye(2)[which]
+        middle = loss(best)
+        bends = np.array([(loss(best + h) + loss(best - h) - 2.0 * middle) / 0.01 for h in steps])
+        slopes = np.array([(log_variances(best + h) - log_variances(best - h)) / 0.2 for h in steps])
+        spread = (slopes**2 * (2.0 / np.maximum(bends, 1e-6))[:, None]).sum(axis=0)
+        freedom: Vector = np.maximum(2.0 / np.maximum(spread, 1e-6), 2.0)
+        return Errors(weights, math.sqrt(least + float(s) ** 2), float(u)), freedom
+
+    # ---- the weighted fit --------------------------------------------------------------------------------
+
+    def whitened(self, x: Vector, errors: Errors, derivatives: bool = True) -> Part:
+        """Residual and derivatives of all logs, independent and of unit size."""
+        residuals, jacobians = [], []
+        parts = self.parts(x, derivatives=derivatives)
+        for part, weights in zip(parts, errors.weights, strict=True):
+            size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
+            residuals.append((weights.rotation @ part.residual) / size)
+            jacobians.append((weights.rotation @ part.jacobian) / size[:, None])
+        return Part(np.concatenate(residuals), np.vstack(jacobians))
+
+    def refine(self, x: Vector, lower: Vector, upper: Vector) -> Solution:
+        """Weights and fit in turns until neither moves."""
+        noise, ripple = 1.0, RIPPLE * self.largest_torque
+        for _ in range(ROUNDS):
+            errors, freedom = self.deviations(self.parts(x), Errors(self.weights(x, ripple), noise, ripple))
+            noise, ripple = errors.noise, errors.ripple
+            new = self.fit(x, errors, lower, upper)
+            moved, x = float(np.max(np.abs(new - x))), new
+            self.tell("weights and fit")
+            if moved < 1e-4:
+                break
+        return Solution(x, errors, freedom, self.whitened(x, errors), lower, upper)
+
+    def fit(
+        self, x: Vector, errors: Errors, lower: Vector, upper: Vector, fixed: tuple[int, float] | None = None
+    ) -> Vector:
+        """The weighted least squares from x; `fixed` is a number of x and the value that it keeps."""
+        free = np.arange(x.size) if fixed is None else np.delete(np.arange(x.size), fixed[0])
+        whole = x.copy()
+        if fixed is not None:
+            whole[fixed[0]] = fixed[1]
+
+        def full(part: Vector) -> Vector:
+            point = whole.copy()
+            point[free] = part
+            return point
+
+        found = least_squares(
+            lambda part: self.whitened(full(part), errors, False).residual,
+            np.clip(whole, lower + 1e-12, upper - 1e-12)[free],
+            jac=lambda part: self.whitened(full(part), errors).jacobian[:, free],
+            bounds=(lower[free], upper[free]),
+            x_scale="jac",
+            max_nfev=30,
+            xtol=1e-9,
+        )
+        return full(np.asarray(found.x, dtype=np.float64))
+
+    def profiled(self, solution: Solution, i: int, step: float, quantile: float) -> float:
+        """Where x_i lies when the weighted squares, all else fitted anew, are larger by quantile^2.
+
+        The search begins with `step` from the solution, and ends at the bound if the squares never get there.
+        """
+        middle = float(solution.x[i])
+        bound = float((solution.upper if step > 0.0 else solution.lower)[i])
+        reach = abs(bound - middle)
+        size, sign, point = min(abs(step), reach), math.copysign(1.0, step), solution.x
+        if reach < 1e-9:
+            return bound
+        below, above = (0.0, 0.0), (math.inf, math.inf)
+        for _ in range(6):
+            fixed = i, middle + sign * size
+            point = self.fit(point, solution.errors, solution.lower, solution.upper, fixed)
+            residual = self.whitened(point, solution.errors, False).residual
+            root = math.sqrt(max(float(residual @ residual) - solution.least, 0.0))
+            if abs(root - quantile) < 0.05 * quantile:
+                break
+            if root < quantile and size >= reach:
+                return bound
+            if root < quantile:
+                below = max(below, (size, root))
+            else:
+                above = min(above, (size, root))
+            if math.isinf(above[0]):
+                size = min(reach, size * min(3.0, quantile / max(root, quantile / 3.0)))
+            else:
+                share = (quantile - below[1]) / (above[1] - below[1])
+                size = below[0] + (above[0] - below[0]) * min(max(share, 0.1), 0.9)
+        return middle + sign * size
+
+    def innovations(self, x: Vector, errors: Errors) -> list[Vector]:
+        """What is left of each log, sample by sample, made independent and of unit size."""
+        left = []
+        for part, one in zip(self.parts(x, derivatives=False), errors.weights, strict=True):
+            spread = one.root @ (one.rotation @ one.root).T  # the directions of the rotation in the samples
+            covariance = (spread * (errors.noise**2 + errors.ripple**2 * one.eigenvalues)) @ spread.T
+            left.append(solve_triangular(cholesky(covariance, lower=True), part.residual, lower=True))
+        return left
+
+
+def covariance_of(jacobian: Matrix, space: Space) -> Matrix:
+    """Covariance of x; what the logs do not tell has a spread of e^3 beforehand, positions of 1/2."""
+    before = np.array([1.0 / 9.0 if i < len(space.shared) else 4.0 for i in range(jacobian.shape[1])])
+    before[len(space.shared) + sum(space.positions) :] = 0.0
+    found = np.linalg.inv(jacobian.T @ jacobian + np.diag(before + 1e-12))
+    return np.asarray(found, dtype=np.float64)

@@ -1,0 +1,368 @@
+"""From logs to a drive: `identify`."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+from softstart.arrays import Matrix, Vector
+from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError, listed
+from softstart.identification.fitting import FACTOR, FREE, Fitter, Solution, Space, Tell, covariance_of
+from softstart.identification.logs import Log, TorqueIs
+from softstart.identification.model import FILTER, POSITION, LogModel
+from softstart.identification.planning import plan_experiments
+from softstart.identification.result import CONFIDENCE, WIDEST, Estimate, Identification
+from softstart.plant import record
+from softstart.quantities import nearest, show
+
+CURVED: Final = 0.05  # half an interval in logarithms beyond which its ends are looked for
+SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
+LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
+FAR: Final = 5.0  # standard deviations that hardly a sample is off
+LAGS: Final = 20  # samples over which what is left must not be correlated
+SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
+
+
+def identify(
+    logs: Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]],
+    drive: Drive | str,
+    *,
+    free: Iterable[str] | None = None,
+    torque_is: TorqueIs = "measured",
+    columns: dict[str, str] | None = None,
+    searches: int = 12,
+    seed: int = 0,
+    tell: Tell | None = None,
+) -> Identification:
+    """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
+
+    The exact plant under the torque of the log is fitted to the angle or speed of the motor. A search follows
+    each log from its beginning over longer and longer parts, from the guess and from points up to a factor of
+    4 around it, until two searches end at the same minimum. Then the squares are weighted by the covariance
+    of what the encoder rounds and of a torque error that the plant integrates, both of a size that restricted
+    maximum likelihood finds; intervals allow for not knowing that size, and follow the likelihood itself
+    where they are wide.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        Logs of one drive, each beginning at standstill, or their CSV files (`Log.load`).
+    drive : Drive or str
+        The guess, by factors of 3 if need be; what is not free stays as it is there. The position in the gap
+        is free for each log where the load is reactive or the drive says "unknown".
+    free : iterable of str, optional
+        What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping and
+        load torque, and with a torque demand the lag.
+    torque_is : {"measured", "demand"}
+        What the torque of files is, see `Log`.
+    columns : dict, optional
+        What files call the columns, see `Log.load`.
+    searches : int
+        At most so many searches.
+    seed : int
+        Of the points at which searches begin.
+    tell : callable, optional
+        Is told what is being done.
+
+    Returns
+    -------
+    Identification
+        Drive, intervals, what is unknown and why, what the logs show that the model has not.
+
+    Raises
+    ------
+    InputError
+        For bad input, for logs that no drive explains, and for units that cannot be right.
+
+    Examples
+    --------
+    >>> from softstart.identification.planning import made_up_log
+    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
+    >>> guess = crane.replace(gap=0.2, stiffness=200.0, load_inertia=0.4)
+    >>> found = identify(made_up_log(crane, "two levels, then reverse", ripple=1.0), guess, searches=2)
+    >>> found["gap"].lower < 0.08 < found["gap"].upper
+    True
+
+    References
+    ----------
+    D. A. Harville, J. Amer. Statist. Assoc. 72 (1977) 320-338; M. G. Kenward, J. H. Roger, Biometrics 53
+    (1997) 983-997; docs/identification.md.
+    """
+    began = time.perf_counter()
+    drive = drive if isinstance(drive, Drive) else Drive.load(drive)
+    if drive.shape:
+        raise InputError("drive: a batch of drives is no guess; give one drive.")
+    given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
+    if not given:
+        raise InputError("logs: there is none; give a log, or the path of its CSV file.")
+    read = [
+        one if isinstance(one, Log) else Log.load(one, columns=columns, torque_is=torque_is) for one in given
+    ]
+    read = [one.summed(float(drive.encoder_lines)) for one in read]
+    if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
+        raise InputError(f"searches = {searches}: give a whole number of 1 or more.")
+    asked, moving = _free(free, drive, read)
+    for one in read:
+        _check_inertia(one, drive)
+    base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
+    space = Space(
+        asked,
+        tuple(moving for _ in read),
+        tuple(one.kind == "angle" for one in read),
+        tuple(-1.0 if float(getattr(drive, name, 1.0)) < 0.0 else 1.0 for name in asked),
+    )
+    fitter = Fitter([LogModel(one, base) for one in read], space, tell)
+    guess, lower, upper = _bounds(space, drive, read)
+    found = fitter.search(guess, lower, upper, searches, seed)
+    solution = fitter.refine(found[0][0], lower, upper)
+    covariance = covariance_of(solution.part.jacobian, space)
+    estimates = _estimates(fitter, solution, covariance)
+    changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
+    sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    kept = len(estimates)
+    best = found[0][1]
+    notes = [
+        *(f"{one.name}: {note}" for one in read for note in one.notes),
+        *_advice(drive.replace(**changes), estimates, read),
+        *_misfits(fitter, solution),
+        "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
+        "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
+    ]
+    return Identification(
+        drive=drive.replace(**changes, source=_source(drive, read)),
+        guess=drive,
+        logs=tuple(read),
+        estimates=tuple(estimates),
+        correlations=(covariance / np.outer(sizes, sizes))[:kept, :kept],
+        ripple=solution.errors.ripple,
+        searches=len(found),
+        agreed=sum(cost <= 1.01 * best + 1e-300 for _, cost in found),
+        seconds=time.perf_counter() - began,
+        notes=tuple(notes),
+        point=solution.x,
+        covariance=covariance,
+        residuals=tuple(one.residual for one in fitter.parts(solution.x, derivatives=False)),
+    )
+
+
+def _source(drive: Drive, logs: Sequence[Log]) -> str:
+    names = ", ".join(one.name for one in logs[:3]) + (f" and {len(logs) - 3} more" if len(logs) > 3 else "")
+    return f"identified from {names}" + (f"; else: {drive.source}" if drive.source else "")
+
+
+def _standing(drive: Drive) -> Drive:
+    """The drive at one position: that of the file."""
+    return drive.assumed.replace(initial_speed=0.0) if drive.initial_speed else drive.assumed
+
+
+def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[tuple[str, ...], bool]:
+    """The parameters to find, and whether the position of each log is among them."""
+    demand = any(one.torque_is == "demand" for one in logs)
+    if free is None:
+        names = [name for name in FREE[:5] if name != "gap" or float(drive.gap) > 0.0]
+        names += ["load_torque"] if float(drive.load_torque) else []
+        names += ["torque_lag"] if demand and float(drive.torque_lag) > 0.0 else []
+        moving = drive.start_position == "unknown" or drive.load_kind == "reactive"
+        return tuple(names), moving and float(drive.gap) > 0.0
+    asked = list(dict.fromkeys(free))
+    for name in asked:
+        if name not in (*FREE, POSITION):
+            near = nearest(name, (*FREE, POSITION))
+            hint = f"did you mean {near}?" if near else f"those are {', '.join((*FREE, POSITION))}."
+            raise InputError(f"free = {show(name)}: it is no parameter that logs can tell; {hint}")
+        if name == FILTER and any(one.kind == "angle" for one in logs):
+            raise InputError(f"free = {show(name)}: an angle has no filter of the speed; leave it out.")
+        if name in FREE[6:8] and not demand:
+            raise InputError(
+                f"free = {show(name)}: with a measured torque it is in the samples already; leave it "
+                "out, or log the "
+                'demand (torque_is = "demand").'
+            )
+        if name == "load_torque" and not float(drive.load_torque):
+            raise InputError(f"free = {show(name)}: the guess is 0; give one that has the right sign.")
+    if asked in ([], [POSITION]):
+        raise InputError("free: there is nothing to find; name parameters, as gap and stiffness.")
+    names = [name for name in FREE if name in asked]  # the filter, which is not the drive's, last
+    return tuple(names), POSITION in asked
+
+
+def _check_inertia(log: Log, drive: Drive) -> None:
+    """Refuse a log whose units cannot be right: torque over acceleration is not near the inertia guessed."""
+    seen = np.isfinite(log.values)
+    time, values = log.time[seen], log.values[seen]
+    speed = values if log.kind == "speed" else np.gradient(values, time)
+    impulse = np.concatenate(
+        [[0.0], np.cumsum(0.5 * (log.torque[1:] + log.torque[:-1]) * np.diff(log.time))]
+    )[seen]
+    inertia = float(np.max(np.abs(impulse))) / max(float(np.max(np.abs(speed))), 1e-300)
+    low, high = float(drive.J1), float(drive.J1 + drive.J2)
+    if low / SUSPECT <= inertia <= high * SUSPECT:
+        return
+    raise InputError(
+        f"{log.name}: torque and motion tell an inertia of about {inertia:.3g} kg m2, and the drive has "
+        f"{low + float(drive.J2):.3g} kg m2; look at the units of its columns: time in ms, speed in "
+        "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms]."
+    )
+
+
+def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Vector, Vector]:
+    """Where the search begins, and how far it may go."""
+    typical = float(np.median(np.diff(logs[0].time)))
+    guess, lower, upper = [], [], []
+    for name in space.shared:
+        value = abs(float(getattr(drive, name, 0.0)))
+        if value == 0.0 and name == "damping":  # a damping ratio of 2 %
+            reduced = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
+            value = 0.04 * math.sqrt(float(drive.c * reduced))
+        elif value == 0.0:
+            value = typical
+        reach = math.log(3.0 * FACTOR)
+        if name in ("damping", "torque_lag", "computing_delay", FILTER):
+            reach = math.log(100.0)
+        guess.append(math.log(value))
+        lower.append(guess[-1] - reach)
+        upper.append(guess[-1] + reach)
+    for _ in range(sum(space.positions)):
+        guess, lower, upper = [*guess, 0.0], [*lower, -1.0], [*upper, 1.0]
+    for log in (one for one in logs if one.kind == "angle"):
+        first = float(log.values[np.isfinite(log.values)][0])
+        reach = max(20.0 * log.count, 100.0 * log.scale)
+        guess, lower, upper = [*guess, -first], [*lower, -first - reach], [*upper, -first + reach]
+    return np.array(guess), np.array(lower), np.array(upper)
+
+
+def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[Estimate]:
+    """Values and intervals: quadratic where they are narrow, else where the fit gets worse."""
+    space, found = fitter.space, []
+    for i, name in enumerate(space.names):
+        if name.startswith("offset"):
+            continue
+        position = i >= len(space.shared)
+        quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, solution.freedom[i]))
+        middle, half = float(solution.x[i]), quantile * math.sqrt(float(covariance[i, i]))
+        ends = [middle - half, middle + half]
+        wide = half > (0.1 if position else CURVED)
+        if wide or ends[0] < solution.lower[i] or ends[1] > solution.upper[i]:
+            fitter.tell(f"interval of {name}")
+            ends = [fitter.profiled(solution, i, step, quantile) for step in (-half, half)]
+        known = ends[1] - ends[0] < (1.0 if position else math.log(WIDEST))
+        reason = "" if known else _why(i, covariance, space)
+        if not position:
+            middle, *ends = (space.signs[i] * math.exp(one) for one in (middle, *ends))
+        found.append(Estimate(name, middle, min(ends), max(ends), known, wide, reason))
+    return found
+
+
+def _why(i: int, covariance: Matrix, space: Space) -> str:
+    """With what an unknown number goes together, or that nothing depends on it."""
+    sizes = np.sqrt(np.diag(covariance))
+    ratio = np.abs(covariance[i] / (sizes[i] * sizes))
+    ratio[i] = 0.0
+    names = space.names
+    partner = int(np.argmax(ratio))
+    if ratio[partner] > 0.9 and not names[partner].startswith("offset"):
+        return f"the logs tell it only together with {names[partner]} (correlation {ratio[partner]:.2f})"
+    return "the motion of the motor hardly depends on it in these logs"
+
+
+def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) -> list[str]:
+    """What is unknown, why, and the experiment that would tell it."""
+    unknown = [one for one in estimates if not one.known and not one.name.startswith(POSITION)]
+    if not unknown:
+        return []
+    names = [one.name for one in unknown]
+    reasons: dict[str, list[str]] = {}
+    for one in unknown:
+        reasons.setdefault(one.reason, []).append(one.name)
+    told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
+    period = float(np.median(np.diff(logs[0].time)))
+    would = [
+        one
+        for one in plan_experiments(drive, log_period=period, optimise=False).experiments
+        if all(one.widths.get(name, math.inf) < math.inf for name in names)
+    ]
+    remedy = "give what is known of it, and leave it out of --free: no standard experiment would tell it"
+    if would:
+        best = min(would, key=lambda one: max(one.widths[name] for name in names))
+        widths = listed([f"{name} within {100.0 * best.widths[name]:.2g} %" for name in names])
+        remedy = f'a log of "{best.name}" would tell {widths} (softstart identify --plan)'
+    return [f"Unknown: {told}. Remedy: {remedy}."]
+
+
+def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
+    """What the logs show that the model has not, each tried as a torque of its own shape."""
+    notes = []
+    errors, part = solution.errors, solution.part
+    columns: dict[str, list[Vector]] = {}
+    for i, (model, weights) in enumerate(zip(fitter.models, errors.weights, strict=True)):
+        values = fitter.space.values(solution.x, i)
+        response = model.torque_responses(values)[fitter.counts[i]] * math.sqrt(model.block)
+        speed = model.states(values)[:, record.W1_OUT]
+        still = np.abs(speed) < 1e-3 * float(np.max(np.abs(speed)))
+        size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
+        for name, shape in (
+            ("friction of the motor", np.where(still, 0.0, -np.sign(speed))),
+            ("viscous friction of the motor", -speed),
+            ("an offset of the torque signal", np.ones(speed.size)),
+        ):
+            means = np.add.reduceat(shape, np.arange(0, shape.size, model.block)) / model.block
+            columns.setdefault(name, []).append((weights.rotation @ (response @ means)) / size)
+    best = ("", 0.0, 0.0)
+    for name, parts in columns.items():
+        column = np.concatenate(parts)
+        alone = column - part.jacobian @ np.linalg.lstsq(part.jacobian, column, rcond=None)[0]
+        strength = float(alone @ alone)
+        if strength < 1e-6 * float(column @ column):
+            continue
+        amount, error = -float(alone @ part.residual) / strength, 1.0 / math.sqrt(strength)
+        if "friction" in name and amount < 0.0:
+            continue  # it would drive
+        if abs(amount) > SURE * error and abs(amount) / error > abs(best[1]) / max(best[2], 1e-300):
+            best = (name, amount, error)
+    if best[0]:
+        unit = "N m s/rad" if "viscous" in best[0] else "N m"
+        notes.append(
+            f"The logs show {best[0]} of {best[1]:.3g} +- {2.0 * best[2]:.2g} {unit}, which the model "
+            "has not: gap and load torque may be off by more than their intervals."
+        )
+    usual, ripple = max(fitter.largest_torque, 0.5 * float(fitter.models[0].guess.Ms)), errors.ripple
+    if ripple > LARGE_RIPPLE * usual:
+        notes.append(
+            f"A torque error of {ripple:.3g} N m in each sample, {100.0 * ripple / usual:.0f} % of the "
+            "largest, is needed to explain the logs: something else moves this drive (a second gap, a cut or "
+            "clipped signal, another kind of load), or the torque signal is poor. Do not trust the intervals."
+        )
+    for log, left in zip(
+        (one.log for one in fitter.models), fitter.innovations(solution.x, errors), strict=True
+    ):
+        chance = _whiteness(left)
+        if chance < 1e-4:
+            notes.append(
+                f"{log.name}: what is left is not independent from sample to sample (chance {chance:.1g}): "
+                "the log holds something that the model has not, as a second gap, an elastic part, a filter."
+            )
+        far = int(np.sum(np.abs(left) > FAR))
+        if far > 2 + 0.005 * left.size:
+            notes.append(f"{log.name}: {far} samples lie more than {FAR:g} standard deviations off.")
+    return notes
+
+
+def _whiteness(left: Vector) -> float:
+    """Chance of correlations as large as these in independent numbers: G. M. Ljung, G. E. P. Box (1978).
+
+    >>> 0.001 < _whiteness(np.random.default_rng(0).standard_normal(500)) < 0.999
+    True
+    """
+    centred = left - left.mean()
+    n, lags = centred.size, min(LAGS, centred.size // 4)
+    power = float(centred @ centred)
+    ratios = np.array([float(centred[k:] @ centred[:-k]) / power for k in range(1, lags + 1)])
+    return float(chi2.sf(n * (n + 2.0) * np.sum(ratios**2 / (n - np.arange(1, lags + 1))), lags))

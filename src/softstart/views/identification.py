@@ -1,0 +1,180 @@
+"""An identification and a plan of experiments in words, tables and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softstart.drive import PARAMETERS
+from softstart.identification.model import FILTER, POSITION, LogModel
+from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
+from softstart.views.numbers import NOTHING, Table, number, short
+
+if TYPE_CHECKING:
+    from softstart.identification.planning import Experiment, Plan
+    from softstart.identification.result import Estimate, Identification
+
+UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
+
+
+def headline(found: Identification) -> list[str]:
+    """What was identified from what."""
+    samples = sum(one.time.size for one in found.logs)
+    logs = f"{len(found.logs)} logs" if len(found.logs) > 1 else found.logs[0].name
+    known = sum(one.known for one in found.shared)
+    return [
+        f"{found.drive.name}: identified from {logs}",
+        f"  {samples} samples of torque and {' and '.join(sorted({one.kind for one in found.logs}))}; "
+        f"{known} of {len(found.shared)} parameters are told by the logs",
+        f"  {found.agreed} of {found.searches} searches ended at the best minimum; torque error "
+        f"{found.ripple:.3g} N m in each sample; {found.seconds:.1f} s",
+    ]
+
+
+def estimates_table(found: Identification) -> Table:
+    """A row for each parameter: guess, value, interval."""
+    rows = found.estimates
+    cells = {
+        "parameter": [_name(one) for one in rows],
+        "unit": [UNITS[one.name][1] if _shared(one) else "s" if one.name == FILTER else "1" for one in rows],
+        "guess": [_guess(found, one) for one in rows],
+        "found": [_digits(one.value, one) if one.known else "unknown" for one in rows],
+        "+- %": [
+            number(100.0 * one.half_width, 2) if one.known and _shared(one) else NOTHING for one in rows
+        ],
+        "from": [_digits(one.lower, one) for one in rows],
+        "to": [_digits(one.upper, one) for one in rows],
+    }
+    return Table.of("Found, with intervals of 95 %", cells, ("parameter", "unit"))
+
+
+def _shared(one: Estimate) -> bool:
+    return one.name in UNITS
+
+
+def _name(one: Estimate) -> str:
+    if _shared(one):
+        return UNITS[one.name][0]
+    return one.name.replace("position", "position in gap, log").replace("_", " ")
+
+
+def _guess(found: Identification, one: Estimate) -> str:
+    return short(float(getattr(found.guess, one.name))) if _shared(one) else NOTHING
+
+
+def _digits(value: float, one: Estimate) -> str:
+    """As many digits as the interval leaves meaning, one more than are certain."""
+    width = 0.5 * (one.upper - one.lower)
+    if not (math.isfinite(width) and width > 0.0 and value):
+        return short(value)
+    digits = max(2, min(7, 2 + math.ceil(math.log10(max(abs(value) / width, 1.0)))))
+    return f"{value:.{digits}g}"
+
+
+def k_dyn_table(each: Mapping[str, tuple[float, float, float]]) -> Table:
+    """K_dyn of strategies with intervals."""
+    rows = sorted(each.items(), key=lambda one: one[1][0])
+    cells = {
+        "strategy": [name for name, _ in rows],
+        "K_dyn": [number(value, 3) for _, (value, _, _) in rows],
+        "from": [number(lower, 3) for _, (_, lower, _) in rows],
+        "to": [number(upper, 3) for _, (_, _, upper) in rows],
+    }
+    return Table.of("K_dyn of the drive found, with intervals of 95 %", cells, ("strategy",))
+
+
+def figure(found: Identification) -> Any:
+    """Each log beside the start of the drive found, and below what is left."""
+    with drawing():
+        made, axes = new_figure(
+            3, len(found.logs), (4.5 + 3.5 * len(found.logs), 6.0), squeeze=False, sharex="col"
+        )
+        entitle(made, f"{found.drive.name}: what was logged, and the start of the drive found")
+        values = {one.name: one.value for one in found.estimates if not one.name.startswith(POSITION)}
+        for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
+            own = f"{POSITION} {i + 1}"
+            position = {POSITION: found[own].value} if own in {one.name for one in found.estimates} else {}
+            base = found.guess.replace(start_position="mid-gap") if position else found.guess.assumed
+            model = LogModel(log, base).signals([values | position])[0]
+            seen = np.isfinite(log.values)
+            time, unit = log.time - log.time[0], "rad" if log.kind == "angle" else "rad/s"
+            head(axes[0][i], log.name, "torque, N m")
+            axes[0][i].plot(
+                time,
+                log.torque,
+                color=COLOURS[0],
+                drawstyle="steps-post" if log.torque_is == "demand" else None,
+            )
+            offset = float(np.median(log.values[seen] - model[seen])) if log.kind == "angle" else 0.0
+            head(axes[1][i], "", f"{log.kind}, {unit}")
+            axes[1][i].plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
+            axes[1][i].plot(time, model + offset, color=COLOURS[1], lw=1.0, label="drive found")
+            axes[1][i].legend(loc="best")
+            head(axes[2][i], "", f"drive - log, {unit}", "time, s")
+            axes[2][i].plot(time[seen], left, color=COLOURS[2], lw=0.8)
+            axes[2][i].axhline(0.0, color=GREY, lw=0.6)
+        return made
+
+
+def plan_headline(plan: Plan) -> list[str]:
+    """What the plan is for."""
+    encoder = f"{plan.lines:g} encoder lines" if plan.lines else "an ideal encoder"
+    return [
+        f"{plan.drive.name}: what an experiment would tell",
+        f"  a sample each {1e3 * plan.log_period:g} ms, {encoder}, a torque error of "
+        f"{plan.ripple:.3g} N m in each",
+    ]
+
+
+def plan_table(plan: Plan) -> Table:
+    """Half an interval of 95 % of each parameter, in %, under each experiment."""
+    shown = plan.experiments
+    names = list(shown[0].widths)
+    cells = {
+        "parameter": [
+            *(UNITS[name][0] for name in names),
+            "peak shaft torque, N m",
+            "load moves, rad",
+            "lasts, s",
+        ],
+        **{one.name.replace(", ", ",\n"): _column(one, names) for one in shown},
+    }
+    return Table.of("Half intervals of 95 %, in % of the value", cells, ("parameter",))
+
+
+def _column(one: Experiment, names: Sequence[str]) -> list[str]:
+    widths = [one.widths[name] for name in names]
+    told = ["unknown" if math.isinf(width) else f"{100.0 * width:.2g}" for width in widths]
+    return [*told, f"{one.peak:.3g}", f"{one.travel:.3g}", f"{one.end:.3g}"]
+
+
+def plan_conclusion(plan: Plan) -> str:
+    """Which experiment tells most."""
+    best = plan.best
+    lost = [name for name, width in best.widths.items() if math.isinf(width)]
+    if lost:
+        return f'"{best.name}" tells most, and still leaves {", ".join(lost)} unknown.'
+    worst = max(best.widths, key=lambda name: best.widths[name])
+    return (
+        f'"{best.name}" tells most: every parameter within {100.0 * best.widths[worst]:.2g} %, {worst} the '
+        f"worst; the shaft torque reaches {best.peak:.3g} N m."
+    )
+
+
+def plan_figure(plan: Plan) -> Any:
+    """The torque of each experiment."""
+    with drawing():
+        made, axes = new_figure(
+            len(plan.experiments), 1, (7.0, 1.3 * len(plan.experiments) + 1.0), sharex=True, squeeze=False
+        )
+        entitle(made, f"{plan.drive.name}: torque demand of each experiment")
+        for axis, one, colour in zip(axes[:, 0], plan.experiments, COLOURS, strict=False):
+            time = np.linspace(0.0, one.end, 1000)
+            axis.plot(time, one.profile.at(time), color=colour)
+            axis.axhline(0.0, color=GREY, lw=0.6)
+            head(axis, one.name, "N m")
+        axes[-1, 0].set_xlabel("time, s")
+        return made

@@ -1,0 +1,283 @@
+"""Identification: the model of a log, its covariances, the fit, what is unknown, what is refused, plans."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from softstart import Drive, InputError, Log, identify, plan_experiments, simulate
+from softstart.arrays import Vector
+from softstart.controller import make_controller
+from softstart.identification.fitting import rounding
+from softstart.identification.model import FILTER, LogModel, filtered
+from softstart.identification.planning import made_up_log
+from softstart.plant import record
+from softstart.profile import TorqueProfile
+
+TRUTH = Drive.load("crane-4amtkf").replace(
+    damping=0.3,
+    torque_lag=0.004,
+    load_kind="reactive",
+    gap=0.08,
+    start_position="unknown",
+    encoder_lines=1024,
+)
+GUESS = TRUTH.replace(
+    gap=0.2, stiffness=200, load_inertia=0.4, motor_inertia=0.02, load_torque=12, damping=0.9
+)
+REVERSE = "two levels, then reverse"
+NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque", "torque_lag")
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    return made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3)
+
+
+@pytest.fixture(scope="module")
+def found(log: Log):  # type: ignore[no-untyped-def]
+    return identify(log, GUESS, searches=3)
+
+
+def played(log: Log, torque: Vector, values: dict[str, float]) -> Vector:
+    """States of the true drive under this demand."""
+    blank = Log(log.time, torque, angle=900.0 * log.time**2.1, torque_is="demand")
+    return LogModel(blank, TRUTH.replace(start_position="mid-gap")).states(values)
+
+
+# ---- the model ------------------------------------------------------------------------------------------
+
+
+def test_the_model_is_the_plant_under_the_torque_of_the_log(log: Log) -> None:
+    profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])
+    drive = TRUTH.replace(start_position=-0.6 * 0.04, minimum_torque=-100.0, maximum_torque=100.0)
+    run = simulate(drive, make_controller("profile", {"profile": profile}), until=float(log.time[-1]))
+    angle = run.at(log.time)["phi1"] - run.at([0.0])["phi1"]
+    signal = LogModel(log, TRUTH.replace(start_position="mid-gap")).signals([{"position": -0.6}])[0]
+    assert np.max(np.abs(signal - angle)) < 1e-12
+
+
+def test_a_measured_torque_is_joined_by_lines() -> None:
+    time = np.linspace(0.0, 0.3, 61)
+    torque = 30.0 * np.sin(8.0 * time) ** 2 + 8.0
+    log = Log(time, torque, speed=time**1.5)
+    free = TRUTH.replace(gap=200.0, start_position="mid-gap")  # the motor alone
+    speed = LogModel(log, free).signals([{}])[0]
+    assert speed == pytest.approx(cumulative_trapezoid(torque, time, initial=0.0) / 0.035, rel=1e-12)
+
+
+def test_a_torque_error_moves_the_signal_as_its_response_says(log: Log) -> None:
+    model = LogModel(log, TRUTH.replace(start_position="mid-gap"))
+    values = {"position": -0.6}
+    response = model.torque_responses(values)
+    assert response.shape == (log.time.size, log.time.size)
+    error = 1e-3 * np.random.default_rng(1).standard_normal(log.time.size)
+    moved = played(log, log.torque + error, values)[:, record.PHI1_OUT]
+    moved = moved - played(log, log.torque, values)[:, record.PHI1_OUT]
+    assert response @ error == pytest.approx(moved, abs=2e-3 * float(np.max(np.abs(moved))))
+    assert np.all(np.triu(response, 1)[:-1] == 0.0)  # no error moves what came before it
+
+
+def test_rounding_errors_of_an_encoder_are_correlated_as_its_covariance_says() -> None:
+    angle = np.array([0.0, 0.1, 0.25, 0.9, 1.0, 2.35])
+    phases = (np.arange(200_000) + 0.5) / 200_000
+    errors = np.floor(angle[:, None] + phases) - (angle[:, None] + phases)  # the offset is fitted
+    sampled = np.cov(errors)
+    assert rounding(angle, np.zeros((6, 1)), 0.0, 1.0) - 0.0025 * np.eye(6) == pytest.approx(
+        sampled, abs=1e-4
+    )
+
+
+def test_a_filter_of_the_speed_is_exact_for_lines() -> None:
+    time = np.linspace(0.0, 0.2, 101)
+    lag = 0.013
+    exact = 5.0 * (time - lag * (1.0 - np.exp(-time / lag)))
+    assert filtered(time, 5.0 * time, lag) == pytest.approx(exact, abs=1e-12)
+    uneven = np.sort(np.concatenate([time, time[1:-1] + 0.0007]))
+    assert filtered(uneven, 5.0 * uneven, lag)[-1] == pytest.approx(exact[-1], abs=1e-12)
+
+
+# ---- the fit --------------------------------------------------------------------------------------------
+
+
+def test_every_parameter_is_found_from_a_guess_off_by_factors(found) -> None:  # type: ignore[no-untyped-def]
+    assert found.agreed >= 2
+    for name in NAMES:
+        one = found[name]
+        assert one.known
+        off = abs(math.log(one.value / float(getattr(TRUTH, name))))
+        assert off < 2.0 * math.log(one.upper / one.lower) / 2.0, name  # twice the interval
+    assert found["gap"].half_width < 0.02
+    assert found["stiffness"].half_width < 0.02
+    assert found.ripple == pytest.approx(1.0, rel=0.35)
+    assert len(found.notes) == 1  # only that the scale of the torque cannot be found
+
+
+def test_values_do_not_depend_on_the_guess(found, log: Log) -> None:  # type: ignore[no-untyped-def]
+    other = identify(log, TRUTH.replace(gap=0.04, stiffness=700.0, load_inertia=0.1), searches=3)
+    for name in NAMES:
+        assert other[name].value == pytest.approx(found[name].value, rel=0.1 * found[name].half_width)
+
+
+def test_a_speed_of_encoder_differences_tells_what_the_angle_tells(found) -> None:  # type: ignore[no-untyped-def]
+    speed = made_up_log(TRUTH, REVERSE, log_period=2e-3, ripple=1.0, seed=3, signal="speed")
+    other = identify(speed, GUESS, searches=3)
+    assert any("summed to the angle" in note for note in other.notes)
+    for name in NAMES:
+        assert other[name].value == pytest.approx(found[name].value, rel=1e-5)
+        assert other[name].half_width == pytest.approx(found[name].half_width, rel=1e-3)
+
+
+def test_other_units_of_torque_scale_what_they_must_and_nothing_else(found, log: Log) -> None:  # type: ignore[no-untyped-def]
+    off = 0.9
+    low = identify(Log(log.time, off * log.torque, angle=log.values, torque_is="demand"), GUESS, searches=3)
+    for name in NAMES:
+        scale = 1.0 if name in ("gap", "torque_lag") else off
+        assert low[name].value == pytest.approx(scale * found[name].value, rel=0.2 * found[name].half_width)
+    ((value, lower, upper),) = low.k_dyn(["direct"], count=50).values()
+    assert lower <= value <= upper
+    assert value == pytest.approx(float(simulate(TRUTH.assumed, "direct").k_dyn), rel=0.1)
+
+
+def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> None:
+    start = made_up_log(TRUTH, "start", log_period=2e-3, ripple=1.0, seed=4)
+    alone = identify(start, GUESS, searches=3)
+    assert not alone["gap"].known
+    assert alone["gap"].lower < 0.08 < alone["gap"].upper
+    assert "position" in alone["gap"].reason
+    assert any(note.startswith("Unknown: gap") and REVERSE in note for note in alone.notes)
+    assert alone["motor_inertia"].known
+
+
+def test_friction_of_the_motor_is_named(log: Log) -> None:
+    values, speed = {"position": -0.6}, played(log, log.torque, {"position": -0.6})[:, record.W1_OUT]
+    generator = np.random.default_rng(5)
+    error = 0.5 * generator.standard_normal(speed.size)
+    for _ in range(4):  # its sign is that of a speed that depends on it
+        states = played(log, log.torque + error - 1.5 * np.sign(speed) * (np.abs(speed) > 0.05), values)
+        speed = states[:, record.W1_OUT]
+    angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
+    rubbed = Log(log.time, log.torque, angle=angle, torque_is="demand")
+    notes = identify(rubbed, TRUTH, searches=1).notes
+    assert any("friction of the motor" in note for note in notes)
+
+
+def test_a_clipped_torque_is_noticed(log: Log) -> None:
+    clipped = Log(log.time, np.clip(log.torque, -20.0, 25.0), angle=log.values, torque_is="demand")
+    assert any("something else moves this drive" in n for n in identify(clipped, TRUTH, searches=1).notes)
+
+
+def test_a_filtered_speed_is_named_or_found(log: Log) -> None:
+    fine = np.linspace(0.0, float(log.time[-1]), 16 * (log.time.size - 1) + 1)
+    profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])
+    drive = TRUTH.replace(start_position=-0.024, minimum_torque=-100.0, maximum_torque=100.0)
+    run = simulate(drive, make_controller("profile", {"profile": profile}), until=float(log.time[-1]))
+    behind = filtered(fine, run.at(fine)["w1"], 0.01)[::16]
+    slow = Log(log.time, log.torque, speed=behind, torque_is="demand")
+    notes = identify(slow, TRUTH, searches=1).notes
+    assert any("not independent" in note for note in notes)
+    with_filter = identify(slow, GUESS, free=[*NAMES, "position", FILTER], searches=3)
+    assert with_filter[FILTER].value == pytest.approx(0.01, rel=0.02)
+    assert with_filter["gap"].value == pytest.approx(0.08, rel=0.02)
+
+
+# ---- logs -----------------------------------------------------------------------------------------------
+
+
+def test_a_file_with_units_commas_and_other_names(log: Log, tmp_path: Path) -> None:
+    rows = [
+        f"{1e3 * t:.6f};{-u:.9f};{math.degrees(a):.12f}".replace(".", ",")
+        for t, u, a in zip(log.time, log.torque, log.values, strict=True)
+    ]
+    path = tmp_path / "inverter.csv"
+    path.write_text("\n".join(["t [ms];M_act [N*m];phi [deg]", *rows]), encoding="utf-8")
+    names = {"time": "t", "torque": "-M_act", "angle": "phi"}
+    read = Log.load(path, columns=names, torque_is="demand")
+    assert read.time == pytest.approx(log.time, abs=1e-9)
+    assert read.torque == pytest.approx(log.torque, abs=1e-8)
+    assert read.values == pytest.approx(log.values, abs=1e-12)
+    assert read.count == pytest.approx(2.0 * math.pi / 4096.0, rel=1e-6)
+
+
+def test_missing_samples_wraps_and_spikes_are_mended_and_told(log: Log) -> None:
+    values, torque = np.mod(log.values + 1.0, 2.0 * math.pi), log.torque.copy()
+    values[50], torque[60] = math.nan, math.nan
+    values[90] += 0.4
+    read = Log(log.time, torque, angle=values, torque_is="demand")
+    told = " ".join(read.notes)
+    assert "wraps" in told
+    assert "missing" in told
+    assert "far off" in told
+    assert math.isnan(read.values[50])
+    assert math.isnan(read.values[90])
+    kept = np.isfinite(read.values)
+    assert read.values[kept] - read.values[0] == pytest.approx(log.values[kept] - log.values[0], abs=1e-9)
+    assert read.torque[60] == pytest.approx(0.5 * (torque[59] + torque[61]))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda t, u, y: (t[::-1], u, y), "it must rise"),
+        (lambda t, u, y: (t[:10], u[:10], y[:10]), "10 samples; a fit needs 30 or more"),
+        (lambda t, u, y: (t, -u, y), "has the wrong sign"),
+        (lambda t, u, y: (t, 0.0 * u, y), "the torque is 0 in every sample"),
+        (lambda t, u, y: (t, u, 0.0 * y), "the angle never changes"),
+        (lambda t, u, y: (t[100:], u[100:], y[100:]), "begin the log at standstill"),
+        (lambda t, u, y: (np.where(t > 0.3, t + 1.0, t), u, y), "there is no sample from"),
+        (lambda t, u, y: (t, np.where((t > 0.1) & (t < 0.11), math.nan, u), y), "cut the log there"),
+        (lambda t, u, y: (t, u[:-1], y), "give one number a sample"),
+    ],
+)
+def test_logs_that_cannot_be_used_are_refused(log: Log, change, sentence: str) -> None:  # type: ignore[no-untyped-def]
+    time, torque, angle = change(log.time, log.torque, log.values)
+    with pytest.raises(InputError, match=sentence):
+        Log(time, torque, angle=angle, torque_is="demand")
+
+
+def test_units_that_cannot_be_right_are_refused(log: Log) -> None:
+    slow = Log(1e3 * log.time, log.torque, angle=log.values, torque_is="demand")
+    with pytest.raises(InputError, match="look at the units"):
+        identify(slow, TRUTH)
+
+
+@pytest.mark.parametrize(
+    ("free", "sentence"),
+    [
+        (["gpa"], "did you mean gap"),
+        (["position"], "nothing to find"),
+        ([FILTER, "gap"], "an angle has no filter"),
+    ],
+)
+def test_what_cannot_be_found_is_refused(log: Log, free: list[str], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        identify(log, TRUTH, free=free)
+
+
+def test_a_lag_cannot_be_found_from_a_measured_torque(log: Log) -> None:
+    measured = Log(log.time, log.torque, angle=log.values)
+    with pytest.raises(InputError, match="log the demand"):
+        identify(measured, TRUTH, free=["gap", "torque_lag"])
+
+
+# ---- plans ----------------------------------------------------------------------------------------------
+
+
+def test_a_plan_tells_the_intervals_that_a_fit_then_has(found) -> None:  # type: ignore[no-untyped-def]
+    plan = plan_experiments(TRUTH, log_period="2 ms", ripple=1.0, optimise=False)
+    for name in NAMES:
+        assert plan[REVERSE].widths[name] == pytest.approx(found[name].half_width, rel=0.35)
+    assert math.isinf(plan["start"].widths["gap"])
+    assert plan["shaking"].travel < 0.1 * plan["start"].travel
+
+
+def test_the_planned_torque_tells_no_less_and_keeps_its_limits() -> None:
+    plan = plan_experiments(TRUTH, log_period="4 ms", ripple=1.0, most_torque="70 N*m")
+    allowed = [one for one in plan.experiments[:-1] if one.peak <= 70.0]
+    assert plan["planned"].score <= min(one.score for one in allowed)
+    assert plan["planned"].peak <= 70.0
+    assert np.max(np.abs(plan["planned"].profile.torque)) <= TRUTH.starting_torque
