@@ -28,8 +28,8 @@ BUDGET = {
     "chain": (5620, 16, 4, 0),
     # 140 and a file: `init`
     # 60: a report is printed to A4
-    # 40: optima of chains
-    "cli": (4720, 21, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    # 250 and a file: `identify`; 40: optima of chains
+    "cli": (4970, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -37,6 +37,8 @@ BUDGET = {
     # 30 lines: S-N curves; 50: one limit and what a figure leaves of it
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
     "drive": (1550, 6, 1, 0),  # 5: a reactive load may be anywhere
+    # the drive from logs of its starts, and experiments that tell it
+    "identification": (2040, 7, 2, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -69,10 +71,10 @@ BUDGET = {
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
     # 20: what a sensor of the start position is worth; 120: starts, sweeps and gains against limits
     # 70: starts and comparisons of chains
-    # 75 and a file: results as notebooks show them
+    # 75 and a file: results as notebooks show them; 190 and a file: identifications and plans
     # 10: the worst of several positions, named by the page and the report too
     # 40: optima of chains
-    "views": (4875, 18, 6, 0),
+    "views": (5070, 19, 6, 0),
 }
 
 

@@ -41,13 +41,18 @@ from softstart.views.numbers import plain
 from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
+    from softstart.identification import planning
     from softstart.identification.logs import TorqueIs
     from softstart.identification.planning import Plan
     from softstart.identification.result import Identification
     from softstart.views import identification as views
 else:  # no numba for a help, a wrong option or the Tab key
+    planning = late("softstart.identification.planning")
     views = late("softstart.views.identification")
 
+SIMULATED = (
+    "simulated by softstart, not measured: the torque demand, and the motor as its encoder would count it"
+)
 STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold")
 
 
@@ -190,11 +195,7 @@ def identify(
                 print_tables(to, [views.estimates_table(found), views.k_dyn_table(each)])
                 print_conclusion(to, [], found.notes)
     if out is not None and not as_json:
-        what = (
-            "a torque profile for each experiment, figure"
-            if plan is not None
-            else "drive.toml, residuals, figure"
-        )
+        what = "torques and simulated logs, figure" if plan is not None else "drive.toml, residuals, figure"
         print(f"\nWritten to {out}: report.md, {what}.")
 
 
@@ -227,6 +228,8 @@ def write_plan(made: Plan, folder: Path, command: str) -> None:
         stem = one.name.replace(", ", "-").replace(" ", "-")
         one.profile.to_csv(folder / f"{stem}.csv")
         one.profile.to_toml(folder / f"{stem}.toml")
+        log = planning.made_up_log(made.drive, one, log_period=made.log_period, ripple=made.ripple)
+        log.to_csv(folder / f"simulated-{stem}.csv", SIMULATED)
     save_figure(views.plan_figure(made), folder, "experiments")
     table = views.plan_table(made)
     write_table(

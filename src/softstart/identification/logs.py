@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import read_text
+from softstart.input.files import read_text, write_whole
 from softstart.quantities import RefusedError, show
 
 Kind = Literal["angle", "speed"]
@@ -183,6 +183,14 @@ class Log:
         _, (time, torque, values) = read_columns(text, f"log = {where}", asked, headed="names", missing=True)
         made: dict[str, Any] = {kinds[0]: signs[2] * values}
         return cls(time, signs[1] * torque, torque_is=torque_is, name=Path(where).name, **made)
+
+    def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
+        """Write the log to a CSV file that `load` reads; `about` goes into a comment above it."""
+        heading = f"time [s],torque [N*m],{self.kind} [{COLUMNS[self.kind].unit}]"
+        lines = [*(f"# {line}" for line in about.splitlines()), heading]
+        rows = zip(self.time.tolist(), self.torque.tolist(), self.values.tolist(), strict=True)
+        lines += [f"{t:.9g},{u:.9g},{'' if math.isnan(value) else f'{value:.12g}'}" for t, u, value in rows]
+        write_whole(Path(path), lambda stream: stream.write("\n".join(lines) + "\n"))
 
     def first(self, count: int) -> Log:
         """The first samples of the log, as they are."""

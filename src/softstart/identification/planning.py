@@ -28,7 +28,7 @@ views = late("softstart.views.identification")  # above this module; see softsta
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
-EVALUATIONS: Final = 160
+EVALUATIONS: Final = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,17 @@ class Experiment:
         Peak of the shaft torque, N m, the worst of the positions in the gap.
     travel : float
         How far the load is moved at most from where it stood, rad at the motor shaft.
+
+    Examples
+    --------
+    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
+    >>> shaking = plan_experiments(crane, optimise=False)["shaking"]
+    >>> shaking.peak < crane.load_torque * 6, round(shaking.travel, 1)
+    (True, 0.1)
+
+    References
+    ----------
+    docs/identification.md.
     """
 
     name: str
@@ -211,7 +222,7 @@ def plan_experiments(
 
 def made_up_log(
     drive: Drive,
-    experiment: str,
+    experiment: str | Experiment,
     *,
     log_period: float = 1e-3,
     ripple: float = 0.0,
@@ -231,9 +242,12 @@ def made_up_log(
     'angle'
     """
     levels = _standard(drive, _level(drive))
-    if experiment not in levels:
+    if isinstance(experiment, Experiment):
+        profile, end = experiment.profile, experiment.end
+    elif experiment in levels:
+        profile, end = _profile(*levels[experiment])
+    else:
         raise InputError(f"experiment = {show(experiment)}: it is none of {', '.join(levels)}.")
-    profile, end = _profile(*levels[experiment])
     time = np.arange(0.0, end, log_period)
     demand = profile.at(time)
     generator = np.random.default_rng(seed)

@@ -40,6 +40,15 @@ class Estimate:
         quadratic would mislead.
     reason : str
         Why it is unknown; else empty.
+
+    Examples
+    --------
+    >>> Estimate("gap", 0.08, 0.079, 0.081, known=True).half_width
+    0.0125...
+
+    References
+    ----------
+    docs/identification.md.
     """
 
     name: str

@@ -30,7 +30,7 @@ def headline(found: Identification) -> list[str]:
         f"  {samples} samples of torque and {' and '.join(sorted({one.kind for one in found.logs}))}; "
         f"{known} of {len(found.shared)} parameters are told by the logs",
         f"  {found.agreed} of {found.searches} searches ended at the best minimum; torque error "
-        f"{found.ripple:.3g} N m in each sample; {found.seconds:.1f} s",
+        f"{found.ripple:.3g} N m in each sample",
     ]
 
 
