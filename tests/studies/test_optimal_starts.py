@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from softstart import TorqueProfile
+from softstart.optimal import whole_certificate
 from softstart.optimal.exact import replay
 from softstart.optimal.result import RobustOptimum, SensorWorth
 from softstart.optimal.solving import optimize
@@ -45,7 +46,9 @@ PART = Extent(
 @pytest.fixture(scope="module")
 def found():
     """A part of the study; profiles for several gaps, slow to find, have a stand-in."""
-    return replace(find(PART, lambda text: None), sensed=[stand_in()])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(whole_certificate, "GRIDS", 1)  # of what a limited torque rate costs
+        return replace(find(PART, lambda text: None), sensed=[stand_in()])
 
 
 def stand_in() -> sensor.Sensed:

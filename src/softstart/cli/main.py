@@ -26,6 +26,7 @@ DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130
 DEBUG = "SOFTSTART_TRACEBACK"
 REPEAT_AFTER = 0.5  # s until a stop signal that was lost is raised again
 PATIENCE = 1.3  # s from a stop signal until the process ends, whatever it is doing
+BUSY = 5.0  # times that at most, where processes queue for the processors
 STOP = "interrupted; no incomplete file was left behind."
 
 
@@ -176,7 +177,8 @@ def _watch_for_stops() -> None:
 def _end_in_time(reader: int) -> None:
     while os.read(reader, 1)[0] not in (signal.SIGTERM, signal.SIGINT):
         pass  # the timer's
-    time.sleep(PATIENCE)
+    queue = os.getloadavg()[0] / (os.cpu_count() or 1)
+    time.sleep(PATIENCE * min(max(queue, 1.0), BUSY))
     _fail([STOP], INTERRUPTED)
     end_now(INTERRUPTED)
 

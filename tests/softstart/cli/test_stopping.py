@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from tests.patience import patient
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no interval timer")
 
@@ -77,7 +78,7 @@ def ended(work: str, name: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=15,
+        timeout=patient(15.0),
         check=False,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )

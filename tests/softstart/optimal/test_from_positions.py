@@ -142,7 +142,7 @@ def test_a_release_by_time_only_takes_that_time() -> None:
 @pytest.mark.parametrize(
     "late", [{"torque_lag": 0.005}, {"torque_rate": 2000.0}, {"torque_lag": 0.004, "torque_rate": 2000.0}]
 )
-def test_torque_proving_waits_for_the_quickest_rise(late: dict[str, float]) -> None:
+def test_torque_proving_waits_for_the_quickest_rise(late: dict[str, float], small_certificate: None) -> None:
     drive = HELD.replace(**late)
     full = simulate(drive, "profile", parameters={"profile": TorqueProfile([0.0], [250.0])})
     best = optimize(drive, "1.2x")
