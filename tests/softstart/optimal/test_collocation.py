@@ -158,6 +158,7 @@ def test_a_change_of_units_leaves_k_dyn_as_it_is():
     assert other.end_time == pytest.approx(solved(problem).end_time * t, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_contact_from_which_the_search_begins_does_not_matter():
     problem = Problem(CRANE, start_time=SWITCHES)
     for contact in (0.016, 0.06):

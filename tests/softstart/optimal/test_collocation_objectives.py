@@ -77,6 +77,7 @@ def test_a_torque_speed_curve_is_obeyed_all_along_and_costs():
     assert candidate.claimed > solve(Problem(CRANE, start_time=0.33)).claimed * (1 + 1e-3)
 
 
+@pytest.mark.slow
 def test_smoothness_makes_the_demand_continuous_and_costs_the_more_the_more_it_weighs(gentle):
     k_dyn = [gentle.claimed]
     rough = []

@@ -139,6 +139,7 @@ def test_a_release_by_time_only_takes_that_time() -> None:
     assert after.bound.k_dyn == pytest.approx(alone.bound.k_dyn, rel=5e-4)  # how near a certificate comes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "late", [{"torque_lag": 0.005}, {"torque_rate": 2000.0}, {"torque_lag": 0.004, "torque_rate": 2000.0}]
 )

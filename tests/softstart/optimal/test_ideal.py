@@ -274,6 +274,7 @@ def test_where_the_start_is_no_linear_problem_the_reason_is_given() -> None:
     assert isinstance(entry_of(Problem(CRANE.replace(start_position=0.26), 0.5)), FromContact)
 
 
+@pytest.mark.slow
 def test_more_time_never_makes_a_start_harder() -> None:
     """The start may take less than it is allowed: drawn out, a contact this hard would open the gap again."""
     drive = Drive(

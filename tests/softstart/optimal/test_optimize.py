@@ -199,6 +199,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_no_shipped_controller_is_gentler_in_its_own_time(name: str) -> None:
     """Who is harder than the optimum of a shorter time is harder than that of its own, which is no higher."""
@@ -271,6 +272,7 @@ def worse_programs(monkeypatch):
     )
 
 
+@pytest.mark.slow
 def test_auto_goes_on_while_the_bound_is_far_and_keeps_the_better_answer(worse_programs):
     first = optimize(DAMPED, 0.28, time_limit=0.0)
     assert (first.method, len(first.tried)) == ("lp", 1)

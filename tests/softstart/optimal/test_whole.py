@@ -105,6 +105,7 @@ IDEAL: dict[str, tuple[dict[str, Any], float, Terminal]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("given", "end", "terminal"), IDEAL.values(), ids=IDEAL)
 def test_without_a_lag_it_is_the_program_from_the_contact_on(
     given: dict[str, Any], end: float, terminal: Terminal
@@ -161,6 +162,7 @@ def test_units_do_not_matter() -> None:
     assert there.claimed == pytest.approx(here.claimed, rel=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given", [{"torque_lag": 0.005}, {"load_kind": "reactive", "damping": 0.5}, {"torque_rate": 3e3}]
 )
@@ -173,6 +175,7 @@ def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[
     assert told.value.verdict.shortest_start_time == pytest.approx(shortest, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_more_time_than_the_load_leaves_is_not_used() -> None:
     """An active load comes back by itself: however much time there is, the gap is closed after a while."""
     drive = CRANE.replace(torque_lag=0.004)
@@ -221,6 +224,7 @@ def test_what_is_not_linear_is_named(drive: Drive, options: dict[str, Any], why:
         optimize(drive, 0.4, method="lp", **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["servo-axis-small", "nordin-servo-60kw"])
 def test_the_drives_with_a_lag_that_come_along_have_optima(name: str, small_certificate: None) -> None:
     drive = Drive.load(name)

@@ -199,6 +199,7 @@ def test_the_gap_is_below_half_a_per_cent(given: dict[str, Any], end: float, opt
     assert best.bound.k_dyn > 1.005 * momentum_bound(best.problem).k_dyn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [0.2883042, 0.27])
 def test_it_is_below_the_closed_form(end: float) -> None:
     """An ideal torque on an undamped shaft, whose optimum is known exactly."""
