@@ -55,6 +55,21 @@ def replay(drive: Drive, profile: TorqueProfile, until: float, base: Drive | Non
     return simulate(drive, player, until, base=base)
 
 
+def demand_of(run: Run, until: float) -> TorqueProfile:
+    """The demand that the motor followed in a run up to `until` in s, after its limits of torque and rate.
+
+    >>> run = replay(Drive.load("crane-4amtkf"), TorqueProfile.steps([0.0, 0.1, 0.2], [62.0, 9.0]), until=0.4)
+    >>> demand_of(run, 0.3).torque.tolist()
+    [62.0, 62.0, 9.0, 9.0]
+    """
+    spans = run.segments[(run.segments[:, at.S_START] < until)]
+    spans = spans[spans[:, at.S_END] > spans[:, at.S_START]]
+    times = np.column_stack([spans[:, at.S_START], np.minimum(spans[:, at.S_END], until)])
+    first = spans[:, at.S_REF]
+    levels = np.column_stack([first, first + spans[:, at.S_UB] * (times[:, 1] - times[:, 0])])
+    return TorqueProfile(times.ravel(), levels.ravel()).simplified()
+
+
 # while a brake holds the motor ------------------------------------------------------------------------------
 
 
@@ -305,11 +320,13 @@ def check(
     bound: LowerBound,
     *,
     tolerance: float = 1e-3,
+    bounces: bool = False,
 ) -> Run:
     """Run a profile on the exact plant to one elastic period after `end_time`; compare it with the claims.
 
     `end_time` is t_f in s, `claimed` the value of what is minimised as the method computed it, `tolerance`
-    how far, relatively, the exact figures may be from it and above bounds. Returns the run; raises
+    how far, relatively, the exact figures may be from it and above bounds. The gap may close several times if
+    the start `bounces`. Returns the run; raises
     OptimumError with one sentence for each thing that does not hold, each with both numbers.
 
     >>> from softstart import Drive
@@ -329,7 +346,7 @@ def check(
         *_torque_speed(problem, run),
         *_times(problem, run, end_time, tolerance),
         *_terminal(problem, run, end_time, tolerance),
-        *_contacts(run, end_time, tolerance),
+        *(() if bounces else _contacts(run, end_time, tolerance)),
         *_figures(problem, run, end_time, claimed, tolerance),
         *_against_bound(problem, run, bound),
     ]

@@ -19,7 +19,7 @@ from softstart.start.run import Run
 
 notebook = late("softstart.views.notebook")
 
-Method = Literal["closed-form", "lp", "collocation", "robust", "slp"]
+Method = Literal["closed-form", "lp", "collocation", "robust", "slp", "trace"]
 BoundKind = Literal["certificate", "momentum", "none"]
 DemandShape = Literal["steps", "ramps", "continuous"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left

@@ -10,13 +10,13 @@ from dataclasses import replace
 from typing import Any, Literal, get_args
 
 from softstart.chain.model import Chain, load_machine
-from softstart.controller import make_controller
+from softstart.controller import make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal import pulse_coast_hold, within_limits
 from softstart.optimal.certificate import certified_bound, not_certified
-from softstart.optimal.exact import Hold, check, hold_of, replay, with_tail
+from softstart.optimal.exact import Hold, check, demand_of, hold_of, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal, usual_terminal
@@ -24,6 +24,7 @@ from softstart.optimal.result import (
     Candidate,
     InfeasibleError,
     LowerBound,
+    Method,
     NotConverged,
     Optimum,
     OptimumError,
@@ -32,6 +33,7 @@ from softstart.optimal.result import (
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.optimal.whole_certificate import LITTLE_WORK, MOST_WORK, whole_bound
 from softstart.optimal.whole_certificate import not_certified as no_whole
+from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -42,6 +44,7 @@ chains = late("softstart.optimal.chains.solving")
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)
 TIGHT = 1e-5  # a bound within this share needs no other one
+BOUNCING = 0.85  # of the shortest time of one contact, from which on several contacts are tried
 TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
 
@@ -101,7 +104,9 @@ def optimize(
         `warm` of the optimum of a similar problem, from which the collocation starts.
     tolerance : float
         `auto` ends when the answer is within this share of its lower bound (0.5 % by default); else it solves
-        the CasADi problem too, from its own guess and from the answer, and keeps the better one.
+        the CasADi problem too, from its own guess and from the answer; if the load need only reach its speed,
+        it also plays the start of each shipped strategy without its feedback, and searches on the exact plant
+        for a start with any number of contacts. It keeps the best one.
     time_limit : float
         s of the clock for further searches of `auto`, of which none is begun after this; by default without
         limit, so that the answer does not depend on the machine; 0 takes the first answer, and a bound that
@@ -216,7 +221,20 @@ def solve(
     if len(problem.drive.positions) > 1:
         return _over_positions(problem, method)
     hold = hold_of(problem)
-    candidate, why = _candidate(hold.free, method, warm) if hold.until == 0.0 else _after(hold, method, warm)
+    may_bounce = method == "auto" and time_limit > 0.0 and hold.until == 0.0 and _may_bounce(problem)
+    try:
+        candidate, why = (
+            _candidate(hold.free, method, warm) if hold.until == 0.0 else _after(hold, method, warm)
+        )
+    except InfeasibleError as error:
+        shortest = error.verdict.shortest_start_time  # inf: no start has a single contact
+        assert problem.start_time is not None
+        if not may_bounce or problem.start_time < BOUNCING * shortest < math.inf:
+            raise
+        with suppress(InfeasibleError, OptimumError):
+            found = _bouncing(hold, "no start with one contact is that quick", began)
+            return replace(found, tried=(_trial(found),))
+        raise
     work = MOST_WORK if time_limit > 0.0 else LITTLE_WORK
     best = _checked(hold, candidate, why, began, work)
     tried = [_trial(best)]
@@ -238,20 +256,81 @@ def solve(
         goes_on = abs(found.minimised / best.minimised - 1.0) > tolerance
         if found.minimised < best.minimised * (1.0 - TIGHT):
             best = found
+    if may_bounce and time.perf_counter() < until and best.gap_percent > 100.0 * tolerance:
+        best, others = _beside_shipped(hold, best, work)
+        tried += others
     return replace(best, tried=tuple(tried), seconds=time.perf_counter() - began)
+
+
+def _may_bounce(problem: Problem) -> bool:
+    """Whether nothing but K_dyn, torque and time count, and the load need only reach its speed."""
+    alone = problem.minimise == "k_dyn" and problem.heat is None and problem.smoothness == 0.0
+    return alone and problem.terminal == "reached" and not problem.torque_speed
+
+
+def _bouncing(hold: Hold, why: str, began: float) -> Optimum:
+    """The gentlest start found on the exact plant, whatever the number of contacts."""
+    problem = hold.problem
+    assert problem.start_time is not None
+    found = robust.optimize_robust([problem.drive], problem.start_time, base=problem.base)
+    return _played(hold, found.profile, found.runs[0].start_time, "robust", why, began)
+
+
+def _played(
+    hold: Hold, profile: TorqueProfile, end: float, method: Method, why: str, began: float,
+    work: float = LITTLE_WORK,
+) -> Optimum:  # fmt: skip
+    """A start that is known as a demand over time."""
+    problem = hold.problem
+    whole = with_tail(problem, profile, end)
+    run = replay(problem.drive, whole, end + float(problem.drive.elastic_period), problem.base)
+    return _checked(hold, Candidate(profile, end, run.k_dyn, method), why, began, work, run.contacts > 1)
+
+
+def _beside_shipped(hold: Hold, best: Optimum, work: float) -> tuple[Optimum, list[Trial]]:
+    """The gentlest of an answer, of the starts of all shipped strategies, played without feedback, and of a
+    search on the exact plant, for any number of contacts.
+    """
+    problem, tried = hold.problem, []
+    latest, gentlest = problem.start_time or math.inf, best.k_dyn * (1.0 - TIGHT)
+    for name in ready_controller_names():
+        began = time.perf_counter()
+        with suppress(InputError):
+            run = simulate(problem.drive, name, base=problem.base)
+            if not run.start_time <= latest or math.isnan(run.k_dyn):
+                continue
+            demand = demand_of(run, run.start_time)
+            if replay(problem.drive, demand, run.start_time, problem.base).k_dyn >= gentlest:
+                continue
+            with suppress(OptimumError):
+                found = _played(hold, demand, run.start_time, "trace", f"the start of {name}", began, work)
+                tried.append(_trial(found))
+                if found.k_dyn < gentlest:
+                    best, gentlest = found, found.k_dyn * (1.0 - TIGHT)
+    began = time.perf_counter()
+    with suppress(InfeasibleError, OptimumError):
+        found = _bouncing(hold, "gentler than any start with one contact found", began)
+        tried.append(_trial(found))
+        best = found if found.k_dyn < gentlest else best
+    return best, tried
 
 
 def _trial(found: Optimum) -> Trial:
     return Trial(found.method, found.minimised, found.seconds, "")
 
 
-def _checked(hold: Hold, candidate: Candidate, why: str, began: float, work: float) -> Optimum:
+def _checked(
+    hold: Hold, candidate: Candidate, why: str, began: float, work: float, bounces: bool = False
+) -> Optimum:
     """A candidate that has passed the exact plant, with its bound for so much work."""
     problem = hold.problem
     end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
     profile = with_tail(problem, hold.before(candidate.profile), end)
-    bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base), work)
-    run = check(problem, profile, end, claimed, bound)
+    if bounces:  # the certificates are about one contact
+        bound = momentum_bound(problem)
+    else:
+        bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base), work)
+    run = check(problem, profile, end, claimed, bound, bounces=bounces)
     return Optimum(
         problem=problem,
         profile=profile,

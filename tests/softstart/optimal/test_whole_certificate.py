@@ -1,26 +1,20 @@
 """The certificate behind lag, rate limit and friction is attacked: no start is below what it proves.
 
-`python -m tests.softstart.optimal.test_whole_certificate 40 3` lists the gap between optimum and bound,
-beside that of the bound by momentum, on so many random drives of a seed.
+`python tests/robustness/test_optima.py` lists the gap between optimum and bound on random drives.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-import time
 from typing import Any
 
 import numpy as np
 import pytest
 
 from softstart import Drive, TorqueProfile, optimize
-from softstart.errors import InputError
 from softstart.optimal.exact import replay
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
-from softstart.optimal.shortest import shortest_start_time
 from softstart.optimal.whole_certificate import (
     _Dual,
     _Free,
@@ -221,48 +215,3 @@ def test_it_is_below_the_closed_form(end: float) -> None:
 )
 def test_what_it_does_not_cover_is_named(given: dict[str, Any], why: str) -> None:
     assert why in not_certified(Problem(CRANE.replace(**given), 0.3))
-
-
-# gaps -------------------------------------------------------------------------------------------------------
-
-
-def measured(rng: np.random.Generator) -> tuple[str, float, float, float, str]:
-    """A random drive: (what it is, gap of old bounds, gap now, seconds of the new one, note)."""
-    drive, options = random_drive(rng)
-    share = float(rng.uniform(1.02, 2.0))
-    marks = {
-        "lag": drive.torque_lag > 0.0, "rate": drive.torque_rate < math.inf, "damped": drive.d > 0.0,
-        "brakes": drive.minimum_torque < 0.0, "curve": "torque_speed" in options,
-    }  # fmt: skip
-    words = [str(drive.load_kind), *(name for name, on in marks.items() if on), options["terminal"]]
-    kind = f"{' '.join(words)} {share:.2f}x"
-    problem = Problem(drive, 1.0, **options)
-    try:
-        shortest = shortest_start_time(problem)
-        if not math.isfinite(shortest):
-            return kind, math.nan, math.nan, math.nan, "no start of one contact is that quick"
-        began = time.perf_counter()
-        best = optimize(drive, share * shortest, time_limit=0.0, **options)
-        seconds = time.perf_counter() - began
-    except (InfeasibleError, NotConverged, OptimumError, InputError) as error:
-        return kind, math.nan, math.nan, math.nan, str(error)[:80]
-    old = momentum_bound(best.problem).k_dyn
-    return kind, best.k_dyn / old - 1.0, best.k_dyn / best.bound.k_dyn - 1.0, seconds, f"{best.k_dyn:.3f}"
-
-
-def print_many(count: int, seed: int) -> None:
-    """One line for each drive, and the quantiles."""
-    rows = []
-    for index in range(count):
-        row = measured(np.random.default_rng([seed, index]))
-        rows.append(row[1:4])
-        print(f"{index:3d} {row[0]:60s} {row[1]:8.2%} {row[2]:8.2%} {row[3]:6.1f} s  {row[4]}", flush=True)
-    table = np.array(rows)
-    table = table[np.isfinite(table[:, 1])]
-    for name, column in zip(("momentum", "now", "seconds"), table.T, strict=True):
-        shown = ", ".join(f"{value:.4f}" for value in (*np.quantile(column, [0.5, 0.95]), column.max()))
-        print(f"{name}: median, 95 %, worst: {shown}; {column.size} drives")
-
-
-if __name__ == "__main__":
-    print_many(int(sys.argv[1]), int(sys.argv[2]))
