@@ -19,6 +19,8 @@ FLOORS := .venv-floors
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
+unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules and rewrite all tests anew
+
 .PHONY: compare test check fuzz everything floors serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
