@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from softstart import controller
     from softstart.optimal import robust, shortest, solving
     from softstart.optimal.chains import problem as chains
+    from softstart.optimal.chains import solving as chain_search
     from softstart.optimal.result import Optimum, SensorWorth
     from softstart.start.run import Run
     from softstart.views import optima as views
@@ -71,6 +72,7 @@ else:  # no numba for a help, a wrong option or the Tab key
     shortest, views = late("softstart.optimal.shortest"), late("softstart.views.optima")
     solving, starts = late("softstart.optimal.solving"), late("softstart.views.starts")
     chains = late("softstart.optimal.chains.problem")
+    chain_search = late("softstart.optimal.chains.solving")
 
 
 SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits", "seeds")  # how, not what
@@ -105,8 +107,8 @@ SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits", "seeds")  # 
 @click.option(
     "--seeds",
     metavar="A,B,...",
-    help="Of a chain: strategies whose torque the search starts from, and cma for a global search (package "
-    "cma). By default all strategies that need no parameter.",
+    help="Of a chain: strategies whose torque the search starts from; cma (cma2, cma3 ...) for a global "
+    "search (package cma). By default all strategies that need no parameter.",
 )
 @click.option(
     "--gaps", metavar="GAP,...", help="One profile for these gaps, with a contact sensor and without."
@@ -182,8 +184,9 @@ def optimize(
 def _read_seeds(text: str) -> list[str]:
     """Names of controllers, and cma for the global search, which is none."""
     names = [name.strip() for name in text.split(",")]
-    controllers = ",".join(name for name in names if name != "cma")
-    return [*(read_names(controllers or None, "--seeds") or ()), *(["cma"] if "cma" in names else [])]
+    controllers = ",".join(name for name in names if not chain_search.is_global(name))
+    globally = [name for name in names if chain_search.is_global(name)]
+    return [*(read_names(controllers or None, "--seeds") or ()), *globally]
 
 
 def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None:

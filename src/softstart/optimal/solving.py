@@ -118,8 +118,9 @@ def optimize(
         permissible shaft torque and the life, from whichever position. `kept` has the margin to each limit,
         that of the start time too, and a lower bound of the start time.
     seeds : sequence of str, optional
-        Of a chain, what the search starts from: names of controllers, and "cma" for a global search over a
-        dozen numbers (package cma). By default all controllers that need no parameter.
+        Of a chain, what the search starts from: names of controllers, and "cma" ("cma2", "cma3" ... with
+        other random numbers) for a global search over a dozen torques (package cma), which finds gentler
+        starts where little time is allowed. By default all controllers that need no parameter.
 
     Returns
     -------

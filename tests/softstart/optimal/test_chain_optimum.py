@@ -2,13 +2,15 @@
 
 import dataclasses
 import math
+import sys
 
 import numpy as np
 import pytest
 
-from softstart import InputError, optimize, simulate_chain
+from softstart import InputError, optimize, pareto, simulate_chain
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import SimulationError
+from softstart.optimal.chains import global_search
 from softstart.optimal.chains.problem import ChainProblem, check, earliest_pull, momentum_bound
 from softstart.optimal.chains.search import Search
 from softstart.optimal.chains.starts import Player
@@ -174,3 +176,36 @@ def test_a_demand_is_sampled_with_its_impulse():
         ours, theirs = (np.trapezoid(np.interp(time, t, u)[time < until], time[time < until])
                         for t, u in ((sampled.time, sampled.torque), (time, torque)))  # fmt: skip
         assert ours == pytest.approx(theirs, rel=2e-3)
+
+
+def test_an_undamped_chain_is_approached_through_damped_ones():
+    chain = dataclasses.replace(
+        without_gaps(),
+        shafts=(Shaft(3000.0, gap=0.02), Shaft(2000.0, gap=0.02)),
+        masses=(Mass(0.1), Mass(0.02), Mass(0.4, torque=10.0)),
+    )
+    assert chain.warnings
+    best = optimize(chain, 0.2, seeds=["s-curve"], tolerance=0.05, time_limit=0.0)
+    assert "similar problem" in best.why or "s-curve" in best.why
+    assert best.bound.k_dyn <= best.k_dyn <= simulate_chain(chain, "direct").k_dyn
+
+
+def test_the_global_search_is_repeatable_and_named_where_it_is_missing(monkeypatch):
+    pytest.importorskip("cma")
+    search = Search(ChainProblem(damped(), 0.42), Player(damped()))
+    one, two = (global_search.found(search, 3, evaluations=96)[1] for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+    assert one.min() >= 0.0
+    assert one.max() <= 62.0
+    monkeypatch.setitem(sys.modules, "cma", None)
+    with pytest.raises(InputError, match=r"needs the package cma.*softstart\[search\]"):
+        optimize(damped(), 0.42, seeds=["cma"])
+
+
+def test_a_front_over_start_times_falls():
+    chain = without_gaps()
+    front = pareto(chain, [0.25, 0.3, 0.4], controllers=["direct"])
+    values = [point.k_dyn for point in front.points]
+    assert values == sorted(values, reverse=True)
+    assert all(point.k_dyn >= point.k_dyn_lower_bound for point in front.points)
+    assert front.controllers[0].ratio is None or front.controllers[0].ratio >= 1.0 - 1e-3

@@ -38,6 +38,7 @@ THIN = 8
 ROUNDS = 6
 LET_THROUGH = 1e-3  # of P
 MOST_STEPS = 60
+MISSED, DEAREST = 1e-5, 1e4
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 NEWTON_STEPS = 6
 
@@ -70,6 +71,7 @@ class Search:
         self.low, self.high = problem.lowest_torque, problem.highest_torque
         self.rate = float(p.rate)
         self.load = problem.drive.load_index
+        self.penalty = PENALTY
 
     # demands -----------------------------------------------------------------------------------------------
 
@@ -106,13 +108,26 @@ class Search:
             return None
         _, w, _, T = played.states([self.end])
         miss = terminal_miss(self.problem, w[0], T[0])
-        merit = played.peak + PENALTY * self.problem.base_torque * float(miss.sum())
+        merit = played.peak + self.penalty * self.problem.base_torque * float(miss.sum())
         return Found(torques, played, miss, merit)
 
     # one program -------------------------------------------------------------------------------------------
 
     def descended(self, torques: Vector, steps: int = MOST_STEPS, least: float = 1e-3) -> Found | None:
-        """Down from a first demand, until a program promises a smaller decrease than the share `least`."""
+        """Down from a first demand, until a program promises a smaller decrease than the share `least`.
+
+        Where the terminal condition is missed at last, missing it costs more: near the shortest start time.
+        """
+        found = self._down(torques, steps, least)
+        while found is not None and steps == MOST_STEPS and self.penalty < DEAREST:
+            if found.miss.max() <= MISSED:
+                break
+            self.penalty *= 10.0
+            found = self._down(found.torques, steps, least)
+        self.penalty = PENALTY
+        return found
+
+    def _down(self, torques: Vector, steps: int, least: float) -> Found | None:
         found = self.play(torques)
         trust = FIRST_TRUST * self.high
         for _ in range(steps):
@@ -240,7 +255,7 @@ class _Model:
             most, now = search.rate * np.diff(search.knots), np.diff(found.torques)
             fixed += [rise, -rise]
             limits += [most - now, most + now]
-        cost = np.concatenate([np.zeros(count), [1.0], np.full(misses, PENALTY * base)])
+        cost = np.concatenate([np.zeros(count), [1.0], np.full(misses, search.penalty * base)])
         bounds = np.column_stack([
             np.concatenate([low, np.zeros(1 + misses)]), np.concatenate([high, np.full(1 + misses, np.inf)]),
         ])  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,14 @@ from softstart.chain.simulation import simulate_chain
 from softstart.controller import make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.chains.problem import ChainOptimum, ChainProblem, check, earliest_pull, momentum_bound
+from softstart.optimal.chains.problem import (
+    SHORT,
+    ChainOptimum,
+    ChainProblem,
+    check,
+    earliest_pull,
+    momentum_bound,
+)
 from softstart.optimal.chains.search import Found, Search
 from softstart.optimal.chains.starts import Player
 from softstart.optimal.problem import USUAL, StartTime
@@ -27,8 +34,10 @@ global_search = late("softstart.optimal.chains.global_search")
 
 CMA = "cma"
 TRACE = 20_001  # instants of a trace that becomes a first demand
-TASTE = 6  # programs from each of the first seeds before one of them is chosen
-TASTED = 3
+RUNS = 4  # of the global search
+TASTE = 6  # programs from each seed before the best are chosen
+FINISHED = 2
+DAMPED = (0.02, 0.01, 0.004)  # damping ratios through which an undamped chain is approached
 PROMISE = 0.1  # of the tolerance: a program that promises less ends the search
 METHOD = "successive linear programs on the exact start, from {}"
 
@@ -57,14 +66,15 @@ def optimize_chain(
     if math.isinf(bound.k_dyn):
         raise InfeasibleError(_too_short(problem))
     names = checked_seeds(seeds)
-    player = Player(problem.drive)
-    search = Search(problem, player)
+    if problem.drive.warnings and not isinstance(warm, Warm):
+        warm = _from_damped(problem, names, tolerance, time_limit)
+    search = Search(problem, Player(problem.drive))
     first = _first_demands(search, names, warm)
     until = began + time_limit
     least = PROMISE * tolerance
-    # a few programs from the best seeds, then all the way from the best of these
+    # a few programs from each seed, then all the way from the best of these
     tasted: list[tuple[str, Found]] = []
-    for name, found in first[: TASTED if time_limit > 0.0 else 1]:
+    for name, found in first if time_limit > 0.0 else first[:1]:
         if tasted and time.perf_counter() > until:
             break
         down = search.descended(found.torques, TASTE, least)
@@ -73,23 +83,27 @@ def optimize_chain(
     tried: list[Trial] = []
     best: tuple[str, Found] | None = None
     for name, start in tasted:
-        if best is not None and (best[1].miss.max() == 0.0 or time.perf_counter() > until):
-            break  # the next one only where this one missed the terminal condition
+        enough = len(tried) >= FINISHED or time.perf_counter() > until
+        if best is not None and best[1].miss.max() <= SHORT and enough:
+            break  # where all before missed the terminal condition, the next one too
         since = time.perf_counter()
         done = search.descended(start.torques, least=least)
         done = None if done is None else search.finished(done)
         value = None if done is None else done.played.peak / problem.base_torque
-        failure = "" if done is not None and done.miss.max() <= 1e-6 else "the terminal condition is missed"
+        failure = "" if done is not None and done.miss.max() <= SHORT else "the terminal condition is missed"
         tried.append(Trial("slp", value, time.perf_counter() - since, failure))
         if done is not None and (best is None or _rank(done) < _rank(best[1])):
             best = (name, done)
-    if best is None or best[1].miss.max() > 1e-6:
+    for one in first:  # a demand may be the best start itself, as the full torque near the shortest time
+        if one[1].miss.max() <= SHORT and (best is None or _rank(one[1]) < _rank(best[1])):
+            best = one
+    if best is None or best[1].miss.max() > SHORT:
         raise OptimumError(_none_found(problem))
     return _checked(search, *best, bound, tried, began, why)
 
 
 def _rank(found: Found) -> tuple[bool, float]:
-    return found.miss.max() > 1e-6, found.merit
+    return found.miss.max() > SHORT, found.merit
 
 
 def _checked(
@@ -131,15 +145,22 @@ def checked_seeds(seeds: Sequence[str] | None) -> list[str]:
     if not names:
         raise InputError("seeds: the list is empty; name controllers, or cma for a global search.")
     for name in names:
-        if name != CMA:
+        if is_global(name):
+            global_search.require_cma()
+        else:
             make_controller(name)
     return names
+
+
+def is_global(name: str) -> bool:
+    """Whether a seed is the global search: cma, or with other random numbers cma2, cma3 ..."""
+    return name == CMA or (name.startswith(CMA) and name[len(CMA) :].isdigit())
 
 
 def _first_demands(search: Search, names: Sequence[str], warm: Any) -> list[tuple[str, Found]]:
     """The seeds, the best first."""
     problem, found = search.problem, []
-    demands: list[tuple[str, Callable[[], Vector]]] = [(name, _demand(search, name)) for name in names]
+    demands = [(name, one) for name in names for one in _demands(search, name)]
     if isinstance(warm, Warm):
         scaled = warm.time * (search.end / warm.end)
         demands.insert(0, ("the demand of a similar problem", lambda: search.sampled(scaled, warm.torque)))
@@ -157,18 +178,41 @@ def _first_demands(search: Search, names: Sequence[str], warm: Any) -> list[tupl
     return sorted(found, key=lambda one: one[1].merit)
 
 
-def _demand(search: Search, name: str) -> Callable[[], Vector]:
-    """The torque of a strategy on this chain, or of the global search."""
+def _from_damped(problem: ChainProblem, names: list[str], tolerance: float, time_limit: float) -> Warm | None:
+    """The optimum of an undamped chain with a little damping, less and less of it.
 
-    def demand() -> Vector:
-        if name == CMA:
-            time, torque = global_search.found(search)
-            return search.sampled(time, torque)
+    Undamped masses rattle, so that strategies lead to poor local optima; damped ones do not.
+    """
+    warm: Warm | None = None
+    for ratio in DAMPED:
+        shafts = tuple(one.replace(damping_ratio=ratio) for one in problem.drive.shafts)
+        near = replace(problem, drive=replace(problem.drive, shafts=shafts))
+        try:
+            found = optimize_chain(
+                near, tolerance=tolerance, time_limit=0.0 if warm else time_limit, seeds=names, warm=warm
+            )
+        except OptimumError:
+            break
+        warm = found.warm
+    return warm
+
+
+def _demands(search: Search, name: str) -> list[Callable[[], Vector]]:
+    """The torque of a strategy on this chain, or those of several runs of the global search."""
+    if is_global(name):
+        number = int(name[len(CMA) :] or 1)
+
+        def searched(run: int) -> Callable[[], Vector]:
+            return lambda: search.sampled(*global_search.found(search, RUNS * (number - 1) + run + 1))
+
+        return [searched(run) for run in range(RUNS)]
+
+    def traced() -> Vector:
         run = simulate_chain(search.problem.drive, name)
         times = np.linspace(0.0, min(run.end_time, search.until), TRACE)
         return search.sampled(times, run.at(times)["u"])
 
-    return demand
+    return [traced]
 
 
 # where there is none ---------------------------------------------------------------------------------------

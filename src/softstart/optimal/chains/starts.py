@@ -117,11 +117,13 @@ class Player:
         self.plays += 1
         return Played(self.given, profile, recorder.finished())
 
-    def figures(self, profile: TorqueProfile, until: float) -> tuple[float, float]:
-        """Largest |T| of all shafts until then, N m, and the start time, s (inf if never)."""
+    def figures(self, profile: TorqueProfile, until: float) -> tuple[float, float, float]:
+        """Largest |T| of all shafts until then, N m; start time, s (inf if none); load speed then, rad/s."""
         made: Any = make_controller("profile", {"profile": profile})
         recorder = ChainRecorder(self.given, int(made.sensors), 0)
         run_one(made, self.nominal, recorder, until)
         self.plays += 1
         time = float(recorder.x[layout.START_TIME])
-        return float(np.abs(recorder.start.shafts["peak"]).max()), math.inf if math.isnan(time) else time
+        peak = float(np.abs(recorder.start.shafts["peak"]).max())
+        speed = float(recorder.start.masses["w"][self.given.place.load])
+        return peak, math.inf if math.isnan(time) else time, speed

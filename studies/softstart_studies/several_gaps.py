@@ -1,0 +1,213 @@
+"""The least K_dyn through several gaps: the chain of four masses, its two-mass drive, and the strategies.
+
+The chain is `crane-4-mass` with a damping ratio of 2 % in each shaft. For each start time three global
+searches (package cma), each with its own random numbers, are carried on by successive linear programs.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from softstart import Drive, optimize, simulate
+from softstart.chain import Chain, reduce_chain
+from softstart.controller import ready_controller_names
+from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError
+from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
+from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, new_figure
+
+if TYPE_CHECKING:
+    pass
+
+RATIO = 0.02  # of each shaft
+ALIKE = 0.02  # by which the searches may differ
+REPLAYED = 1e-6
+
+
+def chain(ratio: float = RATIO) -> Chain:
+    """The crane with four masses, damped.
+
+    >>> chain().shafts[0].damping_ratio
+    0.02
+    """
+    crane = Chain.load("crane-4-mass")
+    return replace(crane, shafts=tuple(one.replace(damping_ratio=ratio) for one in crane.shafts))
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What is computed."""
+
+    start_times: tuple[float, ...] = (0.40, 0.42, 0.44, 0.47, 0.52, 0.60)
+    seeds: tuple[str, ...] = ("cma", "cma2", "cma3")
+    strategies: tuple[str, ...] | None = None  # None: all that need no parameter
+    tolerance: float = 0.005
+
+
+@dataclass(frozen=True)
+class Row:
+    """One start time: the searches on the chain, the optimum of the two-mass drive."""
+
+    start_time: float
+    optima: tuple[Optimum, ...]
+    two_masses: Optimum | None
+    gentlest: float  # K_dyn of the best start known at this time or before
+    seconds: float
+
+    @property
+    def best(self) -> Optimum:
+        """The best search."""
+        return min(self.optima, key=lambda one: one.k_dyn)
+
+    @property
+    def scatter(self) -> float:
+        """How far the worst search lies above the best one, as a share."""
+        return max(one.k_dyn for one in self.optima) / self.best.k_dyn - 1.0
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All rows, and the strategies on the chain."""
+
+    rows: tuple[Row, ...]
+    runs: tuple[Any, ...]
+
+
+def find(extent: Extent, progress: Progress) -> Findings:
+    """All of it."""
+    machine = chain()
+    drive = reduce_chain(machine, to=2).to_drive()
+    rows: list[Row] = []
+    for t in extent.start_times:
+        progress(f"start time {t:g} s")
+        begun = time.perf_counter()
+        optima = tuple(
+            optimize(machine, t, seeds=[seed], tolerance=extent.tolerance) for seed in extent.seeds
+        )
+        seconds = time.perf_counter() - begun
+        known = min([one.k_dyn for one in optima] + [row.gentlest for row in rows])
+        rows.append(Row(t, optima, _two_masses(drive, t), known, seconds))
+    names = ready_controller_names() if extent.strategies is None else extent.strategies
+    start: Any = simulate  # of chains too
+    return Findings(tuple(rows), tuple(start(machine, name) for name in names))
+
+
+def _two_masses(drive: Drive, start_time: float) -> Optimum | None:
+    try:
+        return optimize(drive, start_time, terminal="reached", time_limit=0.0)
+    except (InfeasibleError, OptimumError, NotConverged):
+        return None
+
+
+def table(found: Findings) -> Table:
+    """K_dyn over start time."""
+    return Table(
+        "Least K_dyn of all shafts",
+        ("start time, s", "chain", "searches differ, %", "momentum bound, chain", "two masses",
+         "bound, two masses", "contacts", "computed in, s"),
+        [
+            (row.start_time, round(row.gentlest, 4), round(100.0 * row.scatter, 2),
+             round(row.best.bound.k_dyn, 4),
+             None if row.two_masses is None else round(row.two_masses.k_dyn, 4),
+             None if row.two_masses is None else round(row.two_masses.bound.k_dyn, 4),
+             row.best.run.contacts, round(row.seconds))
+            for row in found.rows
+        ],
+    )  # fmt: skip
+
+
+def strategies(found: Findings) -> Table:
+    """The strategies on the chain."""
+    rows = sorted(found.runs, key=lambda run: run.k_dyn)
+    return Table(
+        "Strategies on the chain",
+        ("strategy", "K_dyn", "start time, s"),
+        [(run.controller_name, round(run.k_dyn, 3), round(run.start_time, 4)) for run in rows],
+    )
+
+
+def claims(found: Findings) -> list[Claim]:
+    """What the table says."""
+    rows = found.rows
+    beaten = [
+        (row, run)
+        for row in rows
+        for run in found.runs
+        if run.start_time <= row.start_time and run.k_dyn < row.gentlest
+    ]
+    least = min((run for run in found.runs), key=lambda run: run.k_dyn)
+    replayed = max(abs(one.claimed / one.k_dyn - 1.0) for row in rows for one in row.optima)
+    worst = max(row.scatter for row in rows)
+    dearer = [row.gentlest / row.two_masses.k_dyn - 1.0 for row in rows if row.two_masses is not None]
+    return [
+        Claim(
+            "No strategy that is as quick is gentler than the start found.",
+            Verdict.of(not beaten),
+            f"{len(beaten)} of {len(rows) * len(found.runs)} comparisons say otherwise; the gentlest "
+            f"strategy of all, {least.controller_name}, has {least.k_dyn:.3f} in {least.start_time:.4g} s.",
+        ),
+        Claim(
+            "Searches from other random numbers find the same K_dyn within 2 %.",
+            Verdict.of(*(row.scatter <= ALIKE for row in rows)),
+            f"They differ by {100.0 * worst:.2f} % at most.",
+        ),
+        Claim(
+            "What is claimed is what the exact chain does.",
+            Verdict.of(replayed <= REPLAYED),
+            f"Claim and replay differ by {replayed:.1e} of K_dyn at most.",
+        ),
+        Claim(
+            "Two masses promise less than several gaps allow.",
+            Verdict.of(*(one > 0.0 for one in dearer)),
+            f"The chain needs {100.0 * min(dearer):.1f} to {100.0 * max(dearer):.1f} % more K_dyn than its "
+            "two-mass drive in the same time."
+            if dearer
+            else "The two-mass drive has no start at these times.",
+        ),
+    ]
+
+
+def figure(found: Findings) -> Any:
+    """K_dyn over start time: chain, bound, two masses, strategies."""
+    times = [row.start_time for row in found.rows]
+    with drawing():
+        drawn, axes = new_figure(1, 1, (7.0, 4.5))
+        best = [row.gentlest for row in found.rows]
+        axes.plot(times, best, "o-", color=COLOURS[0], label="chain, best found")
+        pairs = [(row.start_time, row.two_masses.k_dyn) for row in found.rows if row.two_masses is not None]
+        if pairs:
+            axes.plot(*zip(*pairs, strict=True), "s--", color=COLOURS[1], label="its two-mass drive")
+        bounds = [row.best.bound.k_dyn for row in found.rows]
+        axes.plot(times, bounds, ":", color=GREY, label="momentum bound of the chain")
+        for i, run in enumerate(found.runs):
+            if run.start_time <= 1.1 * times[-1]:
+                axes.plot([run.start_time], [run.k_dyn], MARKERS[i % len(MARKERS)], ls="none", ms=6,
+                          color=COLOURS[(i + 2) % len(COLOURS)], label=run.controller_name)  # fmt: skip
+        axes.set_yscale("log")
+        axes.set_yticks([0.7, 1.0, 1.5, 2.0, 3.0, 4.0], ["0.7", "1", "1.5", "2", "3", "4"])
+        axes.minorticks_off()
+        axes.set_xlabel("start time, s")
+        head(axes, "Crane with four masses, three gaps, damping ratio 2 %", "K_dyn")
+        axes.legend(fontsize=7, ncols=2, loc="upper right")
+    return drawn
+
+
+class SeveralGaps(Study):
+    """The optimum through several gaps."""
+
+    name: ClassVar[str] = "several-gaps"
+    title: ClassVar[str] = "The gentlest start through several gaps: a chain and its two-mass drive"
+    pictures: ClassVar[tuple[str, ...]] = ("several-gaps",)
+
+    def __init__(self, extent: Extent | None = None) -> None:
+        self.extent = extent or Extent()
+
+    def run(self, out: Path | None, progress: Progress) -> StudyResult:
+        """Search, replay, compare."""
+        found = find(self.extent, progress)
+        if out is not None:
+            for row in found.rows:
+                row.best.profile.to_csv(out / f"profile-{row.start_time:g}.csv")
+        return self.result([table(found), strategies(found)], claims(found), [figure(found)])

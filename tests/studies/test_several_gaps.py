@@ -1,0 +1,33 @@
+"""`softstart study several-gaps`: a small version against single optima."""
+
+import pytest
+
+from softstart import optimize, simulate_chain
+from softstart.study import Verdict, find_study
+from softstart_studies.several_gaps import Extent, SeveralGaps, chain, claims, find, table
+
+
+@pytest.fixture(scope="module")
+def found():
+    """One start time, two strategies as seeds."""
+    extent = Extent((0.44,), ("s-curve",), ("direct", "s-curve"), tolerance=0.05)
+    return find(extent, lambda doing: None)
+
+
+def test_the_row_is_that_of_single_optima(found):
+    (row,) = found.rows
+    alone = optimize(chain(), 0.44, seeds=["s-curve"], tolerance=0.05)
+    assert row.gentlest == pytest.approx(alone.k_dyn, rel=1e-9)
+    assert row.best.bound.k_dyn < row.gentlest
+    assert table(found).rows[0][0] == 0.44
+
+
+def test_the_claims_hold_here(found):
+    said = claims(found)
+    assert said[0].verdict is Verdict.CONFIRMED
+    assert said[2].verdict is Verdict.CONFIRMED
+    assert simulate_chain(chain(), "s-curve").k_dyn > found.rows[0].gentlest
+
+
+def test_it_is_found():
+    assert isinstance(find_study("several-gaps"), SeveralGaps)
