@@ -35,7 +35,8 @@ FREE: Final = (
 HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
 FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 times as far
 STEP: Final = 1e-6
-ROUNDS: Final = 5  # of weights and fit
+ROUNDS: Final = 5  # of weights and fit; fewer if nothing moves by more than
+SETTLED: Final = 5e-4  # in logarithms
 # beforehand a torque error of 1.5 % of the largest torque, within a factor of 3: a log that cannot tell how
 # large it is (coarse encoder, few samples) must not conclude that there is none
 RIPPLE, RIPPLE_FACTOR = 0.015, 3.0
@@ -95,6 +96,7 @@ class Weights(NamedTuple):
 
     rotation: Matrix
     eigenvalues: Vector
+    response: Matrix  # to the torque error
     root: Matrix  # of the covariance of the measurement, L L' = B
 
 
@@ -174,6 +176,8 @@ class Fitter:
             points.append(space.values(other, log))
         signals = short.signals(points)
         base = signals[0] - short.log.values
+        if short.shift is not None:
+            base = base - short.shift[: base.size]
         if offset is not None:
             base = base + x[offset]
         jacobian = np.zeros((int(rows.sum()), x.size))
@@ -247,7 +251,9 @@ class Fitter:
         made = []
         for i, model in enumerate(self.models):
             rows = self.counts[i]
-            response = model.torque_responses(self.space.values(x, i))[rows]
+            response = model.torque_responses(self.space.values(x, i))
+            model.shift = None if model.error is None else response @ model.error
+            response = response[rows]
             if model.log.kind == "angle" and model.log.count > 0.0:
                 angle = model.signals([self.space.values(x, i)])[0][rows]
                 root = cholesky(rounding(angle, response, ripple, model.log.count), lower=True)
@@ -258,7 +264,9 @@ class Fitter:
             )
             eigenvalues = np.zeros(vectors.shape[0])
             eigenvalues[: singular.size] = singular**2
-            made.append(Weights(solve_triangular(root, vectors, lower=True, trans="T").T, eigenvalues, root))
+            made.append(
+                Weights(solve_triangular(root, vectors, lower=True, trans="T").T, eigenvalues, response, root)
+            )
         return made
 
     def deviations(self, parts: Sequence[Part], before: Errors) -> tuple[Errors, Vector]:
@@ -328,17 +336,33 @@ class Fitter:
         return Part(np.concatenate(residuals), np.vstack(jacobians))
 
     def refine(self, x: Vector, lower: Vector, upper: Vector) -> Solution:
-        """Weights and fit in turns until neither moves."""
+        """Weights, fit and torque error in turns until none moves.
+
+        The torque error that explains most of what is left (the best linear unbiased prediction) is added to
+        the torque of the model, and its linear response taken off again: so the derivatives are those along
+        the motion that was logged, with its own contacts, and not along that of the ideal torque.
+        """
         noise, ripple = 1.0, RIPPLE * self.largest_torque
         for _ in range(ROUNDS):
-            errors, freedom = self.deviations(self.parts(x), Errors(self.weights(x, ripple), noise, ripple))
+            weights = self.weights(x, ripple)  # before the parts, which it shifts
+            errors, freedom = self.deviations(self.parts(x), Errors(weights, noise, ripple))
             noise, ripple = errors.noise, errors.ripple
             new = self.fit(x, errors, lower, upper)
             moved, x = float(np.max(np.abs(new - x))), new
             self.tell("weights and fit")
-            if moved < 1e-4:
+            if moved < SETTLED:
                 break
+            self.predict(x, errors)
         return Solution(x, errors, freedom, self.whitened(x, errors), lower, upper)
+
+    def predict(self, x: Vector, errors: Errors) -> None:
+        """Take the most likely torque error of each log into its model."""
+        for model, part, one in zip(
+            self.models, self.parts(x, derivatives=False), errors.weights, strict=True
+        ):
+            size = errors.noise**2 + errors.ripple**2 * one.eigenvalues
+            pulled = one.rotation.T @ ((one.rotation @ part.residual) / size)
+            model.error = -(errors.ripple**2) * (one.response.T @ pulled)
 
     def fit(
         self, x: Vector, errors: Errors, lower: Vector, upper: Vector, fixed: tuple[int, float] | None = None

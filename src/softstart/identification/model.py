@@ -55,6 +55,9 @@ class LogModel:
         self.drive = self.drive.replace(computing_delay=0.0)
         self.times = log.time - log.time[0]
         self.recorder = _recorder(self.times.size)
+        self.player = _player(TorqueProfile([0.0], [0.0]))
+        self.error: Vector | None = None  # of the torque, as the fit knows it: scaled, one for each block
+        self.shift: Vector | None = None  # what the linear response to it adds to the signal
         self.block = max(1, math.ceil(self.times.size / MOST_BLOCKS))
 
     def first(self, share: float) -> LogModel:
@@ -81,11 +84,13 @@ class LogModel:
 
     def numbers(self, dead_time: float) -> Vector:
         """The torque of the log as the kernel's `profile` controller takes it."""
-        log, times = self.log, self.times
+        log, times, torque = self.log, self.times, self.log.torque
+        if self.error is not None:
+            torque = torque + np.repeat(self.error, self.block)[: torque.size] / math.sqrt(self.block)
         if log.torque_is == "demand":
-            knots, torques = np.repeat(times, 2)[1:], np.repeat(log.torque, 2)[:-1]
+            knots, torques = np.repeat(times, 2)[1:], np.repeat(torque, 2)[:-1]
         else:
-            knots, torques = times, log.torque
+            knots, torques = times, torque
         knots = knots + dead_time
         if dead_time > 0.0:
             knots, torques = np.concatenate([[0.0], knots]), np.concatenate([[torques[0]], torques])
@@ -143,8 +148,7 @@ class LogModel:
 
     def _states(self, p: Vector, numbers: Vector, times: Vector | None = None) -> Matrix:
         times = self.times if times is None else times
-        player = _player(TorqueProfile([0.0], [0.0]))
-        one = self.recorder
+        player, one = self.player, self.recorder
         one.p = p
         one.m[:] = 0.0
         one.begin(float(self.times[-1]) * (1.0 + 1e-9))
