@@ -51,10 +51,13 @@ def points(page: Any) -> dict[str, np.ndarray]:
 
 
 def refined(page: Any, least: int) -> dict[str, np.ndarray]:
-    """The points, when the server has sent those of the window."""
+    """The points, when the server has sent those of the window for all that is drawn."""
+    ticked = page.locator(".strategies tbody tr:has(input:checked)").evaluate_all(
+        "(rows) => rows.map((one) => one.dataset.name)"
+    )
     for _ in range(50):
         found = points(page)
-        if found["direct time_s"].size >= least:
+        if {f"{name} time_s" for name in ticked} <= found.keys() and found["direct time_s"].size >= least:
             return found
         page.wait_for_timeout(200)
     raise AssertionError("no finer points came")
@@ -81,7 +84,7 @@ def hold(page: Any, share: float) -> float:
 
 def test_a_window_shows_the_exact_start(page):
     page.locator('tr[data-name="ramp"] input[type=checkbox]').check()
-    all_of_it = points(page)
+    all_of_it = refined(page, 2)
     assert all_of_it["direct time_s"][[0, -1]] == pytest.approx([0.0, DIRECT.end_time], rel=1e-6)
     assert button(page, "all").is_disabled()
     place = box(page)

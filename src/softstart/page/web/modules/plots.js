@@ -535,7 +535,7 @@ export class Plots {
     const lines = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad"];
     for (const name of state.order.filter((one) => one === state.selected || state.shown.includes(one))) {
       const trace = state.traces.get(name);
-      trace?.t.forEach((t, i) => {
+      trace?.t?.forEach((t, i) => {
         if (t < from || t > to) return;
         lines.push([`"${name.replaceAll('"', '""')}"`, ...channels.map((one) => (trace[one] ? Number(trace[one][i].toPrecision(7)) : ""))].join(","));
       });
