@@ -6,6 +6,8 @@ from softstart import optimize, simulate_chain
 from softstart.study import Verdict, find_study
 from softstart_studies.several_gaps import Extent, SeveralGaps, chain, claims, find, table
 
+pytestmark = pytest.mark.slow  # all wait for the study
+
 
 @pytest.fixture(scope="module")
 def found():

@@ -49,12 +49,13 @@ from softstart.views.terminal import console, print_conclusion, print_json, prin
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from softstart.optimal import shortest
     from softstart.optimal.chains import problem as chains
     from softstart.views import optima as views
     from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
     chains, views = late("softstart.optimal.chains.problem"), late("softstart.views.optima")
-    starts = late("softstart.views.starts")
+    starts, shortest = late("softstart.views.starts"), late("softstart.optimal.shortest")
 
 STATE = "pareto.jsonl"
 
@@ -162,7 +163,7 @@ def _computed(
 
         times = None
         if asked is not None:
-            direct = cache(lambda: softstart.simulate(drive, "direct").start_time)
+            direct = cache(lambda: shortest.start_time_of_direct(drive))
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
             return softstart.pareto(

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
+from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
@@ -188,20 +190,21 @@ class Bracket:
         return max(end + steeper * missing, 0.5 * end)
 
 
-def start_time_of_direct(drive: Drive) -> float:
-    """Start time of the drive under its constant starting torque, s. Raises SimulationError without one.
+def start_time_of_direct(drive: Drive | Chain) -> float:
+    """Start time under the constant starting torque, s. Raises SimulationError where there is none.
 
     >>> from softstart import Drive
     >>> round(start_time_of_direct(Drive.load("crane-4amtkf")), 4)
     0.3735
     """
-    run = simulate(drive, "direct")
+    start: Any = simulate  # of chains too
+    run = start(drive, "direct")
     if math.isnan(run.start_time):
         raise SimulationError(
             f"direct does not bring this load to its target speed ({run.status.value[:-1]}); "
             "give start times in s instead of multiples."
         )
-    return run.start_time
+    return float(run.start_time)
 
 
 def verdict_on(problem: Problem) -> Verdict:

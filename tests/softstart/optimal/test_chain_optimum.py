@@ -62,6 +62,7 @@ def test_no_strategy_as_quick_is_gentler(crane):
         assert run.start_time > 0.4201 or run.k_dyn > crane.k_dyn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terminal", ["reached", "synchronous", "steady"])
 def test_without_gaps_the_answer_is_the_optimum(terminal):
     """One linear program is then the whole problem, so that a finer trust region changes nothing."""
@@ -77,6 +78,7 @@ def test_without_gaps_the_answer_is_the_optimum(terminal):
         np.testing.assert_allclose(state["T"], 20.0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_lag_and_rate_limit_are_kept():
     chain = without_gaps(torque_lag=4e-3, torque_rate=1500.0)
     best = optimize(chain, 0.3, seeds=["s-curve"], tolerance=1e-3)
@@ -202,6 +204,7 @@ def test_the_global_search_is_repeatable_and_named_where_it_is_missing(monkeypat
         optimize(damped(), 0.42, seeds=["cma"])
 
 
+@pytest.mark.slow
 def test_a_front_over_start_times_falls():
     chain = without_gaps()
     front = pareto(chain, [0.25, 0.3, 0.4], controllers=["direct"])

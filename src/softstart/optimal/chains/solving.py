@@ -12,7 +12,6 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
 from softstart.controller import make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
@@ -29,6 +28,7 @@ from softstart.optimal.chains.search import Found, Search
 from softstart.optimal.chains.starts import Player
 from softstart.optimal.problem import USUAL, StartTime
 from softstart.optimal.result import InfeasibleError, OptimumError, Trial, Verdict
+from softstart.optimal.shortest import start_time_of_direct
 
 global_search = late("softstart.optimal.chains.global_search")
 
@@ -236,12 +236,6 @@ def _none_found(problem: ChainProblem) -> str:
         f"No start within {problem.start_time:g} s with terminal {problem.terminal} was found. The constant "
         f"starting torque (direct) reaches the target speed after {direct:.6g} s; give more time."
     )
-
-
-def start_time_of_direct(chain: Chain) -> float:
-    """The start time of the chain under its constant starting torque, s."""
-    run: ChainRun = simulate_chain(chain, "direct")
-    return run.start_time
 
 
 def asked_of_chain(
