@@ -15,6 +15,7 @@ from softstart.chain.model import Chain, ChainArrays
 
 if TYPE_CHECKING:
     from softstart.chain.batch import simulate_chains
+    from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
     from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
     from softstart.chain.simulation import Verification, simulate_chain, verify_on_chain
@@ -25,15 +26,18 @@ __all__ = [
     "Backbone",
     "Chain",
     "ChainArrays",
+    "ChainFatigue",
     "ChainRun",
     "ForcedResponse",
     "Mass",
     "Motor",
     "Reduction",
     "Shaft",
+    "ShaftLife",
     "Verification",
     "Vibration",
     "chain_backbone",
+    "chain_fatigue",
     "forced_response",
     "natural_vibration",
     "reduce_chain",
@@ -45,12 +49,15 @@ __all__ = [
 # loaded when first used: they need compiled code
 _HOME = {
     "Backbone": "softstart.chain.vibration_with_gaps",
+    "ChainFatigue": "softstart.chain.fatigue",
     "ChainRun": "softstart.chain.run",
     "ForcedResponse": "softstart.chain.vibration_with_gaps",
     "Reduction": "softstart.chain.reduction",
+    "ShaftLife": "softstart.chain.fatigue",
     "Verification": "softstart.chain.simulation",
     "Vibration": "softstart.chain.vibration",
     "chain_backbone": "softstart.chain.vibration_with_gaps",
+    "chain_fatigue": "softstart.chain.fatigue",
     "forced_response": "softstart.chain.vibration_with_gaps",
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",

@@ -165,7 +165,7 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
     if is_chain(name):
         raise InputError(
             f'"{name}": this is a chain, and this command takes a drive; "softstart reduce {name} --out DIR" '
-            "writes the drive.toml that stands for it (simulate and compare take the chain itself)."
+            "writes the drive.toml that stands for it (simulate, compare and fatigue take the chain itself)."
         )
     drive = Drive.load(name)
     if settings:

@@ -22,7 +22,6 @@ from softstart.cli.options import (
     json_option,
     out_option,
     param_option,
-    read_drive,
     read_fitted_to,
     read_machine,
     read_names,
@@ -53,6 +52,9 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from softstart.chain import Chain
+    from softstart.chain import fatigue as shaft_lives
+    from softstart.controller.base import Controller
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
     from softstart.views import chains, starts
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
 else:
     chains = late("softstart.views.chains")
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
+    shaft_lives = late("softstart.chain.fatigue")
     recommendation = late("softstart.start.recommendation")
 
 SHOWN = 24  # rows of stages and events shown; files and JSON hold all
@@ -306,11 +309,18 @@ def fatigue(
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
     of the literature is taken. Its tables [limits] and [limits.fatigue] give the S-N curve, the starts per
     hour and the life asked for; without them lives are compared with that of direct. A drive needs damping.
+    Of a chain, whose shafts all need damping, each shaft is counted by itself.
     """
     mistakes = Mistakes()
     names: Sequence[str] = controller_names()
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_machine(drive, settings)
+        if not isinstance(one, Drive) and (worn_gap or estimate_damping):
+            option = "--worn-gap" if worn_gap else "--estimate-damping"
+            raise InputError(
+                f'{option}: "{drive}" is a chain, whose shafts have gaps and dampings of their own; leave it '
+                "out, and give them with --set, as shaft[1].damping_ratio=0.02."
+            )
     with mistakes.noted():
         names = read_names(controllers) or names
     with mistakes.noted():
@@ -323,6 +333,10 @@ def fatigue(
         estimate = None if estimate_damping is None else _read_numbers(estimate_damping)
     mistakes.settle()
 
+    if not isinstance(one, Drive):
+        asked = names if controllers is not None else None
+        _fatigue_of_chain(one, lambda: make_controllers(asked, given, prefix=True), nominal, m, out, as_json)
+        return
     with output_folder(out) as folder:
         with working("starting the drive ..."):
             made = make_controllers(names if controllers is not None else None, given, prefix=True)
@@ -347,6 +361,30 @@ def fatigue(
     print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
     if out is not None:
         print(f"\nWritten to {out}: report.md, figure, cycles and turning points.")
+
+
+def _fatigue_of_chain(
+    chain: Chain, makes: Callable[[], Sequence[Controller]], nominal: Drive | None, slope: float | None,
+    out: str | None, as_json: bool,
+) -> None:  # fmt: skip
+    """The same for each shaft of a chain."""
+    with output_folder(out) as folder:
+        with working("starting the chain ..."), Attributed():
+            runs = [softstart.simulate_chain(chain, controller, fitted_to=nominal) for controller in makes()]
+            found = shaft_lives.chain_fatigue(runs, slope=slope)
+        if folder is not None:
+            lives.write_chain_fatigue(found, folder, command_line())
+    if as_json:
+        print_json(found.summary())
+        return
+    to = console()
+    print_lines(to, chains.chain_lines(chain))
+    for table in lives.chain_tables(found):
+        to.print()
+        print_table(to, table)
+    print_conclusion(to, [lives.chain_conclusion(found)], [*lives.chain_notes(found), *chain.warnings])
+    if out is not None:
+        print(f"\nWritten to {out}: report.md, fatigue.csv and turning points.")
 
 
 def _read_numbers(text: str) -> dict[str, int]:

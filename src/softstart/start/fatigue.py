@@ -270,11 +270,14 @@ def fatigue(
         life = _life(counted, curve, reference)
         if near:
             both = [worst_damage(_again(run, one, told), curve).damage for one in near]
-            life = replace(life, relative_range=tuple(map(_ratio, references, both)))
+            life = replace(life, relative_range=tuple(map(life_ratio, references, both)))
         if worn is not None:
             over = _over_wear(run, told, curve, gap)
             life = replace(
-                life, worn_relative=_ratio(worn.mean, over.mean), worn_hours=over.hours, wear_error=over.error
+                life,
+                worn_relative=life_ratio(worn.mean, over.mean),
+                worn_hours=over.hours,
+                wear_error=over.error,
             )
         return life
 
@@ -398,8 +401,16 @@ def damage_of(run: Run, curve: SNCurve) -> Damage:
     """The damage of one start, by Miner's rule."""
     points = turning_points(run)
     spectrum = rainflow_cycles(points[:, 1].tolist(), repeated=True)
-    damage = float(np.sum(spectrum[:, 2] / curve.cycles(spectrum[:, 0]))) if spectrum.size else 0.0
-    return Damage(run, points, spectrum, damage)
+    return Damage(run, points, spectrum, miner(spectrum, curve))
+
+
+def miner(spectrum: Matrix, curve: SNCurve) -> float:
+    """The damage of cycles (range, mean, count) by Miner's rule: the sum of n/N.
+
+    >>> miner(np.array([[90.0, 45.0, 2.0]]), SNCurve(6.6, ((90.0, 2e6),)))
+    1e-06
+    """
+    return float(np.sum(spectrum[:, 2] / curve.cycles(spectrum[:, 0]))) if spectrum.size else 0.0
 
 
 def worst_damage(run: Run, curve: SNCurve) -> Damage:
@@ -417,12 +428,17 @@ def _life(found: Damage, curve: SNCurve, reference: float) -> Life:
     rate = run.drive.limits.starts_per_hour
     hours = starts / rate if rate is not None else math.nan
     return Life(
-        run, found.points, found.spectrum, torque, _ratio(reference, damage), starts, hours,
+        run, found.points, found.spectrum, torque, life_ratio(reference, damage), starts, hours,
         energies.size, float(energies.sum()),
     )  # fmt: skip
 
 
-def _ratio(reference: float, damage: float) -> float:
+def life_ratio(reference: float, damage: float) -> float:
+    """Life over that of `direct`, from the damage of both.
+
+    >>> life_ratio(2.0, 1.0), life_ratio(2.0, 0.0)
+    (2.0, inf)
+    """
     return reference / damage if damage > 0.0 else math.inf
 
 
@@ -489,12 +505,23 @@ def _curve(drive: Drive, slope: float | None) -> tuple[SNCurve, bool]:
     own = drive.limits.fatigue
     if slope is None:
         return (own, True) if own is not None else (SNCurve(DEFAULT_SLOPE), False)
-    m = float(to_si(slope, "1", name="slope"))
-    if not 0.0 < m < 100.0:
-        raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
+    m = read_slope(slope)
     if own is not None and own.slope is None:
         raise InputError("slope: the points of limits.fatigue give the slopes; leave out one of the two.")
     return SNCurve(m, own.points if own is not None else ()), True
+
+
+def read_slope(slope: float) -> float:
+    """A slope m of an S-N curve, checked.
+
+    >>> read_slope(-1.0)
+    Traceback (most recent call last):
+    softstart.errors.InputError: slope = -1.0: the slope m of an S-N curve is above 0 and below 100, as 6.6.
+    """
+    m = float(to_si(slope, "1", name="slope"))
+    if not 0.0 < m < 100.0:
+        raise InputError(f"slope = {slope}: the slope m of an S-N curve is above 0 and below 100, as 6.6.")
+    return m
 
 
 def _read_gap(worn_gap: float | str | None, drive: Drive) -> float:

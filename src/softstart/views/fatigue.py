@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from softstart.views.markdown import (
     write_rows,
 )  # fmt: skip
 from softstart.views.numbers import Table, column_of, number, short
+
+if TYPE_CHECKING:
+    from softstart.chain.fatigue import ChainFatigue, ShaftLife
 
 SPECTRUM = ("range N m", "mean N m", "count")
 
@@ -143,6 +146,80 @@ def notes(found: Fatigue) -> list[str]:
     if worst:
         text.append(f"The start position is unknown: most damage is done from {', '.join(worst)}.")
     return text
+
+
+def chain_tables(found: ChainFatigue) -> list[Table]:
+    """Each shaft under the strategies: equivalent torque, life, share of its permissible torque."""
+    names = [row[0].run.controller_name for row in found.rows]
+    shafts = found.chain.shaft_names
+
+    def table(title: str, cell: Callable[[ShaftLife], str]) -> Table:
+        columns = {name: [cell(row[k]) for row in found.rows] for k, name in enumerate(shafts)}
+        return Table.of(title, {"strategy": names, **columns}, ("strategy",))
+
+    tables = [
+        table(
+            "Damage-equivalent torque at the motor shaft, N m", lambda one: number(one.equivalent_torque, 1)
+        ),
+        table("Life over that under direct", lambda one: factor(one.relative)),
+    ]
+    if any(not math.isnan(life.used) for row in found.rows for life in row):
+        tables.append(
+            table("Largest torque, % of the permissible one", lambda one: number(100.0 * one.used, 1))
+        )
+    return tables
+
+
+def chain_conclusion(found: ChainFatigue) -> str:
+    """Under which strategy the shaft that gains least lasts longest."""
+    least = [min(row, key=lambda life: life.relative) for row in found.rows]
+    best = max(least, key=lambda life: life.relative)
+    name = best.run.controller_name
+    if name == REFERENCE:
+        return f"Longest life of the shaft that gains least: {REFERENCE}."
+    shaft = found.chain.shaft_names[best.shaft]
+    life = factor(best.relative)
+    return (
+        f"Longest life: {name}; the shaft that gains least, {shaft}, has {life} times that under {REFERENCE}."
+    )
+
+
+def chain_notes(found: ChainFatigue) -> list[str]:
+    """What the figures mean, and what they rest on."""
+    usual = "" if found.slope_given else ", that of pitting of case-hardened gears (ISO 6336-2)"
+    text = [
+        "Equivalent torque: one cycle of it from 0 and back in each start does the same damage (rainflow "
+        "cycles after ASTM E1049, Miner's rule, without an endurance limit). Slope of the S-N curve: "
+        f"m = {short(found.slope)}{usual}."
+    ]
+    worst = [
+        f"{row[0].run.controller_name} {', '.join(sorted({life.run.position for life in row}))}"
+        for row in found.rows
+        if len(found.chain.positions) > 1
+    ]
+    if worst:
+        text.append(f"The start position is unknown: most damage is done from {'; '.join(worst)}.")
+    return text
+
+
+def write_chain_fatigue(found: ChainFatigue, folder: Path, command: str) -> None:
+    """Table, report, and the turning points of each shaft under each strategy."""
+    write_rows(folder / "fatigue.csv", [life.summary() for row in found.rows for life in row])
+    stems: list[str] = []
+    for row in found.rows:
+        for life in row:
+            stems.append(file_stem(f"{life.run.controller_name} shaft {life.shaft + 1}", stems))
+            times, torques = life.turning_points.T.tolist()
+            write_columns(
+                folder / f"turning-points-{stems[-1]}.csv", {"time s": times, "torque N m": torques}
+            )
+    parts = [
+        f"# {markdown(found.chain.name)}: life of its shafts",
+        chain_conclusion(found),
+        *(part for one in chain_tables(found) for part in (f"**{one.title}**", markdown_table(one))),
+        *map(markdown, chain_notes(found)),
+    ]
+    write_drive_report(folder, parts, found.chain, command)
 
 
 def fatigue_figure(found: Fatigue) -> Any:

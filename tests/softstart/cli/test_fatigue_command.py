@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from softstart import Drive, fatigue, simulate
+from softstart import Chain, Drive, fatigue, simulate
 
 ASKED = ("fatigue", "crane-4amtkf", "--controllers", "direct,s-curve", "--set", "shaft.damping=1")
 CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
@@ -86,3 +86,36 @@ def test_bad_input_is_one_sentence(run, more, said):
     assert code == 2
     assert out == ""
     assert said in " ".join(err.split())
+
+
+DAMPED = [f"shaft[{k}].damping_ratio=0.02" for k in (1, 2, 3)]
+
+
+def test_each_shaft_of_a_chain_is_counted(run, tmp_path):
+    settings = [part for one in DAMPED for part in ("--set", one)]
+    more = ("--controllers", "direct,s-curve", "--json", "--out", str(tmp_path / "lives"))
+    code, out, err = run("fatigue", "crane-4-mass", *settings, *more)
+    assert (code, err) == (0, "")
+    lives = json.loads(out)["lives"]
+    assert [one["shaft"] for one in lives[:3]] == list(Chain.load("crane-4-mass").shaft_names)
+    assert all(one["relative_life"] == 1.0 for one in lives[:3])
+    assert all(one["relative_life"] > 10.0 for one in lives[3:])
+    report = (tmp_path / "lives" / "report.md").read_text(encoding="utf-8")
+    assert "Longest life: s-curve; the shaft that gains least" in report
+    assert len(list((tmp_path / "lives").glob("turning-points-*.csv"))) == 6
+    code, out, err = run("fatigue", "crane-4-mass", *settings, "--controllers", "direct,s-curve")
+    assert (code, err) == (0, "")
+    assert "Life over that under direct" in out
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ((), "damping is missing in rotor - pinion"),
+        (("--worn-gap", "1 rad"), '--worn-gap: "crane-4-mass" is a chain'),
+    ],
+)
+def test_a_chain_that_cannot_be_counted_is_refused(run, more, said):
+    code, _, err = run("fatigue", "crane-4-mass", "--controllers", "direct", *more)
+    assert code != 0
+    assert said in err

@@ -1,0 +1,82 @@
+"""Life of the shafts of a chain: against the drive's own turning points, dense samples, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from softstart import Chain, Drive, InputError, fatigue, simulate, simulate_chain
+from softstart.chain import chain_fatigue
+from softstart.chain.fatigue import reversals, shaft_turning_points
+from softstart.start.fatigue import rainflow_cycles, turning_points
+
+CRANE = Drive.load("crane-4amtkf").replace(damping=1.0)
+DAMPED = {f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)}
+
+
+@pytest.fixture(scope="module")
+def chain() -> Chain:
+    return Chain.load("crane-4-mass", also=DAMPED)
+
+
+@pytest.mark.parametrize("name", ["direct", "s-curve"])
+def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
+    """The plant locates its turning points in closed forms, the chain in its series."""
+    run = simulate(CRANE, name)
+    other = simulate_chain(Chain.from_drive(CRANE), name, fitted_to=CRANE)
+    mine, theirs = turning_points(run), shaft_turning_points(other)[0]
+    assert mine.shape == theirs.shape
+    np.testing.assert_allclose(theirs, mine, rtol=1e-7, atol=1e-7 * run.peak_torque)
+    (life,), ((same,),) = fatigue(run).rows, chain_fatigue(other).rows
+    assert same.equivalent_torque == pytest.approx(life.equivalent_torque, rel=1e-8)
+    assert same.relative == pytest.approx(life.relative, rel=1e-7)
+
+
+def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
+    run = simulate_chain(chain, "ramp")
+    t = np.linspace(0.0, run.end_time, 100_000)
+    sampled = run.at(t)["T"]
+    for k, points in enumerate(shaft_turning_points(run)):
+        seen = reversals(list(zip(t.tolist(), sampled[:, k].tolist(), strict=True)), 1e-9)
+        located, dense = (rainflow_cycles(one[:, 1].tolist(), repeated=True) for one in (points, seen))
+        scale = located[0, 0]
+        large = [one[one[:, 0] > 1e-2 * scale] for one in (located, dense)]
+        assert large[0].shape == large[1].shape
+        np.testing.assert_allclose(large[0][:, 0], large[1][:, 0], atol=1e-5 * scale)
+        assert np.abs(points[:, 1]).max() == pytest.approx(run.peak_torques[k], rel=1e-9)
+        rises = np.diff(points[:, 1])
+        assert (rises[1:] * rises[:-1] < 0.0).all()
+        assert (np.diff(points[:, 0]) >= 0.0).all()
+
+
+def test_each_shaft_beside_direct_and_its_permissible_torque(chain: Chain) -> None:
+    strong = Chain.load("crane-4-mass", also={**DAMPED, "shaft[1].permissible_torque": "300 N*m"})
+    found = chain_fatigue([simulate_chain(strong, name) for name in ("direct", "ramp")])
+    direct, ramp = found.rows
+    assert [life.relative for life in direct] == [1.0, 1.0, 1.0]
+    for hard, gentle in zip(direct, ramp, strict=True):
+        assert gentle.relative == pytest.approx((hard.equivalent_torque / gentle.equivalent_torque) ** 6.6)
+        assert gentle.relative > 1.0
+    assert ramp[0].used == pytest.approx(ramp[0].run.peak_torques[0] / 300.0)
+    assert np.isnan(ramp[1].used)
+    assert len(found.summary()["lives"]) == 6
+
+
+def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(chain: Chain) -> None:
+    anywhere = replace(chain, position="unknown")
+    (found,) = chain_fatigue(simulate_chain(anywhere, "ramp")).rows
+    runs = [simulate_chain(one, "ramp", fitted_to=found[0].run.told) for one in anywhere.positions.values()]
+    each = [chain_fatigue(run).rows[0] for run in runs]
+    for k, life in enumerate(found):
+        assert life.equivalent_torque == pytest.approx(max(row[k].equivalent_torque for row in each))
+
+
+def test_what_cannot_be_counted_is_refused(chain: Chain) -> None:
+    with pytest.raises(InputError, match="damping is missing in rotor - pinion"):
+        chain_fatigue(simulate_chain("crane-4-mass", "ramp"))
+    with pytest.raises(InputError, match="slope = -1"):
+        chain_fatigue(simulate_chain(chain, "ramp"), slope=-1)
+    with pytest.raises(InputError, match="give one ChainRun or several"):
+        chain_fatigue([])  # type: ignore[arg-type]
