@@ -165,7 +165,8 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
     if is_chain(name):
         raise InputError(
             f'"{name}": this is a chain, and this command takes a drive; "softstart reduce {name} --out DIR" '
-            "writes the drive.toml that stands for it (simulate, compare and fatigue take the chain itself)."
+            "writes the drive.toml that stands for it (simulate, compare, fatigue, optimize and pareto take "
+            "the chain)."
         )
     drive = Drive.load(name)
     if settings:

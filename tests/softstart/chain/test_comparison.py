@@ -142,7 +142,7 @@ def test_the_commands_take_chains(tmp_path, capsys):
     alone = json.loads(capsys.readouterr().out)
     assert alone["k_dyns"] == found["strategies"][1]["k_dyns"]
     assert alone["events"][0]["kind"] == "gap closed"
-    assert main(["optimize", "crane-4-mass"]) == 2
+    assert main(["linear", "crane-4-mass", "--controller", "ramp"]) == 2
     assert "this is a chain, and this command takes a drive" in capsys.readouterr().err
 
 
