@@ -37,9 +37,9 @@ FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 time
 STEP: Final = 1e-6
 ROUNDS: Final = 5  # of weights and fit; fewer if nothing moves by more than
 SETTLED: Final = 5e-4  # in logarithms
-# beforehand a torque error of 1.5 % of the largest torque, within a factor of 3: a log that cannot tell how
+# beforehand a torque error of 2.5 % of the largest torque, within a factor of 3: a log that cannot tell how
 # large it is (coarse encoder, few samples) must not conclude that there is none
-RIPPLE, RIPPLE_FACTOR = 0.015, 3.0
+RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 
 Tell = Callable[[str], None]
