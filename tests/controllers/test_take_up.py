@@ -31,7 +31,7 @@ def groups() -> dict[str, Any]:
 
 
 def test_nominal_chain():
-    """Near the optimum found for this start time, which has no lag, no encoder and knows the chain: 1.02."""
+    """The best profile found for this start time has 0.896, without a lag, and knows the chain."""
     K, time = played([NOMINAL], "take-up", NOMINAL)
     assert K[0] <= 1.10
     assert time[0] * rigid_time(NOMINAL) <= 0.49
