@@ -86,6 +86,9 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
     help="No log yet: show what experiments with this drive would tell, and look for a better one.",
 )  # fmt: skip
 @click.option(
+    "--standard", is_flag=True, help="With --plan: the standard experiments only, no search for a better one."
+)
+@click.option(
     "--log-period", metavar="TIME", help="Sample period of the log for --plan, as '4 ms' (the default)."
 )
 @click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
@@ -110,6 +113,7 @@ def identify(
     searches: str | None,
     controllers: str | None,
     plan: str | None,
+    standard: bool,
     log_period: str | None,
     ripple: str | None,
     most_torque: str | None,
@@ -154,7 +158,8 @@ def identify(
             with working("planning experiments ...") as tell:
                 made = softstart.plan_experiments(
                     one, log_period=log_period or "4 ms", ripple=ripple, free=names, most_torque=most_torque,
-                    most_travel=most_travel, tell=tell,
+                    most_travel=most_travel, optimise=not standard,
+                    tell=tell,
                 )  # fmt: skip
                 if folder is not None:
                     write_plan(made, folder, command_line())

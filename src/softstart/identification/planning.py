@@ -15,7 +15,7 @@ from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import FREE, Errors, Fitter, Space, covariance_of
-from softstart.identification.logs import Kind, Log, TorqueIs
+from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE, WIDEST
 from softstart.late import late
@@ -209,8 +209,17 @@ def plan_experiments(
         raise InputError(f"log_period = {show(log_period)}: the sample period of the log is above 0.")
     level = _level(drive)
     error = RIPPLE * level if ripple is None else float(to_si(ripple, "N*m", name="ripple"))
-    if not 0.0 < error < math.inf:
-        raise InputError(f"ripple = {show(ripple)}: the torque error is above 0; no inverter is without.")
+    if not 0.0 < error <= float(drive.Ms):
+        raise InputError(
+            f"ripple = {show(ripple)}: the torque error of a sample is above 0 and at most the "
+            f"starting torque, {float(drive.Ms):.4g} N m."
+        )
+    shortest = min(float(np.sum(durations)) for durations, _ in _standard(drive, level).values())
+    if period > shortest / FEWEST:
+        raise InputError(
+            f"log_period = {show(log_period)}: the shortest experiment lasts {shortest:.3g} s, and a "
+            f"fit needs {FEWEST} samples; give a sample period of {shortest / FEWEST:.2g} s or less."
+        )
     bench = _Bench(drive, period, error, _asked(free, drive), signal, tell or (lambda _: None))
     standard = [bench.experiment(name, *levels) for name, levels in _standard(drive, level).items()]
     torque = standard[0].peak if most_torque is None else float(to_si(most_torque, "N*m", name="most_torque"))

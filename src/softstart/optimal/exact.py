@@ -60,7 +60,7 @@ def demand_of(run: Run, until: float) -> TorqueProfile:
 
     >>> run = replay(Drive.load("crane-4amtkf"), TorqueProfile.steps([0.0, 0.1, 0.2], [62.0, 9.0]), until=0.4)
     >>> demand_of(run, 0.3).torque.tolist()
-    [62.0, 62.0, 9.0, 9.0]
+    [62.0, 62.0, 9.0]
     """
     spans = run.segments[(run.segments[:, at.S_START] < until)]
     spans = spans[spans[:, at.S_END] > spans[:, at.S_START]]
