@@ -73,13 +73,18 @@ class Staircase:
         return np.concatenate([np.full(p.levels.size, i == 1) for i, p in enumerate(self.parts)])
 
     def with_unknowns(self, values: Vector) -> Staircase:
-        """The staircase whose unknowns are `values`."""
+        """The staircase whose unknowns are `values`; edges that fall by rounding coincide."""
         n, first = self.n_levels, self.levels.size
+
+        def edges(inner: Vector) -> Vector:
+            rising: Vector = np.maximum.accumulate(np.concatenate([[0.0], inner]))
+            return rising
+
         if self.contact is None:
-            return Staircase(np.concatenate([[0.0], values[n:]]), values[:n].copy())
+            return Staircase(edges(values[n:]), values[:n].copy())
         middle = n + first - 1
-        contact = Staircase(np.concatenate([[0.0], values[middle:]]), values[first:n].copy())
-        return Staircase(np.concatenate([[0.0], values[n:middle]]), values[:first].copy(), contact)
+        contact = Staircase(edges(values[middle:]), values[first:n].copy())
+        return Staircase(edges(values[n:middle]), values[:first].copy(), contact)
 
     def profile(self) -> TorqueProfile:
         """The same as a profile with two knots at every edge, needed or not."""
