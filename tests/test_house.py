@@ -39,7 +39,7 @@ BUDGET = {
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
     "drive": (1550, 6, 1, 0),  # 5: a reactive load may be anywhere
     # the drive from logs of its starts, and experiments that tell it
-    "identification": (2040, 7, 2, 0),
+    "identification": (2090, 7, 2, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

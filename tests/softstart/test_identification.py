@@ -171,6 +171,20 @@ def test_a_clipped_torque_is_noticed(log: Log) -> None:
     assert any("something else moves this drive" in n for n in identify(clipped, TRUTH, searches=1).notes)
 
 
+@pytest.mark.parametrize("wrong", ["cut", "rpm"])
+def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -> None:
+    kept = np.r_[0:150, 200 : log.time.size] if wrong == "cut" else np.arange(log.time.size)
+    time, torque = log.time[: kept.size], log.torque[kept]
+    if wrong == "cut":
+        bad = Log(time, torque, angle=log.values[kept], torque_is="demand")
+    else:
+        turned = played(log, log.torque, {"position": -0.6})[:, record.W1_OUT]
+        bad = Log(time, torque, speed=turned * 30.0 / math.pi, torque_is="demand")
+    notes = identify(bad, TRUTH, searches=1).notes
+    told = "something else moves this drive" if wrong == "cut" else "look at the units of the log"
+    assert any(told in note for note in notes)
+
+
 def test_a_filtered_speed_is_named_or_found(log: Log) -> None:
     fine = np.linspace(0.0, float(log.time[-1]), 16 * (log.time.size - 1) + 1)
     profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])

@@ -28,6 +28,7 @@ SURE: Final = 4.0  # standard deviations of an effect that the model has not, to
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
 LAGS: Final = 20  # samples over which what is left must not be correlated
+DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
 
@@ -133,6 +134,7 @@ def identify(
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *_advice(drive.replace(**changes), estimates, read),
         *_misfits(fitter, solution),
+        *_other_scale(drive, drive.replace(**changes)),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
     ]
@@ -295,6 +297,19 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
         widths = listed([f"{name} within {100.0 * best.widths[name]:.2g} %" for name in names])
         remedy = f'a log of "{best.name}" would tell {widths} (softstart identify --plan)'
     return [f"Unknown: {told}. Remedy: {remedy}."]
+
+
+def _other_scale(guess: Drive, found: Drive) -> list[str]:
+    """A wrong unit of speed or angle is explained by another drive: only the guess can tell."""
+    ratio = float((found.J1 + found.J2) / (guess.J1 + guess.J2))
+    if 1.0 / DOUBTFUL < ratio < DOUBTFUL:
+        return []
+    return [
+        f"The inertias found are {ratio:.2g} times those of the guess. If that is not off so far, "
+        "look at the "
+        "units of the log: rpm called rad/s makes inertias and stiffness 9.5 times too small and the gap as "
+        "much too wide, and fits as well."
+    ]
 
 
 def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
