@@ -30,7 +30,8 @@ BUDGET = {
     # 140 and a file: `init`; 30: `fatigue` of a chain
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
-    "cli": (5005, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    # 15: a torque constant
+    "cli": (5020, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -39,7 +40,8 @@ BUDGET = {
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
     "drive": (1550, 6, 1, 0),  # 5: a reactive load may be anywhere
     # the drive from logs of its starts, and experiments that tell it
-    "identification": (2090, 7, 2, 0),  # 20: units of another scale
+    # 165: measurement files, whose channels have instants of their own; currents; units given by the user
+    "identification": (2255, 7, 2, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

@@ -77,6 +77,8 @@ QUANTITIES: dict[str, Quantity] = {
         Quantity("kg*m", "an imbalance", "0.045 kg*m"),
         Quantity("Pa", "a pressure", "10 bar", ("J/m^3",)),
         Quantity("m^2", "an area", "0.05 m^2"),
+        Quantity("A", "a current", "12 A"),
+        Quantity("N*m/A", "a torque constant", "1.2 N*m/A", ("J/rad/A",)),
         Quantity("1", "a plain number", "3"),
     )
 }
@@ -109,6 +111,7 @@ gram = [mass] = g
 second = [time] = s = sec
 radian = [angle] = rad
 joule = [energy] = J
+ampere = [current] = A
 inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
 minute = 60 * second = min
@@ -138,7 +141,7 @@ metric_horsepower = 735.49875 * watt = PS
 # Spellings that are offered for an unknown one.
 _USUAL = """
 m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf Nm
-kNm mNm J kJ W kW MW hp PS Pa kPa MPa bar mbar
+kNm mNm J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
 """
 
 # Factors of what most drive files write; pint, which says the same, takes a fifth of a second to import.

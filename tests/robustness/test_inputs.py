@@ -118,7 +118,10 @@ OPTIONS: dict[str, list[str]] = {
     "report": ["--controllers", "--set", "--param", "--resolution", "--budget"],
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
     "init": ["--set", "--json"],
-    "identify": ["--log-period", "--ripple", "--free", "--most-torque", "--most-travel", "--set", "--json"],
+    "identify": [
+        "--log-period", "--ripple", "--free", "--most-torque", "--most-travel", "--torque-constant",
+        "--set", "--json",
+    ],
     "drives": ["--json"],
     "controllers": ["--json"],
     "study": ["--list", "--json"],

@@ -27,6 +27,7 @@ from softstart.cli.options import (
 from softstart.cli.running import working
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.quantities import to_si
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
     markdown,
@@ -65,11 +66,16 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 @set_option
 @click.option(
     "--columns", metavar="SIGNAL=NAME,...",
-    help="What the log calls them, as time=t,torque=-M_act,speed=n_act; a minus turns the sign.",
+    help="What the log calls them, as time=t,torque=-M_act,speed=n_act[rpm]; a minus turns the sign, a unit "
+    "in brackets takes the place of that of the log.",
 )  # fmt: skip
 @click.option(
     "--torque-is", metavar="measured|demand", default="measured", help="What the torque of the log is."
 )
+@click.option(
+    "--torque-constant", metavar="CONSTANT",
+    help="The log has a current in place of the torque, of which this is the torque, as '1.2 N*m/A'.",
+)  # fmt: skip
 @click.option(
     "--free",
     metavar="NAME,...",
@@ -109,6 +115,7 @@ def identify(
     settings: tuple[str, ...],
     columns: str | None,
     torque_is: str,
+    torque_constant: str | None,
     free: str | None,
     searches: str | None,
     controllers: str | None,
@@ -124,8 +131,9 @@ def identify(
     """Find the parameters of a drive, with intervals, from what an inverter logged of its starts.
 
     LOG is a CSV file with the columns time, torque, and angle or speed of the motor, units in its first line
-    as in "time [ms];torque [N*m];speed [rpm]". It begins at standstill. Several logs are of one drive. With
-    --plan DRIVE no log is read: it shows what each experiment would tell before it is run.
+    as in "time [ms];torque [N*m];speed [rpm]", or a measurement file (MDF). It begins at standstill. Several
+    logs are of one drive. With --plan DRIVE no log is read: it shows what each experiment would tell before
+    it is run.
     """
     mistakes = Mistakes()
     with mistakes.noted():
@@ -143,6 +151,12 @@ def identify(
     with mistakes.noted():
         if torque_is not in ("measured", "demand"):
             raise InputError(f'--torque-is = "{torque_is}": write measured or demand.')
+    with mistakes.noted():
+        constant = (
+            None
+            if torque_constant is None
+            else float(to_si(torque_constant, "N*m/A", name="--torque-constant"))
+        )
     with mistakes.noted():
         names = [name.strip() for name in free.split(",")] if free else None
     with mistakes.noted():
@@ -178,6 +192,7 @@ def identify(
                     free=names,
                     torque_is=cast("TorqueIs", torque_is),
                     columns=called,
+                    torque_constant=constant,
                     searches=most or 12,
                     tell=tell,
                 )

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +16,14 @@ from numpy.typing import ArrayLike
 from softstart.arrays import Vector
 from softstart.errors import InputError
 from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import read_text, write_whole
-from softstart.quantities import RefusedError, show
+from softstart.input.files import ABSENT, FOLDER, read_text, refusal_of, write_whole
+from softstart.late import late
+from softstart.quantities import RefusedError, nearest, parse, show, to_si
+
+if TYPE_CHECKING:
+    import asammdf
+else:
+    asammdf = late("asammdf")
 
 Kind = Literal["angle", "speed"]
 TorqueIs = Literal["demand", "measured"]
@@ -27,7 +33,10 @@ COLUMNS: Final = {
     "torque": Wanted(("torque", "u", "demand"), "N*m"),
     "angle": Wanted(("angle", "phi", "position"), "rad"),
     "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
+    "current": Wanted(("current", "i", "iq"), "A"),
 }
+MEASUREMENTS: Final = (".mf4", ".mdf", ".dat")  # how names of MDF files end
+SAME_INSTANT: Final = 1e-3  # of a sample period: two channels have a sample at the same time
 FEWEST: Final = 30  # samples
 MOST_ROWS: Final = 1000  # samples of angle or speed that the fit looks at
 LEAST_COUNT: Final = 1e-5  # of the largest difference: a smaller step is rounding
@@ -142,47 +151,52 @@ class Log:
         *,
         columns: Mapping[str, str] | None = None,
         torque_is: TorqueIs = "measured",
+        torque_constant: float | str | None = None,
     ) -> Log:
         """A log from a CSV file whose first line names the columns, as `time [ms];torque [N*m];speed [rpm]`.
+
+        Also from a measurement file, MDF 3 or 4 (`.mf4`, `.mdf`, `.dat`), by the package `asammdf`. Its
+        channels may be sampled at different instants: the torque, which is straight or constant between its
+        samples, is then known at all of them.
 
         Parameters
         ----------
         path : str or path
             The file; semicolons, tabs or commas divide the columns, decimal commas are read.
         columns : mapping, optional
-            What the file calls time, torque, angle and speed; a name after a minus has the other sign.
+            What the file calls time, torque (or current), angle and speed; a name after a minus has the other
+            sign, and a unit in brackets behind it takes the place of that of the file: `-n_act [rpm]`.
         torque_is : {"measured", "demand"}
             As for `Log`.
+        torque_constant : float or str, optional
+            Torque over current in N m/A, or with a unit: the file has the current that makes the torque in
+            place of it.
         """
         where = os.fspath(path)
-        given = dict(columns or {})
-        unknown = [key for key in given if key not in COLUMNS]
-        if unknown:
-            raise InputError(
-                f"columns: {show(unknown[0])} is no signal of a log; name {', '.join(COLUMNS)}, as "
-                "speed=n_act."
-            )
-        try:
-            text = read_text(Path(path))
-        except RefusedError as refusal:
-            raise InputError(f"log = {where}: {refusal.reason}.") from None
-        heading = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-        kinds = [kind for kind in ("angle", "speed") if kind in given] or _kinds_in(heading)
-        if len(kinds) != 1:
-            found = "both" if kinds else "neither"
-            raise InputError(
-                f"log = {where}: its first line is {show(heading.strip())}, which names {found} of angle and "
-                "speed; write --columns angle=NAME or speed=NAME with the name of one column."
-            )
-        wanted = ["time", "torque", kinds[0]]
-        signs = [-1.0 if given.get(key, "").startswith("-") else 1.0 for key in wanted]
-        asked = [
-            Wanted((given[key].lstrip("-"),), COLUMNS[key].unit) if key in given else COLUMNS[key]
-            for key in wanted
-        ]
-        _, (time, torque, values) = read_columns(text, f"log = {where}", asked, headed="names", missing=True)
-        made: dict[str, Any] = {kinds[0]: signs[2] * values}
-        return cls(time, signs[1] * torque, torque_is=torque_is, name=Path(where).name, **made)
+        asked = _asked(columns or {})
+        constant = None if torque_constant is None else _constant(torque_constant)
+        cause = "torque" if constant is None else "current"
+        for key in asked:
+            if key in ("torque", "current") and key != cause:
+                raise InputError(
+                    'columns: current: give the torque constant with it, as --torque-constant "1.2 N*m/A".'
+                    if constant is None
+                    else "columns: torque: with a torque constant the current is read; name it with "
+                    "current=, or leave out --torque-constant."
+                )
+        if where.lower().endswith(MEASUREMENTS):
+            found = _from_measurement(where, asked, cause, torque_is == "demand")
+        else:
+            found = _from_text(where, asked, cause)
+        signs = {key: asked[key].sign if key in asked else 1.0 for key in (cause, found.kind)}
+        torque = signs[cause] * (1.0 if constant is None else constant) * found.cause
+        values: dict[str, Any] = {found.kind: signs[found.kind] * found.values}
+        log = cls(found.time, torque, torque_is=torque_is, name=Path(where).name, **values)
+        notes = list(found.notes)
+        if constant is not None:
+            notes.append(f"the torque is {constant:g} N m/A times the current")
+        object.__setattr__(log, "notes", (*notes, *log.notes))
+        return log
 
     def to_csv(self, path: str | os.PathLike[str], about: str = "") -> None:
         """Write the log to a CSV file that `load` reads; `about` goes into a comment above it."""
@@ -266,11 +280,201 @@ class Log:
             )
 
 
-def _kinds_in(heading: str) -> list[str]:
-    names = {
-        part.strip().split("[")[0].split("(")[0].strip().lower() for part in re.split(r"[;\t,]", heading)
-    }
-    return [kind for kind in ("angle", "speed") if names & {one.lower() for one in COLUMNS[kind].names}]
+class _Asked(NamedTuple):
+    """What a file calls a signal: name, sign, and a unit that takes the place of its own."""
+
+    name: str
+    sign: float
+    unit: str
+
+
+class _Signals(NamedTuple):
+    """Signals of a file in SI: what moves the motor (torque or current), and how it moved."""
+
+    time: Vector
+    cause: Vector
+    kind: Kind
+    values: Vector
+    notes: tuple[str, ...] = ()
+
+
+def _asked(columns: Mapping[str, str]) -> dict[str, _Asked]:
+    """The columns as people write them.
+
+    >>> _asked({"speed": "-n_act [rpm]"})
+    {'speed': _Asked(name='n_act', sign=-1.0, unit='rpm')}
+    """
+    found = {}
+    for key, text in columns.items():
+        if key not in COLUMNS:
+            near = nearest(key, COLUMNS)
+            hint = f"did you mean {near}?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act."
+            raise InputError(f"columns: {show(key)} is no signal of a log; {hint}")
+        part = re.fullmatch(r"\s*(-?)\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
+        if part is None:
+            raise InputError(f"columns: {key} = {show(text)}: write the name of a column, as {key}=NAME.")
+        unit = part[3] or ""
+        try:
+            parse(f"1 {unit}", COLUMNS[key].unit)
+        except RefusedError as refusal:
+            raise InputError(f"columns: {key} = {show(text)}: {refusal.reason}.") from None
+        found[key] = _Asked(part[2], -1.0 if part[1] else 1.0, unit)
+    return found
+
+
+def _constant(given: float | str) -> float:
+    value = float(to_si(given, "N*m/A", name="torque_constant"))
+    if not value > 0.0:
+        raise InputError(
+            f"torque_constant = {show(given)}: give a value above 0; a minus before the column turns "
+            "the sign."
+        )
+    return value
+
+
+def _from_text(where: str, asked: Mapping[str, _Asked], cause: str) -> _Signals:
+    """The signals of a CSV file."""
+    try:
+        text = read_text(Path(where))
+    except RefusedError as refusal:
+        raise InputError(f"log = {where}: {refusal.reason}.") from None
+    heading = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    cells = [part.strip() for part in re.split(r"[;\t,]", heading)]
+    names = {part.split("[")[0].split("(")[0].strip().lower() for part in cells}
+
+    def in_heading(key: str) -> bool:
+        return bool(names & {one.lower() for one in COLUMNS[key].names})
+
+    kinds = [kind for kind in ("angle", "speed") if kind in asked] or [
+        kind for kind in ("angle", "speed") if in_heading(kind)
+    ]
+    if len(kinds) != 1:
+        found = "both" if kinds else "neither"
+        raise InputError(
+            f"log = {where}: its first line is {show(heading.strip())}, which names {found} of angle and "
+            "speed; write --columns angle=NAME or speed=NAME with the name of one column."
+        )
+    if cause == "torque" and "torque" not in asked and not in_heading("torque") and in_heading("current"):
+        raise InputError(
+            f"log = {where}: it has a current and no torque; give the torque constant of the motor, as "
+            '--torque-constant "1.2 N*m/A".'
+        )
+    wanted = ["time", cause, kinds[0]]
+    own = [Wanted((asked[key].name,), COLUMNS[key].unit) if key in asked else COLUMNS[key] for key in wanted]
+    for key in (key for key in wanted if key in asked and asked[key].unit):
+        cell = rf"(?<![^;\t,]){re.escape(asked[key].name)}\s*([\[(][^\])]*[\])])?(?=\s*([;\t,]|$))"
+        changed = re.sub(cell, lambda _, key=key: f"{asked[key].name} [{asked[key].unit}]", heading)  # type: ignore[misc]
+        text = text.replace(heading, changed, 1)
+        heading = changed
+    _, (time, first, values) = read_columns(text, f"log = {where}", own, headed="names", missing=True)
+    return _Signals(time, first, "angle" if kinds[0] == "angle" else "speed", values)
+
+
+def _from_measurement(where: str, asked: Mapping[str, _Asked], cause: str, held: bool) -> _Signals:
+    """The signals of an MDF file; `held`: the torque keeps its value from sample to sample."""
+    if (reason := refusal_of(where)) in (ABSENT, FOLDER):
+        raise InputError(f"log = {where}: {reason}.")
+    if "time" in asked:
+        raise InputError("columns: time: each channel of a measurement file has its own; leave time out.")
+    try:
+        measurement = asammdf.MDF(where)
+    except ImportError:
+        raise InputError(
+            f"log = {where}: measurement files need the package asammdf; install it with "
+            '"pip install softstart[mdf]", or write the channels to a CSV file.'
+        ) from None
+    except Exception as error:  # what its parser meets in a damaged file
+        raise InputError(f"log = {where}: this cannot be read as an MDF file ({error}).") from None
+    with measurement:
+        names = list(measurement.channels_db)
+
+        def called(key: str) -> list[str]:
+            known = [asked[key].name] if key in asked else COLUMNS[key].names
+            return [name for name in names if name in known] or [
+                name for name in names if name.lower() in {one.lower() for one in known}
+            ]
+
+        kinds = [kind for kind in ("angle", "speed") if kind in asked] or [
+            kind for kind in ("angle", "speed") if called(kind)
+        ]
+        if len(kinds) != 1:
+            raise InputError(
+                f"log = {where}: its channels name {'both' if kinds else 'neither'} of angle and speed; "
+                f"write --columns angle=NAME or speed=NAME; there are {_few(names)}."
+            )
+        read = {}
+        for key in (cause, kinds[0]):
+            one = called(key)
+            if len(one) != 1 or len(measurement.whereis(one[0])) != 1:
+                name = asked[key].name if key in asked else key
+                many = "more than one channel" if one else "no channel"
+                raise InputError(
+                    f"log = {where}: {many} is called {show(name)}; write --columns {key}=NAME; there are "
+                    f"{_few(names)}."
+                )
+            read[key] = _channel(measurement.get(one[0]), where, key, asked)
+    (times, first), (instants, values) = read[cause], read[kinds[0]]
+    kind: Kind = "angle" if kinds[0] == "angle" else "speed"
+    if np.array_equal(times, instants):
+        return _Signals(times, first, kind, values)
+    time, torque, values = _together(times, first, instants, values, held, where)
+    told = f"{cause} and {kind} are sampled at different instants; the torque between its samples is "
+    return _Signals(time, torque, kind, values, (told + ("held" if held else "straight"),))
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def _channel(
+    signal: asammdf.Signal, where: str, key: str, asked: Mapping[str, _Asked]
+) -> tuple[Vector, Vector]:
+    """Instants in s and values in SI of a channel."""
+    unit = (asked[key].unit if key in asked else "") or signal.unit or ""
+    wanted = COLUMNS[key].unit
+    try:
+        factor = float(parse(f"1 {unit}" if unit else 1.0, wanted))
+        values = np.asarray(signal.samples, dtype=np.float64)
+        times = np.asarray(signal.timestamps, dtype=np.float64)
+        if values.ndim != 1 or values.size < FEWEST:
+            raise RefusedError(f"it has values of the shape {values.shape}, and a fit needs {FEWEST} or more")
+    except RefusedError as refusal:
+        raise InputError(
+            f"log = {where}: channel {signal.name}: {refusal.reason}; a unit of your own is given with "
+            f'--columns "{key}={signal.name} [{wanted}]".'
+        ) from None
+    except (TypeError, ValueError):
+        raise InputError(f"log = {where}: channel {signal.name} holds text, and no numbers.") from None
+    _check_times(times, f"{where}, {signal.name}")
+    return times, factor * values
+
+
+def _together(
+    times: Vector, torque: Vector, instants: Vector, values: Vector, held: bool, where: str
+) -> tuple[Vector, Vector, Vector]:
+    """Both signals at the instants of both; values are NaN where they have no sample.
+
+    >>> t, u, y = _together(np.arange(3.0), np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.5, 2.0]),
+    ...     np.array([0.0, 5.0, 9.0]), False, "here")
+    >>> t.tolist(), u.tolist(), y.tolist()
+    ([0.0, 1.0, 1.5, 2.0], [1.0, 2.0, 3.0, 4.0], [0.0, nan, 5.0, 9.0])
+    """
+    near = SAME_INSTANT * min(float(np.median(np.diff(times))), float(np.median(np.diff(instants))))
+    closest = instants[np.clip(np.searchsorted(instants, times - near), 0, instants.size - 1)]
+    times = np.where(np.abs(closest - times) <= near, closest, times)
+    first, last = max(times[0], instants[0]), min(times[-1], instants[-1])
+    if not first < last:
+        raise InputError(f"log = {where}: torque and motion were not logged at the same time.")
+    time = np.union1d(times, instants)
+    time = time[(time >= first) & (time <= last)]
+    if held:
+        joined = torque[np.searchsorted(times, time, side="right") - 1]
+    else:
+        joined = np.interp(time, times, torque)
+    seen = np.full(time.size, math.nan)
+    inside = (instants >= first) & (instants <= last)
+    seen[np.searchsorted(time, instants[inside])] = values[inside]
+    return time, joined, seen
 
 
 def _whole(torque: Vector, time: Vector, name: str, notes: list[str]) -> Vector:

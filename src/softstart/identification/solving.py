@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from scipy.stats import chi2
@@ -39,6 +39,7 @@ def identify(
     free: Iterable[str] | None = None,
     torque_is: TorqueIs = "measured",
     columns: dict[str, str] | None = None,
+    torque_constant: float | str | None = None,
     searches: int = 12,
     seed: int = 0,
     tell: Tell | None = None,
@@ -55,7 +56,7 @@ def identify(
     Parameters
     ----------
     logs : Log, path, or sequence of them
-        Logs of one drive, each beginning at standstill, or their CSV files (`Log.load`).
+        Logs of one drive, each beginning at standstill, or their CSV or MDF files (`Log.load`).
     drive : Drive or str
         The guess, by factors of 3 if need be; what is not free stays as it is there. The position in the gap
         is free for each log where the load is reactive or the drive says "unknown".
@@ -66,6 +67,8 @@ def identify(
         What the torque of files is, see `Log`.
     columns : dict, optional
         What files call the columns, see `Log.load`.
+    torque_constant : float or str, optional
+        N m/A: files hold the current in place of the torque, see `Log.load`.
     searches : int
         At most so many searches.
     seed : int
@@ -104,9 +107,8 @@ def identify(
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
     if not given:
         raise InputError("logs: there is none; give a log, or the path of its CSV file.")
-    read = [
-        one if isinstance(one, Log) else Log.load(one, columns=columns, torque_is=torque_is) for one in given
-    ]
+    files: dict[str, Any] = {"columns": columns, "torque_is": torque_is, "torque_constant": torque_constant}
+    read = [one if isinstance(one, Log) else Log.load(one, **files) for one in given]
     read = [one.summed(float(drive.encoder_lines)) for one in read]
     if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
         raise InputError(f"searches = {searches}: give a whole number of 1 or more.")
