@@ -30,8 +30,8 @@ BUDGET = {
     # 140 and a file: `init`; 30: `fatigue` of a chain
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
-    # 15: a torque constant
-    "cli": (5020, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    # 15: a torque constant; 20: folders of identifications
+    "cli": (5040, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -41,7 +41,8 @@ BUDGET = {
     "drive": (1550, 6, 1, 0),  # 5: a reactive load may be anywhere
     # the drive from logs of its starts, and experiments that tell it
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
-    "identification": (2255, 7, 2, 0),  # 20: units of another scale
+    # 100: identifications kept on disk, drawn by the intervals that are shown
+    "identification": (2355, 7, 2, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -69,10 +70,12 @@ BUDGET = {
     # margins to limits, the rule of what is recommended, that reporting and views had
     # 10: what notebooks show
     # 20: damage of cycles, for chains too
-    "start": (2775, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
+    # 80: intervals of starts whose drive is known within intervals
+    "start": (2855, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
     # 100 lines: damaged chunks and descriptions are found, named and made again; 20: margins to limits
     "sweeping": (1790, 8, 0, 0),
-    "tuning": (2340, 10, 1, 0),  # 15: the margin to limits
+    # 40: drives drawn from an identification as scenarios
+    "tuning": (2380, 10, 1, 0),  # 15: the margin to limits
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
     # 20: what a sensor of the start position is worth; 120: starts, sweeps and gains against limits
     # 70: starts and comparisons of chains

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -36,9 +35,7 @@ from softstart.views.markdown import (
     write_columns,
     write_drive_report,
     write_table,
-    write_text,
 )
-from softstart.views.numbers import plain
 from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
@@ -223,8 +220,7 @@ def write_identification(
     found: Identification, each: dict[str, tuple[float, float, float]], folder: Path, command: str
 ) -> None:
     """The files of --out."""
-    write_text(folder / "drive.toml", found.drive.to_toml())
-    write_text(folder / "identification.json", json.dumps(plain(found.summary()), indent=2) + "\n")
+    found.save(folder)
     save_figure(found.plot(), folder, "logs")
     for number, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True), 1):
         seen = np.isfinite(log.values)

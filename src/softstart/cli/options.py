@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,8 +21,15 @@ from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
 from softstart.errors import InputError
 from softstart.input.files import refusal_of
+from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import to_si, whole_number
+
+if TYPE_CHECKING:
+    from softstart.identification import result
+    from softstart.identification.result import Identification
+else:
+    result = late("softstart.identification.result")
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -177,6 +185,13 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
             "one at a time; give one value a key (softstart.simulate in Python takes batches)."
         )
     return drive
+
+
+def read_identified(name: str, settings: Sequence[str]) -> Identification | None:
+    """The identification in the folder of this name; None where there is none, as for a drive."""
+    if name in drive_names() or not os.path.isfile(os.path.join(name, "identification.json")):
+        return None
+    return result.Identification.load(name).with_settings(settings)
 
 
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:

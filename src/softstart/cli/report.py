@@ -23,6 +23,7 @@ from softstart.cli.options import (
     json_option,
     param_option,
     read_drive,
+    read_identified,
     read_names,
     read_params_of,
     set_option,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart import reporting
+    from softstart.identification.result import Identification
     from softstart.reporting import document
 else:
     reporting, document = late("softstart.reporting"), late("softstart.reporting.document")
@@ -102,12 +104,13 @@ def report(
 ) -> None:
     """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. The report recommends a strategy and gives its parameters, rounded to what the
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives), or the folder of an
+    identification, whose figures have intervals; without it, the crane drive of the literature is taken. The
+    report recommends a strategy and gives its parameters, rounded to what the
     inverter can be set to and started again after rounding.
     """
     mistakes = Mistakes()
-    one: Drive | None = None
+    one: Drive | Identification | None = None
     names: Sequence[str] | None = None
     given: dict[str, dict[str, str]] = {}
     asked: dict[str, Any] = {}
@@ -122,7 +125,7 @@ def report(
         with mistakes.noted():
             browser = _browser()
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_identified(drive, settings) or read_drive(drive, settings)
     with mistakes.noted():
         names = read_names(controllers)
     with mistakes.noted():
@@ -151,7 +154,7 @@ def report(
 
 
 def _made(
-    drive: Drive,
+    drive: Drive | Identification,
     names: Sequence[str] | None,
     given: dict[str, dict[str, str]],
     asked: dict[str, Any],

@@ -23,6 +23,7 @@ from softstart.cli.options import (
     out_option,
     param_option,
     read_fitted_to,
+    read_identified,
     read_machine,
     read_names,
     read_params,
@@ -109,13 +110,14 @@ def compare(
     """Start a drive or a chain under several controllers and compare them.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like); without it, the crane drive of the literature is taken. A controller is a name (see:
-    softstart controllers), path/to/file.py:Class, or a file of tuned gains.
+    tractor-like), or the folder of an identification, whose figures have intervals; without it, the crane
+    drive of the literature is taken. A controller is a name (see: softstart controllers),
+    path/to/file.py:Class, or a file of tuned gains.
     """
     mistakes = Mistakes()
     names: Sequence[str] = controller_names()
     with mistakes.noted():
-        one = read_machine(drive, settings)
+        one = read_identified(drive, settings) or read_machine(drive, settings)
     with mistakes.noted():
         names = read_names(controllers) or names
     with mistakes.noted():
@@ -170,11 +172,14 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
     to.print()
     gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.details(comparison.drive)
     what = "What happens at the gap" if at_the_gap == starts.AT_THE_GAP else "What happens in the shafts"
-    parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *quick, *at_the_gap))]
+    uncertain = starts.INTERVALS if rows[0].intervals else ()
+    parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *uncertain, *quick, *at_the_gap))]
     if not fits(to, starts.comparison_table(rows)):
         parts = [("How gentle, how quick", (*gentle, *quick)), (what, at_the_gap)]
         if not fits(to, starts.comparison_table(rows, parts[0][1])):
             parts[:1] = [("How gentle", gentle), ("How quick", quick)]
+        if uncertain:
+            parts.insert(1, ("Intervals of 95 %", uncertain))
     for index, (title, figures) in enumerate(parts):
         if index:
             to.print()

@@ -23,6 +23,7 @@ from softstart.cli.options import (
     out_option,
     param_option,
     read_drive,
+    read_identified,
     read_params,
     scheduler_option,
     set_option,
@@ -38,6 +39,7 @@ from softstart.views.terminal import console, print_json
 
 if TYPE_CHECKING:
     from softstart.drive import Drive
+    from softstart.identification.result import Identification
     from softstart.tuning.outcome import Tuning
     from softstart.views import tuning as views
 else:  # no numba for a help, a wrong option or the Tab key
@@ -129,18 +131,19 @@ def tune(
 ) -> None:
     """Find the gains of a controller for each gap and load inertia, and one set of gains for all.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. The gains are written as files that stand for a controller everywhere:
-    softstart simulate DRIVE --controller DIR/robust.toml
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives), or the folder of an
+    identification: the gains are then robust over the drives that its logs leave possible. Without it, the
+    crane drive of the literature is taken. The gains are written as files that stand for a controller
+    everywhere: softstart simulate DRIVE --controller DIR/robust.toml
     """
     mistakes = Mistakes()
-    one: Drive | None = None
+    one: Drive | Identification | None = None
     asked: dict[str, Any] = {
         "metric": metric, "start_time": start_time, "certified": not no_optimum, "quantile": 1.0,
         "schedule": only != "robust", "robust": only != "schedule", "scheduler": scheduler,
     }  # fmt: skip
     with mistakes.noted():
-        one = read_drive(drive, settings)
+        one = read_identified(drive, settings) or read_drive(drive, settings)
     with mistakes.noted():
         check_name(controller, "--controller")
     with mistakes.noted():
@@ -184,7 +187,9 @@ def tune(
         )
 
 
-def _computed(drive: Drive, controller: str, state: Path | None, asked: dict[str, Any]) -> Tuning:
+def _computed(
+    drive: Drive | Identification, controller: str, state: Path | None, asked: dict[str, Any]
+) -> Tuning:
 
     with working("starting the drive ...") as progress:
         make_controllers([controller], {controller: asked["parameters"]}, prefix=False)

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from softstart.arrays import Matrix, Vector
+from softstart.arrays import Matrix, Vector, plain_fields
 from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError
 from softstart.identification.logs import Log
+from softstart.input.files import read_text, write_whole
 from softstart.late import late
+from softstart.quantities import RefusedError
+from softstart.start.comparison import INTERVAL, intervals
 from softstart.start.simulation import simulate
 
 views = late("softstart.views.identification")  # above this module; see softstart.late
@@ -20,7 +28,8 @@ notebook = late("softstart.views.notebook")
 
 CONFIDENCE = 0.95
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
-FEWEST_KNOWN = 0.9  # of the draws of a strategy's K_dyn that must end
+FORMAT = 1  # of the file
+FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an identification
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,20 @@ class Estimate:
         """Half the interval over the value, as a share."""
         return 0.5 * (self.upper - self.lower) / abs(self.value) if self.value else math.inf
 
+    def moved(self, shares: ArrayLike) -> Vector:
+        """Values so many half intervals away: 1 is the end further from 0, -1 the other end, by logarithms.
+
+        None is more than a factor of 3 off: what is unknown is left that far.
+
+        >>> Estimate("gap", 0.08, 0.076, 0.085, known=True).moved([-1.0, 0.0, 1.0]).round(4).tolist()
+        [0.076, 0.08, 0.085]
+        """
+        given = np.asarray(shares, dtype=np.float64)
+        near, far = sorted((abs(self.lower), abs(self.upper)))
+        size = abs(self.value)
+        steps = np.where(given > 0.0, math.log(far / size), math.log(size / near)) * given
+        return np.asarray(self.value * np.exp(np.clip(steps, -math.log(WIDEST), math.log(WIDEST))))
+
 
 @dataclass(frozen=True, eq=False)
 class Identification:
@@ -76,7 +99,7 @@ class Identification:
     guess : Drive
         The drive that the search began from.
     logs : tuple of Log
-        The logs, in the order given.
+        The logs, in the order given; none if the identification was loaded.
     estimates : tuple of Estimate
         One for each parameter that was free, then the position of each log.
     correlations : array of shape (k, k)
@@ -116,8 +139,6 @@ class Identification:
     agreed: int
     seconds: float
     notes: tuple[str, ...]
-    point: Vector  # where the search ended, in logarithms; the covariance there
-    covariance: Matrix
     residuals: tuple[Vector, ...]  # of each log, in its own unit
 
     def __getitem__(self, name: str) -> Estimate:
@@ -139,16 +160,16 @@ class Identification:
         >>> found.draws(100).shape
         (100,)
         """
-        generator = np.random.default_rng(seed)
-        shared = self.shared
-        size = len(shared)  # they stand first
-        values, vectors = np.linalg.eigh(self.covariance[:size, :size])
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        moves = np.clip(
-            generator.standard_normal((count, size)) @ root.T, -math.log(WIDEST), math.log(WIDEST)
+        which = [i for i, one in enumerate(self.estimates) if one.name in PARAMETERS]
+        values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
+        normal = np.random.default_rng(seed).standard_normal((count, len(which)))
+        moves = normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T / INTERVAL.quantile
+        return self.drive.replace(
+            **{
+                self.estimates[i].name: self.estimates[i].moved(move)
+                for i, move in zip(which, moves.T, strict=True)
+            }
         )
-        changes = {one.name: one.value * np.exp(moves[:, i]) for i, one in enumerate(shared)}
-        return self.drive.replace(**changes)
 
     def k_dyn(
         self, controllers: Sequence[str], count: int = 200, seed: int = 0
@@ -157,18 +178,78 @@ class Identification:
 
         Each strategy is set up for the drive found and started on `draws`.
         """
-        drives = self.draws(count, seed)
-        found = {}
-        for name in controllers:
-            value = float(simulate(self.drive, name).k_dyn)
-            starts: Any = simulate(drives, name, fitted_to=self.drive)
-            each = np.asarray(starts["k_dyn"])
-            ended = each[np.isfinite(each)]
-            if ended.size < FEWEST_KNOWN * count:
-                found[name] = (value, math.nan, math.nan)
-                continue
-            lower, upper = np.quantile(ended, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE])
-            found[name] = (value, min(float(lower), value), max(float(upper), value))
+        drawn = self.draws(count, seed)
+        runs = {name: simulate(self.drive, name) for name in controllers}
+        return {name: (float(run.k_dyn), *intervals(run, drawn, name)["k_dyn"]) for name, run in runs.items()}
+
+    def with_settings(self, settings: Iterable[str]) -> Self:
+        """The identification with other parameters of its drive, as typed at a command line.
+
+        What was identified stays: a value of one's own has no interval.
+        """
+        given = list(settings)
+        changed = replace(self, drive=self.drive.with_settings(given)) if given else self
+        changed._check(f"--set {', '.join(given)}")
+        return changed
+
+    def _check(self, where: str) -> None:
+        for one in self.shared:
+            if (value := float(getattr(self.drive, one.name))) != one.value:
+                raise InputError(
+                    f"{where}: {PARAMETERS[one.name].path} = {value:.6g}, and the logs say {one.value:.6g} "
+                    f"({one.lower:.6g} to {one.upper:.6g}); leave it as it is, or take "
+                    f"{DRIVE_FILE} alone, as a drive without intervals."
+                )
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder."""
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | self.summary(), indent=2)
+        for name, content in ((DRIVE_FILE, self.drive.to_toml()), (FILE, text + "\n")):
+            write_whole(Path(folder) / name, lambda stream, content=content: stream.write(content))  # type: ignore[misc]
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> Self:
+        """The identification of a folder that `softstart identify --out` or `save` wrote.
+
+        The drive is that of `drive.toml`, to which limits and all that was not identified may be added; what
+        was identified, with intervals and correlations, is in `identification.json`. The logs are not kept.
+
+        >>> Identification.load("nowhere")
+        Traceback (most recent call last):
+        softstart.errors.InputError: nowhere/identification.json: there is no such file; name a folder that
+        softstart identify --out has written.
+        """
+        path = Path(folder) / FILE
+        try:
+            kept = json.loads(read_text(path))
+            if not isinstance(kept, dict) or kept.get("format") != FORMAT:
+                raise RefusedError(f"it is not of the format {FORMAT}; identify the drive again")
+            estimates = tuple(
+                Estimate(**{f.name: one[f.name] for f in fields(Estimate)}) for one in kept["estimates"]
+            )
+            correlations = np.array(kept["correlations"], dtype=np.float64)
+            _check_kept(estimates, correlations)
+            guess = Drive.from_toml(kept["guess"], where=f"{path}, guess")
+            found = cls(
+                drive=Drive.load(Path(folder) / DRIVE_FILE), guess=guess, logs=(), estimates=estimates,
+                correlations=correlations, ripple=float(kept["ripple"]), searches=int(kept["searches"]),
+                agreed=int(kept["agreed"]), seconds=float(kept["seconds"]),
+                notes=tuple(map(str, kept["notes"])), residuals=(),
+            )  # fmt: skip
+        except RefusedError as refusal:
+            reason = refusal.reason
+            raise InputError(
+                f"{path}: {reason}; name a folder that softstart identify --out has written."
+                if "there is no" in reason
+                else f"{path}: {reason}."
+            ) from None
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise InputError(
+                f"{path}: this is not what softstart identify wrote ({type(error).__name__}: {error}); "
+                "identify the drive again."
+            ) from None
+        found._check(str(Path(folder) / DRIVE_FILE))
         return found
 
     def summary(self) -> dict[str, Any]:
@@ -176,7 +257,7 @@ class Identification:
         return {
             "drive": self.drive.given() | {"name": self.drive.name},
             "estimates": [
-                {**vars(one), "half_width_percent": 100.0 * one.half_width} for one in self.estimates
+                {**plain_fields(one), "half_width_percent": 100.0 * one.half_width} for one in self.estimates
             ],
             "correlations": self.correlations.tolist(),
             "ripple": self.ripple,
@@ -192,7 +273,30 @@ class Identification:
 
     def plot(self) -> Any:
         """The logs beside the start of the drive found, and what is left; a matplotlib figure."""
+        if not self.logs:
+            raise InputError("logs: an identification that was loaded has none; their figure is beside it.")
         return views.figure(self)
 
     def _repr_html_(self) -> str:
         return str(notebook.of_identification(self))
+
+
+def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
+    """That estimates and correlations of a file can be those of an identification."""
+    for one in estimates:
+        numbers = (one.lower, one.value, one.upper)
+        if not all(isinstance(n, int | float) and math.isfinite(n) for n in numbers) or sorted(numbers) != [
+            *numbers
+        ]:
+            raise RefusedError(
+                f"{one.name}: its value {one.value} does not lie in {one.lower} to {one.upper}"
+            )
+        if one.name in PARAMETERS and one.lower * one.upper <= 0.0:
+            raise RefusedError(f"{one.name}: its interval {one.lower} to {one.upper} has 0 in it")
+    size = len(estimates)
+    if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):
+        raise RefusedError(f"the correlations of {size} estimates are a symmetric table of {size} rows")
+    if not (
+        np.allclose(np.diag(correlations), 1.0, atol=1e-6) and np.all(np.abs(correlations) <= 1.0 + 1e-6)
+    ):
+        raise RefusedError("correlations lie between -1 and 1, and are 1 of a number with itself")

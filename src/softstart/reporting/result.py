@@ -25,7 +25,7 @@ from softstart.reporting.limit import Limit, bound_at, limit
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import Sheet, make_sheet
-from softstart.start.comparison import REFERENCE, Comparison, compared, make_controllers
+from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compared, make_controllers
 from softstart.start.fatigue import Fatigue, fatigue
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
@@ -177,7 +177,7 @@ class Report:
 
 
 def report(
-    drive: Drive | str,
+    drive: Drive | Uncertain | str,
     *,
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -190,8 +190,8 @@ def report(
 
     Parameters
     ----------
-    drive : Drive or str
-        One drive, or the name or file of one.
+    drive : Drive, Identification or str
+        One drive, or the name or file of one, or an identification, whose figures have intervals.
     controllers : sequence of str or Controller, optional
         Names, files of tuned gains, or Controller objects. By default all installed controllers that need
         no parameter. `direct` is added as the reference if it is not among them.
@@ -230,6 +230,10 @@ def report(
     ----------
     docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
+    drawn = None
+    if isinstance(drive, Uncertain):
+        drawn = drive.draws()
+        drive = drive.drive
     drive = Drive.load(drive) if isinstance(drive, str) else drive
     steps = _checked(drive, resolution, budget)
     made = _made(controllers, parameters or {})
@@ -245,7 +249,7 @@ def report(
     for number, one in enumerate(made):
         tell(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
         try:
-            row = compared(drive, one, reference)
+            row = compared(drive, one, reference, drawn=drawn)
             maps.append(robustness(drive, one))
             rows.append(row)
         except SimulationError as error:
@@ -253,7 +257,7 @@ def report(
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     used = [one for one in made if label_of(one) not in dict(failed)]
-    comparison = Comparison(drive, tuple(rows))
+    comparison = Comparison(drive, tuple(rows), worst_case=rows[0].worst_case)
     choice = choose(maps, rows, comparison.recommendation)
     sheets = []
     chosen = [one for one in (choice.chosen, choice.ordinary) if one is not None]

@@ -21,7 +21,7 @@ from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.views.printed import digits, fixed, short
-from softstart.views.starts import clipped_torque, position_notes
+from softstart.views.starts import INTERVALS_NOTE, clipped_torque, position_notes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,9 +104,9 @@ def strategies_section(
     for row in rows:
         run, name, means = row.run, label_of(row.run.controller), means_of(row.run.controller)
         cells.append([
-            name, fixed(run.k_dyn, 3), fixed(row.k_dyn_worn_gap, 3), fixed(row.k_dyn_light_load, 3),
-            digits(run.peak_torque), digits(run.start_time), digits(run.settled_time),
-            fixed(row.time_lost, _decimals(run.start_time)),
+            name, fixed(run.k_dyn, 3) + _interval(row), fixed(row.k_dyn_worn_gap, 3),
+            fixed(row.k_dyn_light_load, 3), digits(run.peak_torque), digits(run.start_time),
+            digits(run.settled_time), fixed(row.time_lost, _decimals(run.start_time)),
             fixed(row.settled_lost, _decimals(run.start_time)), str(run.contacts),
             *([row.against_limits] if limited else []), ", ".join(flag.word for flag in row.flags),
         ])  # fmt: skip
@@ -124,6 +124,7 @@ def strategies_section(
         f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below the "
         "target. Time lost: start time, and settled time, beyond that of direct start.",
         *([_limits_note(rows[0])] if limited else []),
+        *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
         *(
             f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
@@ -157,6 +158,14 @@ def strategies_section(
         caption="What each strategy needs", text_columns=(0, 1, 2, 3), strong=strong, class_="words",
     )  # fmt: skip
     return html(first, tag("ul", joined(tag("li", one) for one in notes), class_="notes"), second)
+
+
+def _interval(row: Row) -> str:
+    """The interval of K_dyn, where the drive is known within intervals."""
+    if not row.intervals:
+        return ""
+    lower, upper = row.intervals["k_dyn"]
+    return f" ({fixed(lower, 3)} to {fixed(upper, 3)})"
 
 
 def _limits_note(row: Row) -> str:

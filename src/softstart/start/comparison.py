@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from statistics import NormalDist
+from typing import Any, Final, NamedTuple, Protocol, cast, runtime_checkable
+
+import numpy as np
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
@@ -13,7 +17,7 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.start import metrics
-from softstart.start.recommendation import CASES, Case, Recommendation, Row, recommend
+from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import BaseRun
 from softstart.start.simulation import Startable, models, simulate
 
@@ -23,6 +27,61 @@ DEFAULT_DRIVE = "crane-4amtkf"
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
+LEFT_POSSIBLE = "the upper end of 95 %"  # the case of a row whose drive is known within intervals
+UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque", "start_time")
+FEWEST_KNOWN: Final = 0.9  # of the drives drawn whose start must have such a figure
+
+
+class _Share(NamedTuple):
+    """How much an interval holds, and how many standard deviations its ends are away."""
+
+    inside: float
+    quantile: float
+
+
+INTERVAL: Final = _Share(0.95, NormalDist().inv_cdf(0.975))
+
+
+@runtime_checkable
+class Uncertain(Protocol):
+    """A drive that is known within intervals: `softstart.Identification`."""
+
+    @property
+    def drive(self) -> Drive: ...
+    def draws(self, count: int = ..., seed: int = ...) -> Drive:
+        """Drives that are left possible, as a batch."""
+
+
+def intervals(
+    run: BaseRun,
+    drawn: Drive,
+    controller: str | Controller,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+) -> dict[str, tuple[float, float]]:
+    """The interval of 95 % of K_dyn, peak torque and start time over drives that are left possible.
+
+    The controller is set up as in `run`; each K_dyn refers to the mean torque of its own drive. Where the
+    life of the shaft line is limited, `used_life` in % too.
+    """
+    starts: Any = simulate(drawn, controller, until, fitted_to=fitted_to or run.drive)
+    every = {name: np.asarray(starts[name]) for name in UNCERTAIN_FIGURES}
+    middle = {name: float(getattr(run, name)) for name in UNCERTAIN_FIGURES}
+    if checked_limits(run.drive).life is not None:
+        one = (
+            simulate(each, controller, until, fitted_to=fitted_to or run.drive) for each in drawn.elements()
+        )
+        every["used_life"] = np.array([Case.of(start).used_life for start in one])
+        middle["used_life"] = Case.of(run).used_life
+    found = {}
+    for name, values in every.items():
+        known = values[np.isfinite(values)]
+        if known.size < FEWEST_KNOWN * values.size:
+            found[name] = (math.nan, math.nan)
+            continue
+        lower, upper = np.quantile(known, [0.5 - 0.5 * INTERVAL.inside, 0.5 + 0.5 * INTERVAL.inside])
+        found[name] = (min(float(lower), middle[name]), max(float(upper), middle[name]))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +139,7 @@ class Comparison:
 
 
 def compare(
-    drive: Drive | Startable | str = DEFAULT_DRIVE,
+    drive: Drive | Startable | Uncertain | str = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -92,9 +151,10 @@ def compare(
 
     Parameters
     ----------
-    drive : Drive, Chain or str
+    drive : Drive, Chain, Identification or str
         One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
-        in `simulate_chain`.
+        in `simulate_chain`. With an identification each row has `intervals` over 200 drives that its
+        logs leave possible, and limits must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
         Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
         installed controllers that need no parameter, and those that are given parameters.
@@ -137,6 +197,10 @@ def compare(
     """
     if isinstance(drive, str):
         drive = cast("Drive | Startable", models.load_machine(drive))
+    drawn = None
+    if isinstance(drive, Uncertain):
+        drawn = drive.draws()
+        drive = drive.drive
     if not isinstance(drive, Drive | Startable):
         raise InputError(
             f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
@@ -153,8 +217,8 @@ def compare(
         raise InputError(f"worst_case = {worst_case!r}: there are {named}; () is the drive as it is alone.")
     made = make_controllers(controllers, parameters or {})
     direct = simulate(drive, REFERENCE, until)
-    rows = tuple(compared(drive, one, direct, until, fitted_to, counted) for one in made)
-    return Comparison(drive, rows, fitted_to, counted)
+    rows = tuple(compared(drive, one, direct, until, fitted_to, counted, drawn) for one in made)
+    return Comparison(drive, rows, fitted_to, rows[0].worst_case)
 
 
 def make_controllers(
@@ -191,12 +255,22 @@ def compared(
     until: float | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,
+    drawn: Drive | None = None,
 ) -> Row:
-    """The row of one controller; `direct` is the start that its times are compared with."""
+    """The row of one controller; `direct` is the start that its times are compared with.
+
+    `drawn` are the drives that are left possible, where the drive is known within intervals.
+    """
     run = simulate(drive, controller, until, fitted_to=fitted_to)
     _ = run.settled_time  # now, while what a controller prints is still caught
     cases = {case: changed_case(drive, controller, case, until, fitted_to) for case in CASES}
-    return Row(run, direct, cases, worst_case)
+    if drawn is None:
+        return Row(run, direct, cases, worst_case)
+    found = intervals(run, drawn, controller, until, fitted_to)
+    own = Case.of(run)
+    upper = {name: ends[1] for name, ends in found.items()}
+    cases[LEFT_POSSIBLE] = Case(**{"used_life": own.used_life, **upper})
+    return Row(run, direct, cases, (*worst_case, LEFT_POSSIBLE), intervals=found)
 
 
 def changed_case(

@@ -23,6 +23,7 @@ SLOW: Final = 2.0  # times the time of `direct`
 HARDER: Final = 1.001  # times the K_dyn of `direct`
 BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
 ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
+ENDS: Final = ("lower", "upper")  # of an interval, in names of figures
 CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
 
 
@@ -119,6 +120,7 @@ class Row:
     4 times as wide (`k_dyn_worn_gap`) or the load inertia 0.4 times as large (`k_dyn_light_load`); they
     refer to the nominal drive's mean torque, so the three K_dyn compare torques. NaN where that start fails.
 
+    `intervals` of 95 %, by figure, where the drive is known within intervals only (`compare`).
     `direct` is the start that times are compared with, None where that fails; `worst_case` names those of the
     `cases` that must keep the limits, besides the drive as it is.
     """
@@ -128,6 +130,7 @@ class Row:
     cases: Mapping[str, Case] = field(default_factory=dict)
     worst_case: tuple[str, ...] = CASES
     label: str = ""  # a name of its own in tables
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -210,6 +213,11 @@ class Row:
             "k_dyn_light_load": self.k_dyn_light_load,
             "effort": self.effort.value,
             "flags": [flag.text for flag in self.flags],
+            **{
+                f"{name}_{end}": v
+                for name, ends in self.intervals.items()
+                for end, v in zip(ENDS, ends, strict=True)
+            },
             **({"limits": [one.summary() for one in self.margins(limits)]} if limits else {}),
         }
 

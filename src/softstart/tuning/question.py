@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from numbers import Real
 from typing import Any, Literal, NamedTuple
@@ -310,6 +310,30 @@ def scenarios_of(
     else:
         combined = _sampled(levels, seed, most)
     return ({}, *combined)
+
+
+def scenarios_drawn(drive: Drive, drawn: Drive, scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
+    """The drive as it is, and drives that are left possible, each under the next one of the tolerances.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> scenarios_drawn(crane, crane.replace(gap=[0.4, 0.6]), ({},))
+    ({}, {'gap': Level(factor=0.8, offset=0.0)}, {'gap': Level(factor=1.2, offset=0.0)})
+    """
+    moved = {
+        name: np.asarray(value)
+        for name, value in vars(drawn).items()
+        if name in PARAMETERS and np.ndim(value)
+    }
+    moved = {name: values for name, values in moved.items() if np.any(values != vars(drive)[name])}
+    if both := sorted(set(moved) & {name for one in scenarios for name in one}):
+        raise InputError(f"tolerances: {both[0]} was identified, with an interval of its own; leave it out.")
+    found: list[Scenario] = [{}]
+    for k in range(math.prod(drawn.shape)):
+        levels = {
+            name: Level(float(values[k]) / float(vars(drive)[name]), 0.0) for name, values in moved.items()
+        }
+        found.append({**scenarios[k % len(scenarios)], **levels})
+    return tuple(found)
 
 
 def _levels(name: str, given: Any) -> list[Level]:

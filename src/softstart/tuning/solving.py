@@ -10,6 +10,7 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers
+from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target
 from softstart.tuning.gains import robust_set
 from softstart.tuning.gains import schedule as tuned_schedule
@@ -22,6 +23,7 @@ from softstart.tuning.question import (
     gaps_of,
     inertias_of,
     recipe_of,
+    scenarios_drawn,
     scenarios_of,
 )
 from softstart.tuning.ranges import Free, check_number, ranges_of
@@ -39,11 +41,12 @@ from softstart.tuning.trials import Trials
 from softstart.tuning.work import Log, Progress, Workers, pool_for
 
 GENERATIONS = 40
+DRAWN = 100  # drives that stand for an identification
 SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
 
 def tune(
-    drive: Drive | str,
+    drive: Drive | Uncertain | str,
     controller: str | Controller,
     gaps: Iterable[Any] | Any | None = None,
     inertias: Iterable[Any] | Any | None = None,
@@ -77,8 +80,11 @@ def tune(
 
     Parameters
     ----------
-    drive : Drive or str
-        The nominal drive, or its name or file.
+    drive : Drive, Identification or str
+        The nominal drive, or its name or file. With an identification every candidate is judged by the
+        drive found and by 100 drives that its logs leave possible, drawn from their joint distribution: by
+        the worst of them, or by a `quantile`. Gaps and inertias are then those of the drive, if none are
+        given.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or an object.
     gaps : iterable, optional
@@ -155,11 +161,17 @@ def tune(
     """
     if isinstance(drive, str):
         drive = Drive.load(drive)
+    drawn = None
+    if isinstance(drive, Uncertain):
+        drawn = drive.draws(DRAWN)
+        drive = drive.drive
+        gaps = [drive.gap] if gaps is None else gaps
+        inertias = [drive.load_inertia] if inertias is None else inertias
     if not isinstance(drive, Drive) or drive.shape != ():
         raise InputError("drive: tune takes one Drive, the path of its file, or the name of a shipped one.")
     question = _question(
         drive, controller, gaps, inertias, parameters, free, metric, start_time, tolerances, quantile, base,
-        seed, restarts, population, generations,
+        seed, restarts, population, generations, drawn,
     )  # fmt: skip
     if not (schedule or robust):
         raise InputError("schedule = False, robust = False: nothing is asked for; ask for one of the two.")
@@ -218,6 +230,7 @@ def _question(
     restarts: Any,
     population: Any,
     generations: Any,
+    drawn: Drive | None,
 ) -> Question:
     """All that was given, read; every mistake at once."""
     wrong: list[str] = []
@@ -242,6 +255,8 @@ def _question(
         room = max(SMALLEST_POPULATION, PLACES_A_PARAMETER * len(ranges))
         room = room if population is None else read(_whole, "population", population, 5)
     scenarios = read(scenarios_of, drive, tolerances, first or 0)
+    if drawn is not None and scenarios is not None:
+        scenarios = read(scenarios_drawn, drive, drawn, scenarios)
     if base is not None and (not isinstance(base, Drive) or base.shape != ()):
         wrong.append(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
     if not isinstance(metric, str) and not callable(metric):

@@ -23,6 +23,8 @@ UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
 def headline(found: Identification) -> list[str]:
     """What was identified from what."""
     samples = sum(one.time.size for one in found.logs)
+    if not found.logs:
+        return [f"{found.drive.name}: {found.drive.source}"]
     logs = f"{len(found.logs)} logs" if len(found.logs) > 1 else found.logs[0].name
     known = sum(one.known for one in found.shared)
     return [

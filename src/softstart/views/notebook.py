@@ -40,7 +40,8 @@ def of_optimum(best: Any) -> str:
 def of_identification(found: Any) -> str:
     """An identification: its table, what was left, and the notes."""
     lines = identification.headline(found)
-    return _cell(lines[0], [identification.estimates_table(found)], identification.figure(found), found.notes)
+    figure = identification.figure(found) if found.logs else None
+    return _cell(lines[0], [identification.estimates_table(found)], figure, found.notes)
 
 
 def of_front(front: Any) -> str:

@@ -269,6 +269,18 @@ GENTLE = (
     Figure("K\nJ2 x0.4", lambda row: row.k_dyn_light_load, 3),
     Figure("peak\nN m", lambda row: row.run.peak_torque),
 )
+
+
+def _end(name: str, index: int) -> Callable[[Row], float]:
+    return lambda row: row.intervals[name][index]
+
+
+INTERVALS = (
+    Figure("K_dyn\nfrom", _end("k_dyn", 0), 3),
+    Figure("K_dyn\nto", _end("k_dyn", 1), 3),
+    Figure("peak to\nN m", _end("peak_torque", 1)),
+    Figure("start\ntime to s", _end("start_time", 1)),
+)
 QUICK = (
     Figure("start\ntime s", lambda row: row.run.start_time),
     Figure("settled\ns", lambda row: row.run.settled_time),
@@ -302,7 +314,8 @@ def details(machine: Drive | Chain) -> tuple[Figure, ...]:
 
 def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "") -> Table:
     """The strategies and these figures, by default all; last columns for limits and flags, where needed."""
-    figures = figures or (*GENTLE, *QUICK, *details(rows[0].run.drive))
+    uncertain = INTERVALS if rows[0].intervals else ()
+    figures = figures or (*GENTLE, *uncertain, *QUICK, *details(rows[0].run.drive))
     cells = {"strategy": [row.run.controller_name for row in rows]}
     for figure in figures:
         values = [figure.of(row) for row in rows]
@@ -315,6 +328,12 @@ def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title:
     if any(row.flags for row in rows):
         cells["flag"] = [", ".join(flag.word for flag in row.flags) for row in rows]
     return Table.of(title, cells, ("strategy", "limits", "flag"))
+
+
+INTERVALS_NOTE = (
+    "from, to: 95 % of the drives that the logs leave possible start within them, under the controller as "
+    "it is set up for the drive found; the limits must be kept at the upper end as well."
+)
 
 
 def notes(comparison: Comparison) -> list[str]:
@@ -340,6 +359,8 @@ def notes(comparison: Comparison) -> list[str]:
             "limits: the least margin in the worst of "
             f"{', '.join([f'the {what} as it is', *comparison.worst_case])}."
         )
+    if comparison.rows[0].intervals:
+        found.append(INTERVALS_NOTE)
     found += position_notes([row.run for row in comparison.rows])
     if not chain and comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")

@@ -1,0 +1,225 @@
+"""What an identification is used for: kept on disk, compared, tuned, reported, each with its intervals."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softstart import Drive, Identification, InputError, compare, identify, report, simulate, tune
+from softstart.identification.planning import made_up_log
+from softstart.start.comparison import LEFT_POSSIBLE
+
+TRUTH = Drive.load("crane-4amtkf").replace(
+    damping=0.3,
+    torque_lag=0.004,
+    load_kind="reactive",
+    gap=0.08,
+    start_position="mid-gap",
+    encoder_lines=1024,
+)
+REVERSE = "two levels, then reverse"
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    log = made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
+    return identify(log, TRUTH, searches=1)
+
+
+@pytest.fixture(scope="module")
+def folder(found: Identification, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("found")
+    found.save(path)
+    return path
+
+
+# ---- drives that are left possible ----------------------------------------------------------------------
+
+
+def test_draws_have_the_intervals_and_the_correlations_that_are_shown(found: Identification) -> None:
+    drawn = found.draws(40_000, seed=1)
+    logs = []
+    for one in found.shared:
+        values = np.asarray(getattr(drawn, one.name))
+        ends = np.quantile(values, [0.025, 0.975])
+        width = one.upper - one.lower
+        assert ends == pytest.approx([one.lower, one.upper], abs=0.02 * width), one.name
+        assert np.median(values) == pytest.approx(one.value, abs=0.01 * width)
+        logs.append(np.log(values))
+    size = len(logs)
+    assert np.corrcoef(logs) == pytest.approx(found.correlations[:size, :size], abs=0.03)
+
+
+# ---- on disk --------------------------------------------------------------------------------------------
+
+
+def test_what_was_saved_is_loaded_to_the_bit(found: Identification, folder: Path) -> None:
+    read = Identification.load(folder)
+    assert read.drive == found.drive
+    assert read.guess == found.guess
+    assert read.estimates == found.estimates
+    assert np.array_equal(read.correlations, found.correlations)
+    assert np.array_equal(read.draws(20).gap, found.draws(20).gap)
+    assert (read.ripple, read.searches, read.agreed, read.notes) == (
+        found.ripple, found.searches, found.agreed, found.notes,
+    )  # fmt: skip
+    assert read.k_dyn(["direct"], count=20) == found.k_dyn(["direct"], count=20)
+    assert read.logs == ()
+    with pytest.raises(InputError, match="loaded has none"):
+        read.plot()
+    assert "found" in read._repr_html_()
+
+
+def changed(folder: Path, to: Path, change) -> Path:  # type: ignore[no-untyped-def]
+    kept = json.loads((folder / "identification.json").read_text(encoding="utf-8"))
+    change(kept)
+    (to / "drive.toml").write_bytes((folder / "drive.toml").read_bytes())
+    (to / "identification.json").write_text(json.dumps(kept), encoding="utf-8")
+    return to
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda kept: kept.update(format=7), "not of the format 1"),
+        (lambda kept: kept.pop("estimates"), "not what softstart identify wrote .KeyError: 'estimates'."),
+        (lambda kept: kept["estimates"].pop(), "symmetric table of 7 rows"),
+        (lambda kept: kept["estimates"][3].update(lower=1.0), "gap: its value .* does not lie in 1.0 to"),
+        (lambda kept: kept["estimates"][3].update(upper=math.inf), "gap: its value"),
+        (lambda kept: kept["estimates"][3].update(upper="wide"), "gap: its value"),
+        (lambda kept: kept["estimates"][3].update(lower=-1.0), "gap: its interval -1.0 to .* has 0 in it"),
+        (lambda kept: kept["correlations"][0].__setitem__(0, 3.0), "correlations lie between -1 and 1"),
+        (lambda kept: kept["correlations"][0].__setitem__(1, 0.9999), "symmetric table"),
+        (lambda kept: kept.update(correlations="none"), "not what softstart identify wrote"),
+        (lambda kept: kept.update(guess="[motor]\ninertia = -1"), "guess"),
+    ],
+)
+def test_a_file_that_was_changed_is_refused(folder: Path, tmp_path: Path, change, sentence: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(InputError, match=sentence):
+        Identification.load(changed(folder, tmp_path, change))
+
+
+def test_the_drive_may_get_limits_and_no_other_gap(folder: Path, tmp_path: Path) -> None:
+    changed(folder, tmp_path, lambda kept: None)
+    text = (tmp_path / "drive.toml").read_text(encoding="utf-8")
+    (tmp_path / "drive.toml").write_text(text + '\n[limits]\nshaft_torque = "150 N*m"\n', encoding="utf-8")
+    assert Identification.load(tmp_path).drive.limits.shaft_torque == 150.0
+    wider = Drive.from_toml(text).replace(gap=0.1)
+    (tmp_path / "drive.toml").write_text(wider.to_toml(), encoding="utf-8")
+    with pytest.raises(InputError, match=r"drive.toml: shaft.gap = 0.1, and the logs say 0.0"):
+        Identification.load(tmp_path)
+    assert Identification.load(folder).with_settings(["start.target_speed=60"]).drive.target_speed == 60.0
+    with pytest.raises(InputError, match=r"--set shaft.gap=0.3: shaft.gap = 0.3, and the logs say"):
+        Identification.load(folder).with_settings(["shaft.gap=0.3"])
+
+
+# ---- compare --------------------------------------------------------------------------------------------
+
+
+def test_compare_has_the_intervals_of_single_starts(found: Identification) -> None:
+    table = compare(found, ["direct", "s-curve"])
+    drives = list(found.draws().elements())
+    for row in table.rows:
+        assert row.run.drive == found.drive
+        for name in ("k_dyn", "peak_torque", "start_time"):
+            each = [
+                float(getattr(simulate(one, row.run.controller_name, fitted_to=found.drive), name))
+                for one in drives
+            ]
+            ends = np.quantile(each, [0.025, 0.975])
+            middle = float(getattr(row.run, name))
+            assert row.intervals[name] == pytest.approx(
+                (min(ends[0], middle), max(ends[1], middle)), rel=1e-12
+            )
+        assert row.summary()["k_dyn_upper"] == row.intervals["k_dyn"][1]
+    plain = compare(found.drive, ["direct", "s-curve"])
+    for one, two in zip(table.rows, plain.rows, strict=True):
+        assert one.run.k_dyn == two.run.k_dyn
+        assert two.intervals == {}
+        assert "k_dyn_upper" not in two.summary()
+    assert "K_dyn<br>from" in table._repr_html_()
+    assert "K_dyn<br>from" not in plain._repr_html_()
+
+
+def test_limits_are_kept_at_the_upper_end_or_not_at_all(found: Identification) -> None:
+    row = compare(found, ["direct"]).rows[0]
+    between = 0.5 * (row.run.peak_torque + row.intervals["peak_torque"][1])
+    assert between > row.run.peak_torque
+    limited = found.with_settings([f"limits.shaft_torque={between!r}"])
+    known = compare(limited.drive, ["direct"], worst_case=())
+    assert [one.kept for one in known.rows[0].margins(limited.drive.limits)] == [True]
+    table = compare(limited, ["direct"], worst_case=())
+    (margin,) = table.rows[0].margins(limited.drive.limits)
+    assert not margin.kept
+    assert margin.case == LEFT_POSSIBLE
+    assert margin.value == row.intervals["peak_torque"][1]
+    assert LEFT_POSSIBLE in table.recommendation.text
+
+
+# ---- tune -----------------------------------------------------------------------------------------------
+
+
+def test_tuned_gains_are_the_best_over_the_drives_that_are_left(
+    found: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("softstart.tuning.solving.DRAWN", 20)
+    options = {
+        "free": ["time"],
+        "certified": False,
+        "workers": 1,
+        "schedule": False,
+        "start_time": "1.6x",
+        "generations": 15,
+    }
+    tuned = tune(found, "ramp", restarts=1, **options)  # type: ignore[arg-type]
+    assert len(tuned.question.scenarios) == 21
+    assert tuned.question.cells == ((found.drive.gap, found.drive.load_inertia),)
+    assert tuned.robust is not None
+    gains = tuned.robust.gains
+    # K_dyn over the mean torque of the drive found, as tolerances have it
+    drawn = found.draws(20)
+    direct = np.array([float(simulate(one, "direct").start_time) for one in drawn.elements()])
+
+    def worst(time: float) -> float:
+        own = simulate(found.drive, "ramp", parameters={"time": time})
+        starts = simulate(drawn, "ramp", fitted_to=found.drive, parameters={"time": time}, base=found.drive)
+        late = np.any(np.asarray(starts["start_time"]) > 1.6 * direct * (1.0 + 1e-9))  # type: ignore[index]
+        return math.inf if late else max(float(own.k_dyn), float(np.max(starts["k_dyn"])))  # type: ignore[index]
+
+    best = worst(gains["time"])
+    assert best == pytest.approx(tuned.robust.worst, rel=1e-12)
+    for factor in (0.7, 0.85, 0.95, 0.99, 1.01, 1.05, 1.2):
+        assert worst(factor * gains["time"]) >= best - 1e-12
+    half = tune(found, "ramp", restarts=1, quantile=0.8, **options)  # type: ignore[arg-type]
+    assert half.robust is not None
+    assert half.robust.worst < tuned.robust.worst
+
+
+def test_tolerances_go_with_an_identification_but_not_of_what_it_knows(found: Identification) -> None:
+    options = {"free": ["time"], "certified": False, "workers": 1, "schedule": False}
+    with pytest.raises(InputError, match="stiffness was identified, with an interval of its own"):
+        tune(found, "ramp", tolerances={"stiffness": "10 %"}, **options)  # type: ignore[arg-type]
+    tuned = tune(
+        found, "ramp", tolerances={"starting_torque": [60.0, 62.0]}, restarts=1, generations=1, **options
+    )  # type: ignore[arg-type]
+    levels = [one["starting_torque"].offset for one in tuned.question.scenarios if "starting_torque" in one]
+    assert sorted(set(levels)) == [60.0, 62.0]
+    assert len(levels) > 60  # of 100: every third drive has the torque of the file
+
+
+# ---- report ---------------------------------------------------------------------------------------------
+
+
+def test_a_report_on_an_identification_has_its_intervals(found: Identification) -> None:
+    made = report(found, controllers=["ramp"], budget=0.0)
+    row = made.row("ramp")
+    assert row is not None
+    lower, upper = row.intervals["k_dyn"]
+    text = made.to_html()
+    assert f"({lower:.3f} to {upper:.3f})" in text
+    assert "drives that the logs leave possible" in text
+    assert made.summary()["strategies"][0]["k_dyn_upper"] == made.comparison.rows[0].intervals["k_dyn"][1]
