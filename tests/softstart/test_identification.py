@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.stats import norm
 
 from softstart import Drive, InputError, Log, identify, plan_experiments, simulate
 from softstart.arrays import Vector
@@ -92,6 +93,17 @@ def test_rounding_errors_of_an_encoder_are_correlated_as_its_covariance_says() -
     )
 
 
+@pytest.mark.parametrize("distance", [0.0, 0.08, 0.5, 1.9])
+@pytest.mark.parametrize("spread", [0.01, 0.1, 0.349, 0.351, 0.8])
+def test_an_uncertain_distance_weakens_the_correlation_as_its_mean_says(
+    distance: float, spread: float
+) -> None:
+    normal = norm.ppf((np.arange(400_000) + 0.5) / 400_000)
+    x = np.mod(distance + spread * normal, 1.0)
+    found = rounding(np.array([0.0, distance]), np.array([[0.0], [spread]]), 1.0, 1.0)[0, 1]
+    assert found == pytest.approx(np.mean(1.0 / 12.0 - 0.5 * x * (1.0 - x)), abs=2e-5)
+
+
 def test_a_filter_of_the_speed_is_exact_for_lines() -> None:
     time = np.linspace(0.0, 0.2, 101)
     lag = 0.013
@@ -151,6 +163,12 @@ def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> 
     assert "position" in alone["gap"].reason
     assert any(note.startswith("Unknown: gap") and REVERSE in note for note in alone.notes)
     assert alone["motor_inertia"].known
+
+
+def test_a_log_slower_than_any_standard_experiment_is_told_to_be_quicker() -> None:
+    start = made_up_log(TRUTH, "start", log_period=1e-2, ripple=1.0, seed=4)
+    notes = identify(start, TRUTH, searches=1).notes
+    assert any("take samples more often than each 10 ms" in note for note in notes)
 
 
 def test_friction_of_the_motor_is_named(log: Log) -> None:

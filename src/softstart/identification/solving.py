@@ -286,11 +286,11 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
         reasons.setdefault(one.reason, []).append(one.name)
     told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
     period = float(np.median(np.diff(logs[0].time)))
-    would = [
-        one
-        for one in plan_experiments(drive, log_period=period, optimise=False).experiments
-        if all(one.widths.get(name, math.inf) < math.inf for name in names)
-    ]
+    try:
+        tried = plan_experiments(drive, log_period=period, optimise=False).experiments
+    except InputError:  # the standard experiments are too short for a log as slow as this one
+        return [f"Unknown: {told}. Remedy: take samples more often than each {1e3 * period:.3g} ms."]
+    would = [one for one in tried if all(one.widths.get(name, math.inf) < math.inf for name in names)]
     remedy = "give what is known of it, and leave it out of --free: no standard experiment would tell it"
     if would:
         best = min(would, key=lambda one: max(one.widths[name] for name in names))
