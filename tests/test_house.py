@@ -42,7 +42,8 @@ BUDGET = {
     # the drive from logs of its starts, and experiments that tell it
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
     # 100: identifications kept on disk, drawn by the intervals that are shown
-    "identification": (2355, 7, 2, 0),  # 20: units of another scale
+    # 20: the mean correlation of encoder errors
+    "identification": (2375, 7, 2, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
