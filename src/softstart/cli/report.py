@@ -89,6 +89,12 @@ PRINTING = 120.0  # s for a browser to print a report
     metavar="TIME",
     help="Time for the search of optima where there is no formula, as 60 (s). By default 20 s; 0 for none.",
 )
+@click.option(
+    "--project",
+    metavar="FILE",
+    help="A TOML file with customer, project, author, logo, revisions, approval, sources of the data, paper "
+    "size and decimal sign (docs/howto/read-a-report.md has one).",
+)
 @json_option
 def report(
     *,
@@ -100,6 +106,7 @@ def report(
     params: tuple[str, ...],
     resolution: str | None,
     budget: str | None,
+    project: str | None,
     as_json: bool,
 ) -> None:
     """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
@@ -136,6 +143,9 @@ def report(
     if budget is not None:
         with mistakes.noted():
             asked["budget"] = _seconds(budget)
+    if project is not None:
+        with mistakes.noted():
+            asked["project"] = reporting.Project.load(project)
     mistakes.settle()
     assert one is not None
 
@@ -169,7 +179,7 @@ def _made(
 
         with Attributed():
             made = reporting.report(
-                drive, controllers=controllers, progress=progress, command=command_line(), **asked
+                drive, controllers=controllers, progress=progress, command=command_line(), draw=drawn, **asked
             )
         tell("drawing the figures")
         return made, made.to_html() if drawn else ""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.result import Report, report
 
-__all__ = ["Report", "Resolution", "report"]
+__all__ = ["Project", "Report", "Resolution", "report"]

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from softstart.controller.base import Effort
 from softstart.errors import listed
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
-from softstart.reporting.strategies import Means, means_of
+from softstart.reporting.strategies import realisable
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import SLOW, Recommendation, Row
 from softstart.views.printed import digits, fixed, short
@@ -20,17 +21,22 @@ MOST_MAPS = 4
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One strategy: its start, its map, what it needs, and the verdict of the rule on it."""
+    """One strategy: its start, its map, whether drives can do it, and the verdict of the rule on it."""
 
     row: Row
     map: RobustnessMap
-    means: Means
+    realisable: bool
     verdict: str
 
     @property
     def name(self) -> str:
         """Its name in tables."""
         return self.row.name
+
+    @property
+    def ordinary(self) -> bool:
+        """Whether an inverter does it that offers torque ramps and no more."""
+        return self.row.effort is Effort.RAMPS
 
     @property
     def worst(self) -> float:
@@ -78,7 +84,7 @@ class Choice:
     def mapped(self) -> list[Candidate]:
         """Those whose maps are shown: the two chosen, direct, and others with the least worst case."""
         others = sorted(
-            (one for one in self.candidates if one.means.realisable),
+            (one for one in self.candidates if one.realisable),
             key=lambda one: math.inf if math.isnan(one.worst) else one.worst,
         )
         first = [self.chosen, self.ordinary, self.of(REFERENCE)]
@@ -95,8 +101,8 @@ class Choice:
                     "controller": one.name,
                     "effort": one.row.effort.value,
                     "worst_k_dyn": one.worst,
-                    "realisable": one.means.realisable,
-                    "ordinary": one.means.ordinary,
+                    "realisable": one.realisable,
+                    "ordinary": one.ordinary,
                     "verdict": one.verdict,
                 }
                 for one in self.candidates
@@ -107,18 +113,18 @@ class Choice:
 def choose(maps: Sequence[RobustnessMap], rows: Sequence[Row], recommendation: Recommendation) -> Choice:
     """The verdict on each strategy; nothing is decided here."""
     found = [
-        Candidate(row, one, means_of(row.run.controller), recommendation.verdict(row))
+        Candidate(row, one, realisable(row.run.controller), recommendation.verdict(row))
         for row, one in zip(rows, maps, strict=True)
     ]
     shown = recommendation.shown
     chosen = next((one for one in found if shown and one.row is shown[-1]), None)
-    able = [one for one in found if one.means.ordinary and not one.row.flags and not math.isnan(one.worst)]
+    able = [one for one in found if one.ordinary and not one.row.flags and not math.isnan(one.worst)]
     ramps = [one for one in able if all(margin.kept for margin in one.row.margins(recommendation.limits))]
     ordinary = min(ramps, key=lambda one: one.worst, default=None)
     return Choice(tuple(found), recommendation, chosen, ordinary)
 
 
-def choice_section(choice: Choice) -> Html:
+def choice_section(choice: Choice, answer: str) -> Html:
     """The answer, the rule behind it, and every strategy before it."""
     limits = bool(choice.recommendation.limits)
     cases = choice.candidates[0].row.worst_case
@@ -140,21 +146,21 @@ def choice_section(choice: Choice) -> Html:
     order = sorted(choice.candidates, key=lambda one: (one.row.effort.order, one.row.run.k_dyn))
     rows = [
         [
-            one.name, one.row.effort.meaning, fixed(one.row.run.k_dyn, 3), digits(one.row.run.settled_time),
-            fixed(one.worst, 3), digits(one.map.worst_at[0], 3), digits(one.map.worst_at[1], 3), one.verdict,
+            one.name, one.row.run.controller.summary, one.row.effort.meaning, fixed(one.worst, 3),
+            digits(one.map.worst_at[0], 3), digits(one.map.worst_at[1], 3), one.verdict,
         ]
         for one in order
     ]  # fmt: skip
     strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
     heads = [
-        "strategy", "takes", "K_dyn", "settled, s", "worst K_dyn on the map", "at gap, rad", "and J2, kg m²",
+        "strategy", "what it does", "takes", "worst K_dyn on the map", "at gap, rad", "and J2, kg m²",
         "verdict",
     ]  # fmt: skip
     return html(
-        tag("p", choice.recommendation.text),
+        tag("p", answer),
         tag("p", rule + never),
         table(
             heads, rows, caption="Every strategy before the rule, in the order of effort",
-            text_columns=(0, 1, 7), strong=strong, class_="names",
+            text_columns=(0, 1, 2, 6), strong=strong, class_="words",
         ),
     )  # fmt: skip

@@ -4,55 +4,84 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from softstart.reporting.choice import Candidate, choice_section
+from softstart.drive import Drive
+from softstart.errors import listed
+from softstart.reporting.choice import Candidate, Choice, choice_section
 from softstart.reporting.drive_section import drive_section
+from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
 from softstart.reporting.limit import limit_section
-from softstart.reporting.markup import Figures, Html, css_string, html, joined, table, tag
+from softstart.reporting.markup import Figures, Html, css_string, html, joined, table, tag, with_comma
+from softstart.reporting.project import Project
 from softstart.reporting.result import Provenance, Report
-from softstart.reporting.robustness import life_chapter, robustness_section
+from softstart.reporting.robustness import GAPS, INERTIAS, life_chapter, maps_picture, robustness_section
 from softstart.reporting.sheet import sheet_section
-from softstart.reporting.strategies import strategies_section, traces_section
-from softstart.start.comparison import REFERENCE
-from softstart.start.recommendation import Row
-from softstart.views.printed import digits, fixed, percent, short
+from softstart.reporting.strategies import strategies_section, trace_groups, traces_picture, traces_section
+from softstart.start.comparison import Comparison
+from softstart.views.drives import POSITIONS
+from softstart.views.printed import digits, fixed, short
 
-SAME = 0.005  # a peak within this share of that of direct is no saving
-MENTIONED = 3  # strategies that are gentler than direct start and out
-MUCH = 0.75  # times the K_dyn of the recommended strategy, here and at worst
+SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
-BREAKS = ("strategies", "traces", "limit", "robustness")  # sections that begin a printed page
+BREAKS = ("recommendation", "sheets")  # begin a printed page
 LONGEST = 70  # letters of a name in the head of a page
 GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in the file, nothing is loaded
 
 
+def pictures(choice: Choice, comparison: Comparison) -> dict[str, Html]:
+    """The figures that do not wait for the limit, by their keys: what is drawn while that is looked for."""
+    with _any_script():
+        made = {
+            key: traces_picture(key, comparison.rows, some) for key, some, _ in trace_groups(comparison.rows)
+        }
+        made["before-after"] = before_after_picture(before_and_after(choice, comparison))
+        made["maps"] = maps_picture(comparison.drive, choice.mapped)
+        return made
+
+
+@contextmanager
+def _any_script() -> Iterator[None]:
+    """A name may have letters that the font of the figures has not."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        yield
+
+
 def document(report: Report) -> str:
     """The whole file."""
-    with warnings.catch_warnings():  # a name may have letters that the font of the figures has not
-        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
-        return _document(report)
+    with _any_script():
+        page = _document(report)
+    return with_comma(page) if report.project.decimal == "comma" else page
 
 
 def _document(report: Report) -> str:
-    drive, choice, rows, figures = report.drive, report.choice, report.comparison.rows, Figures()
+    drive, choice, rows, project = report.drive, report.choice, report.comparison.rows, report.project
+    figures = Figures(report.pictures)
     chosen = [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
     best = choice.chosen.name if choice.chosen else ""
-    maps = [(one.name, one.map) for one in choice.mapped]
+    first = first_page(report, figures)
     sections: list[tuple[str, str, Html]] = [
-        ("drive", "The drive", drive_section(drive, figures)),
+        ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
         ("strategies", "The strategies compared", strategies_section(drive, rows, chosen, report.failed)),
-        ("traces", "Torques and speeds of each start", traces_section(rows, figures)),
+        ("drive", "The drive", drive_section(drive, project, figures)),
+        ("traces", "Torques of each start", traces_section(rows, figures)),
         ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
-        ("robustness", "When the gap wears and the load changes", robustness_section(drive, maps, figures)),
-        ("recommendation", "The recommendation, and why", choice_section(choice)),
+        (
+            "robustness",
+            "When the gap wears and the load changes",
+            robustness_section(drive, choice.mapped, figures),
+        ),
         (
             "sheets",
             "Parameter sheets for the inverter",
             sheet_section(drive, report.sheets, report.resolution, best, choice.role),
         ),
         *life_chapter(report.lives, figures),
-        ("provenance", "Where this report comes from", provenance_section(report.provenance)),
+        ("validity", "What this report assumes, and where it holds", validity_section(drive, project)),
+        ("provenance", "About this document", provenance_section(report.provenance, project)),
     ]
     name, made = str(drive.name), report.provenance.made
     contents = tag(
@@ -61,16 +90,20 @@ def _document(report: Report) -> str:
         tag("ol", joined(tag("li", tag("a", title, href=f"#{key}")) for key, title, _ in sections)),
         aria_labelledby="contents",
     )
+    heads = [*project.lines, ("Date", made)]
+    names = [tag("div", tag("dt", what), tag("dd", value)) for what, value in heads]
     body = tag(
         "main",
         tag(
             "header",
-            tag("p", "Soft start of a drive with a gap in its transmission", class_="kind"),
+            tag("img", src=project.logo, alt=f"Logo of {project.company or project.author}")
+            if project.logo
+            else None,
+            tag("p", "Soft start of a drive with backlash in its transmission", class_="kind"),
             tag("h1", name),
-            tag("p", f"Report of softstart {report.provenance.softstart}, {made}", class_="made"),
+            tag("dl", *names, class_="made"),
         ),
-        tag("section", tag("p", answer(report)), class_="answer", aria_label="The answer"),
-        _tiles(report),
+        first,
         contents,
         joined(
             tag(
@@ -83,68 +116,89 @@ def _document(report: Report) -> str:
             for number, (key, title, content) in enumerate(sections, start=1)
         ),
     )
+    guard = GUARD + "; img-src data:" if project.logo else GUARD
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=GUARD),
+        tag("meta", http_equiv="Content-Security-Policy", content=guard),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light"),
         tag("title", f"{name}: soft start report"),
-        tag("style", Html(style(name, made))),
+        tag("style", Html(style(name, " · ".join(filter(None, (project.number, made))), project.paper))),
     )
     return html(Html("<!DOCTYPE html>\n"), tag("html", head, "\n", tag("body", body), lang="en"), "\n")
 
 
-def _tiles(report: Report) -> Html | None:
-    """The four numbers that matter."""
-    best, direct = report.choice.chosen, report.row(REFERENCE)
-    if best is None or direct is None:
-        return None
-    run, hard = best.row.run, direct.run
-    tiles = [
-        (report.choice.role, best.name, f"worst K_dyn on the map {fixed(best.worst, 3)}"),
-        ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}"),
-        (
-            "peak shaft torque",
-            f"{digits(run.peak_torque)} N m",
-            f"direct {digits(hard.peak_torque)} N m, saved {share_saved(report, best.row)}",
-        ),
-        (
-            "start time",
-            f"{digits(run.start_time)} s",
-            f"direct {digits(hard.start_time)} s, lost {percent(run.start_time / hard.start_time - 1.0)}",
-        ),
-    ]
-    return tag(
-        "dl",
-        *(
-            tag("div", tag("dt", what), tag("dd", value, tag("small", beside)))
-            for what, value, beside in tiles
-        ),
-        class_="tiles",
+def validity_section(drive: Drive, project: Project) -> Html:
+    """The assumptions behind all figures, and where their data are from."""
+    damping = (
+        f"Damping of the shaft: {short(float(drive.d))} N m s/rad, proportional to the speed of its twist."
+        if drive.d
+        else "No damping: oscillations do not die out, as those of a real shaft do."
     )
+    kind = (
+        "the load torque acts always, also at rest (a hanging load)"
+        if drive.load_kind == "active"
+        else "the load torque is friction: it holds the load at rest and opposes its motion"
+    )
+    low, high = short(float(drive.minimum_torque)), short(float(drive.maximum_torque))
+    notes = [
+        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model; for "
+        "several gaps or masses use softstart compare with a chain.",
+        f"The motor is a source of torque from {low} to {high} N m that follows its demand "
+        + (f"with a lag of {short(1e3 * float(drive.torque_lag))} ms" if drive.torque_lag else "without lag")
+        + ". Currents, fluxes and a motor started directly at the mains are not in the model.",
+        f"Contact law: {drive.contact_law}; {damping[0].lower()}{damping[1:]}",
+        f"Load: {kind}; its torque and inertia are constant during the start.",
+        f"The start begins {POSITIONS[drive.start_position]}." if isinstance(drive.start_position, str)
+        else f"The start begins at a twist of {short(float(drive.theta0))} rad.",
+        f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and from "
+        f"{short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values computed. "
+        "Other stiffness, damping or load torque was not examined.",
+        "The equations are solved in closed form from event to event; peaks are located, not read off a "
+        "grid. The figures are as good as the data: check gap, stiffness and inertias first where "
+        "measured starts differ.",
+    ]  # fmt: skip
+    guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
+    if guessed:
+        notes.append(
+            f"Guessed, so to be checked before the values of the sheets are used: {listed(guessed)}."
+        )
+    elif not project.sources:
+        notes.append(
+            "Where each value of the drive is from (data sheet, drawing, measured, identified, guessed) is "
+            "not stated; [[source]] in the file of --project does."
+        )
+    return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
 
 
-def provenance_section(about: Provenance) -> Html:
-    """Versions, date, command, and the drive's file with all changes."""
+def provenance_section(about: Provenance, project: Project) -> Html:
+    """Revisions, approval, versions, date, command, and the drive's file with all changes."""
+    signed = [["made by", project.author], ["checked by", project.checked], ["approved by", project.approved]]
+    signed = [[what, who or "\N{EN DASH}", ""] for what, who in signed]
     rows = [
         ["date", about.made],
-        ["softstart", about.softstart],
-        ["Python", about.python],
-        ["libraries", ", ".join(f"{name} {version}" for name, version in about.libraries)],
+        ["softstart", tag("code", about.softstart)],
+        ["Python", tag("code", about.python)],
+        ["libraries", tag("code", ", ".join(f"{name} {version}" for name, version in about.libraries))],
     ]
+    revisions = [[one.number, one.date, one.author, one.change] for one in project.revisions]
     return html(
+        table(["revision", "date", "author", "change"], revisions, caption="Revisions", text_columns=range(4))
+        if revisions
+        else None,
+        table(
+            ["", "name, date", "signature"],
+            signed,
+            caption="Approval",
+            text_columns=range(3),
+            class_="signed",
+        ),
         table(["what", "which"], rows, caption="Made with", text_columns=(0, 1)),
         tag("p", "The command that made this report:", class_="lead") if about.command else None,
         tag("pre", about.command, class_="command") if about.command else None,
         tag("p", "The drive as a file for softstart, with all changes (drive.toml):", class_="lead"),
         tag("pre", about.drive_toml),
-        tag(
-            "p",
-            "All starts are computed in closed form from event to event. The figures are as good as the "
-            "data of the "
-            "drive: check gap, stiffness and inertias first where measured starts differ.",
-        ),
     )
 
 
@@ -220,15 +274,12 @@ def _after_rounding(report: Report, one: Candidate) -> str:
     return ""
 
 
-def share_saved(report: Report, row: Row) -> str:
-    """What a strategy saves of the peak of direct."""
-    direct = report.row(REFERENCE)
-    saved = 1.0 - row.run.peak_torque / direct.run.peak_torque if direct else math.nan
-    return percent(saved, 0 if abs(saved) >= 0.1 else 1)
-
-
-def style(header: str, footer: str) -> str:
+def style(header: str, footer: str, paper: str) -> str:
     """The style sheet with what stands at the head and the foot of each printed page."""
     header = header if len(header) <= LONGEST else header[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
     sheet = Path(__file__).with_name("style.css").read_text("utf-8")
-    return sheet.replace("HEADER", css_string(header)).replace("FOOTER", css_string(footer))
+    return (
+        sheet.replace("HEADER", css_string(header))
+        .replace("FOOTER", css_string(footer))
+        .replace("PAPER", paper)
+    )

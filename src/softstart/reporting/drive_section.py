@@ -12,6 +12,7 @@ from functools import partial
 
 from softstart.drive import PARAMETERS, Drive
 from softstart.reporting.markup import Figures, Html, html, table, tag
+from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
 from softstart.start import metrics
 from softstart.views import chain_schemes
@@ -30,9 +31,8 @@ _line = partial(chain_schemes.line, colour=_INK, width=2)
 _polyline = partial(chain_schemes.polyline, colour=_INK, width=2)
 
 
-def drive_section(drive: Drive, figures: Figures) -> Html:
+def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
     """Scheme, data, and what follows from them."""
-    prefix = figures.prefix()
     caption = (
         "The drive, everything brought to the motor shaft. The height of a disc goes with the fourth root "
         "of its "
@@ -41,17 +41,19 @@ def drive_section(drive: Drive, figures: Figures) -> Html:
         "the starting torque. The shaft carries torque only while the gap is closed on a flank."
     )
     return html(
-        figures.ready(scheme(drive, prefix), caption),
-        tag("h3", "Data", class_="page"),
-        _data(drive),
+        figures.shown("scheme", lambda: scheme(drive, "scheme"), caption),
+        tag("h3", "Data"),
+        _data(drive, project),
         tag("p", "Source of the data: ", str(drive.source), ".") if drive.source else None,
         tag("h3", "What follows from them"),
         _derived(drive),
     )
 
 
-def _data(drive: Drive) -> Html:
-    rows = []
+def _data(drive: Drive, project: Project) -> Html:
+    """What is known of the drive and from where; in a sentence what is at its default."""
+    rows, defaults = [], []
+    sourced = bool(project.sources)
     for parameter in PARAMETERS.values():
         value = getattr(drive, parameter.name)
         if value is None or value == "" or parameter.name in HIDDEN:
@@ -65,6 +67,11 @@ def _data(drive: Drive) -> Html:
             other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif parameter.unit == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
+        source = project.source_of(parameter.path)
+        if value == parameter.default and not source:
+            shown = f"{text} {unit(parameter.unit)}".strip()
+            defaults.append(f"{parameter.meaning} {shown}")
+            continue
         rows.append(
             [
                 parameter.meaning,
@@ -72,12 +79,19 @@ def _data(drive: Drive) -> Html:
                 text,
                 "" if isinstance(value, str) else unit(parameter.unit).replace(" ", "\N{NO-BREAK SPACE}"),
                 other,
+                *([source or "not stated"] if sourced else []),
             ]
         )
-    return table(
-        ["parameter", "symbol", "value", "unit", "that is"], rows,
-        caption="Data of the drive, at the motor shaft", text_columns=(0, 1, 3),
-    )  # fmt: skip
+    heads = ["parameter", "symbol", "value", "unit", "that is", *(["source"] if sourced else [])]
+    return html(
+        table(
+            heads,
+            rows,
+            caption="Data of the drive, at the motor shaft",
+            text_columns=(0, 1, 3, 5)[: 3 + sourced],
+        ),
+        tag("p", f"At their defaults: {'; '.join(defaults)}.", class_="small") if defaults else None,
+    )
 
 
 def _derived(drive: Drive) -> Html:

@@ -25,7 +25,7 @@ from softstart.processes import DiedError, Worker
 from softstart.processes import Tell as WorkerTell
 from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
-from softstart.reporting.markup import Figures, Html, html, joined, table, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
 from softstart.reporting.strategies import GREY, SMALL, WIDE, name_in_figure, ordered
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import Row
@@ -123,11 +123,19 @@ def bound_at(drive: Drive, start_time: float) -> float | None:
     return bound if math.isfinite(bound) else None
 
 
-def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, tell: Tell) -> Limit:
+def limit(
+    drive: Drive,
+    own: Sequence[float],
+    reference: float,
+    budget: float,
+    tell: Tell,
+    meanwhile: Callable[[], object] = lambda: None,
+) -> Limit:
     """The limit for start times around those of the strategies, `own`, of which the first matter most.
 
     Where there is a formula the optima are computed at once; the others, by linear program or collocation,
     in a process of their own that is ended after `budget` s. `reference` is the start time of direct, s.
+    `meanwhile` is called once while that process computes.
     """
     try:
         Problem(drive, 1.0, TERMINAL)
@@ -147,7 +155,7 @@ def limit(drive: Drive, own: Sequence[float], reference: float, budget: float, t
     known: list[GentleStart] = []
     if left and budget > 0.0:
         began = time.monotonic()
-        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, tell)
+        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, tell, meanwhile)
         tell(1.0, "looking for gentle starts")
         best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
         order = sorted(left, key=lambda t: t in best)  # those without an optimum first
@@ -177,16 +185,22 @@ def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint],
     return points, left
 
 
-def _in_own_process(drive: Drive, asked: Sequence[float], budget: float, tell: Tell) -> list[FrontPoint]:
+def _in_own_process(
+    drive: Drive, asked: Sequence[float], budget: float, tell: Tell, meanwhile: Callable[[], object]
+) -> list[FrontPoint]:
     """Optima by the other methods, as many as are found in time."""
     points: list[FrontPoint] = []
     worker = Worker(quiet=True)
     try:
         worker.submit(optima, drive, asked, tells=True)
         began = time.monotonic()
-        while (spent := time.monotonic() - began) < budget:
-            tell(spent / budget, f"looking for the optimum, at most {budget:g} s")
-            message = worker.receive(min(POLL, budget - spent))
+        meanwhile()
+        while True:
+            spent = time.monotonic() - began
+            tell(min(spent / budget, 1.0), f"looking for the optimum, at most {budget:g} s")
+            message = worker.receive(min(POLL, max(budget - spent, 0.0)))
+            if message is None and spent >= budget:
+                break
             if message is not None and message.kind != "part":
                 break  # it is done
             if message is not None:
@@ -231,7 +245,9 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
         for one in choice.candidates
     )
     return html(
-        figures.drawn(limit_figure(choice, limit), title, caption) if choice.of(REFERENCE) else None,
+        figures.shown("limit", lambda: inlined(limit_figure(choice, limit), "limit", title), caption)
+        if choice.of(REFERENCE)
+        else None,
         _how_near(drive, choice, limit),
         tag("ul", joined(tag("li", one) for one in _notes(drive, choice, limit)), class_="notes"),
     )
@@ -424,9 +440,10 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
             )  # fmt: skip
         for index, one in enumerate(placed):
             best = one is choice.chosen or one is choice.ordinary
-            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], MARKERS[index % 8],
-                      ms=8 if best else 6.5, mfc=COLOURS[(index + 1) % 8] if best else "white", mew=1.6,
-                      color=COLOURS[(index + 1) % 8], zorder=4)  # fmt: skip
+            colour = COLOURS[(index + 1) % len(COLOURS)]
+            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], MARKERS[index % len(MARKERS)],
+                      ms=8 if best else 6.5, mfc=colour if best else "white", mew=1.6,
+                      color=colour, zorder=4)  # fmt: skip
         axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
         low, high = min(values), max(values)
         if high > 4.0 * low:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 else:
     mpl = late("matplotlib")
 
-VOID = frozenset({"meta", "br", "hr", "col"})
+VOID = frozenset({"meta", "br", "hr", "col", "img"})
 Part = str | None
 
 
@@ -98,32 +98,28 @@ def css_string(text: str) -> str:
 
 
 class Figures:
-    """Numbers the figures of one report in the order in which they are made, with ids of their own."""
+    """Numbers the figures of one report in their order, and keeps pictures that were drawn beforehand."""
 
-    def __init__(self) -> None:
+    def __init__(self, drawn: Mapping[str, Html] | None = None) -> None:
         self.count = 0
+        self.ready = dict(drawn or {})
 
-    def prefix(self) -> str:
-        """What the ids of the next figure begin with."""
+    def shown(self, key: str, picture: Callable[[], Html], caption: Part) -> Html:
+        """The picture of this key, made now unless it was drawn before, with number and caption."""
         self.count += 1
-        return f"figure-{self.count}"
-
-    def drawn(self, figure: Any, title: str, caption: Part) -> Html:
-        """A figure of matplotlib with its caption; `title` describes it to those who cannot see it."""
-        return self.ready(inlined(figure, self.prefix(), title), caption)
-
-    def ready(self, picture: Html, caption: Part) -> Html:
-        """A picture that was made with the last prefix, with its caption."""
-        return tag("figure", picture, tag("figcaption", tag("b", f"Figure {self.count}. "), caption))
+        if key not in self.ready:
+            self.ready[key] = picture()
+        number = tag("b", f"Figure {self.count}. ")
+        return tag("figure", self.ready[key], tag("figcaption", number, caption))
 
 
-def inlined(figure: Any, prefix: str, title: str) -> Html:
-    """The figure as an <svg> element whose ids begin with `prefix`; text is drawn as paths.
+def inlined(figure: Any, key: str, title: str) -> Html:
+    """The figure as an <svg> element whose ids begin with `key`; its letters are those of the page.
 
     The same figure gives the same text. Screen readers read `title` instead of it.
     """
     buffer = io.StringIO()
-    with drawing(), mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": prefix}):
+    with drawing(), mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": key}):
         figure.savefig(
             buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
         )
@@ -133,12 +129,28 @@ def inlined(figure: Any, prefix: str, title: str) -> Html:
     inner = whole[whole.index(">", whole.index("<svg")) + 1 : whole.rindex("</svg>")]
     # a <style> would hold for the whole page; comments repeat every text
     inner = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", "", inner, flags=re.DOTALL)
-    inner = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', inner)
-    inner = re.sub(r'(?:xlink:)?href="#([^"]+)"', rf'href="#{prefix}-\1"', inner)
-    inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", inner)
+    inner = re.sub(r'\bid="([^"]+)"', rf'id="{key}-\1"', inner)
+    inner = re.sub(r'(?:xlink:)?href="#([^"]+)"', rf'href="#{key}-\1"', inner)
+    inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{key}-\1)", inner)
+    inner = re.sub(r"font-family: [^;\"]*(; )?", "", inner)
     inner = re.sub(r"\s*\n\s*", "\n", inner)
-    head = tag("title", title, id=f"{prefix}-title")
+    head = tag("title", title, id=f"{key}-title")
     return Html(
-        f'<svg class="plot" viewBox="{box[1]}" role="img" aria-labelledby="{prefix}-title">'
-        f"{head}{inner}</svg>"
+        f'<svg class="plot" viewBox="{box[1]}" role="img" aria-labelledby="{key}-title">{head}{inner}</svg>'
     )
+
+
+_SKIPPED = re.compile(r"(<(pre|code|style|title)\b.*?</\2>|<[^>]*>)", re.DOTALL)
+_DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
+
+
+def with_comma(page: str) -> str:
+    """A page with decimal commas in its text; commands, files and version numbers stay as they are.
+
+    >>> with_comma("<p>0.981 in 1.5 s, softstart 0.1.0</p><code>04.005</code>")
+    '<p>0,981 in 1,5 s, softstart 0.1.0</p><code>04.005</code>'
+    """
+    parts = _SKIPPED.split(page)  # text, what is skipped, name of its element, text, ...
+    texts = (_DECIMAL.sub(r"\1,\2", text) for text in parts[::3])
+    skipped = [*parts[1::3], ""]
+    return "".join(text + other for text, other in zip(texts, skipped, strict=True))

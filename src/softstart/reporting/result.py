@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -22,11 +23,13 @@ from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.reporting.choice import Choice, choose
 from softstart.reporting.limit import Limit, bound_at, limit
+from softstart.reporting.markup import Html
+from softstart.reporting.project import Project
 from softstart.reporting.resolution import Resolution
 from softstart.reporting.robustness import robustness
 from softstart.reporting.sheet import Sheet, make_sheet
 from softstart.start.comparison import REFERENCE, Comparison, Uncertain, compared, make_controllers
-from softstart.start.fatigue import Fatigue, fatigue
+from softstart.start.fatigue import DEFAULT_SLOPE, Fatigue, fatigue
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 
@@ -82,6 +85,10 @@ class Report:
         The steps in which the inverter can be set.
     provenance : Provenance
         Versions, date, drive file and command.
+    project : Project
+        Customer, author, revisions, sources of the data; see `Project`.
+    pictures : mapping of str to str
+        Figures that were drawn while the limit was looked for.
 
     Examples
     --------
@@ -105,6 +112,8 @@ class Report:
     sheets: tuple[Sheet, ...]
     resolution: Resolution
     provenance: Provenance
+    project: Project = field(default_factory=Project)
+    pictures: Mapping[str, Html] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line that says which strategy came out."""
@@ -129,6 +138,29 @@ class Report:
             return fatigue([row.run for row in self.comparison.rows])
         except (InputError, SimulationError) as error:
             return str(error)
+
+    @cached_property
+    def life_gain(self) -> float | None:
+        """Life of the shaft line under the chosen strategy over that of `direct`; None where none is known.
+
+        Without `[limits.fatigue]` the slope of the S-N curve is that of `softstart fatigue`.
+        """
+        best, direct = self.choice.chosen, self.row(REFERENCE)
+        if best is None or direct is None or not self.drive.d:
+            return None
+        if isinstance(self.lives, Fatigue):
+            lives = {one.run.controller_name: one.relative for one in self.lives.rows}
+            return lives.get(best.row.run.controller_name)
+        try:
+            return fatigue(best.row.run).rows[0].relative
+        except (InputError, SimulationError):
+            return None
+
+    @property
+    def life_slope(self) -> float:
+        """Slope of the S-N curve behind `life_gain`; NaN where it is a curve of several points."""
+        curve = self.drive.limits.fatigue
+        return DEFAULT_SLOPE if curve is None else math.nan if curve.slope is None else curve.slope
 
     def gentlest_known(self, row: Row) -> float | None:
         """Least K_dyn of all starts that this report knows and that take no longer than this one."""
@@ -161,6 +193,7 @@ class Report:
             "maps": {one.name: one.map.summary() for one in self.choice.candidates},
             "limit": self.limit.summary(),
             "life": self.lives.summary() if isinstance(self.lives, Fatigue) else self.lives,
+            "life_gain": self.life_gain,
             "sheets": [sheet.summary() for sheet in self.sheets],
             "provenance": self.provenance.summary(),
         }
@@ -185,6 +218,8 @@ def report(
     budget: float = BUDGET,
     progress: Progress | None = None,
     command: str = "",
+    project: Project | str | Path | None = None,
+    draw: bool = False,
 ) -> Report:
     """Compute everything that a customer asks about the start of a drive.
 
@@ -205,6 +240,10 @@ def report(
         Called with the share that is done (0 to 1) and what is being computed.
     command : str, optional
         The command that makes the same report, for the provenance.
+    project : Project, str or Path, optional
+        Customer, author, revisions, sources of the data, paper size and decimal sign, or their TOML file.
+    draw : bool, optional
+        Draw most figures while the limit is looked for, so that `to_html` is quick.
 
     Returns
     -------
@@ -236,6 +275,7 @@ def report(
         drive = drive.drive
     drive = Drive.load(drive) if isinstance(drive, str) else drive
     steps = _checked(drive, resolution, budget)
+    about = project if isinstance(project, Project) else Project.load(project) if project else Project()
     made = _made(controllers, parameters or {})
 
     def tell(share: float, what: str) -> None:
@@ -269,13 +309,24 @@ def report(
     direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
     reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
     tell(0.5, "looking for the limit")
+    pictures: dict[str, Html] = {}
+
+    def meanwhile() -> None:
+        if draw:
+            pictures.update(document.pictures(choice, comparison))
+
     found = limit(
-        drive, [*times, *reached], direct, budget, lambda share, what: tell(0.5 + 0.5 * share, what)
+        drive,
+        [*times, *reached],
+        direct,
+        budget,
+        lambda share, what: tell(0.5 + 0.5 * share, what),
+        meanwhile,
     )
     tell(1.0, "done")
     return Report(
         drive, comparison, tuple(failed), found, choice, tuple(sheets), steps,
-        provenance(drive, command),
+        provenance(drive, command), about, pictures,
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from softstart.arrays import Matrix
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.late import late
-from softstart.reporting.markup import Figures, Html, html, table, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
 from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -74,6 +74,18 @@ class RobustnessMap:
         }
 
 
+class Mapped(Protocol):
+    """A strategy with its map."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def map(self) -> RobustnessMap:
+        """Its map."""
+
+
 def axes_of(drive: Drive) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Gaps (rad) and load inertias (kg m2) of the map; a drive without a gap has one row.
 
@@ -97,35 +109,37 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
     return RobustnessMap(gaps, inertias, np.where(np.isnan(time), np.nan, k), time)
 
 
-def robustness_section(drive: Drive, shown: Sequence[tuple[str, RobustnessMap]], figures: Figures) -> Html:
-    """The maps of strategies, by name, in one scale of colours."""
-    first = shown[0][1]
-    gap, inertia = float(drive.gap), float(drive.J2)
+def robustness_section(drive: Drive, shown: Sequence[Mapped], figures: Figures) -> Html:
+    """The maps of strategies, in one scale of colours."""
+    first = shown[0].map
     gaps = f"gaps from {digits(first.gaps[0], 3)} to {digits(first.gaps[-1], 3)} rad"
-    if gap == 0.0:
+    if drive.gap == 0.0:
         gaps = "no gap (the drive has none, so the maps have one row and say nothing about play)"
     text = (
         f"Gears wear and loads change. Each strategy was set up once, for the drive as it is, and then "
-        f"started at "
-        f"{gaps} and load inertias from {short(first.inertias[0])} to {short(first.inertias[-1])} kg m². "
-        f"K_dyn refers "
-        "to the drive as it is everywhere, so the numbers compare shaft torques."
-    )
-    nominal = (
-        min(first.gaps, key=lambda v: abs(v - gap)),
-        min(first.inertias, key=lambda v: abs(v - inertia)),
-    )
-    title = "K_dyn over gap and load inertia: " + "; ".join(
-        f"{name}, worst {fixed(one.worst, 3)} at gap {short(one.worst_at[0])} rad and J2 "
-        f"{short(one.worst_at[1])} kg m²"
-        for name, one in shown
+        f"started at {gaps} and load inertias from {short(first.inertias[0])} to {short(first.inertias[-1])} "
+        "kg m². K_dyn refers to the drive as it is everywhere, so the numbers compare shaft torques."
     )
     caption = (
         "K_dyn over gap and load inertia, all maps in one scale of colours, dark is gentle. Framed: the "
-        "drive as it "
-        "is. Grey: the load does not reach its target speed."
+        "drive as it is. Grey: the load does not reach its target speed."
     )
-    return html(tag("p", text), figures.drawn(maps_figure(shown, nominal), title, caption))
+    return html(tag("p", text), figures.shown("maps", lambda: maps_picture(drive, shown), caption))
+
+
+def maps_picture(drive: Drive, shown: Sequence[Mapped]) -> Html:
+    """The maps as an <svg> element."""
+    first = shown[0].map
+    nominal = (
+        min(first.gaps, key=lambda v: abs(v - float(drive.gap))),
+        min(first.inertias, key=lambda v: abs(v - float(drive.J2))),
+    )
+    title = "K_dyn over gap and load inertia: " + "; ".join(
+        f"{one.name}, worst {fixed(one.map.worst, 3)} at gap {short(one.map.worst_at[0])} rad and J2 "
+        f"{short(one.map.worst_at[1])} kg m²"
+        for one in shown
+    )
+    return inlined(maps_figure([(one.name, one.map) for one in shown], nominal), "maps", title)
 
 
 def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[str, str, Html]]:
@@ -141,8 +155,10 @@ def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[st
         content = html(
             tag("p", lives.conclusion(found)),
             table(headings, shown.rows, caption="Life of the shaft line under each strategy"),
-            figures.drawn(
-                lives.fatigue_figure(found), title, f"{title}. Rainflow cycles of the shaft torque."
+            figures.shown(
+                "life",
+                lambda: inlined(lives.fatigue_figure(found), "life", title),
+                f"{title}. Rainflow cycles of the shaft torque.",
             ),
             *(tag("p", one) for one in lives.notes(found)),
         )

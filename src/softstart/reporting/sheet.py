@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError, listed
-from softstart.reporting.markup import Html, html, joined, table, tag
+from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, kind_of
 from softstart.start import metrics
@@ -308,7 +310,47 @@ def sheet_section(
             "may hide.",
         ),
         joined(_sheet(sheet, role if sheet.name == chosen else "", drive) for sheet in sheets),
+        _families(sheets, drive),
     )
+
+
+FUNCTIONS = {
+    "limit": "torque limit",
+    "braking": "torque limit, generating",
+    "reference": "torque reference",
+    "preload": "torque before the brake opens, and its ramp",
+}
+
+
+def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
+    """Where inverters have what the sheets name: names as public manuals print them, and no others."""
+    text = (Path(__file__).with_name("inverters.toml")).read_text("utf-8")
+    low = min(float(np.min((sheet.rounded or sheet.exact).u)) for sheet in sheets)
+    asked = [key for key in FUNCTIONS if key != "braking" or low < 0.0]
+    asked = [key for key in asked if key != "preload" or drive.brake == "motor"]
+    rows, sources = list[list[Part]](), list[Part]()
+    for number, family in enumerate(tomllib.loads(text)["family"], start=1):
+        rows += [
+            [f"{family['name']} [{number}]", FUNCTIONS[key], tag("code", family[key])]
+            for key in asked
+            if key in family
+        ]
+        sources.append(tag("code", f"[{number}] {family['source']}."))
+    return tag(
+        "section",
+        tag("h3", "Where to set it"),
+        table(["inverter", "function", "name in its manual"], rows, caption="Names of these functions",
+              text_columns=(0, 1, 2), class_="words"),
+        tag(
+            "p",
+            "Only names that a public manual prints; what is missing was not found there. The ramps of the "
+            "sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves of speed) "
+            "are ramps of the speed reference and do not replace them. Check the names against the manual of "
+            "your firmware. ",
+            joined(sources, " "),
+            class_="small",
+        ),
+    )  # fmt: skip
 
 
 def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:

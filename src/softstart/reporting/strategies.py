@@ -4,59 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.controller import Controller, Sensor
+from softstart.controller import Controller
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive
 from softstart.errors import listed
-from softstart.reporting.markup import Figures, Html, html, joined, table, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
 from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
-from softstart.views.printed import digits, fixed, short
+from softstart.views.printed import RPM, digits, fixed, short
 from softstart.views.starts import INTERVALS_NOTE, clipped_torque, position_notes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
-_OPEN_LOOP = {
-    "direct": "switching on at a torque limit",
-    "ramp": "a torque ramp",
-    "s-curve": "a torque ramp with an S-curve",
-}
-_SENSORS = {
-    Sensor.STAGE: "sensor in the gap",
-    Sensor.SHAFT_TORQUE: "sensor of the shaft torque",
-    Sensor.LOAD_SPEED: "encoder at the load",
-}
-AT_ONCE = 5  # strategies in one figure of traces: what a page holds
+ACROSS, AT_ONCE = 3, 18  # panels side by side, and in one figure: what a page holds
 LATE = 1.6  # times the median start time, up to which traces are shown
 GREY, SMALL = "#666666", 8.5
 WIDE = 7.1  # inches: what an A4 page holds
-MOST_STAGES = 6  # numbered
 LONGEST = 32  # letters of a name in a figure
-
-
-@dataclass(frozen=True)
-class Means:
-    """What a strategy needs.
-
-    `realisable`: with what a drive itself measures, motor encoder and motor torque. `ordinary`: on an
-    inverter that offers torque ramps and no more.
-    """
-
-    measures: str
-    inverter: str
-    realisable: bool
-    ordinary: bool
 
 
 def kind_of(controller: Controller) -> str:
@@ -65,28 +40,14 @@ def kind_of(controller: Controller) -> str:
     return str(type(inner).name or type(inner).__name__)
 
 
-def means_of(controller: Controller) -> Means:
-    """What a controller needs.
+def realisable(controller: Controller) -> bool:
+    """Whether a drive measures what the controller needs: motor encoder and motor torque.
 
     >>> from softstart.controller import make_controller
-    >>> [means_of(make_controller(name)).realisable for name in ("ramp", "reduced-first-stage")]
+    >>> [realisable(make_controller(name)) for name in ("ramp", "reduced-first-stage")]
     [True, False]
     """
-    kind = kind_of(controller)
-    effort = effort_of(controller)
-    extra = [name for sensor, name in _SENSORS.items() if controller.sensors & sensor]
-    if extra and effort is Effort.SENSOR:
-        return Means(" and ".join(extra), "no: drives have no such sensor", False, False)
-    if kind in _OPEN_LOOP:
-        return Means("nothing", f"yes: {_OPEN_LOOP[kind]}", True, effort is Effort.RAMPS)
-    if effort is Effort.STEPS:
-        return Means("motor speed", "yes: torque steps, timed by the speed", True, False)
-    return Means(
-        "motor encoder, motor torque",
-        "no: it takes one that runs control code of its user in each cycle",
-        True,
-        False,
-    )
+    return effort_of(controller) is not Effort.SENSOR
 
 
 def ordered(rows: Sequence[Row]) -> list[Row]:
@@ -100,17 +61,16 @@ def strategies_section(
     """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
     rows = ordered(compared)
     limited = any(row.against_limits for row in rows)
-    cells, needs = [], []
+    cells = []
     for row in rows:
-        run, name, means = row.run, label_of(row.run.controller), means_of(row.run.controller)
+        run, name = row.run, label_of(row.run.controller)
         cells.append([
             name, fixed(run.k_dyn, 3) + _interval(row), fixed(row.k_dyn_worn_gap, 3),
             fixed(row.k_dyn_light_load, 3), digits(run.peak_torque), digits(run.start_time),
             digits(run.settled_time), fixed(row.time_lost, _decimals(run.start_time)),
-            fixed(row.settled_lost, _decimals(run.start_time)), str(run.contacts),
+            str(run.contacts),
             *([row.against_limits] if limited else []), ", ".join(flag.word for flag in row.flags),
         ])  # fmt: skip
-        needs.append([name, run.controller.summary, means.measures, means.inverter])
     strong = [rows.index(row) for row in chosen]
     base = float(metrics.base_torque(drive))
     notes = [
@@ -122,7 +82,7 @@ def strategies_section(
         f"the gap is {short(WORN_GAP)} times as wide or the load inertia {short(LIGHT_INERTIA)} times as "
         f"large.",
         f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below the "
-        "target. Time lost: start time, and settled time, beyond that of direct start.",
+        "target. Time lost: start time beyond that of direct start.",
         *([_limits_note(rows[0])] if limited else []),
         *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
@@ -146,18 +106,14 @@ def strategies_section(
     first = table(
         [
             "strategy", "K_dyn", f"K_dyn, gap × {short(WORN_GAP)}", f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
-            "peak torque, N m", "start time, s", "settled, s", "time lost, s", "settled, lost, s", "contacts",
+            "peak torque, N m", "start time, s", "settled, s", "time lost, s", "contacts",
             *(["limits, least margin"] if limited else []), "flag",
         ],
         cells, caption="Strategies on this drive, the gentlest first",
-        text_columns=(0, 10, 11) if limited else (0, 10),
+        text_columns=(0, 9, 10) if limited else (0, 9),
         strong=strong, class_="names",
     )  # fmt: skip
-    second = table(
-        ["strategy", "what it does", "what it measures", "can an ordinary inverter do it?"], needs,
-        caption="What each strategy needs", text_columns=(0, 1, 2, 3), strong=strong, class_="words",
-    )  # fmt: skip
-    return html(first, tag("ul", joined(tag("li", one) for one in notes), class_="notes"), second)
+    return html(first, tag("ul", joined(tag("li", one) for one in notes), class_="notes"))
 
 
 def _interval(row: Row) -> str:
@@ -181,82 +137,119 @@ def _decimals(start_time: float) -> int:
 
 
 def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
-    """Torques and speeds of all strategies."""
+    """Torques of all strategies."""
+    parts = []
+    for key, some, note in trace_groups(rows):
+        names = ", ".join(row.marked for row in some)
+        caption = (
+            f"Shaft torque (solid) and motor torque (dashed), with the K_dyn, under {names}. Grey: the gap "
+            "is open; dot: peak; dotted: start time, and the permissible torque where one is given. "
+            f"All panels share both scales.{note}"
+        )
+        parts.append(figures.shown(key, partial(traces_picture, key, rows, some), caption))
+    return html(*parts)
+
+
+def trace_groups(rows: Sequence[Row]) -> list[tuple[str, list[Row], str]]:
+    """Of each figure of traces its key, its rows, the gentlest first, and what goes on beyond it."""
     rows = ordered(rows)
+    shown, _, _ = _frame(rows)
+    late = [label_of(row.run.controller) for row in rows if row.run.start_time > shown]
+    cut = f" The start of {listed(late)} goes on beyond the {digits(shown)} s shown." if late else ""
+    pieces = -(-len(rows) // AT_ONCE)
+    size = -(-len(rows) // pieces)
+    return [(f"traces-{i}", rows[i : i + size], cut) for i in range(0, len(rows), size)]
+
+
+def traces_picture(key: str, rows: Sequence[Row], some: Sequence[Row]) -> Html:
+    """The figure of `some` rows in the frame of all."""
+    title = "; ".join(
+        f"{row.marked}: peak shaft torque {digits(row.run.peak_torque)} N m, start time "
+        f"{digits(row.run.start_time)} s"
+        for row in some
+    )
+    return inlined(traces_figure(some, *_frame(rows)), key, f"Traces over time. {title}.")
+
+
+def _frame(rows: Sequence[Row]) -> tuple[float, float, float]:
+    """Until when traces are shown, s, and the least and largest torque of all, N m."""
     runs = [row.run for row in rows]
     times = [run.start_time for run in runs if not math.isnan(run.start_time)]
     ends = [run.end_time for run in runs if not math.isnan(run.start_time)]
     shown = min(max(ends), LATE * float(np.median(times))) if times else max(run.end_time for run in runs)
-    late = [label_of(run.controller) for run in runs if run.start_time > shown]
-    cut = f" The start of {listed(late)} goes on beyond the {digits(shown)} s shown." if late else ""
     highest = max(float(max(run.peak_torque, run.u.max())) for run in runs)
-    lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
-    parts = []
-    pieces = -(-len(runs) // AT_ONCE)
-    size = -(-len(runs) // pieces)
-    for first in range(0, len(runs), size):
-        some = rows[first : first + size]
-        names = ", ".join(row.marked for row in some)
-        caption = (
-            f"Torques (left) and speeds (right) under {names}. Grey: the gap is open; numbers: stages, odd "
-            f"with the "
-            "gap open, even with the gap closed. Dot: the peak. Dotted: target speed and start time. All "
-            "torques "
-            f"have one scale.{cut}"
-        )
-        title = "; ".join(
-            f"{row.marked}: peak shaft torque {digits(row.run.peak_torque)} N m, start time "
-            f"{digits(row.run.start_time)} s"
-            for row in some
-        )
-        parts.append(
-            figures.drawn(traces_figure(some, shown, lowest, highest), f"Traces over time. {title}.", caption)
-        )
-    return html(*parts)
+    return shown, min(float(min(run.T.min(), run.u.min())) for run in runs), highest
 
 
 def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: float) -> Any:
-    """Torques (left) and speeds (right) of several starts, with their flags; grey where the gap is open.
+    """Torques of several starts, with their flags, in small panels of one scale; grey where the gap is open.
 
-    Up to `longest` s; torques from `lowest` to `highest` N m, with some room, in all panels.
+    Up to `longest` s; torques from `lowest` to `highest` N m, with some room.
     """
+    down = -(-len(rows) // ACROSS)
     with drawing():
-        size = (WIDE, 0.55 + 1.72 * len(rows))
-        figure, axes = new_figure(len(rows), 2, size, sharex=True, squeeze=False)
-        for index, row in enumerate(rows):
+        size = (WIDE, 0.75 + 1.1 * down)
+        figure, axes = new_figure(down, ACROSS, size, sharex=True, sharey=True, squeeze=False)
+        for row, panel in zip(rows, axes.flat, strict=False):
             run = row.run
-            torque, speed = axes[index]
-            for panel in (torque, speed):
-                shade_open_gap(panel, run)
-            torque.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor torque u")
-            torque.plot(run.t, run.T, color=COLOURS[0], lw=1.3, label="shaft torque T")
-            torque.plot([run.peak_time], [_peak(run)], "o", ms=3.5, color=COLOURS[0])
-            torque.set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
-            torque.set_ylabel("N m", fontsize=SMALL)
-            torque.set_title(
-                f"{name_in_figure(row.marked)}: K_dyn {run.k_dyn:.3f}",
-                loc="left",
-                fontsize=SMALL + 0.5,
-                pad=3,
-            )
-            speed.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], lw=1.0, label="motor speed w1")
-            speed.plot(run.t, run.w2, color=COLOURS[0], lw=1.3, label="load speed w2")
-            speed.axhline(float(run.drive.target_speed), color=GREY, lw=0.8, ls=":")
-            reached = not math.isnan(run.start_time)
-            if reached:
-                speed.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
-            title = f"start time {run.start_time:.4g} s" if reached else "target speed not reached"
-            speed.set_title(title, loc="left", fontsize=SMALL + 0.5, pad=3)
-            speed.set_ylabel("rad/s", fontsize=SMALL)
-            _number_stages(torque, run, longest)
-        for panel in axes.flat:
+            shade_open_gap(panel, run, longest)
+            _torques(panel, run, ("motor torque u", "shaft torque T"))
+            title = f"{name_in_figure(row.marked)}: {run.k_dyn:.3f}"
+            panel.set_title(title, loc="left", fontsize=SMALL, pad=3)
+            if not math.isnan(run.start_time):
+                panel.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
             panel.tick_params(labelsize=SMALL - 0.5)
-            panel.set_xlim(0.0, longest)
-        for panel in axes[-1]:
-            panel.set_xlabel("time, s", fontsize=SMALL)
-        handles = [*axes[0, 0].get_legend_handles_labels()[0], *axes[0, 1].get_legend_handles_labels()[0]]
-        figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=SMALL)
+        axes[0, 0].set_xlim(0.0, longest)
+        axes[0, 0].set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
+        for panel in axes.flat[len(rows) :]:
+            panel.set_axis_off()
+        for column in range(ACROSS):
+            last = axes[down - 1 - (len(rows) <= (down - 1) * ACROSS + column), column]
+            last.tick_params(labelbottom=True)
+            last.set_xlabel("time, s", fontsize=SMALL)
+        for panel in axes[:, 0]:
+            panel.set_ylabel("N m", fontsize=SMALL)
+        handles = axes[0, 0].get_legend_handles_labels()[0]
+        figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=SMALL)
     return figure
+
+
+def before_after_figure(rows: Sequence[Row]) -> Any:
+    """Shaft torque and load speed of `direct` and of another start, with the permissible torque as a line."""
+    with drawing():
+        figure, (torque, speed) = new_figure(1, 2, (WIDE, 2.9), width_ratios=(1.7, 1.0))
+        longest = max(
+            run.start_time if run.start_time > 0.0 else run.end_time for run in (r.run for r in rows)
+        )
+        styles = ((COLOURS[1], DASHES[0], 1.1), (COLOURS[0], DASHES[0], 2.0))[-len(rows) :]
+        for row, (colour, dash, width) in zip(rows, styles, strict=True):
+            run, name = row.run, name_in_figure(row.name)
+            torque.plot(run.t, run.T, color=colour, ls=dash, lw=width, label=name)
+            torque.plot([run.peak_time], [_peak(run)], "o", ms=4, color=colour)
+            speed.plot(run.t, run.w2 * RPM, color=colour, ls=dash, lw=width)
+        permissible = rows[0].run.drive.limits.shaft_torque
+        if permissible is not None:
+            torque.axhline(permissible, color="#B00020", lw=1.4, ls=DASHES[1], label="permissible torque")
+        for panel, what in ((torque, "shaft torque, N m"), (speed, "load speed, rpm")):
+            panel.set_xlim(0.0, 1.1 * longest)
+            panel.set_ylabel(what, fontsize=SMALL)
+            panel.set_xlabel("time, s", fontsize=SMALL)
+            panel.tick_params(labelsize=SMALL - 0.5)
+        speed.axhline(float(rows[0].run.drive.target_speed) * RPM, color=GREY, lw=0.8, ls=":")
+        figure.legend(
+            handles=torque.get_legend_handles_labels()[0], loc="outside upper left", ncols=3, fontsize=SMALL
+        )
+    return figure
+
+
+def _torques(panel: Axes, run: Run, labels: tuple[str, str]) -> None:
+    """Motor and shaft torque of a start with its peak, and the permissible torque."""
+    panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=0.9, label=labels[0])
+    panel.plot(run.t, run.T, color=COLOURS[0], lw=1.1, label=labels[1])
+    panel.plot([run.peak_time], [_peak(run)], "o", ms=3.0, color=COLOURS[0])
+    permissible = run.drive.limits.shaft_torque
+    if permissible is not None:
+        panel.axhline(permissible, color="#B00020", lw=0.9, ls=":", label="permissible torque")
 
 
 def name_in_figure(name: str) -> str:
@@ -267,12 +260,3 @@ def name_in_figure(name: str) -> str:
 
 def _peak(run: Run) -> float:
     return max(run.stages, key=lambda one: abs(one.peak_torque)).peak_torque
-
-
-def _number_stages(axes: Axes, run: Run, longest: float) -> None:
-    """The number of each stage at the top, as far as there is room."""
-    for stage in run.stages[:MOST_STAGES]:
-        if min(stage.end, longest) - stage.start > 0.025 * longest:
-            middle = 0.5 * (stage.start + min(stage.end, longest))
-            axes.text(middle, 0.985, str(stage.number), transform=axes.get_xaxis_transform(),
-                      fontsize=SMALL - 1.5, ha="center", va="top", color=GREY)  # fmt: skip

@@ -33,7 +33,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0, (8, 2)))
 GREY, SMALL = "#666666", 9.5
 GAP_SHADE = "#E8ECEF"
-MARKERS = "osD^vPX*"
+MARKERS = "osD^vPX*<>hd"
 
 PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
@@ -116,11 +116,13 @@ def plain_ticks(axis: Any, locator: Any) -> None:
     axis.set_minor_locator(ticker.NullLocator())
 
 
-def shade_open_gap(axes: Axes, run: Run) -> None:
+def shade_open_gap(axes: Axes, run: Run, until: float = math.inf) -> None:
     """Grey where the gap is open."""
-    for stage in run.stages:
-        if stage.side == 0 and stage.duration > 0.0:
-            axes.axvspan(stage.start, stage.end, color=GAP_SHADE, lw=0, zorder=0)
+    spans = [(one.start, one.duration) for one in run.stages if one.side == 0 and one.start < until]
+    axes.broken_barh(
+        [span for span in spans if span[1] > 0.0], (0.0, 1.0), color=GAP_SHADE, lw=0, zorder=0,
+        transform=axes.get_xaxis_transform(),
+    )  # fmt: skip
 
 
 # names beside the points of a figure, placed so that they cover nothing ------------------------------------

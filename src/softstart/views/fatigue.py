@@ -240,7 +240,9 @@ def fatigue_figure(found: Fatigue) -> Any:
         head(left, "cycles of one start", "range of the shaft torque, N m", "cycles of at least this range")
         for index, row in enumerate(rows):
             if math.isfinite(row.relative):
-                right.plot([row.relative], [index], MARKERS[index % 8], color=COLOURS[index % 8], ms=8)
+                right.plot(
+                    [row.relative], [index], MARKERS[index % len(MARKERS)], color=COLOURS[index % 8], ms=8
+                )
         right.axvline(1.0, color=GREY, lw=0.8, ls=":")
         right.set_xscale("log")
         right.set_yticks(range(len(rows)), [row.run.controller_name for row in rows])

@@ -449,7 +449,7 @@ def front_figure(front: Front) -> Any:
         figure, axes = new_figure(1, 1, (8.0, 5.4))
         _curve(axes, found)
         for index, one in enumerate(placed):
-            axes.plot([one.start_time], [one.k_dyn], MARKERS[index % 8], ms=7, mfc="none", mew=1.8,
+            axes.plot([one.start_time], [one.k_dyn], MARKERS[index % len(MARKERS)], ms=7, mfc="none", mew=1.8,
                       color=COLOURS[(index + 1) % 8], clip_on=False, zorder=4)  # fmt: skip
         _scale(axes, [k for _, k, _ in found] + [one.k_dyn for one in placed])
         _where_nothing_starts(axes, front)

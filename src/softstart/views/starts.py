@@ -436,7 +436,7 @@ def trade_off_figure(points: Sequence[tuple[str, float, float]], title: str) -> 
             axes.plot(
                 [time],
                 [k],
-                MARKERS[index % 8],
+                MARKERS[index % len(MARKERS)],
                 ms=9,
                 mfc="none",
                 mew=2.0,

@@ -54,6 +54,17 @@ def test_numbers_for_people_without_a_file_are_refused_and_all_mistakes_told(run
     nothing_left()
 
 
+def test_a_project_that_is_wrong_is_told_before_anything_is_computed(run, place):
+    code, out, err = run("report", "good.toml", *CHEAP, "--out", "r.html", "--project", "nowhere.toml")
+    assert (code, out) == (2, "")
+    assert "no such file" in err
+    (place / "about.toml").write_text('[project]\npapr = "A4"')
+    code, out, err = run("report", "good.toml", *CHEAP, "--out", "r.html", "--project", "about.toml")
+    assert (code, out) == (2, "")
+    assert "did you mean paper?" in err
+    assert not (place / "r.html").exists()
+
+
 def test_a_pipe_or_device_is_not_replaced(run, place):
     pipe = place / "pipe"
     os.mkfifo(pipe)

@@ -53,7 +53,7 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     assert choice.role == "gentlest unbeaten"
     assert choice.ordinary.worst == min(choice.of(name).worst for name in ("ramp", "s-curve"))
     assert answer(hostile).startswith(said.text)
-    section = choice_section(choice)
+    section = choice_section(choice, answer(hostile))
     assert "no limits, so nothing says which peak is low enough" in section
 
 
@@ -62,7 +62,9 @@ def test_with_limits_the_report_is_about_the_recommended_strategy():
     made = report(crane, controllers=["ramp", "shaped"], budget=0.0)
     assert made.choice.chosen.name == made.summary()["recommended"] == "shaped"
     assert [sheet.name for sheet in made.sheets] == ["shaped"]
-    assert "the simplest strategy that keeps the limits of the drive" in choice_section(made.choice)
+    assert "the simplest strategy that keeps the limits of the drive" in choice_section(
+        made.choice, answer(made)
+    )
     assert "On an ordinary inverter" not in answer(made)
     none = report(crane.replace(permissible_torque=20.0), controllers=["ramp"], budget=0.0)
     assert none.choice.chosen is None

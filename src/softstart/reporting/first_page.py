@@ -1,0 +1,151 @@
+"""Page 1, for the one who decides: the answer, before and after, pass or fail, cost and gain."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from softstart.errors import listed
+from softstart.reporting.choice import Choice
+from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
+from softstart.reporting.strategies import before_after_figure
+from softstart.start.comparison import REFERENCE, Comparison
+from softstart.start.recommendation import Row
+from softstart.views.fatigue import factor
+from softstart.views.printed import digits, fixed, percent
+
+if TYPE_CHECKING:
+    from softstart.reporting.result import Report
+
+SAME = 0.005  # a peak within this share of that of direct is no saving
+
+
+def headline(report: Report) -> str:
+    """The answer: which strategy, what it does to the shaft torque, what it costs.
+
+    >>> from softstart import report
+    >>> headline(report("crane-4amtkf", controllers=["shaped"], budget=0.0))[:84]
+    'Gentlest start: shaped. The shaft torque peaks at 53.05 N m instead of 164.8 N m unde'
+    """
+    best, direct = report.choice.chosen, report.row(REFERENCE)
+    if best is None or direct is None:
+        return report.choice.recommendation.text
+    named = report.choice.recommendation.recommended is not None
+    what = f"{'Recommended' if named else 'Gentlest start'}: {best.name}."
+    run, hard = best.row.run, direct.run
+    if best.row is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
+        return f"{what} No strategy that was examined is noticeably gentler than direct start."
+    return (
+        f"{what} The shaft torque peaks at {digits(run.peak_torque)} N m instead of "
+        f"{digits(hard.peak_torque)} N m under direct start, {share_saved(report, best.row)} less; the start "
+        f"takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
+    )
+
+
+def share_saved(report: Report, row: Row) -> str:
+    """What a strategy saves of the peak of direct."""
+    direct = report.row(REFERENCE)
+    saved = 1.0 - row.run.peak_torque / direct.run.peak_torque if direct else math.nan
+    return percent(saved, 0 if abs(saved) >= 0.1 else 1)
+
+
+def first_page(report: Report, figures: Figures) -> Html:
+    """Answer, picture, tiles and the table of limits."""
+    rows = before_and_after(report.choice, report.comparison)
+    caption = (
+        f"{' and '.join(row.name for row in rows)}: shaft torque and load speed, computed for the drive as "
+        "it is. Dots: the peaks. Dotted: the target speed."
+    )
+    return html(
+        tag("section", tag("p", headline(report)), class_="answer", aria_label="The answer"),
+        figures.shown("before-after", lambda: before_after_picture(rows), caption),
+        _tiles(report, rows[-1], rows[0]) if report.choice.chosen else None,
+        _verdicts(report, rows),
+        _choices(report),
+    )
+
+
+def before_and_after(choice: Choice, comparison: Comparison) -> list[Row]:
+    """Direct, and the chosen strategy; where none keeps the limits, the one that comes nearest."""
+    direct = next(row for row in comparison.rows if row.name == REFERENCE)
+    if choice.chosen is not None:
+        return list(dict.fromkeys([direct, choice.chosen.row]))
+    able = [one.row for one in choice.candidates if one.realisable and not one.row.flags]
+    margins = {row: row.least_margin for row in able}
+    known = [row for row, margin in margins.items() if margin is not None and not math.isnan(margin.share)]
+    return list(dict.fromkeys([direct, max(known, key=lambda row: margins[row].share, default=direct)]))  # type: ignore[union-attr]
+
+
+def before_after_picture(rows: list[Row]) -> Html:
+    """The two starts, as an <svg> element."""
+    title = "; ".join(f"{row.name}: peak {digits(row.run.peak_torque)} N m" for row in rows)
+    return inlined(before_after_figure(rows), "before-after", f"Before and after. {title}.")
+
+
+def _tiles(report: Report, best: Row, direct: Row) -> Html:
+    """What it saves, costs and gains."""
+    run, hard = best.run, direct.run
+    gain = report.life_gain
+    tiles = [
+        ("peak shaft torque", f"{digits(run.peak_torque)} N m",
+         f"direct {digits(hard.peak_torque)} N m: {share_saved(report, best)} less"),
+        ("costs in time", f"{digits(1e3 * best.time_lost, 3)} ms",
+         f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s"),
+        ("life of the shaft line", f"× {factor(gain)}" if gain is not None else "not given",
+         f"over that of direct, S-N slope {report.life_slope:g}" if gain is not None
+         else "needs a damping above 0 in the drive file"),
+        ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start"),
+    ]  # fmt: skip
+    return tag(
+        "dl",
+        *(
+            tag("div", tag("dt", what), tag("dd", value, tag("small", beside)))
+            for what, value, beside in tiles
+        ),
+        class_="tiles",
+    )
+
+
+def _verdicts(report: Report, rows: list[Row]) -> Html:
+    """Pass or fail of direct and of the chosen strategy, limit by limit, in the worst case."""
+    limits = report.choice.recommendation.limits
+    if not limits:
+        return tag(
+            "p",
+            "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, the "
+            "longest start time or the life in [limits], and this page says what passes, with the margin.",
+            class_="verdict",
+        )
+    cells = []
+    for row in rows:
+        for margin in row.margins(limits):
+            cells.append([
+                row.name, f"{margin.name}, {margin.unit}", digits(margin.value), digits(margin.limit),
+                percent(margin.share), margin.case or "the drive as it is",
+                tag("b", "pass" if margin.kept else "fail", class_="pass" if margin.kept else "fail"),
+            ])  # fmt: skip
+    cases = ["the drive as it is", *rows[0].worst_case]
+    return table(
+        ["strategy", "limit", "worst value", "permitted", "margin", "worst with", "verdict"], cells,
+        caption=f"Pass or fail, in the worst of {listed(cases)}", text_columns=(0, 1, 5, 6), class_="names",
+    )  # fmt: skip
+
+
+def _choices(report: Report) -> Html:
+    """Direct, what an ordinary inverter can do, and the strategies that no other one beats."""
+    choice, direct = report.choice, report.row(REFERENCE)
+    ordinary = [choice.ordinary.row] if choice.ordinary else []
+    shown = dict.fromkeys([*([direct] if direct else []), *ordinary, *choice.recommendation.shown])
+    rows = sorted(shown, key=lambda row: (row.effort.order, -row.run.k_dyn))
+    cells = [
+        [row.name, row.effort.meaning, digits(row.run.peak_torque), share_saved(report, row),
+         fixed(row.run.k_dyn, 3),
+         digits(row.run.start_time)]
+        for row in rows
+    ]  # fmt: skip
+    best = choice.chosen.row if choice.chosen else None
+    return table(
+        ["strategy", "takes", "peak torque, N m", "less than direct", "K_dyn", "start time, s"], cells,
+        caption="What more effort buys", text_columns=(0, 1),
+        strong=[index for index, row in enumerate(rows) if row is best], class_="names",
+    )  # fmt: skip

@@ -1,0 +1,164 @@
+"""Page 1 and what a report says of itself: verdicts are the margins, names and sources those of the file."""
+
+import base64
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from softstart import Drive, fatigue, reporting
+from softstart.errors import InputError
+from softstart.reporting import Project, document, report, sheet
+from softstart.reporting.first_page import before_and_after, headline
+from softstart.views.fatigue import factor
+
+from .test_page import Page
+
+HOIST = Drive.load("hoist-15kw").replace(permissible_torque=180.0, permissible_start_time=0.25)
+ABOUT = """
+[project]
+customer = "Harbour <Cranes> Ltd"
+number = "SC-0147"
+checked = "B. Checker, 2026-11-20"
+logo = "logo.svg"
+paper = "letter"
+decimal = "comma"
+[[revision]]
+number = "A"
+change = "first issue"
+[[source]]
+parameter = "shaft.gap"
+origin = "identified"
+note = "5.9 to 6.1 deg (95 %)"
+[[source]]
+parameter = "shaft.damping"
+origin = "guessed"
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("project")
+    (folder / "logo.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    (folder / "about.toml").write_text(ABOUT)
+    return report(HOIST, controllers=["s-curve"], budget=0.0, project=folder / "about.toml")
+
+
+@pytest.fixture(scope="module")
+def page(made):
+    return made.to_html()
+
+
+def test_verdicts_are_the_margins_of_the_rule(made):
+    point = Page(document.document(replaced(made, decimal="point")))
+    (table,) = [rows for rows in point.tables if rows[0][-1] == "verdict" and "margin" in rows[0]]
+    wanted = [
+        ["fail" if margin.share < 0.0 else "pass", row.name, f"{100.0 * margin.share:.1f}\N{NO-BREAK SPACE}%"]
+        for row in before_and_after(made.choice, made.comparison)
+        for margin in row.margins(HOIST.limits)
+    ]
+    assert [[row[-1], row[0], row[4].replace("\N{MINUS SIGN}", "-")] for row in table[1:]] == wanted
+    assert {verdict for verdict, *_ in wanted} == {"pass", "fail"}
+
+
+def replaced(made, **changes):
+    from dataclasses import replace
+
+    return replace(made, project=replace(made.project, **changes))
+
+
+def test_headline_and_tiles_are_those_of_the_runs(made, page):
+    direct, best = made.row("direct").run, made.choice.chosen.row.run
+    assert f"{best.peak_torque:.1f} N m instead of {direct.peak_torque:.1f} N m" in headline(made)
+    (life,) = fatigue(best).rows
+    assert made.life_gain == life.relative > 1.0
+    text = "".join(Page(page).text)
+    assert f"{factor(life.relative)}over that of direct".replace(".", ",") in text
+    assert f"{1e3 * (best.start_time - direct.start_time):.3g} ms".replace(".", ",") in text
+
+
+def test_without_damping_no_life_is_given_and_without_limits_nothing_passes():
+    made = report("crane-4amtkf", controllers=["shaped"], budget=0.0)
+    assert made.life_gain is None
+    text = "".join(Page(made.to_html()).text)
+    assert "needs a damping above 0" in text
+    assert "Neither passed nor failed" in text
+
+
+def test_where_no_strategy_keeps_the_limits_the_nearest_one_is_shown():
+    made = report(HOIST.replace(permissible_torque=140.0), controllers=["s-curve", "ramp"], budget=0.0)
+    assert made.choice.chosen is None
+    rows = before_and_after(made.choice, made.comparison)
+    assert rows[0].name == "direct"
+    best = max(made.comparison.rows, key=lambda row: row.least_margin.share)
+    assert rows[-1] is best
+    assert "No strategy keeps the limits" in headline(made)
+
+
+def test_names_logo_revisions_and_sources_are_in_the_page(made, page):
+    assert "Harbour &lt;Cranes&gt; Ltd" in page
+    logo = base64.b64encode(b"<svg xmlns='http://www.w3.org/2000/svg'/>").decode()
+    assert f'src="data:image/svg+xml;base64,{logo}"' in page
+    assert "default-src &#x27;none&#x27;; style-src &#x27;unsafe-inline&#x27;; img-src data:" in page
+    assert "size: letter;" in page
+    text = "".join(Page(page).text)
+    for words in ("first issue", "B. Checker, 2026-11-20", "identified, 5,9 to 6,1 deg", "shaft.damping"):
+        assert words in text
+    assert made.project.source_of("shaft.gap").startswith("identified")
+
+
+def test_decimal_commas_stand_in_text_and_figures_and_in_no_command(made, page):
+    read = Page(page)
+    shown = re.sub(r"<(pre|code|style|title)\b.*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
+    assert re.findall(r"(?<![\w.])\d+\.\d+(?![\w.])", shown) == []
+    assert re.search(r"<text[^>]*>0,\d+</text>", page)
+    assert "04.005 Motoring Current Limit" in "".join(read.text)
+    assert Drive.from_toml(made.provenance.drive_toml) == made.drive
+    assert made.provenance.drive_toml in "".join(read.text)
+
+
+def test_pictures_that_are_drawn_beforehand_are_those_drawn_later(made):
+    early = document.pictures(made.choice, made.comparison)
+    assert {"before-after", "maps", "traces-0"} == set(early)
+    page = made.to_html()
+    for key, picture in early.items():
+        assert picture.partition("</title>")[2].replace(".", ",") in page.replace(".", ","), key
+
+
+def test_each_inverter_has_a_source_and_only_functions_that_are_known():
+    path = Path(reporting.__file__).with_name("inverters.toml")
+    families = tomllib.loads(path.read_text("utf-8"))["family"]
+    assert len(families) >= 3
+    for family in families:
+        assert set(family) <= {"name", "source", *sheet.FUNCTIONS}
+        assert re.search(r"p\. \d+", family["source"]), family["name"]
+        assert "limit" in family
+
+
+def test_preload_of_the_brake_is_named_only_where_there_is_a_brake(made, page):
+    assert "2-27 Torque Ramp Time" in page
+    crane = report("crane-4amtkf", controllers=["ramp"], budget=0.0).to_html()
+    assert "2-27 Torque Ramp Time" not in crane
+    assert "4-16 Torque Limit Motor Mode" in crane
+    assert "4-17" not in crane  # the motor never brakes
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('[project]\ncustmer = "x"', "did you mean customer?"),
+        ('[project]\npaper = "A3"', "A3"),
+        ('[[source]]\norigin = "measured"', "parameter"),
+        ('[[source]]\nparameter = "shaft.gapp"', "did you mean shaft.gap?"),
+        ('[project]\nlogo = "nowhere.png"', "no such file"),
+        ('[project]\nlogo = "logo.exe"', "give a PNG, JPEG or SVG file"),
+        ('[project]\ncustomer = "a\\nb"', "line"),
+    ],
+)
+def test_what_is_wrong_in_a_project_is_one_clear_sentence(text, says):
+    with pytest.raises(InputError) as refused:
+        Project.read(text, "about.toml")
+    (sentence,) = refused.value.sentences
+    assert says.lower() in sentence.lower()
+    assert sentence.startswith("about.toml: ")
