@@ -31,7 +31,7 @@ BUDGET = {
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
     # 15: a torque constant; 20: folders of identifications
-    "cli": (5045, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    "cli": (5048, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -43,7 +43,7 @@ BUDGET = {
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
     # 100: identifications kept on disk, drawn by the intervals that are shown
     # 20: the mean correlation of encoder errors
-    "identification": (2375, 7, 2, 0),  # 20: units of another scale
+    "identification": (2377, 7, 2, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -64,9 +64,9 @@ BUDGET = {
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart
     "plant": (2880, 15, 2, 0),
-    # 40: life of the shaft line; 390 and two files: page 1, project file, revisions, sources,
+    # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed
-    "reporting": (3410, 14, 4, 0),
+    "reporting": (3416, 14, 4, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,
