@@ -33,6 +33,8 @@ from softstart.identification.planning import plan_experiments as plan_experimen
 from softstart.identification.result import Estimate as Estimate
 from softstart.identification.result import Identification as Identification
 from softstart.identification.solving import identify as identify
+from softstart.identification.wear import Wear as Wear
+from softstart.identification.wear import follow_wear as follow_wear
 from softstart.linear.view import LinearView as LinearView
 from softstart.linear.view import linear_view as linear_view
 from softstart.optimal.front import Front as Front

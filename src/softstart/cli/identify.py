@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -101,6 +102,17 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 @click.option(
     "--most-travel", metavar="ANGLE", help="How far a planned experiment may move the load, at the motor."
 )
+@click.option(
+    "--wear", is_flag=True,
+    help="LOG are folders of identifications of one drive: how its gap grows, and when it reaches --limit.",
+)  # fmt: skip
+@click.option(
+    "--dates", metavar="DATE,...",
+    help="With --wear: when the logs were taken, as 2025-05-31,2026-05. By default by the folders' names.",
+)  # fmt: skip
+@click.option(
+    "--limit", metavar="GAP", help="With --wear: the gap of a worn drive, as '0.2 rad'; strategies then."
+)
 @json_option
 @out_option(
     "Write the drive found (drive.toml), figures and report.md, or the planned torques, into this folder."
@@ -122,6 +134,9 @@ def identify(
     ripple: str | None,
     most_torque: str | None,
     most_travel: str | None,
+    wear: bool,
+    dates: str | None,
+    limit: str | None,
     as_json: bool,
     out: str | None,
 ) -> None:
@@ -130,7 +145,7 @@ def identify(
     LOG is a CSV file with the columns time, torque, and angle or speed of the motor, units in its first line
     as in "time [ms];torque [N*m];speed [rpm]", or a measurement file (MDF). It begins at standstill. Several
     logs are of one drive. With --plan DRIVE no log is read: it shows what each experiment would tell before
-    it is run.
+    it is run. With --wear the folders of identifications are compared over the years.
     """
     mistakes = Mistakes()
     with mistakes.noted():
@@ -140,9 +155,19 @@ def identify(
             )
         if plan is not None and logs:
             raise InputError(f'--plan = "{plan}": it reads no log; leave out {logs[0]}, or --plan.')
-        if plan is None and drive is None:
+        if not wear and (dates or limit):
+            raise InputError(
+                f"{'--dates' if dates else '--limit'}: it goes with --wear; leave it out, or add --wear."
+            )
+        if wear and (plan is not None or drive is not None or settings):
+            option = "--plan" if plan is not None else "--drive" if drive is not None else "--set"
+            raise InputError(f"{option}: --wear reads folders of identifications alone; leave it out.")
+        if plan is None and drive is None and not wear:
             raise InputError("--drive is missing: the search begins from a guess; softstart init writes one.")
     mistakes.settle()
+    if wear:
+        show_wear(logs, dates, limit, controllers, as_json, out)
+        return
     with mistakes.noted():
         one = read_drive(str(plan or drive), settings)
     with mistakes.noted():
@@ -214,6 +239,46 @@ def identify(
     if out is not None and not as_json:
         what = "torques and simulated logs, figure" if plan is not None else "drive.toml, residuals, figure"
         print(f"\nWritten to {out}: report.md, {what}.")
+
+
+def show_wear(
+    folders: Sequence[str], dates: str | None, limit: str | None, controllers: str | None, as_json: bool,
+    out: str | None,
+) -> None:  # fmt: skip
+    """`--wear`: growth of the gap, when it is worn, and strategies then."""
+    mistakes = Mistakes()
+    with mistakes.noted():
+        names = read_names(controllers)
+    with mistakes.noted():
+        worn = None if limit is None else float(to_si(limit, "rad", name="--limit"))
+    mistakes.settle()
+    days = None if dates is None else [one.strip() for one in dates.split(",")]
+    with output_folder(out) as folder:
+        with working("starting the worn drive ..."):
+            found = softstart.follow_wear(folders, days, worn, controllers=names or list(STRATEGIES))
+        said = views.wear_conclusion(found)
+        tables = [views.wear_table(found), *([views.wear_strategies(found)] if found.then else [])]
+        if folder is not None:
+            save_figure(found.plot(), folder, "wear")
+            table = tables[0]
+            write_table(folder / "wear.csv", [column.heading for column in table.columns], table.rows)
+            parts = [
+                f"# {markdown(found.found[-1].drive.name)}: wear of the gap",
+                *map(markdown, said),
+                *table_sections(tables),
+                "![the gap over time](wear.svg)",
+                *map(markdown, found.notes),
+            ]
+            write_drive_report(folder, parts, found.found[-1].drive, command_line())
+    if as_json:
+        print_json(found.summary())
+        return
+    to = console()
+    print_lines(to, [f"{found.found[-1].drive.name}: wear from {found.dates[0]} to {found.dates[-1]}"])
+    print_tables(to, tables)
+    print_conclusion(to, said, found.notes)
+    if out is not None:
+        print(f"\nWritten to {out}: report.md, wear.csv, figure.")
 
 
 def write_identification(

@@ -10,12 +10,15 @@ import numpy as np
 
 from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER, POSITION, LogModel
+from softstart.identification.wear import YEAR
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, number, short
 
 if TYPE_CHECKING:
     from softstart.identification.planning import Experiment, Plan
     from softstart.identification.result import Estimate, Identification
+    from softstart.identification.wear import Wear
+    from softstart.start.recommendation import Row
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
 
@@ -179,4 +182,100 @@ def plan_figure(plan: Plan) -> Any:
             axis.axhline(0.0, color=GREY, lw=0.6)
             head(axis, one.name, "N m")
         axes[-1, 0].set_xlabel("time, s")
+        return made
+
+
+def wear_table(wear: Wear) -> Table:
+    """The gap of each identification."""
+    cells = {
+        "date": [str(one) for one in wear.dates],
+        "identification": list(wear.names),
+        "gap rad": [_digits(one.value, one) for one in wear.gaps],
+        "from": [_digits(one.lower, one) for one in wear.gaps],
+        "to": [_digits(one.upper, one) for one in wear.gaps],
+    }
+    return Table.of("Gap, with intervals of 95 %", cells, ("date", "identification"))
+
+
+def wear_conclusion(wear: Wear) -> list[str]:
+    """How fast the gap grows, when it reaches its limit, and which strategies keep what they promise then."""
+    growth, lower, upper = wear.line.growth
+    said = [f"The gap grows by {growth:.3g} rad a year ({lower:.3g} to {upper:.3g})."]
+    if wear.worn is None:
+        return said
+    reached, earliest, latest = wear.worn
+    when = "not on this line" if reached is None else f"on {reached}"
+    begin = "before any of these dates" if earliest is None else str(earliest)
+    end = "never, as the growth may be none" if latest is None else str(latest)
+    if math.isinf(wear.line.reaches(float(wear.limit or 0.0))[1]):
+        said.append(f"It does not reach {short(float(wear.limit or 0.0))} rad: it does not grow.")
+    else:
+        said.append(
+            f"It reaches {short(float(wear.limit or 0.0))} rad {when}; the interval of 95 % goes from "
+            f"{begin} to {end}, if wear goes on as it has."
+        )
+    if wear.found[-1].drive.limits:
+        good = [row.name for row in wear.then if row.least_margin is not None and row.least_margin.kept]
+        said.append(
+            "Strategies that keep the limits of the drive then, at the upper end of their intervals too: "
+            f"{', '.join(good) or 'none'}."
+        )
+    else:
+        lost = [
+            f"{two.name} {100.0 * (two.run.k_dyn / one.run.k_dyn - 1.0):+.1f} %"
+            for one, two in zip(wear.now, wear.then, strict=True)
+        ]
+        said.append(
+            f"K_dyn then, beside now: {', '.join(lost)}. Give [limits] to the drive to know which is enough."
+        )
+    return said
+
+
+def wear_strategies(wear: Wear) -> Table:
+    """Each strategy now and with the gap at its limit, set up for the drive found last."""
+    pairs = sorted(zip(wear.now, wear.then, strict=True), key=lambda pair: pair[1].run.k_dyn)
+    now, then = [one for one, _ in pairs], [one for _, one in pairs]
+
+    def span(row: Row) -> str:
+        return " to ".join(number(end, 3) for end in row.intervals["k_dyn"])
+
+    cells = {
+        "strategy": [row.name for row in now],
+        "K_dyn\nnow": [number(row.run.k_dyn, 3) for row in now],
+        "95 %": [span(row) for row in now],
+        "K_dyn\nworn": [number(row.run.k_dyn, 3) for row in then],
+        "95 % ": [span(row) for row in then],
+        "peak to\nN m": [f"{row.intervals['peak_torque'][1]:.4g}" for row in then],
+    }
+    if wear.found[-1].drive.limits:
+        cells |= {
+            "limits now": [row.against_limits for row in now],
+            "worn": [row.against_limits for row in then],
+        }
+    title = f"Strategies now, and with a gap of {short(float(wear.limit or 0.0))} rad"
+    return Table.of(title, cells, ("strategy", "95 %", "95 % ", "limits now", "worn"))
+
+
+def wear_figure(wear: Wear) -> Any:
+    """The gaps over time, the line with its interval, and the limit."""
+    first = wear.dates[0]
+    years = [(one - first).days / YEAR for one in wear.dates]
+    end = max(1.3 * years[-1], min(wear.line.reaches(wear.limit)[0], 4.0 * years[-1]) if wear.limit else 0.0)
+    with drawing():
+        made, ((axes,),) = new_figure(1, 1, (7.0, 4.0), squeeze=False)
+        entitle(made, f"{wear.found[-1].drive.name}: wear")
+        time = np.linspace(0.0, end if math.isfinite(end) else 1.3 * years[-1], 200)
+        line, half = wear.line.at(time)
+        axes.fill_between(time, line - half, line + half, color=COLOURS[0], alpha=0.2, lw=0.0)
+        axes.plot(time, line, color=COLOURS[0], label="line, interval of 95 %")
+        values = np.array([one.value for one in wear.gaps])
+        reach = np.array([[one.value - one.lower, one.upper - one.value] for one in wear.gaps]).T
+        axes.errorbar(
+            years, values, yerr=reach, fmt="o", ms=5, capsize=3, color=COLOURS[1], label="identified"
+        )
+        if wear.limit is not None:
+            axes.axhline(wear.limit, color=GREY, ls="--", lw=1.0, label="limit")
+        head(axes, "", "gap, rad", f"years after {first}")
+        axes.set_ylim(bottom=0.0)
+        axes.legend(loc="best")
         return made

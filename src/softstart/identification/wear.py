@@ -1,0 +1,350 @@
+"""Wear: how the gap grows from identification to identification, and which strategies stand it."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from scipy.stats import chi2
+
+from softstart.arrays import Matrix, Vector
+from softstart.controller import Controller
+from softstart.errors import InputError
+from softstart.identification.result import Estimate, Identification
+from softstart.late import late
+from softstart.quantities import show, to_si
+from softstart.start.comparison import INTERVAL, compared, make_controllers
+from softstart.start.recommendation import Row
+
+views = late("softstart.views.identification")  # above this module; see softstart.late
+
+YEAR: Final = 365.25  # days
+NOT_BY_CHANCE: Final = 3.0  # standard deviations by which a parameter has changed
+CROOKED: Final = 0.01  # chance below which the gap does not grow along a line
+DATE = re.compile(r"(?<!\d)(\d{4})(?:-(\d{2})(?:-(\d{2}))?)?(?!\d)")
+
+
+@dataclass(frozen=True)
+class Line:
+    """The growth of the gap by weighted least squares: `start + slope t`, t in years.
+
+    Attributes
+    ----------
+    start, slope : float
+        Gap at t = 0, rad, and its growth, rad a year.
+    covariance : array of shape (2, 2)
+        Of both, from the intervals of the gaps, wider by as much as the gaps scatter more than these say.
+    chance : float
+        That gaps with such intervals scatter as much about a line; 1 for two gaps.
+    """
+
+    start: float
+    slope: float
+    covariance: Matrix
+    chance: float
+
+    @staticmethod
+    def through(years: Vector, gaps: Vector, deviations: Vector) -> Line:
+        """The line through these gaps, whose standard deviations are known.
+
+        >>> line = Line.through(np.array([0.0, 1.0]), np.array([0.08, 0.09]), np.array([0.003, 0.004]))
+        >>> round(line.slope, 6), round(math.sqrt(line.covariance[1, 1]), 6)
+        (0.01, 0.005)
+        """
+        rows = np.column_stack([np.ones_like(years), years]) / deviations[:, None]
+        covariance = np.linalg.inv(rows.T @ rows)
+        start, slope = (covariance @ rows.T @ (gaps / deviations)).tolist()
+        squares = float(np.sum(((start + slope * years - gaps) / deviations) ** 2))
+        freedom = gaps.size - 2
+        chance = float(chi2.sf(squares, freedom)) if freedom else 1.0
+        wider = max(1.0, squares / freedom) if freedom else 1.0
+        return Line(start, slope, np.asarray(wider * covariance, dtype=np.float64), chance)
+
+    @property
+    def growth(self) -> tuple[float, float, float]:
+        """Growth and its interval of 95 %, rad a year."""
+        half = INTERVAL.quantile * math.sqrt(float(self.covariance[1, 1]))
+        return self.slope, self.slope - half, self.slope + half
+
+    def at(self, years: Vector) -> tuple[Vector, Vector]:
+        """The gap at these times, and half its interval."""
+        rows = np.column_stack([np.ones_like(years), years])
+        half = INTERVAL.quantile * np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
+        return rows @ np.array([self.start, self.slope]), half
+
+    def reaches(self, gap: float) -> tuple[float, float, float]:
+        """When the line reaches a gap, and the interval of 95 % of that, years: Fieller's theorem.
+
+        The interval holds all times at which the gap of the line may be that. It is open (infinite) where the
+        growth may be 0; NaN, where the gap does not grow.
+
+        >>> line = Line.through(np.array([0.0, 1.0]), np.array([0.08, 0.09]), np.array([1e-3, 1e-3]))
+        >>> [round(t, 3) for t in line.reaches(0.12)]
+        [4.0, 3.231, 5.352]
+        """
+        (v00, v01), (_, v11) = (INTERVAL.quantile**2 * self.covariance).tolist()
+        off = self.start - gap
+        middle = -off / self.slope if self.slope > 0.0 else math.nan
+        # (off + slope t)^2 <= v00 + 2 v01 t + v11 t^2
+        a, b, c = self.slope**2 - v11, off * self.slope - v01, off**2 - v00
+        root = b * b - a * c
+        if a > 0.0 and self.slope > 0.0:
+            ends = sorted(((-b - math.sqrt(max(root, 0.0))) / a, (-b + math.sqrt(max(root, 0.0))) / a))
+            return middle, ends[0], ends[1]
+        if a > 0.0:
+            return math.nan, math.inf, math.inf  # it shrinks
+        earliest = max((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if root > 0.0 else -math.inf
+        return middle, earliest, math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Wear:
+    """How the gap of a drive grows, and what its strategies do when it has reached its limit.
+
+    Attributes
+    ----------
+    found : tuple of Identification
+        The identifications, the oldest first.
+    names : tuple of str
+        What they are called.
+    dates : tuple of datetime.date
+        When their logs were taken.
+    line : Line
+        The growth of the gap.
+    limit : float or None
+        The gap at which the drive is worn, rad.
+    now, then : tuple of Row
+        Each strategy on the drive found last, and on that drive with the gap at the limit; set up for the
+        drive found last in both, each with intervals over all that its logs leave open.
+    notes : tuple of str
+        What else has changed, and what the line cannot tell.
+
+    Examples
+    --------
+    >>> from softstart import Drive, identify
+    >>> from softstart.identification.planning import made_up_log
+    >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
+    >>> worn = crane.replace(gap=0.1)
+    >>> plan = {"log_period": 8e-3, "ripple": 1.0}
+    >>> each = [identify(made_up_log(one, "two levels, then reverse", **plan), one, searches=1)
+    ...     for one in (crane, worn)]
+    >>> wear = follow_wear(each, ["2024-05-01", "2026-05-01"], limit=0.15, controllers=["direct"])
+    >>> wear.line.growth[1] < 0.01 < wear.line.growth[2]
+    True
+
+    References
+    ----------
+    E. C. Fieller, Some problems in interval estimation, J. Royal Statist. Soc. B 16 (1954) 175-185;
+    docs/identification.md.
+    """
+
+    found: tuple[Identification, ...]
+    names: tuple[str, ...]
+    dates: tuple[date, ...]
+    line: Line
+    limit: float | None
+    now: tuple[Row, ...]
+    then: tuple[Row, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def gaps(self) -> tuple[Estimate, ...]:
+        """The gap of each identification."""
+        return tuple(one["gap"] for one in self.found)
+
+    @property
+    def worn(self) -> tuple[date | None, date | None, date | None] | None:
+        """When the gap reaches its limit, the earliest and the latest date of 95 %; None for never."""
+        if self.limit is None:
+            return None
+        return tuple(_date_after(self.dates[0], years) for years in self.line.reaches(self.limit))  # type: ignore[return-value]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data."""
+        growth = dict(zip(("growth", "growth_lower", "growth_upper"), self.line.growth, strict=True))
+        worn = ("worn", "worn_earliest", "worn_latest")
+        return {
+            "drive": self.found[-1].drive.name,
+            "gaps": [
+                {
+                    "name": name,
+                    "date": str(when),
+                    "gap": gap.value,
+                    "gap_lower": gap.lower,
+                    "gap_upper": gap.upper,
+                }
+                for name, when, gap in zip(self.names, self.dates, self.gaps, strict=True)
+            ],
+            **growth,
+            "limit": self.limit,
+            **({} if self.worn is None else {k: v and str(v) for k, v in zip(worn, self.worn, strict=True)}),
+            "strategies": [
+                {"now": one.summary(), "at_the_limit": two.summary()}
+                for one, two in zip(self.now, self.then, strict=True)
+            ],
+            "notes": list(self.notes),
+        }
+
+    def plot(self) -> Any:
+        """The gaps over time, the line with its interval, and the limit; a matplotlib figure."""
+        return views.wear_figure(self)
+
+
+def follow_wear(
+    found: Sequence[Identification | str | os.PathLike[str]],
+    dates: Sequence[str | date] | None = None,
+    limit: float | str | None = None,
+    *,
+    controllers: Sequence[str | Controller] | None = None,
+) -> Wear:
+    """Follow the gap of a drive through its identifications, and say when it is worn.
+
+    Parameters
+    ----------
+    found : sequence of Identification or path
+        Two or more identifications of one drive, or the folders that `softstart identify --out` wrote.
+    dates : sequence of str or date, optional
+        When their logs were taken, as "2026-05-31", "2026-05" (its middle) or "2026". By default what stands
+        in the names of the folders.
+    limit : float or str, optional
+        Gap at which the drive is worn, rad or with a unit: when it is reached, and what strategies do then.
+    controllers : sequence of str or Controller, optional
+        The strategies, by default all that need no parameter.
+
+    Returns
+    -------
+    Wear
+        Growth of the gap with its interval, date of the limit, strategies then.
+
+    Raises
+    ------
+    InputError
+        For bad input, for one identification alone, and for a gap that is unknown in one of them.
+
+    Examples
+    --------
+    >>> follow_wear(["nowhere"], ["2026"])
+    Traceback (most recent call last):
+    softstart.errors.InputError: wear: one identification shows no growth; name two or more, of other dates.
+
+    References
+    ----------
+    Fieller's theorem: `Wear`; docs/identification.md.
+    """
+    given = [found] if isinstance(found, Identification | str | os.PathLike) else list(found)
+    if len(given) < 2:
+        raise InputError("wear: one identification shows no growth; name two or more, of other dates.")
+    names = [
+        f"log {i}" if isinstance(one, Identification) else os.fspath(one) for i, one in enumerate(given, 1)
+    ]
+    if dates is None and any(isinstance(one, Identification) for one in given):
+        raise InputError("dates: give the date of each identification, as 2026-05-31.")
+    told = [Path(name).name for name in names] if dates is None else list(dates)
+    if len(told) != len(given):
+        raise InputError(f"dates: there are {len(told)} for {len(given)} identifications; give one for each.")
+    days = [_date_of(one, dates is None) for one in told]
+    each = [one if isinstance(one, Identification) else Identification.load(one) for one in given]
+    for name, one in zip(names, each, strict=True):
+        gap = next((estimate for estimate in one.estimates if estimate.name == "gap"), None)
+        if gap is None or not gap.known:
+            raise InputError(
+                f"wear: {name} does not know the gap; {gap.reason if gap else 'it was not free'}."
+            )
+    order = sorted(range(len(days)), key=days.__getitem__)
+    days, names, each = ([one[i] for i in order] for one in (days, names, each))  # type: ignore[assignment]
+    if days[0] == days[-1]:
+        raise InputError(f"dates: all identifications are of {days[0]}; growth takes two dates.")
+    years = np.array([(one - days[0]).days / YEAR for one in days])
+    gaps = [one["gap"] for one in each]
+    line = Line.through(
+        years,
+        np.array([one.value for one in gaps]),
+        np.array([0.5 * (one.upper - one.lower) / INTERVAL.quantile for one in gaps]),
+    )
+    worn = None if limit is None else float(to_si(limit, "rad", name="limit"))
+    if worn is not None and not worn > 0.0:
+        raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
+    now: tuple[Row, ...] = ()
+    then: tuple[Row, ...] = ()
+    if worn is not None:
+        last, drawn = each[-1].drive, each[-1].draws()
+        made = make_controllers(controllers, {})
+        now = tuple(compared(last, one, None, worst_case=(), drawn=drawn) for one in made)
+        wide, all_wide = last.with_gap(worn), drawn.with_gap(worn)
+        then = tuple(compared(wide, one, None, None, last, (), all_wide) for one in made)
+    return Wear(
+        tuple(each), tuple(names), tuple(days), line, worn, now, then, tuple(_notes(each, days, line))
+    )
+
+
+def _date_of(given: object, from_name: bool) -> date:
+    """A date; a month or a year alone stands for its middle.
+
+    >>> _date_of("2026-05", False), _date_of("found-2026-05-31", True)
+    (datetime.date(2026, 5, 15), datetime.date(2026, 5, 31))
+    """
+    if isinstance(given, date):
+        return given
+    text = str(given)
+    found = DATE.search(text) if from_name else DATE.fullmatch(text.strip())
+    try:
+        if found is not None:
+            year, month, day = (int(part) if part else 0 for part in found.groups())
+            return date(year, month or 7, day or (15 if month else 1))
+    except ValueError:
+        pass
+    raise InputError(
+        f"dates: the folder {show(text)} has no date in its name, as 2026-05-31; give --dates."
+        if from_name
+        else f"dates: {show(text)} is no date; write one as 2026-05-31, 2026-05 or 2026."
+    )
+
+
+def _date_after(first: date, years: float) -> date | None:
+    """The date so many years later; None beyond what a calendar has."""
+    if not math.isfinite(years):
+        return None
+    day = first.toordinal() + years * YEAR
+    return date.fromordinal(round(day)) if 1.0 <= day <= date.max.toordinal() else None
+
+
+def _notes(each: Sequence[Identification], days: Sequence[date], line: Line) -> list[str]:
+    """What else has changed, and what the line cannot tell."""
+    notes = []
+    growth, lower, _ = line.growth
+    if lower <= 0.0:
+        notes.append(
+            f"The growth of the gap, {growth:.2g} rad a year, is not told apart from none; an identification "
+            "later on, or with narrower intervals, will tell."
+        )
+    if line.chance < CROOKED:
+        notes.append(
+            f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
+            "runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the intervals."
+        )
+    first, last = each[0], each[-1]
+    both = {one.name for one in first.shared if one.known} & {one.name for one in last.shared if one.known}
+    for one in (one for one in first.shared if one.name in both - {"gap"}):
+        other = last[one.name]
+        change = math.log(abs(other.value / one.value))
+        spread = math.hypot(
+            *(0.5 * math.log(abs(e.upper / e.lower)) / INTERVAL.quantile for e in (one, other))
+        )
+        if abs(change) > NOT_BY_CHANCE * spread:
+            notes.append(
+                f"{one.name} has changed from {one.value:.4g} to {other.value:.4g} between {days[0]} "
+                f"and {days[-1]}, by more than its intervals: "
+                + (
+                    "no wear does that; look at the scale of the torque signal."
+                    if one.name == "motor_inertia"
+                    else "another load, temperature, or wear of more than the gap."
+                )
+            )
+    return notes

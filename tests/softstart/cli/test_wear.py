@@ -1,0 +1,179 @@
+"""Wear: the line through dated gaps, when it reaches a limit, and strategies on the worn drive."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softstart import Drive, Identification, InputError, compare, follow_wear, identify, simulate
+from softstart.identification.planning import made_up_log
+from softstart.identification.wear import Line
+
+TRUTH = Drive.load("crane-4amtkf").replace(
+    damping=0.3,
+    torque_lag=0.004,
+    load_kind="reactive",
+    gap=0.08,
+    start_position="mid-gap",
+    encoder_lines=1024,
+)
+
+
+@pytest.fixture(scope="module")
+def new() -> Identification:
+    log = made_up_log(TRUTH, "two levels, then reverse", log_period=4e-3, ripple=1.0, seed=3)
+    return identify(log, TRUTH, searches=1)
+
+
+def with_value(found: Identification, name: str, value: float, half: float) -> Identification:
+    """The same identification with another value of a parameter, and a symmetric interval."""
+    estimates = tuple(
+        replace(one, value=value, lower=value - half, upper=value + half) if one.name == name else one
+        for one in found.estimates
+    )
+    return replace(found, drive=found.drive.replace(**{name: value}), estimates=estimates)
+
+
+# ---- the line -------------------------------------------------------------------------------------------
+
+
+def test_the_line_is_that_of_weighted_least_squares() -> None:
+    t, s = np.array([0.0, 0.7, 1.5, 3.0]), np.array([1e-3, 3e-3, 1e-3, 2e-3])
+    y = 0.08 + 0.004 * t + np.array([4e-4, -1e-3, -3e-4, 5e-4])
+    line = Line.through(t, y, s)
+    (slope, start), covariance = np.polyfit(t, y, 1, w=1.0 / s, cov="unscaled")
+    assert (line.start, line.slope) == pytest.approx((start, slope), rel=1e-12)
+    assert line.covariance == pytest.approx(covariance[::-1, ::-1], rel=1e-10)
+    assert 0.5 < line.chance < 1.0
+    scattered = Line.through(t, y + 10.0 * (y - 0.08 - 0.004 * t), s)
+    assert scattered.chance < 0.01
+    assert np.all(np.diag(scattered.covariance) > 5.0 * np.diag(covariance)[::-1])
+
+
+@pytest.mark.parametrize("slope", [0.004, 0.0015])
+def test_intervals_hold_growth_and_date_in_95_of_100_lives(slope: float) -> None:
+    generator, t, s = np.random.default_rng(2), np.array([0.0, 1.0, 2.5]), np.array([1e-3, 1.5e-3, 1e-3])
+    truth = (0.12 - 0.08) / slope
+    growth = when = 0
+    for _ in range(2000):
+        line = Line.through(t, 0.08 + slope * t + s * generator.standard_normal(3), s)
+        _, lower, upper = line.growth
+        growth += lower <= slope <= upper
+        _, earliest, latest = line.reaches(0.12)
+        when += earliest <= truth <= latest
+    assert 0.945 < growth / 2000 < 0.98
+    assert 0.945 < when / 2000 < 0.98
+
+
+def test_growth_that_may_be_none_has_no_latest_date_and_a_shrinking_gap_no_date() -> None:
+    t = np.array([0.0, 1.0])
+    middle, earliest, latest = Line.through(t, np.array([0.08, 0.081]), np.array([1e-3, 1e-3])).reaches(0.12)
+    assert middle == pytest.approx(40.0)
+    assert 1.0 < earliest < middle
+    assert math.isinf(latest)
+    never = Line.through(t, np.array([0.08, 0.07]), np.array([1e-3, 1e-3])).reaches(0.12)
+    assert math.isnan(never[0])
+    assert never[1:] == (math.inf, math.inf)
+
+
+# ---- a life ---------------------------------------------------------------------------------------------
+
+
+def test_a_life_has_dates_and_strategies_on_the_worn_drive(new: Identification) -> None:
+    limited = replace(new, drive=new.drive.replace(permissible_torque=115.0))
+    older = with_value(limited, "gap", 0.08, 0.001)
+    newer = with_value(limited, "gap", 0.09, 0.001)
+    wear = follow_wear(
+        [newer, older], ["2026-01-01", date(2025, 1, 1)], "0.2 rad", controllers=["direct", "s-curve"]
+    )
+    assert wear.dates == (date(2025, 1, 1), date(2026, 1, 1))
+    assert [one.value for one in wear.gaps] == [0.08, 0.09]
+    years = 365.0 / 365.25
+    assert wear.line.slope == pytest.approx(0.01 / years, rel=1e-12)
+    assert wear.worn is not None
+    assert wear.worn[0] == date.fromordinal(date(2025, 1, 1).toordinal() + 12 * 365)
+    earliest, latest = wear.worn[1:]
+    assert earliest is not None
+    assert latest is not None
+    assert earliest < date(2036, 12, 29) < latest
+    for row, now in zip(wear.then, wear.now, strict=True):
+        alone = simulate(newer.drive.replace(gap=0.2), row.run.controller, fitted_to=newer.drive)
+        assert row.run.k_dyn == alone.k_dyn
+        assert row.run.drive.gap == 0.2
+        assert row.intervals["k_dyn"][0] <= row.run.k_dyn <= row.intervals["k_dyn"][1]
+        assert now.run.k_dyn == compare(newer, [row.run.controller_name]).rows[0].run.k_dyn
+    kept = {row.name: row.least_margin is not None and row.least_margin.kept for row in wear.then}
+    assert kept == {"direct": False, "s-curve": True}
+    data = wear.summary()
+    assert data["worn"] == "2036-12-29"
+    assert data["strategies"][0]["at_the_limit"]["k_dyn"] == wear.then[0].run.k_dyn
+    json.dumps(data, default=str)
+    assert len(wear.plot().axes) == 1
+
+
+def test_what_else_has_changed_is_named(new: Identification) -> None:
+    one = new["stiffness"]
+    softer = with_value(
+        with_value(new, "gap", 0.1, 0.001), "stiffness", 0.8 * one.value, 0.5 * (one.upper - one.lower)
+    )
+    wear = follow_wear([new, softer], ["2025", "2026"])
+    assert [note.split()[0] for note in wear.notes] == ["stiffness"]
+    assert wear.then == ()
+    inertia = new["motor_inertia"]
+    lighter = with_value(new, "motor_inertia", 0.9 * inertia.value, 0.5 * (inertia.upper - inertia.lower))
+    notes = follow_wear([new, lighter], ["2025", "2026"]).notes
+    assert any("look at the scale of the torque signal" in note for note in notes)
+    assert any("is not told apart from none" in note for note in notes)
+    each = [with_value(new, "gap", value, 0.001) for value in (0.08, 0.12, 0.09)]
+    assert any("do not lie on a line" in note for note in follow_wear(each, ["2024", "2025", "2026"]).notes)
+
+
+def test_what_cannot_be_followed_is_refused(new: Identification, tmp_path: Path) -> None:
+    unknown = replace(
+        new, estimates=tuple(replace(one, known=False, reason="no reversal") for one in new.estimates)
+    )
+    free = replace(new, estimates=tuple(one for one in new.estimates if one.name != "gap"))
+    for found, dates, limit, sentence in (
+        ([new], ["2025"], None, "one identification shows no growth"),
+        ([new, new], None, None, "give the date of each identification"),
+        ([new, new], ["2025"], None, "there are 1 for 2 identifications"),
+        ([new, new], ["2025", "2025"], None, "growth takes two dates"),
+        ([new, new], ["2025", "31.5.2026"], None, "is no date; write one as 2026-05-31"),
+        ([new, new], ["2025", "2026-13"], None, "is no date"),
+        ([new, unknown], ["2025", "2026"], None, "log 2 does not know the gap; no reversal"),
+        ([new, free], ["2025", "2026"], None, "it was not free"),
+        ([new, new], ["2025", "2026"], "-1 rad", "is above 0"),
+        ([new, new], ["2025", "2026"], "1 mm", "limit = "),
+        ([str(tmp_path / "a"), str(tmp_path / "b")], None, None, 'the folder "a" has no date in its name'),
+        ([str(tmp_path / "2025"), str(tmp_path / "2026")], None, None, "there is no such file"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            follow_wear(found, dates, limit)  # type: ignore[arg-type]
+
+
+def test_the_command_reads_folders_and_writes_a_report(run, new: Identification, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    for year, gap in (("2024", 0.08), ("2026", 0.1)):
+        with_value(new, "gap", gap, 0.001).save(tmp_path / year)
+    line = ["identify", "--wear", str(tmp_path / "2024"), str(tmp_path / "2026"), "--controllers", "direct"]
+    result = run(*line, "--limit", "0.2 rad", "--out", str(tmp_path / "worn"))
+    assert result.code == 0, result.err
+    assert "The gap grows by 0.01 rad a year" in result.out
+    assert "It reaches 0.2 rad on 2036-0" in " ".join(result.out.split())
+    assert {"report.md", "wear.csv", "wear.svg"} <= {path.name for path in (tmp_path / "worn").iterdir()}
+    data = json.loads(run(*line, "--json").out)
+    assert [one["gap"] for one in data["gaps"]] == [0.08, 0.1]
+    for extra, sentence in (
+        (["--drive", "crane-4amtkf"], "--drive: --wear reads folders"),
+        (["--limit", "soon"], "--limit"),
+        (["--dates", "2024"], "there are 1 for 2"),
+    ):
+        refused = run(*line, *extra)
+        assert refused.code == 2
+        assert sentence in refused.err
+    assert "it goes with --wear" in run("identify", "a.csv", "--drive", "crane-4amtkf", "--limit", "1").err
