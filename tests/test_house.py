@@ -30,7 +30,7 @@ BUDGET = {
     # 140 and a file: `init`; 30: `fatigue` of a chain
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
-    # 15: a torque constant; 20: folders of identifications
+    # 15: a torque constant; 20: folders of identifications; 65: wear
     "cli": (5115, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
@@ -87,7 +87,7 @@ BUDGET = {
     # 10: the worst of several positions, named by the page and the report too
     # 40: optima of chains; 75: lives of the shafts of a chain
     # 90: wear
-    "views": (5235, 19, 6, 0),
+    "views": (5239, 19, 6, 0),
 }
 
 
