@@ -31,7 +31,7 @@ BUDGET = {
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
     # 15: a torque constant; 20: folders of identifications; 65: wear
-    "cli": (5115, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
+    "cli": (5120, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
     "controller": (1270, 5, 0, 0),
@@ -44,7 +44,8 @@ BUDGET = {
     # 100: identifications kept on disk, drawn by the intervals that are shown
     # 20: the mean correlation of encoder errors
     # 350 and a file: wear of the gap over the years
-    "identification": (2730, 8, 2, 0),  # 20: units of another scale
+    # 135 and a file: chains through their reduction
+    "identification": (2880, 9, 3, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

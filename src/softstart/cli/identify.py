@@ -20,6 +20,7 @@ from softstart.cli.options import (
     out_option,
     read_count,
     read_drive,
+    read_machine,
     read_names,
     read_params,
     set_option,
@@ -40,6 +41,7 @@ from softstart.views.markdown import (
 from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
+    from softstart.drive import Drive
     from softstart.identification import planning
     from softstart.identification.logs import TorqueIs
     from softstart.identification.planning import Plan
@@ -59,7 +61,8 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 @click.argument("logs", metavar="[LOG]...", nargs=-1)
 @click.option(
     "--drive", metavar="GUESS", shell_complete=names_or_files(drive_names, ".toml"),
-    help="The drive as it is thought to be, by a factor of 3 if need be: a file or shipped name.",
+    help="The drive, or chain with one dominant gap, as it is thought to be, by a factor of 3 if need be: a "
+    "file or shipped name.",
 )  # fmt: skip
 @set_option
 @click.option(
@@ -169,7 +172,7 @@ def identify(
         show_wear(logs, dates, limit, controllers, as_json, out)
         return
     with mistakes.noted():
-        one = read_drive(str(plan or drive), settings)
+        guess = read_drive(plan, settings) if plan is not None else read_machine(str(drive), settings)
     with mistakes.noted():
         if torque_is not in ("measured", "demand"):
             raise InputError(f'--torque-is = "{torque_is}": write measured or demand.')
@@ -193,9 +196,8 @@ def identify(
         if plan is not None:
             with working("planning experiments ...") as tell:
                 made = softstart.plan_experiments(
-                    one, log_period=log_period or "4 ms", ripple=ripple, free=names, most_torque=most_torque,
-                    most_travel=most_travel, optimise=not standard,
-                    tell=tell,
+                    cast("Drive", guess), log_period=log_period or "4 ms", ripple=ripple, free=names,
+                    most_torque=most_torque, most_travel=most_travel, optimise=not standard, tell=tell,
                 )  # fmt: skip
                 if folder is not None:
                     write_plan(made, folder, command_line())
@@ -210,7 +212,7 @@ def identify(
             with working("fitting the drive to the logs ...") as tell:
                 found = softstart.identify(
                     list(logs),
-                    one,
+                    guess,
                     free=names,
                     torque_is=cast("TorqueIs", torque_is),
                     columns=called,

@@ -13,8 +13,10 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
+from softstart.chain.model import Chain, load_machine
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, listed
+from softstart.identification.chains import reduced_drive, reduction_note
 from softstart.identification.fitting import FACTOR, FREE, Fitter, Solution, Space, Tell, covariance_of
 from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
@@ -34,7 +36,7 @@ SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong uni
 
 def identify(
     logs: Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]],
-    drive: Drive | str,
+    drive: Drive | Chain | str,
     *,
     free: Iterable[str] | None = None,
     torque_is: TorqueIs = "measured",
@@ -57,8 +59,9 @@ def identify(
     ----------
     logs : Log, path, or sequence of them
         Logs of one drive, each beginning at standstill, or their CSV or MDF files (`Log.load`).
-    drive : Drive or str
-        The guess, by factors of 3 if need be; what is not free stays as it is there. The position in the gap
+    drive : Drive, Chain or str
+        The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
+        dominant gap the two masses that stand for it are found, and the error of that is predicted. The position in the gap
         is free for each log where the load is reactive or the drive says "unknown".
     free : iterable of str, optional
         What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping and
@@ -101,7 +104,9 @@ def identify(
     (1997) 983-997; docs/identification.md.
     """
     began = time.perf_counter()
-    drive = drive if isinstance(drive, Drive) else Drive.load(drive)
+    drive = load_machine(drive) if isinstance(drive, str) else drive
+    chain = drive if isinstance(drive, Chain) else None
+    drive = reduced_drive(drive) if isinstance(drive, Chain) else drive
     if drive.shape:
         raise InputError("drive: a batch of drives is no guess; give one drive.")
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
@@ -134,6 +139,7 @@ def identify(
     best = found[0][1]
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
+        *([] if chain is None else _reduction(chain, drive, read[0], free, tell)),
         *_advice(drive.replace(**changes), estimates, read),
         *_misfits(fitter, solution),
         *_other_scale(drive, drive.replace(**changes)),
@@ -153,6 +159,20 @@ def identify(
         notes=tuple(notes),
         residuals=tuple(one.residual for one in fitter.parts(solution.x, derivatives=False)),
     )
+
+
+def _reduction(
+    chain: Chain, drive: Drive, log: Log, free: Iterable[str] | None, tell: Tell | None
+) -> list[str]:
+    """What the reduction of a chain leaves out, and how far that moves what is found."""
+    if len(chain.masses) == 2:
+        return []
+    asked = None if free is None else list(free)
+    return [
+        reduction_note(
+            chain, drive, log, lambda one: identify(one, drive, free=asked, searches=1, tell=tell).shared
+        )
+    ]
 
 
 def _source(drive: Drive, logs: Sequence[Log]) -> str:

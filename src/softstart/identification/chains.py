@@ -1,0 +1,110 @@
+"""A chain with one dominant gap, identified through its reduction to two masses, and the error of that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from softstart.chain.model import Chain
+from softstart.chain.reduction import reduce_chain
+from softstart.chain.simulation import simulate_chain
+from softstart.controller import make_controller
+from softstart.drive import Drive
+from softstart.errors import InputError, SimulationError
+from softstart.identification.logs import TURN, Log
+from softstart.identification.result import Estimate
+from softstart.profile import TorqueProfile
+
+DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
+WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it
+
+
+def reduced_drive(chain: Chain) -> Drive:
+    """The drive of two masses that stands for a chain; refused where no gap is the larger part of all.
+
+    >>> reduced_drive(Chain.load("crane-4-mass"))
+    Traceback (most recent call last):
+    softstart.errors.InputError: drive = Crane travel drive as a chain of four masses: its widest gap is 40 %
+    of all; ...
+    """
+    gaps = chain.at_motor_shaft().gap
+    whole = float(gaps.sum())
+    if whole > 0.0 and float(gaps.max()) <= DOMINANT * whole:
+        raise InputError(
+            f"drive = {chain.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
+            "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
+        )
+    return reduce_chain(chain, to=2, force=True).to_drive()
+
+
+def chain_log(chain: Chain, log: Log, lines: float) -> Log:
+    """What the motor of the whole chain does under the torque of a log, counted by an encoder, without noise.
+
+    It starts in mid-gap where its position is unknown.
+    """
+    limit = WIDE * float(np.max(np.abs(log.torque)))
+    free: dict[str, Any] = {
+        "starting_torque": limit,
+        "maximum_torque": limit,
+        "minimum_torque": -limit,
+        "encoder_lines": 0.0,
+    }
+    if log.torque_is == "measured":
+        free |= {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0}
+    one = chain.positions.get("mid-gap", next(iter(chain.positions.values())))
+    if one.motor is None:
+        raise InputError("[motor] is missing: a drive needs its starting torque; add it to the chain.")
+    one = replace(one, motor=replace(one.motor, **free))
+    times = log.time - log.time[0]
+    if log.torque_is == "demand":
+        profile = TorqueProfile(np.repeat(times, 2)[1:], np.repeat(log.torque, 2)[:-1])
+    else:
+        profile = TorqueProfile(times, log.torque)
+    run = simulate_chain(one, make_controller("profile", {"profile": profile}), until=float(times[-1]))
+    states = run.at(times)
+    angle = states["phi"][:, one.motor_index] - states["phi"][0, one.motor_index]
+    if log.kind == "speed":
+        return Log(
+            times, log.torque, speed=states["w"][:, one.motor_index], torque_is=log.torque_is, name="chain"
+        )
+    if lines:
+        count = TURN / (4.0 * lines)
+        angle = np.floor(angle / count + 0.3) * count
+    return Log(times, log.torque, angle=angle, torque_is=log.torque_is, name="chain")
+
+
+def reduction_note(
+    chain: Chain, drive: Drive, log: Log, fitted: Callable[[Log], tuple[Estimate, ...]]
+) -> str:
+    """What the reduction leaves out, and how far it moves each value.
+
+    The second follows from a fit of two masses to the start of the whole chain, as it was given, under the
+    torque of the log: what comes out beside what the reduction says.
+    """
+    found = reduce_chain(chain, to=2, force=True)
+    first = found.frequencies[0]
+    rest = found.whole_vibration.Omega[2:] / TURN
+    period = float(np.median(np.diff(log.time)))
+    seen = f"a log with {period:.3g} s between samples {'may show' if rest[0] * period < 0.5 else 'cannot show'} it"
+    said = (
+        f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it. Natural "
+        f"frequencies from {rest[0]:.4g} Hz on are left out ({seen}); the first, {first.whole / TURN:.4g} Hz, is "
+        f"{100.0 * first.error:+.2g} % off, by at most {100.0 * first.bound:.2g} %. "
+    )
+    try:
+        each = fitted(chain_log(chain, log, float(drive.encoder_lines)))
+    except (InputError, SimulationError) as error:
+        return f"{said}How far that moves the values could not be predicted: {error}"
+    moved = [
+        f"{one.name} {100.0 * (one.value / float(getattr(drive, one.name)) - 1.0):+.2g} %"
+        for one in each
+        if one.known and float(getattr(drive, one.name, 0.0))
+    ]
+    return (
+        f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was given, "
+        f"under this torque: {', '.join(moved)}. The intervals do not hold this error."
+    )

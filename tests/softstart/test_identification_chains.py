@@ -1,0 +1,98 @@
+"""A chain identified through its reduction: the whole chain under a log, and the error of two masses."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from softstart import Chain, Drive, InputError, Log, identify, natural_vibration
+from softstart.identification.chains import chain_log, reduced_drive, reduction_note
+from softstart.identification.model import LogModel
+from softstart.identification.planning import made_up_log
+
+REVERSE = "two levels, then reverse"
+
+
+def stiff_behind_the_gap(widest: str = "0.08 rad", others: float = 0.0) -> Chain:
+    """Four masses whose dominant gap is beside the motor, and whose other shafts are stiff."""
+    also = {f"shaft[{k}].damping_ratio": 0.05 for k in (1, 2, 3)} | {
+        "mass[4].kind": "reactive", "start.position": "mid-gap", "shaft[1].stiffness": 400.0,
+        "shaft[2].stiffness": 12000.0, "shaft[3].stiffness": 3.3e6, "shaft[1].gap": widest,
+        "shaft[2].gap": others, "shaft[3].gap": 0.0,
+    }  # fmt: skip
+    return Chain.load("crane-4-mass", also=also)
+
+
+def moved_by(note: str) -> dict[str, str]:
+    """The predicted errors of a note, in %."""
+    return dict(re.findall(r"(\w+) ([+-][\d.e+]+) %", note.split("this torque: ")[1]))
+
+
+@pytest.mark.parametrize("torque_is", ["demand", "measured"])
+@pytest.mark.parametrize("signal", ["angle", "speed"])
+def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: str) -> None:
+    drive = Drive.load("crane-4amtkf").replace(
+        damping=0.3,
+        torque_lag=0.004,
+        load_kind="reactive",
+        gap=0.08,
+        start_position="mid-gap",
+        encoder_lines=0,
+    )
+    log = made_up_log(drive, REVERSE, log_period=2e-3, torque_is=torque_is, signal=signal)  # type: ignore[arg-type]
+    whole = chain_log(Chain.from_drive(drive), log, 0.0)
+    assert whole.values == pytest.approx(LogModel(log, drive).signals([{}])[0], abs=1e-11)
+
+
+def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None:
+    chain = stiff_behind_the_gap()
+    drive = reduced_drive(chain)
+    plan = made_up_log(drive, REVERSE, log_period=4e-3)
+    generator = np.random.default_rng(5)
+    played = Log(
+        plan.time,
+        plan.torque + generator.standard_normal(plan.time.size),
+        angle=plan.values,
+        torque_is="demand",
+    )
+    real = chain_log(chain, played, 4096.0)
+    log = Log(plan.time, plan.torque, angle=real.values, torque_is="demand", name="rig")
+    found = identify(log, chain, searches=1)
+    (note,) = [note for note in found.notes if "has 4 masses" in note]
+    first, second = natural_vibration(chain).Omega[1:3] / (2.0 * np.pi)
+    assert f"Natural frequencies from {second:.4g} Hz on are left out" in note
+    assert f"the first, {first:.4g} Hz, is -0.58 % off" in note
+    moved = moved_by(note)
+    assert set(moved) == {one.name for one in found.shared}
+    assert float(moved["motor_inertia"]) == pytest.approx(-1.2, abs=0.3)  # the pinion flies with the load
+    for one in found.shared:
+        # what the reduction says, moved by the predicted error, is in twice the interval
+        expected = float(getattr(drive, one.name)) * (1.0 + 0.01 * float(moved[one.name]))
+        assert abs(one.value - expected) < one.upper - one.lower, one.name
+    assert found.drive.name.endswith("reduced to two masses (lever)")
+
+
+@pytest.mark.slow  # a fit of two masses to a chain that rattles
+def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
+    """The page's second example: the pinion, a fifteenth of the rotor, rattles between soft shafts."""
+    also = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)} | {
+        "mass[4].kind": "reactive", "start.position": "mid-gap", "shaft[1].gap": 0.08, "shaft[2].gap": 0.002,
+        "shaft[3].gap": 1e-4,
+    }  # fmt: skip
+    chain = Chain.load("crane-4-mass", also=also)
+    drive = reduced_drive(chain)
+    plan = made_up_log(drive, REVERSE, log_period=4e-3)
+    note = reduction_note(chain, drive, plan, lambda one: identify(one, drive, searches=1).shared)
+    moved = {name: float(text) for name, text in moved_by(note).items()}
+    assert -13.0 < moved["motor_inertia"] < -9.0
+    assert -40.0 < moved["gap"] < -20.0
+
+
+def test_chains_without_a_dominant_gap_and_without_a_motor_are_refused() -> None:
+    with pytest.raises(InputError, match="its widest gap is 40 % of all"):
+        identify(made_up_log(Drive.load("crane-4amtkf"), "start"), "crane-4-mass")
+    with pytest.raises(InputError, match="its widest gap is 50 % of all"):
+        reduced_drive(stiff_behind_the_gap("0.08 rad", 0.08))
+    assert reduced_drive(stiff_behind_the_gap("0.08 rad", 0.02)).gap == pytest.approx(0.1)
