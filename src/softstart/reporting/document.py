@@ -26,7 +26,7 @@ from softstart.views.printed import digits, fixed, short
 
 SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
-BREAKS = ("recommendation", "sheets")  # begin a printed page
+BREAKS = ("recommendation", "strategies", "drive", "limit", "robustness", "sheets")  # begin a printed page
 LONGEST = 70  # letters of a name in the head of a page
 GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in the file, nothing is loaded
 
@@ -66,8 +66,8 @@ def _document(report: Report) -> str:
     sections: list[tuple[str, str, Html]] = [
         ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
         ("strategies", "The strategies compared", strategies_section(drive, rows, chosen, report.failed)),
-        ("drive", "The drive", drive_section(drive, project, figures)),
         ("traces", "Torques of each start", traces_section(rows, figures)),
+        ("drive", "The drive", drive_section(drive, project, figures)),
         ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
         (
             "robustness",
