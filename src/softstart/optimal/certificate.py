@@ -176,6 +176,7 @@ class _Dual:
         self.share, self.net = by.share[used], net[used]
         self.open = by.closed[used] if self.pulls else np.zeros(self.share.size)
         self.known: dict[float, tuple[float, float]] = {}
+        self.bends: dict[float, float] = {}
 
     def at(self, tau: float) -> tuple[float, float]:
         """(what does not depend on v and te, coefficient of v), N m and N m s/rad."""
@@ -185,25 +186,21 @@ class _Dual:
 
     def _evaluate(self, tau: float) -> tuple[float, float]:
         by, contact, problem = self.by, self.contact, self.problem
-        none = np.array([0.0, max(tau, 1e-300)])
-        z0 = self.entry.z0
-
-        def parts(rows: tuple[Vector, Vector, Vector, Vector]) -> tuple[Vector, Vector]:
-            _, a_v, a_0, a_z = rows
-            return a_v, a_0 + a_z * z0
-
-        s, end = self.share * tau, np.array([tau])
-        T_v, T_0 = parts(contact.torque(s, none))
-        z_v, z_0 = parts(contact.twist(s, none))
-        tail_v, tail_0 = parts(contact.torque(tau + by.tail_at, none))
-        w_v, w_0 = parts(contact.load_speed(end, none))
-        r_v, r_0 = parts(contact.rate(end, none))
-        E_v, E_0 = parts(contact.torque(end, none))
-        c = contact.c
-        a_v = self.net @ T_v - c * (self.open @ z_v) + by.tail @ tail_v
-        a_v = a_v - by.speed * w_v[0] - by.rate * r_v[0] - by.torque * E_v[0]
-        fixed = self.net @ T_0 - c * (self.open @ z_0) + by.tail @ tail_0
-        fixed = fixed - by.speed * w_0[0] - by.rate * r_0[0] - by.torque * (E_0[0] - problem.drive.Mc)
+        z0, c, d = self.entry.z0, contact.c, contact.d
+        n = self.share.size
+        # at the checked instants, while coasting afterwards, and at the end
+        z, rate = contact.coasting(np.concatenate([self.share * tau, tau + by.tail_at, [tau]]))
+        T_v, a_0, a_z = (c * one + d * other for one, other in zip(z, rate, strict=True))
+        T_0 = a_0 + a_z * z0
+        z_v, z_0, r_v, r_0 = z[0], z[1] + z[2] * z0, rate[0][-1], rate[1][-1] + rate[2][-1] * z0
+        # momentum: J1 w1 + J2 w2 is what the torques brought
+        total = contact.J1 + contact.J2
+        w_v = contact.J1 * (1.0 - rate[0][-1]) / total
+        w_0 = (-contact.Mc * tau - contact.J1 * rate[1][-1]) / total + -contact.J1 * rate[2][-1] / total * z0
+        a_v = self.net @ T_v[:n] - c * (self.open @ z_v[:n]) + by.tail @ T_v[n:-1]
+        a_v = a_v - by.speed * w_v - by.rate * r_v - by.torque * T_v[-1]
+        fixed = self.net @ T_0[:n] - c * (self.open @ z_0[:n]) + by.tail @ T_0[n:-1]
+        fixed = fixed - by.speed * w_0 - by.rate * r_0 - by.torque * (T_0[-1] - problem.drive.Mc)
         fixed += self._by_torque(tau)
         return float(fixed), float(a_v)
 
@@ -248,6 +245,11 @@ class _Dual:
 
     def curvature(self, tau: float) -> float:
         """M: bound of the second derivative in tau, for a contact of length <= tau."""
+        if tau not in self.bends:
+            self.bends[tau] = self._curvature(tau)
+        return self.bends[tau]
+
+    def _curvature(self, tau: float) -> float:
         by, e = self.by, self.envelope
         Ms, v, z0 = self.problem.highest_torque, self.v, self.entry.z0
 
@@ -295,6 +297,8 @@ class _Search:
         self.envelope = _Envelope(contact, self.end + coasting)
         self.impact = self._impact()
         self.duals: list[_Dual] = []
+        # of each cell the bounds so far, and from how many sets of multipliers
+        self.seen: dict[tuple[float, float], tuple[Vector | None, int]] = {}
 
     def _impact(self) -> Vector:
         """The peak that the entry alone brings, N m: T is nowhere below that of coasting from the least v."""
@@ -358,11 +362,15 @@ class _Search:
         count = int(np.searchsorted(self.edges[:-1], self.end - a, side="right"))
         count = max(min(count, self.low.size), 1)
         J2, Mc = self.problem.drive.J2, self.problem.drive.Mc
-        need = np.minimum(self.missing[:-1], self.missing[1:])[:count]
-        best = np.maximum(Mc + J2 * need / b, self.impact[:count])
-        if float(best.min()) < self.goal:
-            for dual in self.duals:
-                best = np.maximum(best, self._dual(dual, a, b, count))
+        best, seen = self.seen.get((a, b), (None, 0))
+        if best is None:
+            need = np.minimum(self.missing[:-1], self.missing[1:])[:count]
+            best = np.maximum(Mc + J2 * need / b, self.impact[:count])
+            if float(best.min()) >= self.goal:
+                seen = MOST_PROGRAMS + 1  # no multipliers are needed here
+        for dual in self.duals[seen:]:
+            best = np.maximum(best, self._dual(dual, a, b, count))
+        self.seen[a, b] = best, max(seen, len(self.duals))
         k = int(np.argmin(best))
         return float(best[k]), k
 

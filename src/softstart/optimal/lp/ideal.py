@@ -190,16 +190,14 @@ class ContactProgram:
             (dh + 2.0 * contact.zeta * h, Omega * h, c * H / contact.J1, c * H * push),
             (-Omega * h, dh, c * h / (Omega * contact.J1), c * h * push / Omega),
         )
-        row = np.arange(s.size)
+        own = [] if step is None else [step]  # the columns of each row rise
+        columns = np.stack([*own, self.first_a + node, self.first_b + node], axis=1)
+        starts = np.arange(0, columns.size + 1, columns.shape[1])
         out = []
         for by_a, by_b, by_u, constant in weights:
-            entries = [(by_a, self.first_a + node), (by_b, self.first_b + node)]
-            if step is not None:
-                entries.append((by_u, step))
-            values = np.concatenate([value for value, _ in entries])
-            columns = np.concatenate([column for _, column in entries])
-            where = np.tile(row, len(entries)), columns
-            out.append((sparse.csr_array((values, where), shape=(s.size, self.columns)), constant))
+            values = np.stack([*([by_u] if own else []), by_a, by_b], axis=1).ravel()
+            entries = values, columns.ravel(), starts
+            out.append((sparse.csr_array(entries, shape=(s.size, self.columns)), constant))
         return out[0], out[1]
 
     def _stepped(self, s: Vector) -> tuple[Rows, Rows]:

@@ -386,7 +386,8 @@ class Contact:
         when = np.asarray(s, dtype=np.float64)
         r1, r2 = self._exponents
         late = np.maximum(when, 0.0)
-        e1, e2 = np.exp(r1 * late), np.exp(r2 * late)
+        e1 = np.exp(r1 * late)
+        e2 = np.conj(e1) if r2 == r1.conjugate() else np.exp(r2 * late)
         h = ((e1 - e2) / (r1 - r2)).real
         dh = ((r1 * e1 - r2 * e2) / (r1 - r2)).real
         return np.where(when >= 0.0, h, 0.0), np.where(when >= 0.0, dh, 0.0)
@@ -427,14 +428,23 @@ class Contact:
                 return total
 
             return dense(after), dense(before)
-        from_above, from_below = np.zeros(s.size, dtype=complex), np.zeros(s.size, dtype=complex)
-        for r, sign in ((r1, 1.0), (r2, -1.0)):
+        pair = r2 == r1.conjugate()  # then the second sum is the first one's conjugate
+        from_above, from_below = np.zeros(s.size), np.zeros(s.size)
+        for r, sign in ((r1, 1.0), (r2, -1.0))[: 1 if pair else 2]:
             terms = (of_h + r * of_dh) * np.exp(r * at) * sign / (r1 - r2)
             left = np.concatenate([np.cumsum(terms[::-1])[::-1], [0.0]])
             decay = np.exp(-r * s)
-            from_above += left[after] * decay
-            from_below += left[before] * decay
-        return from_above.real, from_below.real
+            from_above += (left[after] * decay).real
+            from_below += (left[before] * decay).real
+        return (2.0 * from_above, 2.0 * from_below) if pair else (from_above, from_below)
+
+    def coasting(self, s: Vector) -> tuple[tuple[Vector, Vector, Vector], tuple[Vector, Vector, Vector]]:
+        """(a_v, a_0, a_z) of z(s) and of z'(s) without motor torque, as `twist` and `rate` have them."""
+        h, dh = self._both(s)
+        settled = (1.0 - dh - 2.0 * self.zeta * h) / self.Omega**2
+        H = np.where(s >= 0.0, settled, 0.0)
+        z = h, H * self.Mc / self.J2, dh + 2.0 * self.zeta * h
+        return z, (dh, h * self.Mc / self.J2, -(self.Omega**2) * h)
 
     def twist(self, s: Vector, edges: Vector) -> tuple[Vector, Vector, Vector, Vector]:
         """z(s) = A u + a_v v + a_0 + a_z z0: (A, a_v, a_0, a_z) for u constant between the edges."""
