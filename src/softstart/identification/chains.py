@@ -89,10 +89,11 @@ def reduction_note(
     first = found.frequencies[0]
     rest = found.whole_vibration.Omega[2:] / TURN
     period = float(np.median(np.diff(log.time)))
-    seen = f"a log with {period:.3g} s between samples {'may show' if rest[0] * period < 0.5 else 'cannot show'} it"
+    may = "may show it" if rest[0] * period < 0.5 else "cannot show it"
     said = (
         f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it. Natural "
-        f"frequencies from {rest[0]:.4g} Hz on are left out ({seen}); the first, {first.whole / TURN:.4g} Hz, is "
+        f"frequencies from {rest[0]:.4g} Hz on are left out (a log with {period:.3g} s between samples "
+        f"{may}); the first, {first.whole / TURN:.4g} Hz, is "
         f"{100.0 * first.error:+.2g} % off, by at most {100.0 * first.bound:.2g} %. "
     )
     try:
@@ -105,6 +106,6 @@ def reduction_note(
         if one.known and float(getattr(drive, one.name, 0.0))
     ]
     return (
-        f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was given, "
-        f"under this torque: {', '.join(moved)}. The intervals do not hold this error."
+        f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was "
+        f"given, under this torque: {', '.join(moved)}. The intervals do not hold this error."
     )

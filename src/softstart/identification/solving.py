@@ -61,8 +61,8 @@ def identify(
         Logs of one drive, each beginning at standstill, or their CSV or MDF files (`Log.load`).
     drive : Drive, Chain or str
         The guess, by factors of 3 if need be; what is not free stays as it is there. For a chain with one
-        dominant gap the two masses that stand for it are found, and the error of that is predicted. The position in the gap
-        is free for each log where the load is reactive or the drive says "unknown".
+        dominant gap the two masses that stand for it are found, and the error of that is predicted. The
+        position in the gap is free for each log where the load is reactive or the drive says "unknown".
     free : iterable of str, optional
         What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping and
         load torque, and with a torque demand the lag.
