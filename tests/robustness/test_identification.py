@@ -20,8 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.softstart.optimal.test_from_positions import random_unknown
 
-from softstart import Drive, Identification, identify
+from softstart import Drive, Identification, identify, plan_experiments, simulate
+from softstart.controller import make_controller
 from softstart.errors import InputError
 from softstart.identification.planning import made_up_log
 
@@ -73,6 +75,54 @@ def searched(lines: float, period: float, factor: float, number: int) -> dict[st
     log = made_up_log(drive, REVERSE, log_period=period, ripple=RIPPLE, position=0.35, phase=0.6, seed=11)
     guess = off_by(drive, factor if number else 1.0, np.random.default_rng(number))
     return told(identify(log, guess, seed=number))
+
+
+def planned(number: int) -> dict[str, Any]:
+    """A random drive, its standard experiments and the planned ones."""
+    generator = np.random.default_rng([number, 17])
+    drive = random_unknown(number).replace(
+        load_kind="reactive", encoder_lines=float(generator.choice([64, 256, 1024, 4096]))
+    )
+    if not drive.load_torque:
+        drive = drive.replace(load_torque=0.2 * float(drive.Ms))
+    period = float(drive.elastic_period) / generator.uniform(8.0, 25.0)
+    plan = plan_experiments(drive, log_period=period)
+    limit = max(one.peak for one in plan.experiments[:4])
+    runs = {}
+    for one in plan.experiments[4:]:
+        wide = drive.replace(maximum_torque=10.0 * float(drive.Ms), minimum_torque=-10.0 * float(drive.Ms))
+        play = make_controller("profile", {"profile": one.profile})
+        half = 0.5 * float(drive.gap)
+        each = [
+            simulate(wide.replace(start_position=place), play, until=one.end)
+            for place in (-half, *generator.uniform(-half, half, 40), half)
+        ]
+        run = max(each, key=lambda one: one.peak_torque)
+        runs[one.name] = {"k_dyn": run.k_dyn, "over": run.peak_torque / limit - 1.0, "by": one.found_by}
+    return {
+        "scores": {one.name: one.score for one in plan.experiments}, "runs": runs,
+        "gap": plan.experiments[-1].widths.get("gap"), "travel": plan.experiments[-1].travel,
+    }  # fmt: skip
+
+
+def plans_of(rows: list[dict[str, Any]]) -> str:
+    """In how many drives the planned experiment tells as much as every standard one, within the limit."""
+    done = [row for row in rows if "scores" in row]
+    ratios = []
+    for row in done:
+        scores = dict(row["scores"])
+        rest = {name: scores.pop(name) for name in list(scores) if name.startswith("planned")}
+        ratios.append(rest["planned"] / min(scores.values()))
+    over = [row["runs"]["planned"]["over"] for row in done]
+    still = sum(row["travel"] == 0.0 for row in done)
+    return (
+        f"{len(done)} of {len(rows)} drives planned; as informative as every standard one or more: "
+        f"{sum(ratio <= 1.0 for ratio in ratios)}; half intervals {100 * np.median(ratios):.0f} % of the "
+        f"best of those in the median, {100 * min(ratios):.0f} to {100 * max(ratios):.0f} %\n"
+        f"shaft torque and K_dyn beyond the limit, from 42 places: {sum(one > 1e-9 for one in over)}, "
+        f"{100 * max(over):.2f} % at most; the load at rest throughout in {still}\n"
+        + "\n".join(row["error"] for row in rows if "error" in row)
+    )
 
 
 def half_widths(row: dict[str, Any], truth: dict[str, float]) -> dict[str, float]:
@@ -160,11 +210,11 @@ def main() -> None:
         "search": {"lines": lines, "period": period, "factor": factor},
         "plan": {},
     }[kind]
-    work = {"coverage": covered, "search": searched}[kind]
+    work = {"coverage": covered, "search": searched, "plan": planned}[kind]
     wanted = {"kind": kind, **keys}
     text = given.file.read_text(encoding="utf-8") if given.file.exists() else ""
     rows = [row for row in map(json.loads, text.splitlines()) if wanted.items() <= row.items()]
-    for number in sorted({*range(kind == "coverage", given.fits + 1)} - {row["number"] for row in rows}):
+    for number in sorted({*range(kind != "search", given.fits + 1)} - {row["number"] for row in rows}):
         try:
             found = work(**keys, number=number)
         except InputError as error:
@@ -173,7 +223,7 @@ def main() -> None:
         with given.file.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(rows[-1]) + "\n")
     print(", ".join(f"{key} {value}" for key, value in wanted.items()))
-    print({"coverage": coverage_of, "search": searches_of}[kind](rows))
+    print({"coverage": coverage_of, "search": searches_of, "plan": plans_of}[kind](rows))
 
 
 if __name__ == "__main__":

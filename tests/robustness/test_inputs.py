@@ -119,8 +119,8 @@ OPTIONS: dict[str, list[str]] = {
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
     "init": ["--set", "--json"],
     "identify": [
-        "--log-period", "--ripple", "--free", "--most-torque", "--most-travel", "--torque-constant", "--wear",
-        "--dates", "--limit",
+        "--log-period", "--ripple", "--free", "--most-torque", "--most-travel", "--tell", "--torque-constant",
+        "--wear", "--dates", "--limit",
         "--set", "--json",
     ],
     "drives": ["--json"],

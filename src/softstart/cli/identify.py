@@ -100,6 +100,10 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 )
 @click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
 @click.option(
+    "--tell", "wanted", metavar="NAME,...",
+    help="Parameters that a planned experiment is to tell best; all by default.",
+)  # fmt: skip
+@click.option(
     "--most-torque", metavar="TORQUE", help="Largest shaft torque that a planned experiment may have."
 )
 @click.option(
@@ -135,6 +139,7 @@ def identify(
     standard: bool,
     log_period: str | None,
     ripple: str | None,
+    wanted: str | None,
     most_torque: str | None,
     most_travel: str | None,
     wear: bool,
@@ -198,6 +203,7 @@ def identify(
                 made = softstart.plan_experiments(
                     cast("Drive", guess), log_period=log_period or "4 ms", ripple=ripple, free=names,
                     most_torque=most_torque, most_travel=most_travel, optimise=not standard, tell=tell,
+                    wanted=[name.strip() for name in wanted.split(",")] if wanted else (),
                 )  # fmt: skip
                 if folder is not None:
                     write_plan(made, folder, command_line())

@@ -276,13 +276,8 @@ class Fitter:
             rows = self.counts[i]
             response = model.torque_responses(self.space.values(x, i))
             model.shift = None if model.error is None else response @ model.error
-            shift, response = 0.0 if model.shift is None else model.shift[rows], response[rows]
-            if model.log.kind == "angle" and model.log.count > 0.0:
-                # where the motor would be without the torque error: its spread stands in `rounding`
-                angle = model.signals([self.space.values(x, i)])[0][rows] - shift
-                root = cholesky(rounding(angle, response, ripple, model.log.count), lower=True)
-            else:
-                root = max(model.log.floor, 1e-3 * model.log.scale) * np.eye(int(rows.sum()))
+            response = response[rows]
+            root = cholesky(self._measurement(x, i, response, ripple), lower=True)
             vectors, singular, _ = np.linalg.svd(
                 solve_triangular(root, response, lower=True), full_matrices=True
             )
@@ -292,6 +287,26 @@ class Fitter:
                 Weights(solve_triangular(root, vectors, lower=True, trans="T").T, eigenvalues, response, root)
             )
         return made
+
+    def _measurement(self, x: Vector, log: int, response: Matrix, ripple: float) -> Matrix:
+        """Covariance of what encoder or log round."""
+        model, rows = self.models[log], self.counts[log]
+        if model.log.kind != "angle" or model.log.count == 0.0:
+            floor: float = max(model.log.floor, 1e-3 * model.log.scale)
+            return np.asarray(floor**2 * np.eye(int(rows.sum())))
+        # where the motor would be without the torque error: its spread stands in `rounding`
+        shift = 0.0 if model.shift is None else model.shift[rows]
+        angle = model.signals([self.space.values(x, log)])[0][rows] - shift
+        return rounding(angle, response, ripple, model.log.count)
+
+    def foreseen(self, x: Vector, ripple: float) -> Matrix:
+        """Derivatives of all logs, whitened for a ripple that is known: what logs not yet made will tell."""
+        found = []
+        for i, (model, part) in enumerate(zip(self.models, self.parts(x), strict=True)):
+            response = model.torque_responses(self.space.values(x, i))[self.counts[i]]
+            covariance = self._measurement(x, i, response, ripple) + ripple**2 * (response @ response.T)
+            found.append(solve_triangular(cholesky(covariance, lower=True), part.jacobian, lower=True))
+        return np.vstack(found)
 
     def deviations(self, parts: Sequence[Part], before: Errors) -> tuple[Errors, Vector]:
         """Noise and ripple by restricted maximum likelihood, from where they stood, and how sure they are."""

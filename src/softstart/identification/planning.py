@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Final
 
+import casadi as ca
 import numpy as np
-from scipy.optimize import minimize
 from scipy.stats import norm
 
 from softstart.arrays import Vector
+from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import FREE, Errors, Fitter, Space, covariance_of
+from softstart.identification.fitting import FREE, Fitter, Space, covariance_of
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE, WIDEST
@@ -22,13 +24,30 @@ from softstart.late import late
 from softstart.plant import record
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
+from softstart.start.simulation import simulate
 
 views = late("softstart.views.identification")  # above this module; see softstart.late
 
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
-EVALUATIONS: Final = 100
+CHECKED: Final = 65  # places in the gap from which an experiment is simulated; an impact may need one of them
+COARSE: Final = 8  # of these only each eighth while a torque is designed
+PIECES: Final = 9  # levels of a designed torque at least
+ROUGH: Final = 150, 50  # samples, and blocks of the torque error, at most while a torque is designed
+DRAWS: Final = 40  # random torques, half of them steps from the best one
+SPREAD: Final = 0.15  # of the largest level
+ITERATIONS: Final = 8
+STEP: Final = 2e-3  # of the largest level, for derivatives
+WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may go
+NEAR: Final = 0.01  # relative distance of a design to its limits: from places between those checked
+RESTING: Final = 0.9  # of the load torque: what the shaft may have where the load must not move
+TRIED: Final = 4  # torques beyond a limit that are pulled back to it
+QUIET: Final[dict[str, Any]] = {
+    "qpsol": "qrqp", "qpsol_options": {"print_iter": False, "print_header": False, "error_on_fail": False},
+    "hessian_approximation": "limited-memory", "max_iter": ITERATIONS, "tol_du": 1e-3, "error_on_fail": False,
+    "print_iteration": False, "print_header": False, "print_time": False, "print_status": False,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +65,13 @@ class Experiment:
     widths : dict
         Half an interval of 95 % over the value for each parameter; infinite where it would be unknown.
     peak : float
-        Peak of the shaft torque, N m, the worst of the positions in the gap.
+        Peak of the shaft torque on the exact plant, N m, the worst of 65 places in the gap.
     travel : float
         How far the load is moved at most from where it stood, rad at the motor shaft.
+    wanted : tuple of str
+        The parameters that `score` is about; all of them if it is empty.
+    found_by : str
+        "standard", or what the torque was designed with.
 
     Examples
     --------
@@ -68,11 +91,18 @@ class Experiment:
     widths: dict[str, float]
     peak: float
     travel: float
+    wanted: tuple[str, ...] = ()
+    found_by: str = "standard"
 
     @property
     def score(self) -> float:
-        """One figure: the root mean square of the logarithmic standard deviations; less is better."""
-        return _score(np.array(list(self.widths.values())))
+        """Root mean square of the half intervals of the wanted parameters; less is better.
+
+        Of logarithms, so that units do not matter (A-optimal). A determinant (D-optimal) would pay for a
+        vague gap with a sharp inertia.
+        """
+        widths = np.array([self.widths[name] for name in self.wanted or self.widths])
+        return float(np.sqrt(np.mean(np.minimum(widths, 1e3) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +114,7 @@ class Plan:
     drive : Drive
         The drive as it is thought to be.
     experiments : tuple of Experiment
-        The standard ones, and last the planned one.
+        The standard ones, then the planned one, and last one that leaves the load at rest.
     log_period, ripple : float
         Sample period of the log, s; torque error in each sample, N m.
 
@@ -130,6 +160,7 @@ class Plan:
                     "half_width_percent": {name: 100.0 * width for name, width in one.widths.items()},
                     "peak_shaft_torque": one.peak,
                     "travel": one.travel,
+                    "found_by": one.found_by,
                     "time": one.profile.time.tolist(),
                     "torque": one.profile.torque.tolist(),
                     "end": one.end,
@@ -147,6 +178,7 @@ def plan_experiments(
     ripple: float | str | None = None,
     free: Sequence[str] | None = None,
     signal: Kind = "angle",
+    wanted: Sequence[str] = (),
     most_torque: float | str | None = None,
     most_travel: float | str | None = None,
     optimise: bool = True,
@@ -156,8 +188,16 @@ def plan_experiments(
 
     No fit is made: the derivatives of the exact plant and the covariance of encoder and torque error give the
     interval that a fit would have (Fisher information). The position in the gap is unknown in each where the
-    load is reactive. The planned torque starts from the best standard one that keeps the limits; levels and
-    times are moved as long as the intervals become narrower.
+    load is reactive.
+
+    The planned torque has at least nine levels, on edges of the best standard experiment that keeps the
+    limits, and its duration. The levels minimise `Experiment.score` (CasADi, sequential quadratic programs,
+    derivatives by differences of the exact plant), the peak of the shaft torque from each position and the
+    travel within the limits. Torques beyond a limit are pulled back to it, random ones follow, and the best
+    that keeps all limits on the exact plant is returned: never less than the best standard experiment tells
+    within them. It is a local optimum. Where the load has a reactive torque, another one keeps the shaft
+    below 0.9 of it, so that the load stays at rest;
+    it is to tell the gap, unless `wanted` names something else.
 
     Parameters
     ----------
@@ -172,8 +212,11 @@ def plan_experiments(
     signal : {"angle", "speed"}
         What the log holds beside the torque. An angle has the drive's encoder; a speed the difference of its
         counts.
+    wanted : sequence of str, optional
+        The parameters that the planned torque is to tell best; all that are to be found by default.
     most_torque : float or str, optional
-        Largest shaft torque that an experiment may have, N m; that of the standard start by default.
+        Largest shaft torque that a planned experiment may have, N m; by default the permissible one of the
+        drive, or else the largest of the standard experiments.
     most_travel : float or str, optional
         How far the load may be moved, rad at the motor shaft; no limit by default.
     optimise : bool
@@ -189,7 +232,7 @@ def plan_experiments(
     Raises
     ------
     InputError
-        For bad input.
+        For bad input, and for limits that no experiment keeps.
 
     Examples
     --------
@@ -220,13 +263,29 @@ def plan_experiments(
             f"log_period = {show(log_period)}: the shortest experiment lasts {shortest:.3g} s, and a "
             f"fit needs {FEWEST} samples; give a sample period of {shortest / FEWEST:.2g} s or less."
         )
-    bench = _Bench(drive, period, error, _asked(free, drive), signal, tell or (lambda _: None))
+    asked = _asked(free, drive)
+    for name in wanted:
+        if name not in asked:
+            near = nearest(name, asked)
+            hint = f"did you mean {near}?" if near else f"those are {', '.join(asked)}."
+            raise InputError(f"wanted = {show(name)}: it is no parameter that is to be found; {hint}")
+    bench = _Bench(drive, period, error, asked, signal, tuple(wanted), tell or (lambda _: None))
     standard = [bench.experiment(name, *levels) for name, levels in _standard(drive, level).items()]
-    torque = standard[0].peak if most_torque is None else float(to_si(most_torque, "N*m", name="most_torque"))
+    usual = (
+        max(one.peak for one in standard) if drive.permissible_torque is None else drive.permissible_torque
+    )
+    torque = float(to_si(usual if most_torque is None else most_torque, "N*m", name="most_torque"))
     travel = math.inf if most_travel is None else float(to_si(most_travel, "rad", name="most_travel"))
-    planned = [bench.better(standard, torque, travel)] if optimise else []
-    lines = float(drive.encoder_lines)
-    return Plan(drive, (*standard, *(one for one in planned if one is not None)), period, error, lines)
+    for key, limit, given in (("most_torque", torque, most_torque), ("most_travel", travel, most_travel)):
+        if not limit > 0.0:
+            raise InputError(f"{key} = {show(given)}: a limit is above 0.")
+    planned = [bench.designed("planned", standard, torque, travel)] if optimise else []
+    if optimise and drive.load_kind == "reactive" and "gap" in asked and float(drive.Mc) != 0.0:
+        bench.wanted = bench.wanted or ("gap",)  # of the rest a load that does not move tells little
+        planned.append(
+            bench.designed("planned, load at rest", bench.resting(), RESTING * abs(float(drive.Mc)), travel)
+        )
+    return Plan(drive, (*standard, *planned), period, error, float(drive.encoder_lines))
 
 
 def made_up_log(
@@ -261,10 +320,7 @@ def made_up_log(
     demand = profile.at(time)
     generator = np.random.default_rng(seed)
     played = demand + ripple * generator.standard_normal(time.size)
-    blank = Log(
-        time, played, angle=time**2 * float(np.sign(np.sum(demand[: time.size // 4]))), torque_is="demand"
-    )
-    model = LogModel(blank, _at_rest(drive))
+    model = LogModel(_demand(time, played, signal), _at_rest(drive))
     states = model.states({POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {})
     angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
     count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
@@ -274,6 +330,16 @@ def made_up_log(
     torque = demand if torque_is == "demand" else states[:, record.U_OUT]
     values = {signal: speed if signal == "speed" else angle}
     return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
+
+
+def _demand(time: Vector, torque: Vector, kind: Kind) -> Log:
+    """A log whose motion is not known yet."""
+    one = object.__new__(Log)
+    vars(one).update(
+        time=time, torque=torque, values=np.zeros(time.size), kind=kind, torque_is="demand", name="plan",
+        count=0.0, notes=(),
+    )  # fmt: skip
+    return one
 
 
 def _moving(drive: Drive) -> bool:
@@ -329,11 +395,6 @@ def _profile(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     return TorqueProfile.steps(edges, levels), float(edges[-1])
 
 
-def _score(widths: Vector) -> float:
-    logs = np.minimum(widths, 1e3)
-    return float(np.sqrt(np.mean(logs**2)))
-
-
 class _Bench:
     """A drive, an inverter's log and an encoder: what any torque would tell."""
 
@@ -344,29 +405,31 @@ class _Bench:
         ripple: float,
         free: tuple[str, ...],
         signal: Kind,
+        wanted: tuple[str, ...],
         tell: Callable[[str], None],
     ) -> None:
-        self.drive, self.period, self.ripple, self.free, self.signal, self.tell = (
-            drive,
-            period,
-            ripple,
-            free,
-            signal,
-            tell,
-        )
+        self.drive, self.period, self.ripple, self.free = drive, period, ripple, free
+        self.signal, self.wanted, self.tell = signal, wanted, tell
         self.moving = _moving(drive) and float(drive.gap) > 0.0
         self.base = _at_rest(drive)
         self.count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
         self.quantile = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
+        limit = 10.0 * float(drive.Ms)
+        free_torque = self.base.replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
+        places = 0.5 * float(drive.gap) * np.linspace(-1.0, 1.0, CHECKED)
+        self.starts = (
+            [free_torque.replace(start_position=place) for place in places] if self.moving else [free_torque]
+        )
 
-    def experiment(self, name: str, durations: Vector, levels: Vector) -> Experiment:
-        """What these levels would tell."""
+    def experiment(self, name: str, durations: Vector, levels: Vector, rough: bool = False) -> Experiment:
+        """What these levels would tell; roughly, for a design."""
         self.tell(name)
         profile, end = _profile(durations, levels)
-        period = max(self.period, end / SAMPLES)
+        samples, blocks = ROUGH if rough else (SAMPLES, SAMPLES)
+        period = max(self.period, end / samples)
         time = np.arange(0.0, end + 0.5 * period, period)
-        blank = Log(time, profile.at(time), angle=time**2 * float(np.sign(levels[0])), torque_is="demand")
-        model = LogModel(blank, self.base)
+        model = LogModel(_demand(time, profile.at(time), self.signal), self.base)
+        model.block = max(model.block, math.ceil(time.size / blocks))
         space = Space(
             self.free,
             (self.moving,),
@@ -378,74 +441,168 @@ class _Bench:
             + ([-0.6] if self.moving else [])
             + ([0.0] if self.signal == "angle" else [])
         )
-        values = space.values(x, 0)
-        states = model.states(values)
+        states = model.states(space.values(x, 0))
         angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
-        kept = object.__new__(Log)
-        vars(kept).update(vars(blank))
-        vars(kept)["values"] = angle if self.signal == "angle" else states[:, record.W1_OUT]
-        vars(kept)["kind"] = self.signal
-        vars(kept)["count"] = self.count if self.signal == "angle" else self.count / period
-        model.log = kept
+        vars(model.log)["values"] = angle if self.signal == "angle" else states[:, record.W1_OUT]
+        vars(model.log)["count"] = self.count if self.signal == "angle" else self.count / period
         fitter = Fitter([model], space)
         # a longer period stands for samples left out: the same error of the torque in each of them
         ripple = self.ripple * math.sqrt(self.period / period)
-        part = fitter.whitened(x, Errors(fitter.weights(x, ripple), 1.0, ripple))
-        sizes = np.sqrt(np.diag(covariance_of(part.jacobian, space)))[: len(self.free)]
+        sizes = np.sqrt(np.diag(covariance_of(fitter.foreseen(x, ripple), space)))[: len(self.free)]
         widths = np.sinh(np.minimum(self.quantile * sizes, 50.0))
-        unknown = 2.0 * self.quantile * sizes > math.log(WIDEST)
-        peak, travel = self._load(model, values)
-        widths[unknown] = math.inf
+        if not rough:  # a design needs their slope
+            widths[2.0 * self.quantile * sizes > math.log(WIDEST)] = math.inf
+        peaks, travels = self.loads = self.load(profile, end, rough)
         told = dict(zip(self.free, widths.tolist(), strict=True))
-        return Experiment(name, profile, end, told, peak, travel)
+        return Experiment(name, profile, end, told, float(peaks.max()), float(travels.max()), self.wanted)
 
-    def _load(self, model: LogModel, values: dict[str, float]) -> tuple[float, float]:
-        """Largest shaft torque and travel of the load, from both flanks and from the middle."""
-        peak = travel = 0.0
-        for position in (-1.0, 0.0, 1.0) if self.moving else (0.0,):
-            at = values | ({POSITION: position} if self.moving else {})
-            states = model.states(at)
-            peak = max(peak, float(np.max(np.abs(states[:, record.T_OUT]))))
-            way = states[:, record.PHI2_OUT]
-            travel = max(travel, float(np.max(np.abs(way - way[0]))))
-        return peak, travel
+    def load(self, profile: TorqueProfile, end: float, rough: bool = False) -> tuple[Vector, Vector]:
+        """Largest shaft torque and travel of the load, from places all over the gap."""
+        peaks, travels, times = [], [], np.linspace(0.0, end, SAMPLES)
+        for drive in self.starts[:: COARSE if rough else 1]:
+            run = simulate(drive, make_controller("profile", {"profile": profile}), until=end)
+            way = run.at(times)["phi2"]
+            peaks.append(run.peak_torque)
+            travels.append(float(np.max(np.abs(way - way[0]))))
+        return np.array(peaks), np.array(travels)
 
-    def better(self, standard: Sequence[Experiment], torque: float, travel: float) -> Experiment | None:
-        """Levels and times moved from the best standard experiment that keeps the limits."""
-        allowed = [one for one in standard if one.peak <= torque and one.travel <= travel]
-        start = min(allowed, key=lambda one: one.score, default=None)
-        if start is None:
-            return None
-        Ms = float(self.drive.Ms)
-        durations = np.diff(np.concatenate([_edges(start), [start.end]]))
-        levels = start.profile.at(_edges(start))
-        braking = min(float(np.min(levels)), float(self.drive.minimum_torque))
-        found = start
+    def resting(self) -> list[Experiment]:
+        """A push to and fro that leaves the load at rest, by the energy of the motor at a flank."""
+        drive, most = self.drive, RESTING * abs(float(self.drive.Mc))
+        # u + sqrt(u^2 + 2 c u gap) = most, undamped against a load that rests
+        push = most**2 / (2.0 * (float(drive.c * drive.gap) + most))
+        part = 1.3 * math.sqrt(2.0 * float(drive.gap * drive.J1) / push) + 4.0 * float(drive.torque_lag)
+        return [self.experiment("push", np.full(4, part), push * np.array([1.0, -1.0, 1.0, -1.0]))]
 
-        def loss(moves: Vector) -> float:
-            nonlocal found
-            times = durations * np.exp(np.clip(moves[: durations.size], -1.5, 1.5))
-            times *= min(1.0, 1.5 * start.end / float(times.sum()))
-            torques = np.clip(levels + moves[durations.size :] * Ms, braking, Ms)
-            if np.any(times < 2.0 * self.period):
-                return 1e3
-            one = self.experiment("planned", times, torques)
-            over = max(0.0, one.peak / torque - 1.0) + max(0.0, one.travel / travel - 1.0)
-            if over == 0.0 and one.score < found.score:
-                found = one
-            return math.log(one.score) + 30.0 * over
+    def keeping(self, one: Experiment, torque: float, travel: float) -> Experiment | None:
+        """The experiment, its levels made smaller until it keeps the limits."""
+        edges = _edges(one)
+        for share in (1.0, 0.99, 0.97, 0.93, *0.85 ** np.arange(1, 20)):
+            levels = share * one.profile.at(edges)
+            peaks, travels = self.load(_profile(np.diff([*edges, one.end]), levels)[0], one.end)
+            if peaks.max() <= torque and travels.max() <= travel:
+                return one if share == 1.0 else self.experiment(one.name, np.diff([*edges, one.end]), levels)
+        return None
 
-        first = np.zeros(2 * durations.size)
-        simplex = np.vstack([first, first + 0.25 * np.eye(first.size)])
-        minimize(
-            loss,
-            first,
-            method="Nelder-Mead",
-            options={"maxfev": EVALUATIONS, "initial_simplex": simplex, "adaptive": True},
-        )
-        if found is start:
-            found = Experiment("planned", start.profile, start.end, start.widths, start.peak, start.travel)
+    def designed(self, name: str, seeds: Sequence[Experiment], torque: float, travel: float) -> Experiment:
+        """The torque within the limits that tells most, from the best of the seeds."""
+        kept = [one for one in (self.keeping(seed, torque, travel) for seed in seeds) if one is not None]
+        if not kept:
+            raise InputError(
+                f"most_torque = {torque:.4g} N m, most_travel = {travel:.4g} rad: no experiment keeps them, "
+                "however small its torque; raise the limit."
+            )
+        seed = min(kept, key=lambda one: one.score)
+        durations, levels = self._pieces(seed)
+        scale = float(np.max(np.abs(levels)))
+        lower = max(min(float(levels.min()), float(self.drive.minimum_torque)) / scale, -WIDER)
+        upper = min(float(self.drive.Ms) / scale, WIDER)
+        tried: list[tuple[float, float, Vector]] = []
+
+        def evaluated(shares: Vector) -> Vector:
+            shares = np.clip(shares, lower, upper)  # a quadratic program that failed may leave them
+            one = self.experiment(name, durations, scale * shares, rough=True)
+            peaks, travels = self.loads
+            over = np.concatenate([peaks / torque, travels / travel if travel < math.inf else []]) - 1.0
+            tried.append((math.log(one.score), float(over.max()), shares))
+            return np.concatenate([[tried[-1][0]], over])
+
+        first = levels / scale
+        rows = evaluated(first).size
+        design = _Design(evaluated, first.size, rows)
+        shares = ca.MX.sym("shares", first.size)
+        found = design(shares)
+        program: dict[str, Any] = {"x": shares, "f": found[0], "g": found[1:]}
+        search = ca.nlpsol("plan", "sqpmethod", program, QUIET)
+        search(x0=first, lbx=lower, ubx=upper, lbg=-ca.inf, ubg=-NEAR)
+        pulled = self._pulled(tried, first, durations, scale, torque, travel)
+        for point in pulled:
+            evaluated(point)
+        self._wander(evaluated, tried, lower, upper)
+        within = sorted((one for one in tried if one[1] <= 0.0), key=lambda one: one[0])[:TRIED]
+        exact = [self.experiment(name, durations, scale * point) for _, _, point in within]
+        exact = [
+            one for each in exact if (one := self.keeping(each, (1.0 - NEAR) * torque, travel)) is not None
+        ]
+        best = [seed, *exact]
+        chosen = min(best, key=lambda one: one.score)
+        by = f'"{seed.name}"' if chosen is seed else f'CasADi, from "{seed.name}"'
+        return replace(chosen, name=name, found_by=by)
+
+    def _pieces(self, seed: Experiment) -> tuple[Vector, Vector]:
+        """Durations and levels of a seed, cut into more pieces with edges on samples."""
+        edges = np.append(_edges(seed), seed.end)
+        each = math.ceil(PIECES / (edges.size - 1))
+        cut = np.concatenate([np.linspace(*ends, each, endpoint=False) for ends in pairwise(edges)])
+        period = max(self.period, seed.end / ROUGH[0])
+        cut = np.unique(np.round(cut / period)) * period
+        return np.diff(np.append(cut, seed.end)), seed.profile.at(cut)
+
+    def _pulled(
+        self,
+        tried: Sequence[tuple[float, float, Vector]],
+        seed: Vector,
+        durations: Vector,
+        scale: float,
+        torque: float,
+        travel: float,
+    ) -> list[Vector]:
+        """Torques beyond the limits, pulled back towards the best one within them."""
+        within = [one for one in tried if one[1] <= 0.0]
+        anchor = min(within, key=lambda one: one[0])[2] if within else seed
+        beyond = sorted((one for one in tried if one[1] > 0.0), key=lambda one: one[0] + 2.0 * one[1])
+        found = []
+        for _, _, point in beyond[:: seed.size][:TRIED]:
+            inside, outside = 0.0, 1.0
+            for _ in range(8):
+                middle = 0.5 * (inside + outside)
+                peaks, travels = self.load(
+                    *_profile(durations, scale * (anchor + middle * (point - anchor))), True
+                )
+                keeps = peaks.max() <= torque and travels.max() <= travel
+                inside, outside = (middle, outside) if keeps else (inside, middle)
+            found.append(anchor + inside * (point - anchor))
         return found
+
+    @staticmethod
+    def _wander(
+        evaluated: Callable[[Vector], Vector],
+        tried: Sequence[tuple[float, float, Vector]],
+        lower: float,
+        upper: float,
+    ) -> None:
+        """Random torques anywhere, then steps from the best: there are many optima, and kinks of peaks."""
+        generator, spread = np.random.default_rng(0), SPREAD
+        for number in range(DRAWS):
+            best = min((one for one in tried if one[1] <= 0.0), key=lambda one: one[0], default=tried[0])
+            point = best[2] + spread * generator.standard_normal(best[2].size)
+            if anywhere := 2 * number < DRAWS:
+                point = generator.uniform(lower, upper, best[2].size)
+            found = evaluated(np.clip(point, lower, upper))
+            if (over := float(found[1:].max())) > 0.0:
+                found = evaluated(tried[-1][2] * (1.0 - NEAR) / (1.0 + over))
+            if not anywhere:
+                spread *= 1.5 if found[0] < best[0] and bool(np.all(found[1:] <= 0.0)) else 0.9
+
+
+class _Design(ca.Callback):
+    """What a torque tells and loads, as CasADi calls it; derivatives are differences."""
+
+    def __init__(self, evaluated: Callable[[Vector], Vector], levels: int, rows: int) -> None:
+        ca.Callback.__init__(self)
+        self.evaluated, self.levels, self.rows = evaluated, levels, rows
+        self.construct(
+            "design", {"enable_fd": True, "fd_method": "forward", "fd_options": {"h": STEP, "h_iter": 0}}
+        )
+
+    def get_sparsity_in(self, _: int) -> Any:
+        return ca.Sparsity.dense(self.levels)
+
+    def get_sparsity_out(self, _: int) -> Any:
+        return ca.Sparsity.dense(self.rows)
+
+    def eval(self, given: Any) -> list[Any]:
+        return [ca.DM(self.evaluated(np.array(given[0]).ravel()))]
 
 
 def _edges(one: Experiment) -> Vector:

@@ -159,13 +159,18 @@ def _column(one: Experiment, names: Sequence[str]) -> list[str]:
 def plan_conclusion(plan: Plan) -> str:
     """Which experiment tells most."""
     best = plan.best
+    designed = "".join(
+        f" {one.name[0].upper()}{one.name[1:]}: {one.found_by}."
+        for one in plan.experiments
+        if one.found_by != "standard"
+    )
     lost = [name for name, width in best.widths.items() if math.isinf(width)]
     if lost:
-        return f'"{best.name}" tells most, and still leaves {", ".join(lost)} unknown.'
+        return f'"{best.name}" tells most, and still leaves {", ".join(lost)} unknown.{designed}'
     worst = max(best.widths, key=lambda name: best.widths[name])
     return (
         f'"{best.name}" tells most: every parameter within {100.0 * best.widths[worst]:.2g} %, {worst} the '
-        f"worst; the shaft torque reaches {best.peak:.3g} N m."
+        f"worst; the shaft torque reaches {best.peak:.3g} N m.{designed}"
     )
 
 
