@@ -100,9 +100,8 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 )
 @click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
 @click.option(
-    "--tell", "wanted", metavar="NAME,...",
-    help="Parameters that a planned experiment is to tell best; all by default.",
-)  # fmt: skip
+    "--tell", "wanted", metavar="NAME,...", help="Parameters that a plan is to tell best; all by default."
+)
 @click.option(
     "--most-torque", metavar="TORQUE", help="Largest shaft torque that a planned experiment may have."
 )
