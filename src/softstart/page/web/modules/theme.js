@@ -4,9 +4,10 @@ import { element } from "./numbers.js";
 const CHOICES = [["auto", "Auto"], ["light", "Light"], ["dark", "Dark"]];
 const KEY = "softstart-colours";
 
-// Okabe-Ito and relatives, told apart by colour-blind readers; the dark ones are lighter
-const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b5498e", "#b87700", "#2b9bd6", "#444b53", "#8c6d31", "#6a51a3", "#5b8c00", "#c2334d", "#007f86"];
-const DARK = ["#5ab0ea", "#ff8c42", "#2fc79a", "#e693c4", "#f0b43c", "#8fd0f7", "#c3cad2", "#c9a961", "#b3a0e6", "#a5cc4f", "#ff7b8d", "#45c4c9"];
+// the least difference of two, with full sight or any colour blindness, is as large as twelve allow; the first ones
+// differ most (tests/softstart/page/test_palette.py)
+const LIGHT = ["#3c0fe1", "#c33c00", "#7887d2", "#691e3c", "#c37887", "#961e00", "#a54bff", "#4b00a5", "#f05a3c", "#693c78", "#6969a5", "#a55a69"];
+const DARK = ["#ff870f", "#c3f0e1", "#8778b4", "#b4a5c3", "#d21eff", "#f03c1e", "#ffc30f", "#e178ff", "#009669", "#00f096", "#4bc378", "#d2c3f0"];
 
 export class Theme {
   constructor(place, changed) {
