@@ -20,7 +20,7 @@ export class Figure {
     for (const [key, label, unit] of FACTS) {
       const value = element("dd", {}, "");
       this.facts.set(key, value);
-      list.append(element("div", {}, element("dt", {}, label), value, element("span", { class: "unit" }, unit)));
+      list.append(element("div", {}, element("dt", {}, label), value, element("dd", { class: "unit" }, unit)));
     }
     const head = element("div", { class: "head" }, element("div", { class: "caption" }, "K", element("sub", {}, "dyn")), this.value);
     place.append(this.name, head, list, this.status);

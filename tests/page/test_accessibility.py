@@ -1,0 +1,69 @@
+"""axe-core finds no serious violation, contrast of 4.5:1 included, on the page and in a report.
+
+axe-core is fetched from the npm registry (`npm pack`), or is the file of SOFTSTART_AXE; without it: skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tarfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart.reporting import report
+
+AXE = "axe-core@4.14.1"
+HARMFUL = ("serious", "critical")
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The text of axe.min.js."""
+    if named := os.environ.get("SOFTSTART_AXE"):
+        return Path(named).read_text("utf-8")
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("axe-core: npm is missing; install it, or name axe.min.js in SOFTSTART_AXE")
+    folder = tmp_path_factory.mktemp("axe")
+    try:
+        subprocess.run(
+            [npm, "pack", AXE, "--silent"], cwd=folder, check=True, capture_output=True, timeout=60
+        )
+    except (subprocess.SubprocessError, OSError) as error:
+        pytest.skip(f"axe-core cannot be fetched: {error}")
+    with tarfile.open(next(folder.glob("*.tgz"))) as packed:
+        found = packed.extractfile("package/axe.min.js")
+        assert found is not None
+        return found.read().decode("utf-8")
+
+
+def violations(page: Any, axe: str) -> list[str]:
+    """What axe-core calls serious or critical, a line each with the places."""
+    page.evaluate(axe)
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+    return [
+        f"{one['id']} ({one['impact']}): " + "; ".join(node["html"][:160] for node in one["nodes"][:4])
+        for one in found["violations"]
+        if one["impact"] in HARMFUL
+    ]
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_has_no_serious_violation(visit: Callable[..., Any], axe: str, dark: bool) -> None:
+    page = visit(1280, 800, dark)
+    page.wait_for_function("document.querySelectorAll('tbody tr').length > 5")
+    assert violations(page, axe) == []
+
+
+def test_a_report_has_no_serious_violation(browser: Any, axe: str, tmp_path: Path) -> None:
+    made = report("hoist-15kw", controllers=["s-curve"], budget=0.0)
+    made.write(tmp_path / "report.html")
+    page = browser.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    assert violations(page, axe) == []
+    page.close()
