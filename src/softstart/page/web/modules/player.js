@@ -20,7 +20,7 @@ export class Player {
     const windows = element("span", { role: "group", "aria-label": "Window in time" },
       this.press("\u2212", "Zoom out (\u2212)", () => plots.zoom(2)),
       this.press("+", "Zoom in (+)", () => plots.zoom(0.5)),
-      (this.all = this.press("all", "Show all: the whole start (0)", () => plots.show(null))));
+      (this.all = this.press("all", "The whole start, all of it (0)", () => plots.show(null))));
     const files = element("span", { role: "group", "aria-label": "What is seen, as a file" },
       this.press("SVG", "The plots as they are seen, as SVG", () => this.save("svg", "image/svg+xml", plots.svg())),
       this.press("CSV", "The points that are seen, as CSV", () => this.save("csv", "text/csv", plots.csv())));
