@@ -62,7 +62,8 @@ BUDGET = {
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet
-    "page": (4510, 19, 3, 0),
+    # 150 and a file: a log is identified
+    "page": (4660, 20, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart

@@ -14,6 +14,7 @@ import pytest
 from tests.page.conftest import SOFTSTART
 
 from softstart import DataSheet, Drive, InputError, compare, simulate
+from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
 BROKEN = b"""name = "broken"
@@ -196,3 +197,29 @@ def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
     for width, height in sheets:  # A4 in points
         assert float(width) == pytest.approx(595.3, abs=1.0)
         assert float(height) == pytest.approx(841.9, abs=1.0)
+
+
+def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path: Path) -> None:
+    drive = CRANE.replace(load_kind="reactive", gap=0.08, damping=0.3)
+    log = made_up_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
+    log.to_csv(tmp_path / "rig.csv")
+    page.get_by_role("tab", name="Files", exact=True).click()
+    guess = drive.replace(gap=0.1, start_position="mid-gap")
+    put(page, "guess.toml", guess.to_toml().encode())
+    page.get_by_text("is loaded").first.wait_for()
+    page.get_by_role("tab", name="Log", exact=True).click()
+    upload = page.locator('[data-testid="log-upload"] input[type="file"]')
+    upload.set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
+    page.get_by_test_id("log-trouble").get_by_text("names neither of angle and speed").wait_for(
+        timeout=30_000
+    )
+    content = (tmp_path / "rig.csv").read_bytes()
+    upload.set_input_files({"name": "rig.csv", "mimeType": "text/csv", "buffer": content})
+    page.get_by_test_id("log-found").wait_for(timeout=60_000)
+    assert "shaft.gap" in page.get_by_test_id("log-found").inner_text()
+    name, saved_drive = saved(page, "log-save")
+    assert name == "identified-drive.toml"
+    found = Drive.from_toml(saved_drive.decode())
+    assert found.gap == pytest.approx(0.08, rel=0.05)
+    page.get_by_test_id("log-use").click()
+    page.get_by_text("as identified, is loaded").wait_for()

@@ -32,6 +32,7 @@ PANELS = (
     ("Limit", "curve_panel", "CurvePanel"),
     ("Tuning", "tuning_panel", "TuningPanel"),
     ("Data sheet", "data_sheet_panel", "DataSheetPanel"),
+    ("Log", "log_panel", "LogPanel"),
     ("Files", "files_panel", "FilesPanel"),
 )
 

@@ -8,33 +8,42 @@ from __future__ import annotations
 
 import math
 import re
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.drive import Drive
-from softstart.errors import SimulationError
+from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.processes import Tell
+from softstart.quantities import show
 from softstart.start.simulation import simulate
 from softstart.tuning.solving import tune
 
 if TYPE_CHECKING:
     from softstart import reporting
     from softstart.controller.base import Controller
+    from softstart.identification import logs
+    from softstart.identification import solving as fits
+    from softstart.identification.logs import TorqueIs
     from softstart.optimal import front, shortest, solving
     from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
     from softstart.profile import TorqueProfile
     from softstart.tuning.outcome import Tuning
+    from softstart.views import identification as shown
 else:  # they import scipy.optimize; in the server the first page would wait for that
     reporting, front = late("softstart.reporting"), late("softstart.optimal.front")
+    logs, fits = late("softstart.identification.logs"), late("softstart.identification.solving")
+    shown = late("softstart.views.identification")
     shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
 
 LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
@@ -199,6 +208,46 @@ def tuning_share(doing: str) -> float | None:
             done = int(counted[2]) - (1 if counted[1] == "search " else 0)
             return low + (high - low) * done / int(counted[3])
     return None
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A drive from a log as plain data: the drive, the table of what was found, and the notes."""
+
+    drive: Drive
+    headings: list[str]
+    rows: list[list[str]]
+    notes: list[str]
+
+
+def columns_of(text: str) -> dict[str, str]:
+    """The columns of a log as typed, `torque=M, speed=n[rpm]`; InputError for what is none.
+
+    >>> columns_of("torque=-M_act, speed=n[rpm]"), columns_of(" ")
+    ({'torque': '-M_act', 'speed': 'n[rpm]'}, {})
+    """
+    pairs = [part.partition("=") for part in text.split(",") if part.strip()]
+    if wrong := [key for key, equals, name in pairs if not (key.strip() and equals and name.strip())]:
+        raise InputError(f"columns: {show(wrong[0].strip())}: write signal=name, as torque=M, speed=n[rpm].")
+    return {key.strip(): name.strip() for key, _, name in pairs}
+
+
+def identified(
+    content: bytes, name: str, guess: Drive, torque_is: TorqueIs, columns: Mapping[str, str], *, tell: Tell
+) -> Identified:
+    """The drive from the log in these bytes, with its intervals, from this guess."""
+    tell(None, "reading the log")
+    with tempfile.TemporaryDirectory(prefix="softstart-log-") as folder:
+        path = Path(folder, "log.csv")
+        path.write_bytes(content)
+        try:
+            log = logs.Log.load(path, columns=columns, torque_is=torque_is)
+        except InputError as error:
+            raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
+    found = fits.identify(log, guess, tell=lambda doing: tell(None, doing))
+    table = shown.estimates_table(found)
+    headings = [column.heading for column in table.columns]
+    return Identified(found.drive, headings, [list(row) for row in table.rows], list(found.notes))
 
 
 def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> str:

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, SimulationError, optimize, simulate, tune
+from softstart import Drive, InputError, SimulationError, identify, optimize, simulate, tune
 from softstart.controller import make_controller
+from softstart.identification.planning import made_up_log
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.curve_panel import StrategyPoint, against, csv_of, curve_svg
@@ -39,6 +40,27 @@ class Heard:
 
     def part(self, value: Any) -> None:
         self.parts.append(value)
+
+
+def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
+    drive = CRANE.replace(load_kind="reactive", gap=0.08, damping=0.3, start_position="mid-gap")
+    log = made_up_log(drive, "two levels, then reverse", log_period=4e-3, ripple=1.0)
+    log.to_csv(tmp_path / "rig.csv")
+    heard = Heard()
+    content = (tmp_path / "rig.csv").read_bytes()
+    found = tasks.identified(content, "rig.csv", drive, "demand", {}, tell=heard)  # type: ignore[arg-type]
+    alone = identify(tmp_path / "rig.csv", drive, torque_is="demand")
+    assert {name: getattr(found.drive, name) for name in ("gap", "stiffness", "J1", "J2")} == {
+        name: getattr(alone.drive, name) for name in ("gap", "stiffness", "J1", "J2")
+    }
+    assert found.headings[:4] == ["parameter", "unit", "guess", "found"]
+    assert [row[0] for row in found.rows][:2] == ["motor.inertia", "load.inertia"]
+    assert tuple(found.notes) == alone.notes
+    assert len(heard.shares) > 2
+    with pytest.raises(InputError, match=r"^log = rig.csv: its first line"):
+        tasks.identified(b"a,b\n1,2\n", "rig.csv", drive, "demand", {}, tell=heard)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="write signal=name"):
+        tasks.columns_of("torque")
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
