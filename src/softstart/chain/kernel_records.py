@@ -170,10 +170,6 @@ START_TYPE: Any = numba.typeof(  # type: ignore[no-untyped-call]
     _blank(1, Place(0, 1, 0, 1, 0), np.zeros(2, MASS), np.zeros(1, SHAFT), np.zeros(1, TONE), np.zeros(1))
 )
 
-# those of several starts, a row each
-MASSES_TYPE: Any = numba.typeof(np.zeros((1, 2), MASS))  # type: ignore[no-untyped-call]
-SHAFTS_TYPE: Any = numba.typeof(np.zeros((1, 2), SHAFT))  # type: ignore[no-untyped-call]
-
 
 # a chain as records ---------------------------------------------------------------------------------
 

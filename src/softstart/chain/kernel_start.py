@@ -16,12 +16,10 @@ from softstart.chain.kernel_records import (
     DOUBLED,
     JOINED,
     LOWER,
-    MASSES_TYPE,
     NO_EVENT,
     ORDERS,
     PRESSED,
     SETTLE,
-    SHAFTS_TYPE,
     START_TYPE,
     UNSOLVED,
     UPPER,
@@ -54,6 +52,8 @@ from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, 
 _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _STEP = types.FunctionType(STEP_SIGNATURE)
+_WORDS, _ROWS = types.Array(types.int64, 1, "C"), types.Array(types.int64, 2, "C")
+_ADVANCE = types.int64(START_TYPE)
 
 
 @compiled
@@ -156,7 +156,7 @@ def rate_of(start: Start) -> float:
     return rate
 
 
-@compiled
+@compiled_as(_ADVANCE)
 def advance(start: Start) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way."""
     p, x, m = start.p.view(PLANT)[0], start.x.view(STATE)[0], start.m.view(MOTION)[0]
@@ -268,62 +268,80 @@ def measure_chain(start: Start, sees: int, measured: Vector) -> None:
         seen.shaft_torque = sign * torque_now(start, k)
 
 
-@compiled_as(types.int64(_STEP, _A, types.int64, START_TYPE, _A, _A, _A))
-def run(step, parameters, sees, start, measured, state, command):  # type: ignore[no-untyped-def]
-    """One start to its end, or until a buffer is full: call again with larger ones."""
-    p, x, m = start.p.view(PLANT)[0], start.x.view(STATE)[0], start.m.view(MOTION)[0]
-    answer = command[:NEW_STATE].view(ANSWER)[0]
-    new_state = command[NEW_STATE:]
-    while True:
-        reason = advance(start)
-        if reason != ASK:
-            x.status = reason
-            return reason
-        measure_chain(start, sees, measured)
-        answer.slope = 0.0
-        step(parameters, measured, state, command)
-        taken = take_answer(p, x, m, answer.torque, answer.ask_again, answer.slope)
-        if taken != ASK:
-            x.status = taken
-            return taken
-        for i in range(state.shape[0]):
-            state[i] = new_state[i]
-
-
 @compiled_as(
-    types.void(
-        _STEP, _M, MASSES_TYPE, SHAFTS_TYPE, _M, types.int64, types.boolean, types.float64, _M, SHAFTS_TYPE,
-        START_TYPE, _A, _A, _A,
+    types.int64(
+        types.FunctionType(_ADVANCE), _STEP, _M, _ROWS, _ROWS, _M, types.int64, types.boolean, types.float64,
+        _M, _ROWS, START_TYPE, _WORDS, _WORDS, _A, _A, _A,
     )
 )  # fmt: skip
-def run_many(  # type: ignore[no-untyped-def]
-    step, p, masses, shafts, parameters, sees, on_gap, until, results, ends, start, measured, state, command
-):
-    """Start i has row i of p, masses, shafts and parameters (one row serves all); its x goes to results[i].
-
-    Its shafts as they are at the end go to ends[i]. `start` and the arrays behind it are scratch.
-    """
+def _starts(  # type: ignore[no-untyped-def]
+    go_on, step, p, masses, shafts, parameters, sees, on_gap, until, results, ends, start, own_masses,
+    own_shafts, measured, state, command,
+):  # fmt: skip
+    plant, x, m = start.p.view(PLANT)[0], start.x.view(STATE)[0], start.m.view(MOTION)[0]
+    answer = command[:NEW_STATE].view(ANSWER)[0]
     own = parameters[0]
+    reason = ASK
     for i in range(results.shape[0]):
-        if parameters.shape[0] > 1:
-            own = parameters[i]
-        for j in range(start.p.shape[0]):
-            start.p[j] = p[i, j]
-        for j in range(start.m.shape[0]):
-            start.m[j] = 0.0
-        for j in range(start.masses.size):
-            start.masses[j] = masses[i, j]
-        for k in range(start.shafts.size):
-            start.shafts[k] = shafts[i, k]
-        for j in range(state.shape[0]):
-            state[j] = 0.0
-        begin(start, until)
-        start.x.view(STATE)[0].ask_on_gap = 1.0 if on_gap else 0.0
-        run(step, own, sees, start, measured, state, command)
+        if p.shape[0] > 0:
+            if parameters.shape[0] > 1:
+                own = parameters[i]
+            for j in range(start.p.shape[0]):
+                start.p[j] = p[i, j]
+            for j in range(start.m.shape[0]):
+                start.m[j] = 0.0
+            for j in range(own_masses.shape[0]):
+                own_masses[j] = masses[i, j]
+            for j in range(own_shafts.shape[0]):
+                own_shafts[j] = shafts[i, j]
+            for j in range(state.shape[0]):
+                state[j] = 0.0
+            begin(start, until)
+            x.ask_on_gap = 1.0 if on_gap else 0.0
+        while True:
+            reason = go_on(start)
+            if reason == ASK:
+                measure_chain(start, sees, measured)
+                answer.slope = 0.0
+                step(own, measured, state, command)
+                reason = take_answer(plant, x, m, answer.torque, answer.ask_again, answer.slope)
+            if reason != ASK:
+                x.status = reason
+                break
+            for j in range(state.shape[0]):
+                state[j] = command[NEW_STATE + j]
         for j in range(start.x.shape[0]):
             results[i, j] = start.x[j]
-        for k in range(start.shafts.size):
-            ends[i, k] = start.shafts[k]
+        for j in range(ends.shape[1]):
+            ends[i, j] = own_shafts[j]
+    return reason
+
+
+def run_many(  # type: ignore[no-untyped-def]
+    step, p, masses, shafts, parameters, sees, on_gap, until, results, ends, start, measured, state, command
+) -> int:
+    """Start i has row i of p, masses, shafts and parameters (one row serves all); its x goes to results[i].
+
+    Its shafts as they are at the end go to ends[i]. `start` and the arrays behind it are scratch. Without
+    rows of p, `start` goes on from where it stands.
+    """
+    # records as words of 8 bytes: copying a record compiles to a line for each of its numbers; `advance` by
+    # its address: else it would be compiled here a second time
+    reason: int = _starts(
+        advance, step, p, masses.view(np.int64), shafts.view(np.int64), parameters, sees, on_gap, until,
+        results, ends.view(np.int64), start, start.masses.view(np.int64), start.shafts.view(np.int64),
+        measured, state, command,
+    )  # fmt: skip
+    return reason
+
+
+def run(step, parameters, sees, start, measured, state, command) -> int:  # type: ignore[no-untyped-def]
+    """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
+    row, masses, shafts = start.x.reshape(1, -1), start.masses[None, :0], start.shafts[None, :0]
+    return run_many(
+        step, row[:0], masses, shafts, parameters[None], sees, False, math.inf, row, shafts, start, measured,
+        state, command,
+    )  # fmt: skip
 
 
 # the record -----------------------------------------------------------------------------------------
