@@ -34,13 +34,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.certificate import ENDINGS
 from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import Limits, Solution, WarmStarts, no_linear_objective
+from softstart.optimal.lp.rows import Limits, Solution, Sparse, WarmStarts, no_linear_objective
 from softstart.optimal.lp.whole import ONE, SLOPE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
@@ -338,17 +337,18 @@ class _Dual:
 def _rate_multipliers(q: Vector, start: _Start) -> Vector:
     """The values of psi at the nodes of the demand that makes the sum of q r least within its limits."""
     n, rise = q.size, start.rate * start.h
-    D = sparse.diags([np.ones(n), -np.ones(n - 1)], [0, -1], format="csr")[1:]  # from step to step
-    D = sparse.vstack([D, sparse.csr_array(([-1.0], ([0], [n - 1])), shape=(1, n))], format="csr")
+    k = np.arange(n - 1)
+    step = Sparse.of(n - 1, k + 1, np.ones(n - 1)) - Sparse.of(n - 1, k, np.ones(n - 1))  # from step to step
+    D = Sparse.stacked([step, Sparse.single({n - 1: -1.0})])
     limit = np.full(n, rise)
     limit[-1] = 0.5 * rise
     first = np.zeros(n)
     first[-1] = start.problem.first_demand
     unit, most = max(float(np.abs(q).max()), 1e-300), start.most
     rights = np.concatenate([limit - first, limit + first]) / most
-    none = sparse.csr_array((0, n)), np.zeros(0)
+    none = Sparse.stacked([]), np.zeros(0)
     bounds = np.tile([start.low / most, start.high / most], (n, 1))
-    found = Limits(q / unit, sparse.vstack([D, -D], format="csr"), rights, *none).solved(bounds)
+    found = Limits(q / unit, Sparse.stacked([D, -1.0 * D]), rights, *none).solved(bounds)
     if found is None:
         return np.zeros(n + 1)
     return np.concatenate([[0.0], (found.above[n:] - found.above[:n]) * start.h * unit])
@@ -783,7 +783,7 @@ class _Program:
         bounds[:demands] = s.low / s.most, s.high / s.most
         if s.rate < math.inf:
             bounds[0] = s.problem.first_demand / s.most
-        above, equations = sparse.csr_array(ub[:, :-1]), sparse.csr_array(eq[:, :-1])
+        above, equations = (Sparse.dense(rows[:, :-1]) for rows in (ub, eq))
         found: Solution | None = None
         for price in PRICES:
             cost = np.full(columns, price)

@@ -20,9 +20,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -42,6 +41,7 @@ from softstart.optimal.lp.rows import (
     RowList,
     Rows,
     Solution,
+    Sparse,
     Steps,
     WarmStarts,
     below,
@@ -49,7 +49,6 @@ from softstart.optimal.lp.rows import (
     contact_grid,
     no_linear_objective,
     refined,
-    single_row,
     split,
 )
 from softstart.optimal.problem import Problem
@@ -158,10 +157,10 @@ class ContactProgram:
         reach = min(contact.half_period, np.pi / contact.Omega)
         self.tail_at = reach * np.arange(1, TAIL_POINTS + 1) / TAIL_POINTS
         a, b = self._from_node(self.tail_at, np.full(TAIL_POINTS, self.n), None)
-        self.tail = a[0] + damping * b[0], a[1] + damping * b[1]
-        self.T_end = self._single({self.first_a + self.n: 1.0, self.first_b + self.n: damping})
+        self.tail = self._torque(a, b)
+        self.T_end = Sparse.single({self.first_a + self.n: 1.0, self.first_b + self.n: damping})
         # a damped contact begins with T = d v; for the certificate's relaxation it need not count
-        self.T_first: Rows = self._single({self.first_a: 1.0, self.first_b: damping}), np.zeros(1)
+        self.T_first: Rows = Sparse.single({self.first_a: 1.0, self.first_b: damping}), np.zeros(1)
         self.jumps = damping > 0.0 and mix is None and margin > 0.0
 
     # rows ------------------------------------------------------------------------------------------------
@@ -190,15 +189,15 @@ class ContactProgram:
             (dh + 2.0 * contact.zeta * h, Omega * h, c * H / contact.J1, c * H * push),
             (-Omega * h, dh, c * h / (Omega * contact.J1), c * h * push / Omega),
         )
-        own = [] if step is None else [step]  # the columns of each row rise
-        columns = np.stack([*own, self.first_a + node, self.first_b + node], axis=1)
-        starts = np.arange(0, columns.size + 1, columns.shape[1])
-        out = []
-        for by_a, by_b, by_u, constant in weights:
-            values = np.stack([*([by_u] if own else []), by_a, by_b], axis=1).ravel()
-            entries = values, columns.ravel(), starts
-            out.append((sparse.csr_array(entries, shape=(s.size, self.columns)), constant))
-        return out[0], out[1]
+        columns = [self.first_a + node, self.first_b + node]
+        if step is not None:
+            columns.append(step)
+        place = np.concatenate(columns)
+        a, b = (
+            (Sparse.of(s.size, place, np.concatenate(entries[: len(columns)])), entries[-1])
+            for entries in weights
+        )
+        return a, b
 
     def _stepped(self, s: Vector) -> tuple[Rows, Rows]:
         """(a, b) at s_k after node k, under the torque of step k."""
@@ -210,36 +209,38 @@ class ContactProgram:
         rows = []
         for (matrix, constant), first in ((a, self.first_a), (b, self.first_b)):
             at = np.arange(self.n), first + 1 + np.arange(self.n)
-            node = sparse.csr_array((np.ones(self.n), at), shape=(self.n, self.columns))
-            rows.append((matrix - node, constant))
-        return sparse.vstack([rows[0][0], rows[1][0]]), np.concatenate([rows[0][1], rows[1][1]])
+            rows.append((matrix - Sparse(self.n, *at, np.ones(self.n)), constant))
+        return Sparse.stacked([rows[0][0], rows[1][0]]), np.concatenate([rows[0][1], rows[1][1]])
 
     def _limited(self, step: Steps, s: Vector) -> tuple[Rows, Rows]:
         """T/U at s into each of the given steps, and what must not be negative there: T or c z/U."""
-        damping = self.contact.d * self.contact.Omega / self.contact.c
         a, b = self._from_node(s, step, step)
-        T = a[0] + damping * b[0], a[1] + damping * b[1]
+        T = self._torque(a, b)
         return T, a if self.pulls else T
+
+    def _torque(self, a: Rows, b: Rows) -> Rows:
+        """T/U = a + d Omega/c b, of rows with entries at the same places."""
+        damping = self.contact.d * self.contact.Omega / self.contact.c
+        return replace(a[0], value=a[0].value + damping * b[0].value), a[1] + damping * b[1]
 
     def broken(self, answer: Answer) -> Marks:
         """Steps in which T goes above P or comes off the flank between the checks, by a share of P."""
         step, s = self._instants(SIXTEENTHS)
         T, kept = self._limited(step, s)
         P = answer.P / self.U
-        over = np.abs(T[0] @ answer.x + T[1]) if self.pulls else T[0] @ answer.x + T[1]
-        bad = (over > P * (1.0 + EXCESS)) | (kept[0] @ answer.x + kept[1] < -1e-9)
+        over, least = (rows.csr(self.columns) @ answer.x + constant for rows, constant in (T, kept))
+        over = np.abs(over) if self.pulls else over
+        bad = (over > P * (1.0 + EXCESS)) | (least < -1e-9)
         steps: Marks = np.bincount(step, weights=bad, minlength=self.n) > 0.0
         return steps
 
     def _mixed(self, rows: Rows, mix: Vector | None) -> Rows:
         if mix is None:
             return rows
-        return sparse.csr_array(mix) @ rows[0], mix @ rows[1]
+        mixed = (sparse.csr_array(mix) @ rows[0].csr(self.columns)).tocoo()
+        return Sparse(mix.shape[0], mixed.row, mixed.col, mixed.data), mix @ rows[1]
 
-    def _single(self, weights: dict[int, float]) -> Any:
-        return single_row(weights, self.columns)
-
-    def _speed(self) -> tuple[Any, float]:
+    def _speed(self) -> tuple[Sparse, float]:
         """(w2(tau) - w2(te))/W: momentum is what the torques brought."""
         contact, n = self.contact, self.n
         total = contact.J1 + contact.J2
@@ -247,15 +248,15 @@ class ContactProgram:
         weights = dict(enumerate((np.diff(self.edges) * self.U / (total * self.W)).tolist()))
         weights[self.first_b] = own
         weights[self.first_b + n] = -own
-        return self._single(weights), -contact.Mc * self.tau / (total * self.W)
+        return Sparse.single(weights), -contact.Mc * self.tau / (total * self.W)
 
-    def _terminal(self, te: float) -> list[tuple[Any, float]]:
+    def _terminal(self, te: float) -> list[tuple[Sparse, float]]:
         """Equations (row, right side) at tau; the speed comes first."""
         row, constant = self._speed()
         start = float(self.entry.load_speed(np.array([te]))[0])
         equations = [(row, (self.problem.target * AIM - start) / self.W - constant)]
         if self.problem.terminal != "reached":
-            equations.append((self._single({self.first_b + self.n: 1.0}), 0.0))
+            equations.append((Sparse.single({self.first_b + self.n: 1.0}), 0.0))
         if self.problem.terminal == "steady":
             equations.append((self.T_end, self.contact.Mc / self.U))
         return equations
@@ -268,8 +269,8 @@ class ContactProgram:
         With `elastic` > 0 the terminal equations may be missed at that price (in U), so that there always is
         an answer; its multipliers say how far from feasible the problem is.
         """
-        P = self._single({self.P: 1.0})
-        none: Rows = (sparse.csr_array((0, self.columns)), np.zeros(0))
+        P = Sparse.single({self.P: 1.0})
+        none: Rows = Sparse.stacked([]), np.zeros(0)
         blocks = [
             below(self.T, P),
             below(self.T, P, -1.0) if self.pulls else none,
@@ -277,7 +278,7 @@ class ContactProgram:
             below(self.tail, P) if self.problem.terminal == "reached" else none,
             below(self.T_first, P) if self.jumps else none,
         ]
-        found = self._solved(te, P.toarray()[0], blocks, self._terminal(te), elastic)
+        found = self._solved(te, self._cost(P), blocks, self._terminal(te), elastic)
         if found is None:
             return None
         return Answer(
@@ -295,17 +296,27 @@ class ContactProgram:
     def greatest_speed(self, te: float) -> float | None:
         """The greatest w2(tau) whatever T, rad/s; None where the terminal cannot be met."""
         row, constant = self._speed()
-        found = self._solved(te, -row.toarray()[0], [self._kept_closed()], self._terminal(te)[1:], 0.0)
+        found = self._solved(te, -self._cost(row), [self._kept_closed()], self._terminal(te)[1:], 0.0)
         if found is None:
             return None
         start = float(self.entry.load_speed(np.array([te]))[0])
         return start + self.W * (constant - found.cost)
 
+    def _cost(self, row: Sparse) -> Vector:
+        cost = np.zeros(self.columns)
+        cost[row.column] = row.value
+        return cost
+
     def _kept_closed(self) -> Rows:
         return -1.0 * self.kept[0], self.kept[1] - self.least
 
     def _solved(
-        self, te: float, cost: Vector, blocks: list[Rows], terminal: list[tuple[Any, float]], elastic: float
+        self,
+        te: float,
+        cost: Vector,
+        blocks: list[Rows],
+        terminal: list[tuple[Sparse, float]],
+        elastic: float,
     ) -> Solution | None:
         """The solution; with `elastic` there are slack variables of the terminal equations behind ours."""
         above, equal = RowList(), RowList()
@@ -314,15 +325,15 @@ class ContactProgram:
         equal.add(self.dynamics[0], -self.dynamics[1])
         for row, value in terminal:
             equal.add(row, np.array([value]))
-        A_ub, b_ub = above.all(self.columns)
-        A_eq, b_eq = equal.all(self.columns)
+        (A_ub, b_ub), (A_eq, b_eq) = above.all(), equal.all()
         bounds = self._bounds(te)
         if elastic > 0.0:
             missed = len(terminal)
-            slack = np.zeros((b_eq.size, 2 * missed))
-            slack[2 * self.n :] = np.hstack([np.eye(missed), -np.eye(missed)])
-            A_eq = sparse.hstack([A_eq, sparse.csr_array(slack)]).tocsr()
-            A_ub = sparse.hstack([A_ub, sparse.csr_array((b_ub.size, 2 * missed))]).tocsr()
+            k = np.arange(2 * missed)
+            slack = Sparse(
+                b_eq.size, 2 * self.n + k % missed, self.columns + k, np.where(k < missed, -1.0, 1.0)
+            )
+            A_eq = A_eq - slack
             cost = np.concatenate([cost, np.full(2 * missed, elastic)])
             bounds = np.concatenate([bounds, np.tile([0.0, np.inf], (2 * missed, 1))])
         return Limits(cost, A_ub, b_ub, A_eq, b_eq).solved(bounds, self.warm)

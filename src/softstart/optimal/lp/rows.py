@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -22,7 +23,6 @@ from softstart.optimal.problem import Problem
 
 Steps = NDArray[np.int64]
 Marks = NDArray[np.bool_]
-Rows = tuple[Any, Vector]  # sparse matrix over the variables, constants
 
 AIM = 1.0 + 1e-9  # a little above the target, so that the exact plant finds it reached
 MARGIN = 2e-4  # of U, which T keeps above 0
@@ -43,21 +43,96 @@ def no_linear_objective(problem: Problem) -> str:
     return "a bound on the heat is not linear" if problem.heat is not None else ""
 
 
+@dataclass(frozen=True, eq=False)
+class Sparse:
+    """Some rows over the variables: entries (row, column, value), of which those at one place add up.
+
+    A program is built of thousands of small blocks: SciPy's sparse matrices would take longer to check
+    their indices than HiGHS takes to solve it.
+
+    >>> rows = Sparse.of(2, np.array([1, 2]), np.array([3.0, 4.0]))
+    >>> (2.0 * (rows - Sparse.single({0: 1.0}).repeated(2))).csr(3).toarray().tolist()
+    [[-2.0, 6.0, 0.0], [-2.0, 0.0, 8.0]]
+    """
+
+    count: int
+    row: Steps
+    column: Steps
+    value: Vector
+
+    @classmethod
+    def of(cls, count: int, columns: Steps, values: Vector) -> Sparse:
+        """An entry or more in each of `count` rows, all first entries before all second ones."""
+        return cls(count, np.tile(np.arange(count), columns.size // max(count, 1)), columns, values)
+
+    @classmethod
+    def single(cls, weights: dict[int, float]) -> Sparse:
+        """One row with the given weight in each of the given columns."""
+        return cls(
+            1,
+            np.zeros(len(weights), dtype=np.int64),
+            np.array(list(weights)),
+            np.array(list(weights.values())),
+        )
+
+    @classmethod
+    def dense(cls, rows: Matrix) -> Sparse:
+        """The entries of a full matrix that are not 0."""
+        row, column = np.nonzero(rows)
+        return cls(rows.shape[0], row, column, rows[row, column])
+
+    @classmethod
+    def stacked(cls, blocks: Sequence[Sparse]) -> Sparse:
+        """The rows of all blocks, one below the other."""
+        first = np.cumsum([0, *(one.count for one in blocks)])
+        if not blocks:
+            return cls(0, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+        return cls(
+            int(first[-1]),
+            np.concatenate([one.row + offset for one, offset in zip(blocks, first[:-1], strict=True)]),
+            np.concatenate([one.column for one in blocks]),
+            np.concatenate([one.value for one in blocks]),
+        )
+
+    def __rmul__(self, factor: float) -> Sparse:
+        return Sparse(self.count, self.row, self.column, factor * self.value)
+
+    def __sub__(self, other: Sparse) -> Sparse:
+        return Sparse(
+            self.count,
+            np.concatenate([self.row, other.row]),
+            np.concatenate([self.column, other.column]),
+            np.concatenate([self.value, -other.value]),
+        )
+
+    def repeated(self, count: int) -> Sparse:
+        """The same single row so many times."""
+        each = self.value.size
+        return Sparse(
+            count, np.repeat(np.arange(count), each), np.tile(self.column, count), np.tile(self.value, count)
+        )
+
+    def csr(self, columns: int) -> Any:
+        """As SciPy's matrix of compressed rows."""
+        return sparse.csr_array((self.value, (self.row, self.column)), shape=(self.count, columns))
+
+
+Rows = tuple[Sparse, Vector]  # rows over the variables, constants
+
+
 class RowList:
-    """Sparse rows and their right sides, collected block by block."""
+    """Rows and their right sides, collected block by block."""
 
     def __init__(self) -> None:
-        self.matrices: list[Any] = []
+        self.blocks: list[Sparse] = []
         self.rights: list[Vector] = []
 
-    def add(self, matrix: Any, right: Vector) -> None:
-        self.matrices.append(matrix)
-        self.rights.append(np.broadcast_to(right, (matrix.shape[0],)))
+    def add(self, rows: Sparse, right: Vector) -> None:
+        self.blocks.append(rows)
+        self.rights.append(np.broadcast_to(right, (rows.count,)))
 
-    def all(self, columns: int) -> tuple[Any, Vector]:
-        if not self.matrices:
-            return sparse.csr_array((0, columns)), np.zeros(0)
-        return sparse.vstack(self.matrices).tocsr(), np.concatenate(self.rights)
+    def all(self) -> Rows:
+        return Sparse.stacked(self.blocks), np.concatenate(self.rights or [np.zeros(0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,19 +181,25 @@ class Limits:
     """Minimise cost @ x subject to A_ub x <= b_ub, A_eq x = b_eq."""
 
     cost: Vector
-    A_ub: Any
+    A_ub: Sparse
     b_ub: Vector
-    A_eq: Any
+    A_eq: Sparse
     b_eq: Vector
 
-    def solved(self, bounds: Matrix, warm: WarmStarts | None = None) -> Solution | None:
+    def solved(
+        self, bounds: Matrix, warm: WarmStarts | None = None, presolve: bool = True
+    ) -> Solution | None:
         """The best x within the bounds (columns, 2); None where there is none.
 
         By the dual simplex method, from the last basis of `warm`; where that takes far longer than usual, by
         the interior point method.
         """
         if highs is None:
-            found = linprog(self.cost, self.A_ub, self.b_ub, self.A_eq, self.b_eq, bounds, method="highs-ds")
+            A_ub, A_eq = (one.csr(self.cost.size) for one in (self.A_ub, self.A_eq))
+            options = {"presolve": presolve}
+            found = linprog(
+                self.cost, A_ub, self.b_ub, A_eq, self.b_eq, bounds, "highs-ds", options=options
+            )  # fmt: skip
             if found.status != 0:
                 return None
             above, equal = np.asarray(found.ineqlin.marginals), np.asarray(found.eqlin.marginals)
@@ -130,6 +211,8 @@ class Limits:
             engine = highs._Highs()
             engine.setOptionValue("output_flag", False)
             engine.setOptionValue("solver", solver)
+            if not presolve:
+                engine.setOptionValue("presolve", "off")
             engine.setOptionValue("simplex_iteration_limit", int(FEW_ITERATIONS + sum(size)))
             engine.passModel(program)
             if start is not None:
@@ -152,7 +235,7 @@ class Limits:
 
     def _program(self, bounds: Matrix) -> Any:
         """The program as HiGHS takes it."""
-        A = sparse.vstack([self.A_ub, self.A_eq], format="csc")
+        A = Sparse.stacked([self.A_ub, self.A_eq]).csr(self.cost.size).tocsc()
         program = highs.HighsLp()
         program.num_col_, program.num_row_ = A.shape[1], A.shape[0]
         program.col_cost_ = self.cost
@@ -166,16 +249,9 @@ class Limits:
         return program
 
 
-def single_row(weights: dict[int, float], columns: int) -> Any:
-    """One row with the given weight in each of the given columns."""
-    where = np.zeros(len(weights), dtype=np.int64), np.array(list(weights))
-    return sparse.csr_array((np.array(list(weights.values())), where), shape=(1, columns))
-
-
-def below(rows: Rows, variable: Any, sign: float = 1.0) -> Rows:
+def below(rows: Rows, variable: Sparse, sign: float = 1.0) -> Rows:
     """Rows and right sides of sign * rows <= variable, which is itself a row."""
-    ones = sparse.csr_array(np.ones((rows[1].size, 1)))
-    return sign * rows[0] - ones @ variable, -sign * rows[1]
+    return sign * rows[0] - variable.repeated(rows[1].size), -sign * rows[1]
 
 
 # grids ----------------------------------------------------------------------------------------------------
@@ -198,7 +274,8 @@ def contact_grid(contact: Contact, tau: float, steps: int) -> Vector:
 
 def checked_instants(lengths: Vector, within: Callable[[float], Vector]) -> tuple[Steps, Vector]:
     """(step, time since its beginning) of all checks; `within` gives those of a step by its length in s."""
-    parts = [within(length) for length in lengths.tolist()]
+    once = cache(within)
+    parts = [once(length) for length in lengths.tolist()]
     return np.repeat(np.arange(lengths.size), [part.size for part in parts]), np.concatenate(parts)
 
 

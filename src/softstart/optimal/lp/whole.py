@@ -28,7 +28,6 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from scipy import sparse
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
@@ -42,11 +41,11 @@ from softstart.optimal.lp.rows import (
     Marks,
     RowList,
     Rows,
+    Sparse,
     Steps,
     WarmStarts,
     below,
     checked_instants,
-    single_row,
     split,
 )
 from softstart.optimal.problem import Problem
@@ -242,16 +241,16 @@ class WholeProgram:
         on_slope = weights[:, SLOPE] / each
         values = [weights[:, i] * self.scale[i] for i in range(STATES)]
         columns = [STATES * step + i for i in range(STATES)]
-        values += [(weights[:, R] - on_slope) * self.U, on_slope * self.U]
-        columns += [self.first[step], self.second[step]]
-        where = np.tile(np.arange(m), len(values)), np.concatenate(columns)
-        matrix = sparse.csr_array((np.concatenate(values), where), shape=(m, self.columns))
-        return matrix, weights[:, ONE]
+        demand = [(weights[:, R] - on_slope) * self.U, on_slope * self.U]
+        values += [demand[0] + demand[1]] if self.shape == "steps" else demand
+        columns += [self.first[step], self.second[step]][: 1 if self.shape == "steps" else 2]
+        return Sparse.of(m, np.concatenate(columns), np.concatenate(values)), weights[:, ONE]
 
-    def single(self, node: int, weights: dict[int, float]) -> Any:
+    def single(self, node: int, weights: dict[int, float]) -> Sparse:
         """One row on the state at a node."""
-        scaled = {STATES * node + i: value * float(self.scale[i]) for i, value in weights.items()}
-        return single_row(scaled, self.columns)
+        return Sparse.single(
+            {STATES * node + i: value * float(self.scale[i]) for i, value in weights.items()}
+        )
 
     @property
     def T(self) -> Vector:
@@ -280,11 +279,11 @@ class WholeProgram:
     # what must hold --------------------------------------------------------------------------------------
 
     @cached_property
-    def _on_P(self) -> Any:
-        return single_row({self.P: 1.0}, self.columns)
+    def _on_P(self) -> Sparse:
+        return Sparse.single({self.P: 1.0})
 
     def _below_P(self, torque: Rows, sign: float = 1.0) -> Rows:
-        return below((torque[0] / self.U, torque[1] / self.U), self._on_P, sign)
+        return below(((1.0 / self.U) * torque[0], torque[1] / self.U), self._on_P, sign)
 
     def _equations(self) -> RowList:
         """The motion, the joints of the phases, the end; the load speed at t_f comes last."""
@@ -293,7 +292,7 @@ class WholeProgram:
         moved = self.moved(all_steps, self.length)
         for i in range(STATES):
             rows, constant = self.rows(all_steps, moved[:, i, :] / self.scale[i])
-            node = sparse.csr_array((np.ones(self.n), (all_steps, STATES * (all_steps + 1) + i)), rows.shape)
+            node = Sparse.of(self.n, STATES * (all_steps + 1) + i, np.ones(self.n))
             equal.add(rows - node, -constant)
         at = 0
         T = {Z: self.c / self.U, V: self.d / self.U}
@@ -309,7 +308,7 @@ class WholeProgram:
             if self.shape == "continuous":  # what holds T is demanded already
                 total = (self.J1 + self.J2) / self.J2
                 row = self.single(self.steps, {i: value * total for i, value in T.items()})
-                held = sparse.csr_array((np.ones(1), ([0], [self.second[self.steps - 1]])), row.shape)
+                held = Sparse.single({int(self.second[self.steps - 1]): 1.0})
                 equal.add(row - held, np.array([self.Mc * self.J1 / self.J2 / self.U]))
         if terminal == "steady":
             equal.add(self.single(self.steps, T), np.array([self.Mc / self.U]))
@@ -370,12 +369,8 @@ class WholeProgram:
 
     def _add_demand_limits(self, limits: RowList) -> None:
         if self.rate < math.inf:
-            k = np.arange(self.n)
             ones = np.ones(self.n)
-            rise = sparse.csr_array(
-                (np.concatenate([ones, -ones]), (np.tile(k, 2), np.concatenate([self.second, self.first]))),
-                (self.n, self.columns),
-            )
+            rise = Sparse.of(self.n, self.second, ones) - Sparse.of(self.n, self.first, ones)
             limits.add(rise, self.rate * self.length / self.U)
             limits.add(-1.0 * rise, self.rate * self.length / self.U)
         # also at the beginning of each step, where the demand may jump
@@ -415,10 +410,8 @@ class WholeProgram:
             weights[:, Z] += weights[:, R] * total * self.c
             weights[:, V] += weights[:, R] * total * self.d
             constant = weights[:, ONE] - weights[:, R] * self.Mc * self.J1 / self.J2
-        columns = np.tile(STATES * node + np.arange(STATES), (TAIL_POINTS, 1))
-        where = np.repeat(np.arange(TAIL_POINTS), STATES), columns.ravel()
-        values = (weights[:, :STATES] * self.scale).ravel()
-        return sparse.csr_array((values, where), (TAIL_POINTS, self.columns)), constant
+        columns = np.repeat(STATES * node + np.arange(STATES), TAIL_POINTS)
+        return Sparse.of(TAIL_POINTS, columns, (weights[:, :STATES] * self.scale).T.ravel()), constant
 
     def _bounds(self) -> Matrix:
         drive: Any = self.problem.drive
@@ -467,16 +460,16 @@ class WholeProgram:
         """The program that looks for the least P."""
         cost = np.zeros(self.columns)
         cost[self.P] = 1.0
-        A_eq, b_eq = self._equations().all(self.columns)
-        return Limits(cost, *self._limits(with_P=True).all(self.columns), A_eq, b_eq)
+        return Limits(cost, *self._limits(with_P=True).all(), *self._equations().all())
 
     @cached_property
     def most_speed(self) -> Limits:
         """The program that looks for the greatest speed."""
         cost = np.zeros(self.columns)
         cost[STATES * self.steps + W2] = -1.0
-        A_eq, b_eq = self._equations().all(self.columns)
-        return Limits(cost, *self._limits(with_P=False).all(self.columns), A_eq[:-1], b_eq[:-1])
+        equations = self._equations()
+        equations.blocks.pop(), equations.rights.pop()
+        return Limits(cost, *self._limits(with_P=False).all(), *equations.all())
 
     def _solved(self, limits: Limits, warm: WarmStarts) -> Vector | None:
         found = limits.solved(self._bounds(), warm)
@@ -494,24 +487,29 @@ class WholeProgram:
         others = [one.most_speed if fast else one.least_P for one in near]
         if any(one.b_ub.size != own.b_ub.size for one in others):
             return None
+        ub, eq = own.A_ub.csr(self.columns) @ found, own.A_eq.csr(self.columns) @ found
         slopes = [
-            ((one.A_ub @ found - one.b_ub - own.A_ub @ found + own.b_ub) / by[i],
-             (one.A_eq @ found - one.b_eq - own.A_eq @ found + own.b_eq) / by[i])
+            ((one.A_ub.csr(self.columns) @ found - one.b_ub - ub + own.b_ub) / by[i],
+             (one.A_eq.csr(self.columns) @ found - one.b_eq - eq + own.b_eq) / by[i])
             for i, one in enumerate(others)
         ]  # fmt: skip
         size = np.maximum(np.abs(ends).max(axis=1), 1e-300)  # a unit in which the shift is about 1
+        shifts = self.columns + np.arange(by.size)
+
+        def joined(rows: Sparse, values: list[Vector]) -> Sparse:
+            """The rows with what the shifts change in them."""
+            more = -(np.array(values) * size[:, None]).ravel()
+            return rows - Sparse.of(rows.count, np.repeat(shifts, rows.count), more)
+
         limits = Limits(
             np.concatenate([own.cost, np.zeros(by.size)]),
-            sparse.vstack([
-                sparse.hstack([own.A_ub, sparse.csr_array(np.column_stack([ub for ub, _ in slopes]) * size)]),
-                sparse.csr_array(np.concatenate([np.zeros(self.columns), -order[0] * size])[None, :]),
-            ]).tocsr(),
+            Sparse.stacked(
+                [joined(own.A_ub, [ub for ub, _ in slopes]), Sparse.of(1, shifts, -order[0] * size)]
+            ),
             np.append(own.b_ub, -order[1]),
-            sparse.hstack(
-                [own.A_eq, sparse.csr_array(np.column_stack([eq for _, eq in slopes]) * size)]
-            ).tocsr(),
+            joined(own.A_eq, [eq for _, eq in slopes]),
             own.b_eq,
-        )  # fmt: skip
+        )
         best = limits.solved(np.vstack([self._bounds(), ends / size[:, None]]), self.warm[fast])
         return None if best is None else best.x[self.columns :] * size
 
@@ -520,13 +518,13 @@ class WholeProgram:
         step, s = self.instants(SIXTEENTHS)
         moved = self.moved(step, s)
         rows, constant = self.rows(step, self.T @ moved / self.U)
-        T = rows @ found + constant
+        T = rows.csr(self.columns) @ found + constant
         rows, constant = self.rows(step, self.c * moved[:, Z] / self.U)
-        kept = rows @ found + constant if self.pulls else T
+        kept = rows.csr(self.columns) @ found + constant if self.pulls else T
         contact = np.array(self.kinds)[step] == "contact"
         over = np.abs(T) if self.pulls else T
         bad = contact & ((over > P * (1.0 + EXCESS)) | ((kept < -1e-9) & (step < self.steps)))
         for rows, right in self._under_curve(SIXTEENTHS):
-            bad[step < self.steps] |= rows @ found > right
+            bad[step < self.steps] |= rows.csr(self.columns) @ found > right
         broken: Marks = np.bincount(step, weights=bad, minlength=self.n)[: self.steps] > 0.0
         return broken

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.sparse import csr_array, vstack
 
 from softstart.arrays import Matrix, Vector
+from softstart.optimal.lp.rows import Limits, Sparse
 from softstart.optimal.robust.evaluation import Evaluator, Indices, ProfileParameters, Staircase, Trajectory
 
 Aim = Literal["gentle", "quick"]
@@ -82,7 +81,7 @@ def linear_step(
     used = np.concatenate([np.arange(n), n + free_edges(staircase, rules)])
     box = _box(staircase, rules, trust)[used]
     jumps, flat, steps_now = _jumps(staircase, used.size, rules)
-    extra = 2 + jumps.shape[0] // 2
+    extra = 2 + jumps.count // 2
     if rules.aim == "gentle":
         dense, right = _gentle(evaluator, trajectories, used, box, rules, earlier, extra)
         cost = np.concatenate(
@@ -105,7 +104,7 @@ def linear_step(
 
 
 def _least(
-    cost: Vector, dense: Matrix, right: Vector, jumps: Matrix, flat: Vector, bounds: Matrix
+    cost: Vector, dense: Matrix, right: Vector, jumps: Sparse, flat: Vector, bounds: Matrix
 ) -> Vector | None:
     """The x with the least cost x, subject to dense x <= right, jumps x <= flat and bounds; None if none is.
 
@@ -117,15 +116,14 @@ def _least(
     used[np.argsort(room, kind="stable")[:FIRST_ROWS]] = True
     while True:
         # dense and small: presolving takes longer than it saves (with it a descent takes 1.8 times as long)
-        answer = linprog(
-            cost, vstack([csr_array(dense[used]), jumps]), np.concatenate([right[used], flat]), bounds=bounds,
-            method="highs-ds", options={"presolve": False},
-        )  # fmt: skip
-        if answer.x is None:
+        rows = Sparse.stacked([Sparse.dense(dense[used]), jumps])
+        limits = Limits(cost, rows, np.concatenate([right[used], flat]), Sparse.stacked([]), np.zeros(0))
+        answer = limits.solved(bounds, presolve=False)
+        if answer is None:
             return None
         broken = (dense @ answer.x - right > BROKEN * np.abs(right).max()) & ~used
         if not broken.any():
-            return np.asarray(answer.x)
+            return answer.x
         used |= broken
 
 
@@ -141,10 +139,10 @@ def _box(staircase: Staircase, rules: Rules, trust: float) -> Matrix:
     return np.stack([np.concatenate(lower), np.concatenate(upper)], axis=1)
 
 
-def _jumps(staircase: Staircase, columns: int, rules: Rules) -> tuple[Matrix, Vector, float]:
+def _jumps(staircase: Staircase, columns: int, rules: Rules) -> tuple[Sparse, Vector, float]:
     """Rows  +-(step + change of step) - r <= 0  with one r for each step, and the sum of steps now."""
     if rules.calm == 0.0:
-        return csr_array((0, columns + 2)), np.zeros(0), 0.0
+        return Sparse.stacked([]), np.zeros(0), 0.0
     below, offset = [], 0
     for part in staircase.parts:
         below.append(offset + np.arange(part.levels.size - 1))
@@ -157,8 +155,7 @@ def _jumps(staircase: Staircase, columns: int, rules: Rules) -> tuple[Matrix, Ve
     column = np.concatenate([lower + 1, lower, columns + 2 + k] * 2)
     one = np.ones(count)
     value = np.concatenate([one, -one, -one, -one, one, -one])
-    matrix = csr_array((value, (row, column)), shape=(2 * count, columns + 2 + count))
-    return matrix, np.concatenate([-here, here]), float(np.abs(here).sum())
+    return Sparse(2 * count, row, column, value), np.concatenate([-here, here]), float(np.abs(here).sum())
 
 
 def _gentle(
