@@ -319,6 +319,7 @@ def loads(one: Experiment, position: float) -> Run:
     return simulate(drive, make_controller("profile", {"profile": one.profile}), until=one.end)
 
 
+@pytest.mark.slow  # a design takes some 200 torques
 def test_the_planned_torque_tells_no_less_and_keeps_its_limits(planned: Plan) -> None:
     one = planned["planned"]
     allowed = [standard for standard in planned.experiments[:4] if standard.peak <= 70.0]
@@ -332,6 +333,7 @@ def test_the_planned_torque_tells_no_less_and_keeps_its_limits(planned: Plan) ->
     assert one.end == min(allowed, key=lambda standard: standard.score).end
 
 
+@pytest.mark.slow  # of the same design
 @pytest.mark.parametrize("position", [-0.04, -0.013, 0.0, 0.04])
 def test_a_load_that_is_to_rest_does_not_move_at_all(planned: Plan, position: float) -> None:
     one = planned["planned, load at rest"]
@@ -343,6 +345,7 @@ def test_a_load_that_is_to_rest_does_not_move_at_all(planned: Plan, position: fl
     made_up_log(TRUTH, one, log_period=8e-3, ripple=0.2)  # a log that `identify` would take
 
 
+@pytest.mark.slow  # a design takes some 200 torques
 def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_one(planned: Plan) -> None:
     one, generator = planned["planned"], np.random.default_rng(7)
     bench = _Bench(TRUTH, 8e-3, 1.0, NAMES, "angle", (), lambda _: None)
