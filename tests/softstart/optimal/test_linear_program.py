@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import sparse
 from scipy.optimize import linprog
 
 from softstart import Drive, optimize
@@ -17,7 +16,7 @@ from softstart.optimal.exact import replay
 from softstart.optimal.lp import ideal
 from softstart.optimal.lp.ideal import Answer, ContactProgram
 from softstart.optimal.lp.motion import Contact, entry_of
-from softstart.optimal.lp.rows import Limits, WarmStarts
+from softstart.optimal.lp.rows import Limits, Sparse, WarmStarts
 from softstart.optimal.problem import Problem, Terminal
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -27,20 +26,21 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 def test_a_warm_start_finds_the_same(limit: float) -> None:
     """Also of a program without a solution, and of one with a variable and a limit more."""
     rng = np.random.default_rng(7)
-    A, none = sparse.csr_array(rng.uniform(0.1, 1.0, (30, 20))), np.zeros(0)
+    A, none = rng.uniform(0.1, 1.0, (30, 20)), np.zeros(0)
     cost, box = -rng.uniform(0.5, 1.0, 20), np.tile([0.0, 1.0], (20, 1))
-    no_rows, warm = sparse.csr_array((0, 20)), WarmStarts()
-    assert Limits(cost, A, np.full(30, 1.0), no_rows, none).solved(box, warm) is not None
-    after = Limits(cost, A, np.full(30, limit), no_rows, none).solved(box, warm)
+    no_rows, warm = Sparse.stacked([]), WarmStarts()
+    rows = Sparse.dense(A)
+    assert Limits(cost, rows, np.full(30, 1.0), no_rows, none).solved(box, warm) is not None
+    after = Limits(cost, rows, np.full(30, limit), no_rows, none).solved(box, warm)
     truth = linprog(cost, A, np.full(30, limit), bounds=box)
     assert after is not None
     assert after.cost == pytest.approx(truth.fun, rel=1e-9)
     np.testing.assert_allclose(after.above, truth.ineqlin.marginals, atol=1e-9)
-    assert Limits(cost, A, np.full(30, -limit), no_rows, none).solved(box, warm) is None
-    wider = sparse.vstack([sparse.hstack([A, np.ones((30, 1))]), np.ones((1, 21))], format="csr")
+    assert Limits(cost, rows, np.full(30, -limit), no_rows, none).solved(box, warm) is None
+    wider = np.vstack([np.hstack([A, np.ones((30, 1))]), np.ones((1, 21))])
     rights, costs = np.append(np.full(30, limit), 0.5), np.append(cost, -1.0)
     box = np.vstack([box, [-0.3, 0.3]])
-    more = Limits(costs, wider, rights, sparse.csr_array((0, 21)), none).solved(box, warm)
+    more = Limits(costs, Sparse.dense(wider), rights, no_rows, none).solved(box, warm)
     assert more is not None
     assert more.cost == pytest.approx(linprog(costs, wider, rights, bounds=box).fun, rel=1e-9)
 
