@@ -71,7 +71,7 @@ BUDGET = {
     "plant": (2880, 15, 2, 0),
     # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed
-    "reporting": (3416, 14, 4, 0),
+    "reporting": (3417, 14, 4, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,

@@ -69,7 +69,8 @@ def strategies_section(
             fixed(row.k_dyn_light_load, 3), digits(run.peak_torque), digits(run.start_time),
             digits(run.settled_time), fixed(row.time_lost, _decimals(run.start_time)),
             str(run.contacts),
-            *([row.against_limits] if limited else []), ", ".join(flag.word for flag in row.flags),
+            *([row.against_limits.replace(" ", "\N{NO-BREAK SPACE}")] if limited else []),
+            ", ".join(flag.word for flag in row.flags),
         ])  # fmt: skip
     strong = [rows.index(row) for row in chosen]
     base = float(metrics.base_torque(drive))
