@@ -18,6 +18,8 @@ Corners defined here:
 - A reactive load whose speed passes zero without resting gives "load-stops" and "load-starts" at one instant.
 - `modelica` has the cut of ElastoBacklash, T = max(0, ...). Its special case of gap <= 1e-10 rad is left out.
 - Before the first torque piece the demand is u0. With rate = inf and lag = 0, u jumps with the demand.
+- Coulomb friction of the motor holds it at rest as long as |u - T| <= friction ("motor-stops" and
+  "motor-starts"); b1 and b2 are viscous friction of motor and load.
 - With `release` a brake holds the motor (w1 = 0, w1_0 must be 0) until that instant, or, for infinity, until
   u >= T for the first time ("released"; at t = 0 if it is so from the start).
 """
@@ -81,6 +83,9 @@ class Drive:
     Mc: float
     reactive: bool
     law: str
+    friction: float = 0.0
+    b1: float = 0.0
+    b2: float = 0.0
 
 
 @dataclass
@@ -91,6 +96,8 @@ class Mode:
     form: str = "open"
     direction: int = 1
     held: bool = False
+    rubs: int = 0  # sign of the motor speed that its friction opposes
+    stuck: bool = False  # the motor is held by its friction
 
 
 def integrate(
@@ -115,9 +122,12 @@ def integrate(
     rtol: float = 1e-11,
     energy: bool = False,
     release: float = 0.0,
+    friction: float = 0.0,
+    b1: float = 0.0,
+    b2: float = 0.0,
 ) -> Start:
     """Integrate one start from t = 0 to t_end; see the module for its modes and corners."""
-    drive = Drive(J1, J2, c, d, gap, Mc, kind == "reactive", law)
+    drive = Drive(J1, J2, c, d, gap, Mc, kind == "reactive", law, friction, b1, b2)
     path = TorquePath(torque_pieces, lag, rate, u0, t_end)
     return _Run(drive, path, (theta0, w1_0 - w2_0, w2_0), target, rtol, energy, release).go()
 
@@ -153,6 +163,7 @@ class _Run:
         self.atol = self.atol[: len(self.y)]
         self.held_until = release
         self.mode = Mode(held=release > 0.0)
+        self.stand_or_slide(v + w2)
         self.events: list[tuple[float, str]] = []
         self.contacts: list[Contact] = []
         self.peak, self.peak_time = 0.0, 0.0
@@ -173,13 +184,14 @@ class _Run:
         kq, kv = self.stiffness()
         J1, J2, energy = self.drive.J1, self.drive.J2, self.energy
         moves, friction = self.mode.direction != 0, self.mode.direction * self.drive.Mc
-        path, span, held = self.path, self.span, self.mode.held
+        path, span, held = self.path, self.span, self.mode.held or self.mode.stuck
+        drag, b1, b2 = self.mode.rubs * self.drive.friction, self.drive.b1, self.drive.b2
 
         def derivative(t: float, y: np.ndarray) -> list[float]:
             q, v, w2, *_ = y.tolist()
             u, T = path.torque(t, span)[0], kq * q + kv * v
-            a2 = (T - friction) / J2 if moves else 0.0
-            rates = [v, (0.0 if held else (u - T) / J1) - a2, a2, w2]
+            a2 = (T - friction - b2 * w2) / J2 if moves else 0.0
+            rates = [v, (0.0 if held else (u - drag - b1 * (v + w2) - T) / J1) - a2, a2, w2]
             return [*rates, u * (v + w2), T * v, friction * w2] if energy else rates
 
         return derivative
@@ -187,10 +199,14 @@ class _Run:
     def slope_functional(self) -> np.ndarray:
         """dT/dt as coefficients of (q, v, w2, u, 1)."""
         kq, kv = self.stiffness()
-        motor = 0.0 if self.mode.held else 1 / self.drive.J1
-        mobility = motor + (1 / self.drive.J2 if self.mode.direction else 0.0)
+        motor = 0.0 if self.mode.held or self.mode.stuck else 1 / self.drive.J1
+        load = 1 / self.drive.J2 if self.mode.direction else 0.0
+        mobility = motor + load
         friction = self.mode.direction * self.drive.Mc / self.drive.J2
-        return np.array([-kv * kq * mobility, kq - kv * kv * mobility, 0, kv * motor, kv * friction])
+        friction -= motor * self.mode.rubs * self.drive.friction
+        b1, b2 = self.drive.b1 * motor, self.drive.b2 * load
+        by_v = kq - kv * kv * mobility - kv * b1
+        return np.array([-kv * kq * mobility, by_v, kv * (b2 - b1), kv * motor, kv * friction])
 
     def event_functionals(self) -> tuple[list[str], np.ndarray]:
         """Names, and coefficients of (q, v, w2, u, 1): each fires when it rises through zero."""
@@ -219,6 +235,12 @@ class _Run:
         if self.mode.held and math.isinf(self.held_until):
             kq, kv = self.stiffness()
             table["let go"] = (-kq, -kv, 0, 1, 0)
+        if self.mode.stuck:
+            kq, kv = self.stiffness()
+            table["motor forward"] = (-kq, -kv, 0, 1, -self.drive.friction)
+            table["motor backward"] = (kq, kv, 0, -1, -self.drive.friction)
+        elif self.mode.rubs:
+            table["motor stop"] = (0, -self.mode.rubs, -self.mode.rubs, 0, 0)
         if self.target is not None:
             table["target"] = (0, 0, 1, 0, -self.target)
         return list(table), np.array(list(table.values()), dtype=float)
@@ -278,18 +300,34 @@ class _Run:
         elif name == "let go":
             self.mode.held = False
             self.happened("released")
+            self.stand_or_slide(0.0)
+        elif name == "motor stop":
+            self.y[1] = -self.y[2]
+            self.happened("motor-stops")
+            self.stand_or_slide(0.0)
+        elif name.startswith("motor"):
+            self.slide(1 if name.endswith("forward") else -1)
         elif name.startswith("break"):
             self.begin_move(1 if name.endswith("forward") else -1)
         else:
             self.target = None
             self.happened("target")
 
+    def stand_or_slide(self, w1: float) -> None:
+        """The friction of the motor opposes its speed, or holds it."""
+        if self.drive.friction > 0.0 and not self.mode.held:
+            self.mode.rubs, self.mode.stuck = int(np.sign(w1)), w1 == 0.0
+
+    def slide(self, direction: int) -> None:
+        self.mode.stuck, self.mode.rubs = False, direction
+        self.happened("motor-starts")
+
     def settle(self) -> None:
-        """Changes that follow at once from where the drive is: flank touched, stuck load overcome."""
+        """Changes that follow at once from where the drive is: flank touched, stuck mass overcome."""
         self.release_if_due()
         if self.mode.form == "open":
             grows = bends = 0.0
-            if not self.mode.held:
+            if not self.mode.held and not self.mode.stuck:
                 grows = self.path.torque(self.t, self.span)[1]
                 if self.path.lag > 0.0:  # a ramp behind a lag begins with u = u' = 0
                     bends = (self.span[3] - grows) / self.path.lag
@@ -302,6 +340,9 @@ class _Run:
         if self.mode.direction == 0 and abs(self.torque()) > self.drive.Mc:
             self.begin_move(1 if self.torque() > 0 else -1)
         self.release_if_due()
+        pushed = self.path.torque(self.t, self.span)[0] - self.torque()
+        if self.mode.stuck and abs(pushed) > self.drive.friction:
+            self.slide(1 if pushed > 0 else -1)
 
     def release_if_due(self) -> None:
         """Torque proved, or the instant has come."""

@@ -187,6 +187,8 @@ class Chain:
         """
         if drive.shape != ():
             raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
+        if wrong := list(drive.without_friction("a chain has no such friction")):
+            raise InputError(wrong)
         of: Any = drive  # one number for each parameter
         rotor = Mass(of.J1, name="motor", initial_speed=of.initial_motor_speed)
         load = Mass(of.J2, name="load", torque=of.Mc, kind=of.load_kind, initial_speed=of.initial_load_speed)

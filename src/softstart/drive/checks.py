@@ -54,6 +54,7 @@ def contradictions(values: Values, parameters: Mapping[str, Parameter], wording:
         "starting_torque", "load_torque", lambda Ms, Mc: Ms <= Mc,
         "the starting torque cannot move the load against {other}; raise the one or lower the other",
     )  # fmt: skip
+    yield from _friction_too_large(both)
     if values.get("load_kind") == "reactive":
         yield from both.broken(
             "load_torque", "load_kind", lambda Mc, _: Mc < 0.0,
@@ -133,6 +134,29 @@ def _impossible_starts(both: _Pairs) -> Iterator[str]:
         )  # fmt: skip
 
 
+def _friction_too_large(both: _Pairs) -> Iterator[str]:
+    """Friction against which the motor cannot start, or not reach the target speed of the load."""
+    needed = ("starting_torque", "maximum_torque", "load_torque", "target_speed")
+    Ms, most, Mc, target = (both.values.get(name) for name in needed)
+    names = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
+    friction, b1, b2 = (both.values.get(name, 0.0) for name in names)
+    if Ms is None or Mc is None:
+        return
+    yield from both.broken(
+        "motor_friction", "starting_torque", lambda one, Ms: (one > 0.0) & (Ms - one <= Mc) & (Ms > Mc),
+        "with this friction {other} cannot move the load; lower the friction, or raise the torque",
+    )  # fmt: skip
+    if target is None:
+        return
+    left = np.maximum(Ms, Ms if most is None else most) - friction - Mc
+    slow = (left > 0.0) & ((np.add(b1, b2)) * target >= left)
+    for name in names[1:]:
+        yield from both.broken(
+            name, "target_speed", lambda one, _: (one > 0.0) & slow,
+            "at {other} this takes more torque than the motor has left; lower the one or the other",
+        )  # fmt: skip
+
+
 def _is(value: object, word: str) -> bool:
     return isinstance(value, str) and value == word
 
@@ -144,6 +168,7 @@ def _impossible_dynamics(
     if any(name not in values for name in needed):
         return
     J1, J2, Ms, Mc = (values[name] for name in needed)
+    Ms = Ms - values.get("motor_friction", 0.0)
     mean = (Ms + Mc * (J1 / J2)) / (1.0 + J1 / J2)
     if np.any(~np.asarray(mean > 0.0) & np.asarray(Ms > Mc)):
         yield wording.sentence(

@@ -3,7 +3,7 @@
 In contact (linear), with `z` the twist beyond the gap on the touching side:
 
     z'  = w1 - w2,    T = c z + d (w1 - w2)
-    w1' = (motor_torque - T)/J1,    w2' = (T - load_torque)/J2
+    w1' = (motor_torque - b1 w1 - T)/J1,    w2' = (T - b2 w2 - load_torque)/J2
 
 Three states, not four: the sum of the angles neither acts on the torque nor shows in it, and would be an
 unobservable double integrator in every Bode plot and observer design. Add `1/s` to `w1` for the motor angle.
@@ -11,8 +11,9 @@ unobservable double integrator in every Bode plot and observer design. Add `1/s`
 The whole drive (nonlinear) has the gap, the contact law, the load torque, the torque limits, the rate limit
 of the demand and the lag of the torque. It is meant for design work with python-control; exact peaks and
 events come from `softstart.simulate`, which locates them. Two idealisations cannot be written as an ordinary
-differential equation and are smoothed over a thousandth of the elastic period: sticking of a reactive load
-(Karnopp 1985, doi:10.1115/1.3140698: stuck below a millionth of the target speed) and the rate limit.
+differential equation and are smoothed over a thousandth of the elastic period: sticking of a reactive load or
+of a motor with friction (Karnopp 1985, doi:10.1115/1.3140698: stuck below a millionth of the target speed),
+and the rate limit.
 """
 
 from __future__ import annotations
@@ -60,8 +61,9 @@ def in_contact(drive: Drive) -> control.StateSpace:
     J1, J2, c, d = (float(value) for value in (drive.J1, drive.J2, drive.c, drive.d))
     torque = np.array([[c, d, -d]])
     states = ["z", "w1", "w2"]
+    _, b1, b2 = map(float, drive.frictions)
     return control.StateSpace(
-        np.vstack([[[0.0, 1.0, -1.0]], -torque / J1, torque / J2]),
+        np.vstack([[[0.0, 1.0, -1.0]], -torque / J1, torque / J2]) - np.diag([0.0, b1 / J1, b2 / J2]),
         np.array([[0.0, 0.0], [1.0 / J1, 0.0], [0.0, -1.0 / J2]]),
         np.vstack([np.eye(3), torque]),
         np.zeros((4, 2)),
@@ -96,9 +98,9 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     """The whole drive: input `demand` (N m), outputs `phi1, w1, phi2, w2, u, T` in SI.
 
     States `phi1, w1, phi2, w2`, then `reference` (the demand behind the rate limit) if `torque_rate` is
-    finite and `u` if there is a `torque_lag`. `params` holds J1, J2, c, d, gap and Mc, to be overridden in a
-    simulation. Give it `initial_state(drive)`, and a `max_step` below the shortest stage to the solver, or it
-    may step over a contact. Raises `InputError` for a batch.
+    finite and `u` if there is a `torque_lag`. `params` holds J1, J2, c, d, gap, Mc, b1 and b2, to be
+    overridden in a simulation. Give it `initial_state(drive)`, and a `max_step` below the shortest stage to
+    the solver, or it may step over a contact. Raises `InputError` for a batch.
 
     >>> from softstart.drive import Drive
     >>> whole_drive(Drive.load("servo-axis-small")).state_labels
@@ -108,8 +110,17 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     states = _states(drive)
     actuator = _actuator(drive, states)
     smoothing = _SMOOTHING * float(drive.elastic_period)
-    stuck = _STUCK * float(drive.target_speed) if drive.load_kind == "reactive" else 0.0
+    stuck = _STUCK * float(drive.target_speed)
+    reactive, drag = drive.load_kind == "reactive", float(drive.motor_friction)
     law = drive.contact_law
+
+    def rate(torque: float, speed: float, friction: float, inertia: float, *, sticks: bool) -> float:
+        direction = 1.0
+        if sticks:
+            if abs(speed) <= stuck and abs(torque) <= friction:
+                return -speed / smoothing
+            direction = math.copysign(1.0, speed if abs(speed) > stuck else torque)
+        return (torque - direction * friction) / inertia
 
     def torque(x: Vector, p: dict[str, float]) -> float:
         return shaft_torque(x[0] - x[2], x[1] - x[3], p["c"], p["d"], p["gap"], law=law)
@@ -117,18 +128,9 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
     def update(t: float, x: Vector, inputs: Vector, params: dict[str, float]) -> Vector:
         T = torque(x, params)
         u, internal = actuator(x, inputs[0])
-        friction = params["Mc"]
-        slipping = 1.0
-        if stuck:
-            if abs(x[3]) > stuck:
-                slipping = math.copysign(1.0, x[3])
-            elif abs(T) > friction:
-                slipping = math.copysign(1.0, T)
-            else:
-                slipping = 0.0
-        at_rest = -x[3] / smoothing
-        w2_rate = (T - slipping * friction) / params["J2"] if slipping else at_rest
-        return np.array([x[1], (u - T) / params["J1"], x[3], w2_rate, *internal])
+        w2_rate = rate(T - params["b2"] * x[3], x[3], params["Mc"], params["J2"], sticks=reactive)
+        w1_rate = rate(u - T - params["b1"] * x[1], x[1], drag, params["J1"], sticks=drag > 0.0)
+        return np.array([x[1], w1_rate, x[3], w2_rate, *internal])
 
     def output(t: float, x: Vector, inputs: Vector, params: dict[str, float]) -> Vector:
         return np.array([*x[:4], actuator(x, inputs[0])[0], torque(x, params)])
@@ -140,7 +142,8 @@ def whole_drive(drive: Drive) -> control.NonlinearIOSystem:
         outputs=["phi1", "w1", "phi2", "w2", "u", "T"],
         states=states,
         name=_system_name(drive),
-        params={symbol: float(getattr(drive, symbol)) for symbol in ("J1", "J2", "c", "d", "gap", "Mc")},
+        params={symbol: float(getattr(drive, symbol)) for symbol in ("J1", "J2", "c", "d", "gap", "Mc")}
+        | {"b1": float(drive.motor_viscous_friction), "b2": float(drive.load_viscous_friction)},
     )
     return system
 

@@ -104,6 +104,13 @@ class Drive(ParameterSet):
         "motor.minimum_torque", "N*m", "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less",
         default=0.0,
     )  # fmt: skip
+    motor_friction: Numbers = parameter(
+        "motor.friction", "N*m", "Coulomb friction of the motor", '"1.2 N*m"', "0 or more", default=0.0,
+    )  # fmt: skip
+    motor_viscous_friction: Numbers = parameter(
+        "motor.viscous_friction", "N*m*s/rad", "viscous friction of the motor", '"0.01 N*m*s/rad"',
+        "0 or more", default=0.0, symbol="b1",
+    )  # fmt: skip
     rated_power: MaybeNumbers = parameter(
         "motor.rated_power", "W", "rated power of the motor", '"2.2 kW"', "above 0", default=None
     )
@@ -166,6 +173,10 @@ class Drive(ParameterSet):
     load_kind: LoadKind = parameter(
         "load.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
     )
+    load_viscous_friction: Numbers = parameter(
+        "load.viscous_friction", "N*m*s/rad", "viscous friction of the load at the motor shaft",
+        '"0.02 N*m*s/rad"', "0 or more", default=0.0, symbol="b2",
+    )  # fmt: skip
     target_speed: Numbers = parameter(
         "start.target_speed", "rad/s", "speed that the load is to reach", '"880 rpm"', "above 0",
         default=None, follows="rated_speed",
@@ -377,6 +388,26 @@ class Drive(ParameterSet):
     def Ms(self) -> Value:
         """Starting torque of the motor, N m."""
         return self.starting_torque
+
+    @property
+    def frictions(self) -> tuple[Value, Value, Value]:
+        """Coulomb and viscous friction of the motor, and viscous friction of the load: N m, N m s/rad twice.
+
+        >>> Drive.load("crane-4amtkf").replace(motor_friction="1.5 N*m").frictions
+        (1.5, 0.0, 0.0)
+        """
+        return self.motor_friction, self.motor_viscous_friction, self.load_viscous_friction
+
+    def without_friction(self, reason: str) -> Iterator[str]:
+        """A sentence with this reason for each friction that the drive has, where none may be.
+
+        >>> list(Drive.load("crane-4amtkf").replace(motor_friction=1.5).without_friction("a chain has none"))
+        ['motor_friction = 1.5 N*m: a chain has none; set it to 0.']
+        """
+        for name in ("motor_friction", "motor_viscous_friction", "load_viscous_friction"):
+            value = getattr(self, name)
+            if np.any(value != 0.0):
+                yield f"{name} = {show(value)} {self.PARAMETERS[name].unit}: {reason}; set it to 0."
 
     @property
     def Omega(self) -> Value:

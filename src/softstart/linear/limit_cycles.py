@@ -162,6 +162,9 @@ class Outside:
         self.period = plant.period
         self.delay = float(drive.computing_delay)
         self.lag = float(drive.torque_lag)
+        # the rates at which viscous friction takes the speeds of motor and load
+        _, b1, b2 = drive.frictions
+        self.decays = float(b1 / drive.J1), float(b2 / drive.J2)
         self.differencing = differencing
         self.motor = sampled(motor_alone(drive), self.period, self.delay, inputs, differencing).system
 
@@ -169,14 +172,15 @@ class Outside:
         """Measured quantities at the samples under T = sin wt without any demand: shape (inputs, points)."""
         J1, J2 = float(self.drive.J1), float(self.drive.J2)
         s = 1j * w
-        angle = -1.0 / (J1 * s**2)
+        b1, b2 = self.decays
+        angle = -1.0 / (J1 * (s * (s + b1)))
         speed = (1.0 - np.exp(-s * self.period)) / self.period * angle if self.differencing else s * angle
         quantities = {
             kernel.M_MOTOR_ANGLE: angle,
             kernel.M_MOTOR_SPEED: speed,
             kernel.M_MOTOR_TORQUE: 0.0 * s,
             kernel.M_SHAFT_TORQUE: 1.0 + 0.0 * s,
-            kernel.M_LOAD_SPEED: 1.0 / (J2 * s),
+            kernel.M_LOAD_SPEED: 1.0 / (J2 * (s + b2)),
         }
         return np.array([quantities[index] for index in self.inputs])
 
@@ -197,10 +201,13 @@ class Outside:
 
     def twist(self, w: Vector) -> Complex:
         """G(jw): twist over -T, rad/(N m)."""
-        s2 = -(w**2)
         J1, J2 = float(self.drive.J1), float(self.drive.J2)
+        b1, b2 = self.decays
+        s = 1j * w
         u = self.motor_torque_per_demand(w) * self.demand_per_torque(w)
-        return np.asarray(-((u - 1.0) / J1 - 1.0 / J2) / s2)
+        if b1 == b2 == 0.0:
+            return np.asarray(((u - 1.0) / J1 - 1.0 / J2) / w**2)
+        return np.asarray(-((u - 1.0) / (J1 * (s + b1)) - 1.0 / (J2 * (s + b2))) / s)
 
     def contact(self, w: Vector) -> Complex:
         """M(jw) = (c + jw d) G(jw)."""
@@ -355,7 +362,8 @@ def _on_the_cycle(
     demand = torque * complex(outside.demand_per_torque(w)[0])
     u = demand * complex(outside.motor_torque_per_demand(w)[0])
     J1, J2 = float(start.drive.J1), float(start.drive.J2)
-    phi1, w2 = (u - torque) / (J1 * s**2), torque / (J2 * s)
+    b1, b2 = outside.decays
+    phi1, w2 = (u - torque) / (J1 * (s * (s + b1))), torque / (J2 * (s + b2))
     motor_angle = base.x[layout.PHI2] + base.x[layout.THETA] + phi1.imag
     changes = {
         layout.THETA: twist - base.x[layout.THETA],

@@ -80,7 +80,9 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     """Run the start until it is steady, at most for LONGEST and STIFF."""
     drive = start.drive
     period = float(drive.elastic_period)
-    stiff = (drive.J1 + drive.J2) * drive.target_speed / (drive.Ms - drive.Mc)
+    friction, b1, b2 = drive.frictions
+    net = max(drive.Ms - drive.Mc - (friction + (b1 + b2) * drive.target_speed), 0.01 * (drive.Ms - drive.Mc))
+    stiff = (drive.J1 + drive.J2) * drive.target_speed / net
     enough = STEADY * float(base_torque(drive))
     samples: list[Sample] = []
     steady = False

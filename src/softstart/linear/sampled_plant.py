@@ -51,7 +51,7 @@ def in_contact(drive: Drive) -> Continuous:
 
 def motor_alone(drive: Drive) -> Continuous:
     """The motor without the shaft: states phi1, w1."""
-    A = np.array([[0.0, 1.0], [0.0, 0.0]])
+    A = np.array([[0.0, 1.0], [0.0, -float(drive.motor_viscous_friction / drive.J1)]])
     B = np.array([[0.0], [1.0 / float(drive.J1)]])
     nothing = np.zeros((1, 2))
     return _with_lag(drive, A, B, {"phi1": _row(2, 0), "w1": _row(2, 1), "w2": nothing, "T": nothing})

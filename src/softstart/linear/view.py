@@ -26,6 +26,7 @@ from softstart.linear.operating_point import (
 )
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
+from softstart.plant import layout
 from softstart.plant import start as kernel
 
 if TYPE_CHECKING:
@@ -441,8 +442,11 @@ def _cycles(
     rest = run.samples[run.last if not holds else -1]
     back = max(1, round(float(drive.elastic_period) / run.period))
     recent = run.samples[max(run.first, run.last - back) : run.last + 1]
-    mean = float(drive.Mc) if holds else float(np.mean([shaft_torque(start, one) for one in recent]))
-    demand = mean if holds else float(np.mean([one.demand for one in recent]))
+    w1, w2 = rest.x[layout.W2] + rest.x[layout.V], rest.x[layout.W2]
+    against = float(drive.Mc + drive.load_viscous_friction * w2)
+    mean = against if holds else float(np.mean([shaft_torque(start, one) for one in recent]))
+    takes = float(drive.motor_friction + drive.motor_viscous_friction * w1)
+    demand = mean + takes if holds else float(np.mean([one.demand for one in recent]))
     room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))
     return tuple(
         PredictedCycle(cycle, check_cycle(start, point, rest, outside, cycle), cycle.demand_amplitude > room)

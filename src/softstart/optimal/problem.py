@@ -148,6 +148,7 @@ class Problem:
             )
         if drive.computing_delay != 0.0:
             object.__setattr__(self, "drive", drive := drive.replace(computing_delay=0.0))
+        wrong += drive.without_friction("optimal starts and bounds are known without this friction only")
         if drive.Mc < 0.0:
             wrong.append(
                 f"load_torque = {drive.Mc:g} N m: this load drives instead of braking; an optimal start "

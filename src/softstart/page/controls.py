@@ -32,6 +32,8 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("minimum_torque", "braking torque"),
         ("torque_rate", "torque rate"),
         ("computing_delay", "dead time"),
+        ("motor_friction", "friction"),
+        ("motor_viscous_friction", "viscous friction"),
         ("encoder_lines", "encoder lines"),
         ("torque_noise", "torque noise"),
     ),
@@ -45,6 +47,7 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("load_inertia", "inertia"),
         ("load_torque", "torque"),
         ("load_kind", "kind"),
+        ("load_viscous_friction", "viscous friction"),
     ),
     "Start": (
         ("target_speed", "target speed"),

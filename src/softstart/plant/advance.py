@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
+from softstart.plant.coupled import coupled_travel
 from softstart.plant.crossing import load_speed
 from softstart.plant.jit import compiled, inlined, merged
 from softstart.plant.layout import (
     ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, MOST_PENDING, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT,
     TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
-from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque
-from softstart.plant.motion import SERIES, motion, remainders
+from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque, start_motor
+from softstart.plant.motion import COUPLED, SERIES, motion, remainders
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import (
     begin_span, next_event, torque_after, torque_course,
@@ -127,7 +128,13 @@ def move(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> None:
         z = 0.0  # on a flank, to which `handle` sets the angle
         v = m.last_v
     theta = z
-    if side == 0.0:
+    if m.form == COUPLED:
+        x.phi2 += coupled_travel(m, s)
+        x.w2 = load_speed(m, load, s, v)
+        if side != 0.0:
+            theta = side * (z + 0.5 * p.gap)
+            v *= side
+    elif side == 0.0:
         if x.load != 0.0:
             x.phi2 += s * (x.w2 + 0.5 * s * load[6])
             x.w2 += s * load[6]
@@ -181,10 +188,12 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
         if t >= x.ask_at:
             return ASK if x.asked < p.event_cap else EVENT_LIMIT
         torque_course(p, x, m)
-        if x.held != 0.0 and (t >= p.release_at or (p.release_at == math.inf and x.u >= shaft_torque(p, x))):
-            release_motor(x, events)
+        if x.held == 1.0 and (t >= p.release_at or (p.release_at == math.inf and x.u >= shaft_torque(p, x))):
+            release_motor(p, x, events)
+        if x.held == 2.0 and abs(x.u - shaft_torque(p, x)) > p.friction:
+            start_motor(p, x, x.u - shaft_torque(p, x), events)
         until = min(x.ask_at, stop)
-        if x.held != 0.0:
+        if x.held == 1.0:
             until = min(until, p.release_at)
         if m.pending > 0.0:
             until = min(until, m.due_time[0])
@@ -200,6 +209,9 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
         if m.form == SERIES and m.ue != 0.0 and horizon > p.lag:
             cut = True
             horizon = p.lag
+        if m.form == COUPLED and horizon > m.length:
+            cut = True
+            horizon = m.length
         if x.side != 0.0 and horizon > LONGEST_SPAN * p.period:
             cut = True
             horizon = LONGEST_SPAN * p.period

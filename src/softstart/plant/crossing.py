@@ -16,10 +16,11 @@ from __future__ import annotations
 
 import math
 
+from softstart.plant.coupled import coupled_bounds, coupled_load
 from softstart.plant.jit import compiled
 from softstart.plant.layout import Motion, Quintuple, Septuple
 from softstart.plant.motion import (
-    IN_PARTS, SERIES, derivatives, forcing_from_start, forcing_tail, motion, remainders, slow_part,
+    COUPLED, IN_PARTS, SERIES, derivatives, forcing_from_start, forcing_tail, motion, remainders, slow_part,
 )  # fmt: skip
 from softstart.plant.terms import crossing_by_terms
 
@@ -64,6 +65,8 @@ def overdamped_bounds(m: Motion, s: float, end: float, y: float, yv: float, tail
 @compiled
 def bounds_from_start(m: Motion, s: float, end: float, z: float, v: float) -> Quintuple:
     """`bounds` where the right-hand side is written from its start."""
+    if m.form == COUPLED:
+        return coupled_bounds(m, end)
     rate = m.rate
     length = end - s
     f, rise, _ = forcing_from_start(m, end)
@@ -129,6 +132,8 @@ def bounds(m: Motion, s: float, end: float, z: float, v: float, tail: float) -> 
 @compiled
 def load_speed(m: Motion, load: Septuple, s: float, v: float) -> float:
     """w2 at s from the total momentum; load = (w2_0, a, b, e, ratio, factor, offset), see `advance`."""
+    if m.form == COUPLED:
+        return coupled_load(m, s, s)[0]
     w2 = load[0] + s * (load[1] + 0.5 * s * load[2]) - load[4] * (v - m.v0)
     if m.slow_lag != 0.0:
         _, third, _ = remainders(m.rate * s)
@@ -144,7 +149,7 @@ def first_crossing(
     load: Septuple, start: float, begin: float, end: float,
 ) -> float:  # fmt: skip
     """First s in [begin, end] at which f falls through zero, or NO_CROSSING."""
-    if m.by_terms != 0.0 and m.form != SERIES:
+    if m.by_terms != 0.0 and m.form < SERIES:
         return crossing_by_terms(m, c0, alpha, beta, gamma, kappa, load, start != WATCH, begin, end)
     s = begin
     begun = start == WATCH
@@ -163,9 +168,17 @@ def first_crossing(
         curve = alpha * a + beta * jerk + gamma * snap
         most = abs(alpha) * b2 + abs(beta) * b3 + abs(gamma) * b4
         third = abs(alpha) * b3 + abs(beta) * b4 + abs(gamma) * b5
-        rest = abs(m.p0) if m.free == 0.0 and m.form != SERIES else 0.0
+        rest = abs(m.p0) if m.free == 0.0 and m.form < SERIES else 0.0
         scale = abs(c0) + abs(alpha) * (abs(z) + rest) + abs(beta * v) + abs(gamma * a)
-        if kappa != 0.0:
+        if kappa != 0.0 and m.form == COUPLED:
+            w2, rise, bend, most_bend, most_third = coupled_load(m, s, end)
+            f += kappa * w2
+            slope += kappa * rise
+            curve += kappa * bend
+            most += abs(kappa) * most_bend
+            third += abs(kappa) * most_third
+            scale += abs(kappa * w2)
+        elif kappa != 0.0:
             w2 = load_speed(m, load, s, v)
             f += kappa * w2
             slope += kappa * (load[5] * (m.k * z + m.dd * v) + load[6])
@@ -202,6 +215,8 @@ def first_crossing(
             if curve > 0.0 and third > 0.0:
                 # rounding may have left a trace of the event just handled: step over it
                 out = max(out, 1.5 * curve / third, -4.0 * slope / curve)
+            elif curve > 0.0 and kappa != 0.0:  # a motor that breaks away in the gap: its jerk is constant
+                out = max(out, -4.0 * slope / curve)
             if out > 0.0:
                 pass
             elif slope < 0.0:
@@ -230,6 +245,8 @@ def first_crossing(
             s += step
         if s >= end:
             return NO_CROSSING
+    if m.form == COUPLED:
+        return LOST
     # The rates of this start lie decades apart: from here on, and in its other spans, each has its own bound
     m.by_terms = 1.0
     if flat:

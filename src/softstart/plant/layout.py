@@ -20,6 +20,7 @@ Quintuple = tuple[float, float, float, float, float]
 Septuple = tuple[float, float, float, float, float, float, float]
 
 MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
+COUPLED_TERMS: Final = 23  # of the power series of a span with viscous friction, see `coupled`
 
 
 def record(*fields: type, **parts: Any) -> Any:
@@ -101,6 +102,9 @@ class Plant:
     noise_seed: float
     dead_time: float
     release_at: float  # when the motor's brake is released: 0 no brake, inf by torque proving
+    friction: float  # Coulomb friction of the motor, N m
+    decay1: float  # viscous friction of motor and load over their inertias, 1/s
+    decay2: float
 
 
 class State:
@@ -124,7 +128,8 @@ class State:
     beyond: float  # +1 or -1: no torque though the flanks overlap, as a damped spring must not pull back
     load: float  # 0 stuck, +1 or -1 sign of the speed that Mc opposes; an active load has +1 always
     mask: float  # the event that has just fired, one of the masks below
-    held: float  # 1 while the brake holds the motor: w1 = 0, so v = -w2
+    held: float  # 1 while the brake holds the motor, 2 while its friction does: w1 = 0, so v = -w2
+    motor: float  # +1 or -1 sign of the motor speed that its friction opposes, 0 if none does
     ask_at: float
     ask_on_gap: float
     t_end: float
@@ -207,6 +212,10 @@ class Motion:
     over_since: float
     over_torque: float
     over_slope: float
+    length: float  # with viscous friction: the longest span of the power series of z, z' and w2, and their
+    z_terms: Vector  # coefficients, in s/length
+    v_terms: Vector
+    w2_terms: Vector
     due_time: Vector  # when each of them takes effect, and what it is
     due_demand: Vector
     due_slope: Vector
@@ -230,6 +239,7 @@ class Segment:
     k: float
     dd: float
     held: float
+    motor: float
     u: float  # torque and demand at the start; ua and ub give them only to the digits that cancel
     ref: float
 
@@ -274,7 +284,10 @@ class Answer:
 
 
 PLANT, STATE = record(Plant), record(State)
-MOTION = record(Motion, due_time=MOST_PENDING, due_demand=MOST_PENDING, due_slope=MOST_PENDING)
+MOTION = record(
+    Motion, due_time=MOST_PENDING, due_demand=MOST_PENDING, due_slope=MOST_PENDING,
+    z_terms=COUPLED_TERMS, v_terms=COUPLED_TERMS, w2_terms=COUPLED_TERMS,
+)  # fmt: skip
 SEGMENT, EVENT, STAGE_ROW, MEASURED = record(Segment), record(EventRow), record(StageRow), record(Measured)
 ANSWER = record(Answer)
 N_P, N_X, N_M = size(PLANT), size(STATE), size(MOTION)
@@ -285,6 +298,7 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 
 # kinds of recorded events
 CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED, RELEASED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+MOTOR_STARTS, MOTOR_STOPS = 7.0, 8.0
 
 # why `advance` came back
 ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)
@@ -292,8 +306,8 @@ ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEU
 # what a span ends with
 (
     NO_EVENT, UPPER, LOWER, GRAZE_UPPER, GRAZE_LOWER, REJOIN, BACK, EXIT, SWITCH, BREAKAWAY, STOP, REACHED,
-    RELEASE, UNSOLVED,
-) = range(14)  # fmt: skip
+    RELEASE, UNSOLVED, MOTOR_FORWARD, MOTOR_BACKWARD, MOTOR_STOP,
+) = range(17)  # fmt: skip
 
 # masks: the event that has just fired must not fire again at the instant at which the span begins
 NOTHING, LEFT_UPPER, LEFT_LOWER, LEFT_BEYOND, SWITCHED, BROKE_AWAY, REJOINED = range(7)

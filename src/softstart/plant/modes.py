@@ -7,7 +7,8 @@ import math
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, CLOSED, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND,
-    LEFT_LOWER, LEFT_UPPER, LOAD_STARTS, LOAD_STOPS, LOWER, MODELICA, NOTHING, OPENED, REACHED, REJOIN,
+    LEFT_LOWER, LEFT_UPPER, LOAD_STARTS, LOAD_STOPS, LOWER, MODELICA, MOTOR_BACKWARD, MOTOR_FORWARD,
+    MOTOR_STARTS, MOTOR_STOP, MOTOR_STOPS, NOTHING, OPENED, REACHED, REJOIN,
     REJOINED, RELEASE, RELEASED, STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
 )  # fmt: skip
 from softstart.plant.notes import end_stage, note_event, note_event_at
@@ -64,9 +65,17 @@ def reach_target(p: Plant, x: State, time: float, speed: float, events: Matrix) 
 
 
 @inlined
-def release_motor(x: State, events: Matrix) -> None:
-    """The brake lets the motor go."""
+def start_motor(p: Plant, x: State, push: float, events: Matrix) -> None:
+    """The motor, which stood still, moves against its friction in the direction of `push`."""
     x.held = 0.0
+    x.motor = math.copysign(1.0, push)
+    note_event(x, events, MOTOR_STARTS, x.motor)
+
+
+@inlined
+def release_motor(p: Plant, x: State, events: Matrix) -> None:
+    """The brake lets the motor go; its friction may still hold it."""
+    x.held = 2.0 if p.friction > 0.0 else 0.0
     x.release_time = x.time
     note_event(x, events, RELEASED, x.u)
 
@@ -127,7 +136,18 @@ def handle(p: Plant, x: State, m: Motion, event: int, events: Matrix, stages: Ma
             x.load = math.copysign(1.0, torque)
             note_event(x, events, LOAD_STARTS, x.load)
     elif event == RELEASE:
-        release_motor(x, events)
+        release_motor(p, x, events)
+    elif event in (MOTOR_FORWARD, MOTOR_BACKWARD):
+        start_motor(p, x, 1.0 if event == MOTOR_FORWARD else -1.0, events)
+    elif event == MOTOR_STOP:
+        x.v = -x.w2
+        push = x.u - shaft_torque(p, x)
+        note_event(x, events, MOTOR_STOPS, x.motor)
+        if abs(push) <= p.friction:
+            x.held = 2.0
+            x.motor = 0.0
+        else:
+            start_motor(p, x, push, events)
     elif event == REACHED:
         reach_target(p, x, x.time, x.w2, events)
     return False

@@ -15,21 +15,24 @@ Where the lag is far longer than the span, A, B s and E exp(-lambda s) are far l
     f0 + f1 s + E chi(s),   chi(s) = exp(-lambda s) - 1 + lambda s,
 
 of which no part is larger than the whole. Where the torque rises far faster than the spring can answer, a
-power series takes over, since the particular solution B s/w0^2 is far larger than the motion.
+power series takes over, since the particular solution B s/w0^2 is far larger than the motion. With viscous
+friction of motor or load the twist depends on their speeds as well: `coupled` has the series of all three.
 """
 
 from __future__ import annotations
 
 import math
 
+from softstart.plant.coupled import coupled_derivatives, coupled_motion
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import Motion, Pair, Triple
 
 # how the response to the exponential is computed
 NO_EXPONENTIAL, PARTICULAR, REAL_ROOTS, NEAR_TRIPLE = 0.0, 1.0, 2.0, 3.0
 
-# the right-hand side as A + B s + E exp(-lambda s), as f0 + f1 s + E chi(s), and that by a power series
-IN_PARTS, FROM_START, SERIES = 0.0, 1.0, 2.0
+# the right-hand side as A + B s + E exp(-lambda s), as f0 + f1 s + E chi(s), that by a power series, and
+# as the power series of `coupled`
+IN_PARTS, FROM_START, SERIES, COUPLED = 0.0, 1.0, 2.0, 3.0
 SERIES_TERMS = 24  # lambda s may be up to 1
 
 
@@ -146,6 +149,8 @@ def slow_part(m: Motion, s: float) -> Triple:
 @compiled
 def motion_from_start(m: Motion, s: float) -> Pair:
     """Z and z' at s where the right-hand side is written from its start."""
+    if m.form == COUPLED:
+        return coupled_motion(m, s)
     rate = m.rate
     if m.form == SERIES:
         before, this = m.z0, m.v0  # the n-th and the next derivative at 0, times s^n/n!
@@ -297,6 +302,8 @@ def forcing_tail(m: Motion, s: float) -> float:
 def derivatives(m: Motion, s: float, z: float, v: float, tail: float) -> Triple:
     """z'', z''' and z'''' at s, from the equation of motion."""
     if m.form != IN_PARTS:
+        if m.form == COUPLED:
+            return coupled_derivatives(m, s)
         f, rise, bend = forcing_from_start(m, s)
         a = f - 2.0 * m.zeta * v - m.w0sq * z
         jerk = rise - 2.0 * m.zeta * a - m.w0sq * v

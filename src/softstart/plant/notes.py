@@ -46,7 +46,7 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
     turned = 1.0
     for _ in range(3):  # once more, with its signs, if the search by terms takes over within this one
         by_terms = m.by_terms
-        if by_terms != 0.0 and m.form != SERIES:  # k v and dd a may cancel to their last digits
+        if by_terms != 0.0 and m.form < SERIES:  # k v and dd a may cancel to their last digits
             slope = slope_by_terms(m, begin, s)
             bend = slope
         else:
@@ -170,6 +170,7 @@ def note_segment(x: State, m: Motion, s: float, segments: Matrix) -> None:
     row.k = m.k
     row.dd = m.dd
     row.held = x.held
+    row.motor = x.motor
     row.u = x.u
     row.ref = x.ref
     x.n_segments += 1.0

@@ -29,6 +29,7 @@ def begin_again(p: Plant, x: State, m: Motion, row: Segment) -> Septuple:
     x.side = row.side
     x.load = row.load
     x.held = row.held
+    x.motor = row.motor
     x.theta = row.theta
     x.v = row.v
     x.phi2 = row.phi2

@@ -11,24 +11,28 @@ import math
 
 from numba import from_dtype, types
 
+from softstart.plant.coupled import begin_coupled
 from softstart.plant.crossing import (
     LOST, NO_CROSSING, RISING, ROUNDING, WATCH, bounds, first_crossing,
 )  # fmt: skip
 from softstart.plant.jit import apart, inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
-    LEFT_UPPER, LOWER, MODELICA, MOTION, NO_EVENT, PLANT, REACHED, REJOIN, REJOINED, RELEASE, STATE, STOP,
+    LEFT_UPPER, LOWER, MODELICA, MOTION, MOTOR_BACKWARD, MOTOR_FORWARD, MOTOR_STOP, NO_EVENT, PLANT, REACHED,
+    REJOIN, REJOINED, RELEASE, STATE, STOP,
     SWITCH, SWITCHED, UNSOLVED, UPPER,
     Motion, Plant, Septuple, State,
 )  # fmt: skip
 from softstart.plant.motion import (
-    derivatives, forcing_tail, motion, prepare, remainders, write_without_cancelling,
+    COUPLED, derivatives, forcing_tail, motion, prepare, remainders, write_without_cancelling,
 )  # fmt: skip
+from softstart.plant.modes import shaft_torque
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 from softstart.plant.terms import MAX_STEPS
 
 MUCH_LONGER = 1e3  # a lag than the slewing or than an elastic period: more digits would cancel
 MUCH_FASTER = 1e4  # a torque that rises, than the spring can answer
+HELD = 1e-9  # of the torques on a motor at rest: what they lack of moving it, to be more than rounding
 MOST_PARTS = 1e4  # a power series needs steps no longer than the lag; so many of them at most
 
 
@@ -103,7 +107,8 @@ def torque_after(p: Plant, x: State, m: Motion, s: float, left: float) -> float:
 @inlined
 def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
     """Coefficients of the motion from the state x on; returns those of the load speed."""
-    ua = m.ua
+    drag = x.motor * p.friction
+    ua = m.ua - drag
     ub = m.ub
     ue = m.ue
     rate = 1.0 / p.lag if p.lag > 0.0 else 0.0
@@ -121,6 +126,19 @@ def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
     if not stuck:
         a += friction * p.inv_J2
     m.steady = 0.0
+    if p.decay1 != 0.0 or p.decay2 != 0.0:
+        k, dd = 0.0, 0.0
+        if side != 0.0:
+            k, dd = (2.0 * p.c, 0.0) if x.doubled != 0.0 else (p.c, p.d)
+        z0 = x.theta if side == 0.0 else side * x.theta - 0.5 * p.gap
+        v0 = x.v if side == 0.0 else side * x.v
+        prepare(m, z0, v0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rate)
+        m.form = COUPLED
+        m.k = k
+        m.dd = dd
+        m.w0sq = k * (p.inv_J1 + p.inv_J2)
+        begin_coupled(p, x, m, k, dd, drag)
+        return (x.w2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if side == 0.0:
         prepare(m, x.theta, x.v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, e, rate)
         side = 1.0
@@ -153,7 +171,7 @@ def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
     slope = (x.ref - x.u) * rate if p.lag > 0.0 else ub
     series = series_serves(p, x, m, horizon)
     if (m.slow_lag != 0.0 or series) and not held:
-        f0 = x.u * inv_J1
+        f0 = (x.u - drag) * inv_J1
         if not stuck:
             f0 += friction * p.inv_J2
         write_without_cancelling(m, side * f0, side * slope * inv_J1, series)
@@ -163,7 +181,7 @@ def begin_span(p: Plant, x: State, m: Motion, horizon: float) -> Septuple:
         return (x.w2, 0.0, 0.0, 0.0, side, side * p.inv_J2, -friction * p.inv_J2)
     inverse = p.inv_J
     if m.slow_lag != 0.0:
-        ua, ub = x.u, slope
+        ua, ub = x.u - drag, slope
     return (
         x.w2, (ua - friction) * inverse, ub * inverse, ue * inverse,
         side * p.J1 * inverse, side * p.inv_J2, -friction * p.inv_J2,
@@ -204,7 +222,7 @@ def flank_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -
     left_upper = x.mask == LEFT_UPPER
     left_lower = x.mask == LEFT_LOWER
     v = x.v
-    if m.ub == 0.0 and m.ue == 0.0:
+    if m.ub == 0.0 and m.ue == 0.0 and m.form != COUPLED:
         a = m.A
         up = time_to_flank(half - x.theta, v, a, left_upper, tolerance)
         down = time_to_flank(half + x.theta, -v, -a, left_lower, tolerance)
@@ -309,7 +327,7 @@ def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: f
             event = STOP
             end = s
     if s >= -1.0 and high >= p.target and math.isnan(x.start_time):
-        flank_to_flank = event == NO_EVENT and m.z0 == 0.0 and not math.isnan(m.last_v)
+        flank_to_flank = event == NO_EVENT and m.z0 == 0.0 and not math.isnan(m.last_v) and p.friction == 0.0
         if flank_to_flank and x.side > 0.0 and x.load > 0.0:
             if p.Mc < 0.0 or x.w2 + largest_gain(p, m, load, end) >= p.target:
                 s = steady_target(m, load, p.target, end)
@@ -324,11 +342,16 @@ def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: f
     return (event, end) if s >= -1.0 else (UNSOLVED, 0.0)
 
 
-@apart(types.float64(from_dtype(PLANT), from_dtype(STATE), from_dtype(MOTION), types.float64))
-def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
-    """When the motor torque, rising, meets the shaft torque of a motor that is held, if before `end`.
+@apart(
+    types.float64(
+        from_dtype(PLANT), from_dtype(STATE), from_dtype(MOTION), types.float64, types.float64, types.float64
+    )
+)
+def release_event(p: Plant, x: State, m: Motion, sign: float, holds: float, end: float) -> float:
+    """When the torques on a motor that is held overcome what holds it, if before `end`.
 
-    The first zero of T - u > 0, by the parabolas of `crossing`: |u''| is at most |ue|/lag^2.
+    The first zero of holds + sign (T - u) > 0, by the parabolas of `crossing`: |u''| is at most |ue|/lag^2.
+    A brake (holds = 0, sign = 1) is released when the motor torque meets the shaft torque.
     """
     side = x.side
     s = 0.0
@@ -338,7 +361,7 @@ def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
         a, _, _ = derivatives(m, s, z, v, 0.0)
         rest = m.ue * math.exp(-rate * s)
         f, slope, most = -(m.ua + m.ub * s + rest), rate * rest - m.ub, abs(rest) * rate * rate
-        scale = abs(m.ua) + abs(m.ub * s) + abs(rest)
+        scale = abs(m.ua) + abs(m.ub * s) + abs(rest) + holds
         if m.slow_lag != 0.0:
             f = -torque_after(p, x, m, s, 0.0)
             slope = (x.u - x.ref) * rate * math.exp(-rate * s) + m.ub * math.expm1(-rate * s)
@@ -349,6 +372,7 @@ def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
             slope += side * (m.k * v + m.dd * a)
             most += m.k * b2 + m.dd * b3
             scale += abs(m.k * z) + abs(m.dd * v)
+        f, slope = holds + sign * f, sign * slope
         if f <= ROUNDING * scale:
             return s
         root = math.sqrt(slope * slope + 2.0 * most * f)
@@ -370,14 +394,43 @@ def release_event(p: Plant, x: State, m: Motion, end: float) -> float:
 def next_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The event that ends this span and when, at most `horizon` from now."""
     event, s = event_of_the_shaft(p, x, m, load, horizon)
-    if x.held != 0.0 and p.release_at == math.inf and event != UNSOLVED:
-        at = release_event(p, x, m, s)
+    if x.held == 1.0 and p.release_at == math.inf and event != UNSOLVED:
+        at = release_event(p, x, m, 1.0, 0.0, s)
         if at < -1.0:
             return UNSOLVED, 0.0
         if at >= 0.0:
             m.last_v = math.nan
             return RELEASE, at
+    if p.friction != 0.0 and x.held != 1.0 and event != UNSOLVED:
+        other, at = friction_event(p, x, m, load, s)
+        if other != NO_EVENT:
+            m.last_v = math.nan
+            return other, at
     return event, s
+
+
+@inlined
+def friction_event(p: Plant, x: State, m: Motion, load: Septuple, end: float) -> tuple[int, float]:
+    """The motor that its friction holds is moved, or one that slides stands still, if before `end`."""
+    if x.held != 0.0:
+        s = release_event(p, x, m, 1.0, p.friction, end)
+        back = release_event(p, x, m, -1.0, p.friction, s if s >= 0.0 else end)
+        if s < -1.0 or back < -1.0:
+            return UNSOLVED, 0.0
+        if back >= 0.0:
+            return MOTOR_BACKWARD, back
+        return (MOTOR_FORWARD, s) if s >= 0.0 else (NO_EVENT, end)
+    side = x.side if x.side != 0.0 else 1.0
+    start = WATCH
+    if x.v + x.w2 == 0.0:  # it has just begun to slide; but an impact at this very instant may hold it
+        torque = shaft_torque(p, x)
+        if x.motor * (x.u - torque) < p.friction - HELD * (p.friction + abs(x.u) + abs(torque)):
+            return MOTOR_STOP, 0.0
+        start = RISING
+    s = first_crossing(m, 0.0, 0.0, x.motor * side, 0.0, x.motor, load, start, 0.0, end)
+    if s < -1.0:
+        return UNSOLVED, 0.0
+    return (MOTOR_STOP, s) if s >= 0.0 else (NO_EVENT, end)
 
 
 @inlined
@@ -385,12 +438,14 @@ def event_of_the_shaft(p: Plant, x: State, m: Motion, load: Septuple, horizon: f
     """The earliest event of flanks and load."""
     if x.side == 0.0:
         event, s = flank_event(p, x, m, load, horizon)
-        other, at = load_event_open(p, x, load)
-        if at < s:
-            m.last_v = math.nan
-            return other, at
-        return event, s
-    event, s = exit_event(p, x, m, load, horizon)
+        if m.form != COUPLED:
+            other, at = load_event_open(p, x, load)
+            if at < s:
+                m.last_v = math.nan
+                return other, at
+            return event, s
+    else:
+        event, s = exit_event(p, x, m, load, horizon)
     if event == UNSOLVED:
         return event, s
     other, at = load_event_contact(p, x, m, load, s)

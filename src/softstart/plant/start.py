@@ -45,6 +45,10 @@ def first_state(p: Plant, x: State, until: float, events: Matrix) -> None:
     x.start_time = math.nan
     x.release_time = math.nan
     x.held = 1.0 if p.release_at > 0.0 else 0.0
+    if p.friction > 0.0 and x.held == 0.0:
+        x.motor = np.sign(p.w1_0)
+        if p.w1_0 == 0.0:
+            x.held = 2.0
     x.first_contact = math.nan
     x.stage_2_end = math.nan
     x.impact_speed = math.nan

@@ -118,6 +118,7 @@ def repeats(p: Plant, x: State, m: Motion) -> bool:
         and x.load > 0.0
         and x.ask_on_gap == 0.0
         and p.Mc >= 0.0
+        and p.friction == 0.0
     )
 
 

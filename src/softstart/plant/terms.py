@@ -102,9 +102,13 @@ def terms(
 ) -> Septuple:  # fmt: skip
     """F, f', f'' at s, least f'' on [s, end], bound of |f'''| from s on, sizes of the terms of f, f'."""
     if m.free != 0.0:
+        w2, rise = kappa * (load[0] + load[6] * s), kappa * load[6]
         if m.form != IN_PARTS:
-            return terms_of_slow_flight(m, c0, alpha, beta, s, end)
-        return terms_of_flight(m, c0, alpha, beta, s, end)
+            flight = terms_of_slow_flight(m, c0, alpha, beta, s, end)
+        else:
+            flight = terms_of_flight(m, c0, alpha, beta, s, end)
+        f, slope, curve, lowest, third, size, steep = flight
+        return f + w2, slope + rise, curve, lowest, third, size + abs(w2), steep + abs(rise)
     rate, w0sq, w0, zeta, p1 = m.rate, m.w0sq, m.w0, m.zeta, m.p1
     # w2 holds -load[4] v, see `crossing.load_speed`
     beta -= kappa * load[4]

@@ -65,7 +65,10 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
     lag = column(drive.torque_lag)
     p["lag"] = np.where(lag > 1e-12 * p["period"], lag, 0.0)
-    stiff = (J1 + J2) * (target + np.abs(p["w2_0"]) + np.abs(p["w1_0"])) / (Ms - Mc)
+    friction, b1, b2 = map(column, drive.frictions)
+    p["friction"], p["decay1"], p["decay2"] = friction, b1 / J1, b2 / J2
+    net = np.maximum(Ms - Mc - (friction + (b1 + b2) * target), 1e-3 * (Ms - Mc))
+    stiff = (J1 + J2) * (target + np.abs(p["w2_0"]) + np.abs(p["w1_0"])) / net
     held = np.where(p["release_at"] < math.inf, p["release_at"], 0.0)
     p["longest"] = LONGEST * p["period"]
     if time_limit is None:

@@ -121,7 +121,7 @@ def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
     broken = np.array(
         [[not status_of(int(s), True, False).finished for s in one[:, at.STATUS]] for one in every]
     )
-    broken |= every[:, :, at.HELD] != 0.0
+    broken |= every[:, :, at.HELD] == 1.0
     which = np.argmax(np.where(broken, np.inf, np.abs(every[:, :, at.PEAK])), axis=0)
     worst: at.Matrix = every[which, rows]
     worst[:, at.POSITION] = which + 1.0
@@ -183,7 +183,7 @@ def figures(
     likewise, whose life is not checked. Starts that could not be finished have NaN.
     """
     reached = ~np.isnan(results[:, at.START_TIME])
-    held = results[:, at.HELD] != 0.0
+    held = results[:, at.HELD] == 1.0
     codes = 4 * results[:, at.STATUS].astype(np.int64) + 2 * held + reached
     ended, which = np.unique(codes, return_inverse=True)
     kinds = [status_of(c // 4, bool(c % 2), until is not None, bool(c & 2)) for c in ended.tolist()]

@@ -206,7 +206,7 @@ def _time(name: str, value: object, remedy: str) -> float | None:
 
 def ended(x: at.Vector, reason: int, until: float | None, max_events: int, start: str) -> Status:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
-    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None, x[at.HELD] != 0.0)
+    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None, x[at.HELD] == 1.0)
     if status.finished:
         return status
     remedy = ""

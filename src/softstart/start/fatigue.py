@@ -347,7 +347,7 @@ def impacts(run: Run) -> Vector:
         return np.zeros(0)
     # not above 0 where flanks that overlap still take hold again
     speed = rows[meets, at.S_SIDE] * rows[meets, at.S_V]
-    inertia = np.where(rows[meets, at.S_HELD] != 0.0, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2))
+    inertia = np.where(rows[meets, at.S_HELD] == 1.0, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2))
     energy: Vector = (0.5 * inertia * speed**2)[speed > 0.0]
     return energy
 

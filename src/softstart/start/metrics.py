@@ -73,10 +73,14 @@ AT_ONCE = 100_000  # instants, or pieces, that are evaluated together
 def base_torque(drive: Drive) -> Any:
     """M12avg_base = (Ms J2 + J1 Mc)/(J1 + J2) in N m, [G](16): the mean shaft torque under full torque.
 
-    >>> round(base_torque(Drive.load("crane-4amtkf")), 2)
-    52.86
+    What the Coulomb friction of the motor takes does not reach the shaft: Ms - friction stands for Ms.
+    Viscous friction is left out, it is zero as the motion begins: K_dyn does not depend on the target speed.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> round(base_torque(crane), 2), round(base_torque(crane.replace(motor_friction=6.0)), 2)
+    (52.86, 47.86)
     """
-    return stages.mean_shaft_torque(drive.Ms, drive.J1, drive.J2, drive.Mc)
+    return stages.mean_shaft_torque(drive.Ms - drive.motor_friction, drive.J1, drive.J2, drive.Mc)
 
 
 def k_dyn(peak_torque: Any, drive: Drive) -> Any:
@@ -91,6 +95,7 @@ def k_dyn(peak_torque: Any, drive: Drive) -> Any:
 def settling_time(run: Recorded, band: float) -> float:
     """First instant from which |T - M12avg(u)| <= band * M12avg_base holds with the gap closed, s.
 
+    M12avg(u) is the torque under which both masses gain speed alike, friction included.
     It must hold for one elastic period at least, to the end of the run; NaN otherwise.
     Scanned at 64 points an elastic period, the crossing itself located by root finding.
     """
@@ -103,7 +108,9 @@ def settling_time(run: Recorded, band: float) -> float:
 
     def excess(times: float | np.ndarray) -> np.ndarray:
         state = run.at(times)
-        return np.abs(state["T"] - stages.mean_shaft_torque(state["u"], drive.J1, drive.J2, drive.Mc)) - limit
+        motor = state["u"] - drive.motor_friction - drive.motor_viscous_friction * state["w1"]
+        load = drive.Mc + drive.load_viscous_friction * state["w2"]
+        return np.abs(state["T"] - stages.mean_shaft_torque(motor, drive.J1, drive.J2, load)) - limit
 
     begin = run.stages[-1].start
     period = float(drive.elastic_period)
@@ -193,7 +200,8 @@ def energy_balance(run: Recorded) -> Energy:
     """Motor work = kinetic + elastic + work against the load + dissipated + residual.
 
     Motor work int u w1 dt, load work int Mc' w2 dt (Mc' opposes motion when reactive), dissipated
-    int (T - c z) z' dt in contact plus what the spring still holds when the flanks part at z > 0. The
+    int (T - c z) z' dt in contact plus what the spring still holds when the flanks part at z > 0, and what
+    friction of the motor and viscous friction of the load take. The
     residual is computed, not assumed: it shows how exact the run is.
     """
     drive, rows = run.drive, run.segments
@@ -203,6 +211,8 @@ def energy_balance(run: Recorded) -> Energy:
         fastest = max(fastest, float(drive.d * (1.0 / drive.J1 + 1.0 / drive.J2)))
     if drive.torque_lag > 0.0:
         fastest = max(fastest, 1.0 / float(drive.torque_lag))
+    friction, b1, b2 = drive.frictions
+    fastest = max(fastest, float(b1 / drive.J1), float(b2 / drive.J2))
     work = np.zeros(3)
     pieces = np.ceil((rows[:, at.S_END] - rows[:, at.S_START]) / scale) + GRADED
     turn = np.cumsum(pieces) // AT_ONCE  # spans are taken in turns of so many pieces: memory is bounded
@@ -213,20 +223,23 @@ def energy_balance(run: Recorded) -> Energy:
         times = starts[:, None] + half[:, None] * (NODES + 1.0)
         states = run.states_in(owner[:, None] + np.zeros(NODES.size, dtype=np.int64), times)
         side, load = rows[owner, at.S_SIDE][:, None], rows[owner, at.S_LOAD][:, None]
+        motor = rows[owner, at.S_MOTOR][:, None]
         z = np.where(side != 0.0, side * states["theta"] - 0.5 * drive.gap, 0.0)
         spring = side * drive.c * z
         powers = (
             states["u"] * states["w1"],
             load * drive.Mc * states["w2"],
-            (states["T"] - spring) * states["v"],
+            (states["T"] - spring) * states["v"]
+            + (motor * friction + b1 * states["w1"]) * states["w1"]
+            + b2 * states["w2"] ** 2,
         )
         work += [np.sum(half * (power @ WEIGHTS)) for power in powers]
-    motor, against_load, dissipated = work.tolist()
+    supplied, against_load, dissipated = work.tolist()
     dissipated += _lost_at_parting(run)
     kinetic = _kinetic(run, run.end_time) - _kinetic(run, 0.0)
     elastic = _elastic(run, -1) - _elastic(run, 0)
-    residual = motor - kinetic - elastic - against_load - dissipated
-    return Energy(motor, against_load, kinetic, elastic, dissipated, residual)
+    residual = supplied - kinetic - elastic - against_load - dissipated
+    return Energy(supplied, against_load, kinetic, elastic, dissipated, residual)
 
 
 def _pieces(rows: at.Matrix, scale: float, shortest: float) -> tuple[at.Vector, at.Vector, NDArray[np.int64]]:

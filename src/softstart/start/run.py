@@ -35,6 +35,8 @@ EVENT_NAMES = {
     at.LOAD_STOPS: "load stops",
     at.TARGET_REACHED: "target speed reached",
     at.RELEASED: "brake released",
+    at.MOTOR_STARTS: "motor starts",
+    at.MOTOR_STOPS: "motor stops",
 }
 AnyRun = TypeVar("AnyRun", bound="BaseRun")
 PLOT_POINTS = 1500
@@ -370,7 +372,7 @@ class Run(BaseRun):
     def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
         """Speed of the load, rad/s, and the torque that speeds it up, N m, at any instants of the run."""
         states = self.at(times)
-        return states["w2"], states["T"] - self.drive.Mc
+        return states["w2"], states["T"] - self.drive.Mc - self.drive.load_viscous_friction * states["w2"]
 
     @property
     def _continued(self) -> Run:
@@ -519,7 +521,7 @@ class Run(BaseRun):
         That of the load speed is `settled_time`.
 
         Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
-        torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant.
+        torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant, less its friction.
         """
         return self._worst(lambda run: metrics.settling_time(run, band))
 

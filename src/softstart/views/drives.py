@@ -35,6 +35,11 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
             "its torque has reached the shaft torque" if proving else f"{short(float(drive.release_time))} s"
         )
         extra.append(f"the brake holds the motor until {until}")
+    friction, b1, b2 = map(float, drive.frictions)
+    if friction:
+        extra.append(f"friction of the motor {short(friction)} N m")
+    if b1 or b2:
+        extra.append(f"viscous friction b1 = {short(b1)}, b2 = {short(b2)} N m s/rad")
     if drive.torque_lag:
         extra.append(f"torque lag {short(float(drive.torque_lag))} s")
     if math.isfinite(float(drive.torque_rate)):

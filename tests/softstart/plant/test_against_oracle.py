@@ -19,6 +19,8 @@ KINDS = {
     "load stops": "load-stops",
     "target speed reached": "target",
     "brake released": "released",
+    "motor starts": "motor-starts",
+    "motor stops": "motor-stops",
 }
 BLOCKS = 20
 DRIVES_PER_BLOCK = 25
@@ -58,6 +60,9 @@ def run_of(drawn: dict[str, Any]) -> Run:
         starting_torque=Ms,
         minimum_torque=min(0.0, *torques),
         target_speed=drawn["target"],
+        motor_friction=drawn.get("friction", 0.0),
+        motor_viscous_friction=drawn.get("b1", 0.0),
+        load_viscous_friction=drawn.get("b2", 0.0),
         **brake_of(drawn),
     )
     return simulate(drive, Pieces(pieces=tuple(pieces), end=drawn["t_end"]), until=drawn["t_end"])
@@ -73,6 +78,30 @@ def brake_of(drawn: dict[str, Any]) -> dict[str, Any]:
 def test_peaks_events_and_final_state(block: int) -> None:
     for seed in range(block * DRIVES_PER_BLOCK, (block + 1) * DRIVES_PER_BLOCK):
         compare_with_oracle(case(seed), seed)
+
+
+def case_with_friction(seed: int) -> dict[str, Any]:
+    """A random start with friction at the motor, viscous friction on either side, or all of them."""
+    drawn, rng = case(seed), np.random.default_rng((seed, 17))
+    which = rng.integers(1, 8)
+    room = 0.9 * (max(1.1 * drawn["Mc"], *(u for _, u in drawn["torque_pieces"])) - drawn["Mc"])
+    rate = 2.0 * math.pi / drawn["t_end"]
+    if which & 1:
+        drawn["friction"] = max(room, 0.0) * float(rng.uniform(0.01, 1.0))
+    for bit, name, inertia in ((2, "b1", "J1"), (4, "b2", "J2")):
+        if which & bit:
+            drawn[name] = drawn[inertia] * rate * float(10 ** rng.uniform(-3.0, 0.5))
+    left = room - drawn.get("friction", 0.0)
+    if (most := drawn.get("b1", 0.0) + drawn.get("b2", 0.0)) > 0.0:
+        drawn["target"] = max(min(drawn["target"], 0.9 * left / most), 1e-6)
+    drawn["w2_0"] = min(drawn["w2_0"], 0.5 * drawn["target"])
+    return drawn
+
+
+@pytest.mark.parametrize("block", range(8))
+def test_friction_of_motor_and_load(block: int) -> None:
+    for seed in range(20_000 + block * DRIVES_PER_BLOCK, 20_000 + (block + 1) * DRIVES_PER_BLOCK):
+        compare_with_oracle(case_with_friction(seed), seed)
 
 
 @pytest.mark.parametrize("block", range(6))

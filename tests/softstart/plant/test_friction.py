@@ -1,0 +1,222 @@
+"""Friction of the motor and viscous friction: closed forms, balances, and the limits in which they vanish."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.softstart.plant.pieces import Pieces, TwoSteps
+from tests.softstart.plant.test_against_oracle import case_with_friction, run_of
+
+from softstart import Chain, Drive, InputError, Run, optimize, simulate
+from softstart.start.metrics import base_torque
+
+CRANE = Drive.load("crane-4amtkf")
+SEEDS = st.integers(1_000, 100_000)
+
+
+def steady(drive: Drive, torque: float, until: float) -> Run:
+    """A start under one torque."""
+    return simulate(drive, Pieces(pieces=((0.0, torque),)), until=until)
+
+
+def test_a_motor_that_coasts_to_rest() -> None:
+    """In an open gap: w1 = (w0 + F/b) exp(-b t/J1) - F/b until it is zero at (J1/b) ln(1 + b w0/F)."""
+    w0, F, b = 30.0, 4.0, 0.2
+    drive = CRANE.replace(
+        gap=200.0, load_torque=0.0, motor_friction=F, motor_viscous_friction=b, initial_motor_speed=w0
+    )
+    J1 = float(drive.J1)
+    run = steady(drive, 0.0, 1.0)
+    stop = J1 / b * math.log1p(b * w0 / F)
+    assert [(event.time, event.kind) for event in run.events] == [
+        (pytest.approx(stop, rel=1e-13), "motor stops")
+    ]
+    t = np.linspace(0.0, stop, 9)
+    np.testing.assert_allclose(
+        run.at(t)["w1"], (w0 + F / b) * np.exp(-b * t / J1) - F / b, rtol=1e-12, atol=1e-12
+    )
+    turned = J1 / b * (w0 - F / b * math.log1p(b * w0 / F))
+    assert run.at(1.0)["phi1"] == pytest.approx(turned, rel=1e-12)
+    assert run.at(1.0)["w1"] == 0.0
+    assert run.energy.dissipated == pytest.approx(0.5 * J1 * w0**2, rel=1e-12)
+
+
+def test_a_motor_breaks_away_behind_a_ramp() -> None:
+    """U = k t moves it at F/k; from then on w1 = k (t - F/k)^2/(2 J1)."""
+    F, k = 4.0, 50.0
+    drive = CRANE.replace(gap=200.0, motor_friction=F, torque_rate=k, load_torque=0.0)
+    run = steady(drive, 62.0, 0.2)
+    assert [(event.time, event.kind) for event in run.events] == [
+        (pytest.approx(F / k, rel=1e-13), "motor starts")
+    ]
+    assert run.at(0.2)["w1"] == pytest.approx(k * (0.2 - F / k) ** 2 / (2.0 * drive.J1), rel=1e-12)
+
+
+def test_friction_that_is_not_overcome() -> None:
+    drive = CRANE.replace(motor_friction=10.0, load_torque=0.0)
+    run = steady(drive, 9.99, 1.0)
+    assert not run.events
+    assert run.at(1.0)["phi1"] == run.peak_torque == run.energy.motor == 0.0
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.5])
+def test_friction_of_a_motor_that_runs_forward_is_a_lower_torque(damping: float) -> None:
+    """As long as the motor runs forward: friction F under Ms is no friction under Ms - F."""
+    F = 6.0
+    plain = CRANE.replace(gap=0.0, damping=damping, target_speed=500.0, motor_inertia=0.5)
+    rough = plain.replace(motor_friction=F, start_position=0.0)
+    one, other = steady(rough, 50.0, 0.4), steady(plain, 50.0 - F, 0.4)
+    assert [event.kind for event in one.events].count("motor stops") == 0
+    assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-14)
+    t = np.linspace(0.0, 0.4, 50)
+    for name in ("w1", "w2", "T"):
+        np.testing.assert_allclose(one.at(t)[name], other.at(t)[name], rtol=1e-12, atol=1e-11)
+    assert base_torque(rough) == base_torque(plain.replace(starting_torque=plain.Ms - F, maximum_torque=62.0))
+
+
+def test_the_speed_at_which_viscous_friction_takes_all() -> None:
+    """Behind it w1 = w2 = (u - F - Mc)/(b1 + b2) and T = Mc + b2 w2; that is settled, too."""
+    drive = CRANE.replace(
+        damping=1.5,
+        motor_friction=2.0,
+        motor_viscous_friction=0.3,
+        load_viscous_friction=0.2,
+        target_speed=60.0,
+    )
+    run = steady(drive, 40.0, 8.0)
+    speed = (40.0 - 2.0 - float(drive.Mc)) / 0.5
+    end = run.at(8.0)
+    assert [end["w1"], end["w2"]] == pytest.approx([speed, speed], rel=1e-7)
+    assert end["T"] == pytest.approx(drive.Mc + 0.2 * speed, rel=1e-7)
+    assert 0.0 < run.settling_time(0.02) < 2.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(0.01, 3.0))
+def test_momentum_where_both_masses_lose_alike(seed: int, decay: float) -> None:
+    """With b1/J1 = b2/J2 = k: P = J1 w1 + J2 w2 obeys P' = u - Mc - k P, whatever the shaft does."""
+    drawn = case_with_friction(seed) | {"kind": "active", "friction": 0.0, "lag": 0.0, "rate": math.inf}
+    k = decay / drawn["t_end"]
+    drawn |= {"b1": k * drawn["J1"], "b2": k * drawn["J2"], "target": 1e-6, "w2_0": min(drawn["w2_0"], 0.0)}
+    run = run_of(drawn)
+    P = drawn["J1"] * drawn["w1_0"] + drawn["J2"] * drawn["w2_0"]
+    size = abs(P)
+    ends = [*(t for t, _ in drawn["torque_pieces"][1:]), drawn["t_end"]]
+    for (t, u), end in zip(drawn["torque_pieces"], ends, strict=True):
+        rest = (u - drawn["Mc"]) / k
+        P = rest + (P - rest) * math.exp(-k * (end - t))
+        size = max(size, abs(P), abs(u - drawn["Mc"]) * drawn["t_end"])
+    state = run.at(drawn["t_end"])
+    assert drawn["J1"] * state["w1"] + drawn["J2"] * state["w2"] == pytest.approx(P, abs=1e-11 * size)
+
+
+@settings(max_examples=60, deadline=None)
+@given(SEEDS)
+def test_energy_balance(seed: int) -> None:
+    run = run_of(case_with_friction(seed))
+    energy, start, drive = run.energy, run.at(0.0), run.drive
+    turnover = max(
+        abs(value) for value in (energy.motor, energy.load, energy.kinetic, energy.dissipated, 1e-300)
+    )
+    turnover = max(turnover, drive.J1 * float(start["w1"]) ** 2, drive.J2 * float(start["w2"]) ** 2)
+    turnover = max(turnover, 0.5 * drive.c * float(start["theta"]) ** 2)
+    assert abs(energy.residual) < 1e-9 * turnover
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS)
+def test_the_instants_of_asking_change_nothing(seed: int) -> None:
+    """Pieces cut into twelve are the same torque, whose spans begin elsewhere."""
+    drawn = case_with_friction(seed)
+    cuts = np.linspace(0.0, drawn["t_end"], 13)[:-1].tolist()
+    pieces = dict(drawn["torque_pieces"])
+    for cut in cuts:
+        pieces.setdefault(cut, next(u for t, u in reversed(drawn["torque_pieces"]) if t <= cut))
+    whole, parts = run_of(drawn), run_of({**drawn, "torque_pieces": sorted(pieces.items())})
+    assert [event.kind for event in whole.events] == [event.kind for event in parts.events]
+    assert parts.peak_torque == pytest.approx(whole.peak_torque, rel=1e-9, abs=1e-12 * drawn["c"])
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(-4, 4), st.floats(-3, 3))
+def test_unit_changes(seed: int, mass: float, time: float) -> None:
+    """With inertias in other units and time in others, it is the same start."""
+    drawn = case_with_friction(seed)
+    m, s = 10.0**mass, 10.0**time
+    torque = m / s**2
+    units = dict.fromkeys(("J1", "J2"), m) | dict.fromkeys(("c", "Mc", "friction"), torque)
+    units |= dict.fromkeys(("d", "b1", "b2"), torque * s) | dict.fromkeys(("w1_0", "w2_0", "target"), 1.0 / s)
+    units |= {"lag": s, "rate": torque / s, "t_end": s}
+    scaled = drawn | {name: drawn[name] * unit for name, unit in units.items() if name in drawn}
+    scaled["torque_pieces"] = [(t * s, u * torque) for t, u in drawn["torque_pieces"]]
+    one, other = run_of(drawn), run_of(scaled)
+    assert other.peak_torque == pytest.approx(one.peak_torque * torque, rel=1e-8, abs=1e-12 * scaled["c"])
+    assert other.start_time == pytest.approx(one.start_time * s, rel=1e-8, nan_ok=True)
+
+
+def test_viscous_friction_that_vanishes_leaves_the_closed_form() -> None:
+    """The power series of the coupled motion against the closed forms of the kernel: nothing is shared."""
+    for changes in ({}, {"damping": 1.0, "torque_lag": 0.003}, {"load_kind": "reactive", "gap": 0.1}):
+        drive = CRANE.replace(start_position="mid-gap", **changes)
+        one = steady(drive.replace(load_viscous_friction=1e-18), 62.0, 0.3)
+        other = steady(drive, 62.0, 0.3)
+        assert one.peak_torque == pytest.approx(other.peak_torque, rel=1e-12)
+        assert [event.kind for event in one.events] == [event.kind for event in other.events]
+        np.testing.assert_allclose(
+            [event.time for event in one.events], [event.time for event in other.events], rtol=1e-10
+        )
+
+
+def test_a_batch_has_the_bits_of_single_starts() -> None:
+    batch = CRANE.replace(
+        motor_friction=[0.0, 3.0, 3.0, 0.0], motor_viscous_friction=[0.0, 0.0, 0.02, 0.0],
+        load_viscous_friction=[0.0, 0.0, 0.01, 0.03],
+    )  # fmt: skip
+    player = TwoSteps(first=15.0, switch=0.06, second=62.0)
+    found = simulate(batch, player)
+    for i, one in enumerate(batch.elements()):
+        run = simulate(one, player)
+        assert float(found["k_dyn"][i]) == run.k_dyn
+        assert float(found["start_time"][i]) == run.start_time
+
+
+def test_units_of_friction() -> None:
+    one = CRANE.replace(motor_friction="1500 N*mm", motor_viscous_friction="20 N*mm*s/rad")
+    assert one == CRANE.replace(motor_friction=1.5, motor_viscous_friction=0.02)
+    assert Drive.from_toml(one.to_toml()) == one
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        (
+            {"motor_friction": 55.0},
+            "motor_friction = 55 N*m: with this friction starting_torque = 62 N*m cannot",
+        ),
+        (
+            {"motor_friction": -1.0},
+            "motor_friction = -1.0: the Coulomb friction of the motor must be 0 or more",
+        ),
+        (
+            {"load_viscous_friction": 0.8},
+            "at target_speed = 92.1534 rad/s this takes more torque than the motor",
+        ),
+        ({"motor_viscous_friction": "1 N*m"}, "motor_viscous_friction"),
+    ],
+)
+def test_friction_that_no_start_can_have(changes: dict[str, object], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
+        CRANE.replace(**changes)
+
+
+@pytest.mark.parametrize("name", ["motor_friction", "motor_viscous_friction", "load_viscous_friction"])
+def test_what_does_not_know_friction_says_so(name: str) -> None:
+    rough = CRANE.replace(**{name: 0.01})
+    with pytest.raises(InputError, match=f"{name} = 0.01 .*optimal starts and bounds are known without"):
+        optimize(rough, 0.5)
+    with pytest.raises(InputError, match=f"{name} = 0.01 .*a chain has no such friction; set it to 0"):
+        Chain.from_drive(rough)
