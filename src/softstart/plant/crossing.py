@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from softstart.plant.coupled import coupled_bounds, coupled_load
-from softstart.plant.jit import compiled
+from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import Motion, Quintuple, Septuple
 from softstart.plant.motion import (
     COUPLED, IN_PARTS, SERIES, derivatives, forcing_from_start, forcing_tail, motion, remainders, slow_part,
@@ -31,6 +31,7 @@ LOST = -2.0  # the iteration did not end: reported as an error, never passed ove
 WATCH, RISING = 0.0, 1.0  # floats: numba would compile the search anew for a literal integer
 
 ROUNDING = 4.0 * 2.220446049250313e-16
+SHORTEST_PART, LONGER_PART = 1e-18, 1e3  # of a span that is searched part by part
 PATIENCE = 2_000  # steps; most searches take fewer than ten
 
 
@@ -143,12 +144,28 @@ def load_speed(m: Motion, load: Septuple, s: float, v: float) -> float:
     return w2
 
 
-@compiled
+@inlined
 def first_crossing(
     m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
     load: Septuple, start: float, begin: float, end: float,
 ) -> float:  # fmt: skip
     """First s in [begin, end] at which f falls through zero, or NO_CROSSING."""
+    s = crossing_within(m, c0, alpha, beta, gamma, kappa, load, start, begin, end)
+    if s == LOST and m.form == COUPLED:  # M2 of the whole span is far too large at its start: begin with less
+        s = NO_CROSSING
+        part = begin + SHORTEST_PART * (end - begin)
+        while s == NO_CROSSING and begin < end:
+            s = crossing_within(m, c0, alpha, beta, gamma, kappa, load, start, begin, min(part, end))
+            begin, start, part = part, WATCH, LONGER_PART * part
+    return s
+
+
+@compiled
+def crossing_within(
+    m: Motion, c0: float, alpha: float, beta: float, gamma: float, kappa: float,
+    load: Septuple, start: float, begin: float, end: float,
+) -> float:  # fmt: skip
+    """As `first_crossing`, with one bound of f'' for the whole of [begin, end]."""
     if m.by_terms != 0.0 and m.form < SERIES:
         return crossing_by_terms(m, c0, alpha, beta, gamma, kappa, load, start != WATCH, begin, end)
     s = begin
