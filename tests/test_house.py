@@ -38,7 +38,7 @@ BUDGET = {
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     # 30 lines: S-N curves; 50: one limit and what a figure leaves of it
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
-    "drive": (1550, 6, 1, 0),  # 5: a reactive load may be anywhere
+    "drive": (1602, 6, 1, 0),  # 5: a reactive load may be anywhere; 55: friction of motor and load
     # the drive from logs of its starts, and experiments that tell it
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
     # 100: identifications kept on disk, drawn by the intervals that are shown
@@ -50,7 +50,8 @@ BUDGET = {
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
-    "linear": (2120, 8, 1, 0),
+    # 5: viscous friction
+    "linear": (2125, 8, 1, 0),
     # ends before the bound; shared bounds; 230: brake, unknown position; 80: two methods where a bound is far
     # 250 and a file: the quickest start that keeps the limits
     # 930 and a file: the certificate of the whole start, behind lag, rate limit and friction
@@ -64,11 +65,13 @@ BUDGET = {
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet
     # 150 and a file: a log is identified
-    "page": (4660, 20, 3, 0),
+    # 3: fields of friction
+    "page": (4663, 20, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart
-    "plant": (2880, 15, 2, 0),
+    # 290 and a file: friction of the motor; viscous friction, which couples three speeds in one series
+    "plant": (3170, 16, 2, 0),
     # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed
     "reporting": (3417, 14, 4, 0),
@@ -79,7 +82,8 @@ BUDGET = {
     # 10: what notebooks show
     # 20: damage of cycles, for chains too
     # 80: intervals of starts whose drive is known within intervals
-    "start": (2855, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
+    # 15: friction in the energy balance
+    "start": (2870, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
     # 100 lines: damaged chunks and descriptions are found, named and made again; 20: margins to limits
     "sweeping": (1790, 8, 0, 0),
     # 40: drives drawn from an identification as scenarios
@@ -92,7 +96,8 @@ BUDGET = {
     # 40: optima of chains; 75: lives of the shafts of a chain
     # 90: wear
     # 5: what designed a torque
-    "views": (5244, 19, 6, 0),
+    # 5: friction
+    "views": (5249, 19, 6, 0),
 }
 
 
