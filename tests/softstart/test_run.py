@@ -149,7 +149,8 @@ def test_the_figure_shows_the_run(run: Run) -> None:
     np.testing.assert_array_equal(drawn.get_ydata(), run.T)
     assert max(drawn.get_ydata()) == pytest.approx(run.peak_torque, rel=1e-12)  # the peak is on the grid
     open_stages = [stage for stage in run.stages if stage.side == 0]
-    assert len(twist.patches) == len(open_stages)
+    shaded = [path.get_extents() for shade in twist.collections for path in shade.get_paths()]
+    np.testing.assert_allclose([one.intervalx for one in shaded], [(s.start, s.end) for s in open_stages])
     assert f"{run.start_time:.4f}" in speed.get_title(loc="left")
 
 
