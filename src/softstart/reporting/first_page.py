@@ -24,8 +24,8 @@ def headline(report: Report) -> str:
     """The answer: which strategy, what it does to the shaft torque, what it costs.
 
     >>> from softstart import report
-    >>> headline(report("crane-4amtkf", controllers=["shaped"], budget=0.0))[:84]
-    'Gentlest start: shaped. The shaft torque peaks at 53.05 N m instead of 164.8 N m unde'
+    >>> headline(report("crane-4amtkf", controllers=["shaped"], budget=0.0))[:81]
+    'Gentlest start: shaped. The shaft torque peaks at 53.06 N m instead of 164.8 N m '
     """
     best, direct = report.choice.chosen, report.row(REFERENCE)
     if best is None or direct is None:
