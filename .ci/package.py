@@ -170,7 +170,7 @@ def suite_of_wheel(python: Path, unpacked: Path, folder: Path, whole: bool) -> N
 def unpack(sdist: Path, folder: Path) -> Path:
     """The folder that the sdist unpacks to."""
     with tarfile.open(sdist) as opened:
-        opened.extractall(folder / "sdist", filter="data")
+        opened.extractall(folder / "sdist", **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))
     (only,) = (folder / "sdist").iterdir()
     return only
 
