@@ -74,7 +74,7 @@ QUICK: dict[str, list[str]] = {
     ],
     "sweep": ["sweep", "--controller", "ramp", "--axis", "shaft.gap=0.5,1.5"],
     "linear": ["linear", "--controller", "state-feedback"],
-    "reduce": ["reduce"],
+    "reduce": ["reduce", "--no-starts"],
     "clutch": ["clutch"],
     "balance": ["balance"],
     "report": ["report", "--json", "--budget", "0", "--controllers", "direct,ramp"],
@@ -111,7 +111,8 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "linear": ["--controller", "--param", "--set", "--json"],
     "reduce": [
-        "--to", "--up-to", "--method", "--factor", "--force", "--set", "--verify", "--param", "--json",
+        "--to", "--up-to", "--method", "--factor", "--force", "--set", "--verify", "--no-starts",
+        "--param", "--json",
     ],
     "clutch": ["--law", "--set", "--until", "--optimal", "--points", "--nondecreasing", "--json"],
     "balance": ["--speed", "--set", "--json"],
@@ -128,7 +129,10 @@ OPTIONS: dict[str, list[str]] = {
     "study": ["--list", "--json"],
     "completion": ["--help"],
 }  # fmt: skip
-FLAGS = {"--allow-code", "--json", "--force", "--optimal", "--nondecreasing", "--expose", "--list", "--help"}
+FLAGS = {
+    "--allow-code", "--json", "--force", "--no-starts", "--optimal", "--nondecreasing", "--expose", "--list",
+    "--help",
+}  # fmt: skip
 PATHS = {
     "drive": [p.path for p in PARAMETERS.values()],
     "chain": [

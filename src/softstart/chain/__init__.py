@@ -18,7 +18,13 @@ if TYPE_CHECKING:
     from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
     from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
-    from softstart.chain.simulation import Verification, simulate_chain, verify_on_chain
+    from softstart.chain.simulation import (
+        TwoMassError,
+        Verification,
+        simulate_chain,
+        two_mass_error,
+        verify_on_chain,
+    )
     from softstart.chain.vibration import Vibration, natural_vibration
     from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse, chain_backbone, forced_response
 
@@ -34,6 +40,7 @@ __all__ = [
     "Reduction",
     "Shaft",
     "ShaftLife",
+    "TwoMassError",
     "Verification",
     "Vibration",
     "chain_backbone",
@@ -43,6 +50,7 @@ __all__ = [
     "reduce_chain",
     "simulate_chain",
     "simulate_chains",
+    "two_mass_error",
     "verify_on_chain",
 ]
 
@@ -54,6 +62,7 @@ _HOME = {
     "ForcedResponse": "softstart.chain.vibration_with_gaps",
     "Reduction": "softstart.chain.reduction",
     "ShaftLife": "softstart.chain.fatigue",
+    "TwoMassError": "softstart.chain.simulation",
     "Verification": "softstart.chain.simulation",
     "Vibration": "softstart.chain.vibration",
     "chain_backbone": "softstart.chain.vibration_with_gaps",
@@ -63,6 +72,7 @@ _HOME = {
     "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",
     "simulate_chains": "softstart.chain.batch",
+    "two_mass_error": "softstart.chain.simulation",
     "verify_on_chain": "softstart.chain.simulation",
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shlex
+import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,10 +27,13 @@ from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import to_si, whole_number
 
 if TYPE_CHECKING:
+    from softstart.chain import simulation
     from softstart.identification import result
     from softstart.identification.result import Identification
+    from softstart.views import chains as views
 else:
-    result = late("softstart.identification.result")
+    result, simulation = late("softstart.identification.result"), late("softstart.chain.simulation")
+    views = late("softstart.views.chains")
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -169,13 +173,9 @@ def command_line() -> str:
 
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
-    """The one drive asked for, with its changes."""
+    """The one drive asked for, with its changes; of a chain the two masses that stand for it."""
     if is_chain(name):
-        raise InputError(
-            f'"{name}": this is a chain, and this command takes a drive; "softstart reduce {name} --out DIR" '
-            "writes the drive.toml that stands for it (simulate, compare, fatigue, optimize and pareto take "
-            "the chain)."
-        )
+        return two_masses(Chain.load(name, also=read_changes(settings)), name)
     drive = Drive.load(name)
     if settings:
         drive = drive.with_settings(settings)
@@ -185,6 +185,18 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
             "one at a time; give one value a key (softstart.simulate in Python takes batches)."
         )
     return drive
+
+
+def two_masses(chain: Chain, name: str) -> Drive:
+    """The two masses of a chain, if their K_dyn is near enough to that of the chain; says so."""
+    found = simulation.two_mass_error(chain)
+    if not found.enough:
+        raise InputError(
+            f'"{name}": this is a chain, and this command takes a drive. {views.enough(found)} '
+            f'"softstart reduce {name} --out DIR" writes the two masses all the same.'
+        )
+    print(f'"{name}" is a chain. {views.enough(found)}', file=sys.stderr)
+    return found.drive
 
 
 def read_identified(name: str, settings: Sequence[str]) -> Identification | None:

@@ -50,7 +50,7 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from softstart.chain import reduction, simulation
     from softstart.chain.reduction import Reduction
-    from softstart.chain.simulation import Verification
+    from softstart.chain.simulation import TwoMassError
     from softstart.views import chain_schemes
     from softstart.views import chains as views
 else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
@@ -104,7 +104,11 @@ def _keys() -> Keys:
 @controller_option(
     "--verify",
     "A,B,...",
-    "Controllers to set up for the drive and to start on the drive and on the whole chain.",
+    "Controllers to set up for the drive and to start on the drive and on the whole chain. By default all "
+    "that need no parameter.",
+)
+@click.option(
+    "--no-starts", is_flag=True, help="Leave out the starts that tell whether two masses are enough."
 )
 @param_option(
     "CONTROLLER.KEY=VALUE",
@@ -124,6 +128,7 @@ def reduce(
     force: bool,
     settings: tuple[str, ...],
     verify: str | None,
+    no_starts: bool,
     params: tuple[str, ...],
     as_json: bool,
     out: str | None,
@@ -132,6 +137,7 @@ def reduce(
 
     CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); without it, the crane
     drive as a chain of four masses is taken. The drive that comes out goes into compare, optimize and tune.
+    Whether two masses are enough is told by starts of both, under --verify's controllers and 128 torques.
     """
     mistakes = Mistakes()
     one: Chain | None = None
@@ -155,6 +161,8 @@ def reduce(
         names = read_names(verify, "--verify")
     given: dict[str, dict[str, Any]] = {}
     with mistakes.noted():
+        if no_starts and names is not None:
+            raise InputError("--no-starts: it leaves out the starts of --verify; give one of the two.")
         if params and names is None:
             raise InputError("--param: it sets up a controller of --verify; name that, as --verify ramp.")
         given = read_params_of(params, names or ())
@@ -166,37 +174,36 @@ def reduce(
             found = reduced(one, asked)
             beside = beside_it(found)
         check(found, names)
-        done: list[Verification] = []
-        if names:
+        off: TwoMassError | None = None
+        if makes_drive(found) and not no_starts:
             with working("starting the drive and the chain ..."):
-                done = verified(found, names, given)
+                off = error_of(found, names, given)
         if folder is not None:
             with working("drawing the figures ..."):
-                _write(found, beside, done, folder, command_line())
+                _write(found, beside, off, folder, command_line())
 
     if as_json:
-        verification = {"verified": [one.summary() for one in done], "verdict": views.verdict(done)}
-        print_json({**summary(found, beside), **verification})
+        print_json({**summary(found, beside), **views.verdict(off)})
         return
-    _show(found, beside, done)
+    _show(found, beside, off)
     if out is not None:
         print(
             f"\nWritten to {out}: report.md, the scheme, the figures, the tables and what it was reduced to."
         )
 
 
-def _show(found: Reduction, beside: Reduction | None, done: Sequence[Verification]) -> None:
+def _show(found: Reduction, beside: Reduction | None, off: TwoMassError | None) -> None:
     """The chain, its frequencies, the steps and what came out."""
     to = console()
     print_lines(to, views.chain_lines(found.chain))
-    print_tables(to, views.tables(found, beside, done))
-    if said := views.caution(done):
-        sentence(to, said, "bold")
+    print_tables(to, views.tables(found, beside, off))
+    if off is not None:
+        sentence(to, views.enough(off), "bold")
     print_conclusion(to, [views.conclusion(found)], views.footnotes(found))
 
 
 def _write(
-    found: Reduction, beside: Reduction | None, done: Sequence[Verification], folder: Path, command: str
+    found: Reduction, beside: Reduction | None, off: TwoMassError | None, folder: Path, command: str
 ) -> None:
     """Scheme, figures, tables, the chain with all changes, what came out, and the report that ties them."""
     vibration = found.whole_vibration
@@ -213,7 +220,7 @@ def _write(
     if makes_drive(found):
         write_text(folder / "drive.toml", found.to_drive().to_toml())
         results += ", [drive.toml](drive.toml) for compare, optimize and tune"
-    for name, (headings, rows) in views.files(found, done).items():
+    for name, (headings, rows) in views.files(found, off).items():
         write_table(folder / name, headings, rows)
 
     parts = [
@@ -223,11 +230,11 @@ def _write(
         "![scheme](scheme.svg)",
         "![reduced scheme](reduced-scheme.svg)",
     ]
-    parts += table_sections(views.tables(found, beside, done))
-    if said := views.caution(done):
-        parts.append(markdown(said))
+    parts += table_sections(views.tables(found, beside, off))
+    if off is not None:
+        parts.append(markdown(views.enough(off)))
     parts += [f"![{stem}]({stem}.svg)" for stem in pictures]
-    starts = ", [verified.csv](verified.csv)" if done else ""
+    starts = ", [verified.csv](verified.csv)" if off is not None and off.verified else ""
     parts += [
         *map(markdown, views.footnotes(found)),
         f"What was reduced, and to what: {results}.",
@@ -238,16 +245,13 @@ def _write(
     write_report(folder, parts, command, f"Source: {markdown(found.chain.source) or 'none given'}.")
 
 
-def verified(
-    found: Reduction, names: Sequence[str], params: Mapping[str, Mapping[str, Any]]
-) -> list[Verification]:
-    """The controllers of these names, set up for the drive, started on the drive and on the chain."""
-    drive = found.to_drive()
-    done = []
-    for controller in make_controllers(names, params, prefix=True):
-        with Attributed():
-            done.append(simulation.verify_on_chain(found.chain, drive, controller))
-    return done
+def error_of(
+    found: Reduction, names: Sequence[str] | None, params: Mapping[str, Mapping[str, Any]]
+) -> TwoMassError:
+    """How far the drive is off the chain, under the controllers of these names and under torques."""
+    made = None if names is None else make_controllers(names, params, prefix=True)
+    with Attributed():
+        return simulation.two_mass_error(found.chain, found.to_drive(), made)
 
 
 def check(found: Reduction, names: Sequence[str] | None) -> None:

@@ -17,12 +17,11 @@ if TYPE_CHECKING:
     from softstart.chain.model import Chain
     from softstart.chain.reduction import Reduction
     from softstart.chain.run import ChainRun
-    from softstart.chain.simulation import Verification
+    from softstart.chain.simulation import TwoMassError, Verification
     from softstart.chain.vibration import Vibration
     from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse
 
 MOST_MODES = 12
-FAR = 1.5  # times the K_dyn of the drive: from there on the two masses do not predict the load of the chain
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
 OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
@@ -144,45 +143,57 @@ def reordered(done: Sequence[Verification]) -> tuple[Verification, Verification]
     return max(pairs, key=lambda pair: pair[1].chain_k_dyn / pair[0].chain_k_dyn, default=None)
 
 
-def caution(done: Sequence[Verification]) -> str:
-    """One sentence where the chain orders or loads strategies otherwise than the two masses; else none."""
-    said = []
-    pair = reordered(done)
+def enough(found: TwoMassError) -> str:
+    """Whether two masses are enough, and for what they are not, in a few sentences."""
+    limit = f"{100.0 * found.LIMIT:g} %"
+    if found.enough:
+        torques = f"and under {found.TORQUES} torques over time "
+        return (
+            f"Two masses are enough: K_dyn of {', '.join(one.name for one in found.verified)} {torques}"
+            f"is off by {_percent(found.error)} at most (limit {limit})."
+        )
+    said = [f"{name} does not start the chain" for name in found.failed]
+    worst = found.worst
+    if worst is not None and abs(worst.error) > found.LIMIT:
+        said.append(
+            f"{worst.name} has K_dyn {worst.chain_k_dyn:.3g} on the chain and {worst.drive.k_dyn:.3g} on them"
+        )
+    if found.of_torques > found.LIMIT:
+        said.append(f"of {found.TORQUES} torques over time the worst is {_percent(found.of_torques)} off")
+    text = f"Two masses are not enough: {'; '.join(said)} (limit {limit})."
+    pair = reordered(found.verified)
     if pair is not None:
         gentler, harder = pair
-        said.append(
-            f"{gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain_k_dyn:.3g} and "
-            f"{harder.chain_k_dyn:.3g}), on the drive it is the other way round "
-            f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})"
+        text += (
+            f" On the chain {gentler.name} is gentler than {harder.name} (K_dyn {gentler.chain_k_dyn:.3g} "
+            f"and {harder.chain_k_dyn:.3g}), on two masses it is the other way round "
+            f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})."
         )
-    far = max(done, key=_ratio, default=None)
-    if far is not None and _ratio(far) > FAR:
-        said.append(f"{far.name} has {_ratio(far):.2f} times its K_dyn on the drive")
-    return f"On the chain {', and '.join(said)}: choose by the chain." if said else ""
+    return f"{text} Choose by the chain: simulate, compare, optimize, pareto and fatigue take it."
 
 
-def verdict(done: Sequence[Verification]) -> dict[str, Any] | None:
-    """The same as plain data; None without starts."""
-    if not done:
-        return None
-    return {
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def verdict(found: TwoMassError | None) -> dict[str, Any]:
+    """The same as plain data; nothing where no drive comes out."""
+    if found is None:
+        return {"verified": [], "verdict": None}
+    done = found.verified
+    orders = {
         "order_on_drive": [one.name for one in sorted(done, key=lambda v: v.drive.k_dyn)],
         "order_on_chain": [one.name for one in sorted(done, key=lambda v: v.chain_k_dyn)],
         "order_differs": reordered(done) is not None,
-        "largest_ratio": max(map(_ratio, done)),
-        "caution": caution(done) or None,
+        "said": enough(found),
     }
-
-
-def _ratio(one: Verification) -> float:
-    """K_dyn on the chain over that on the drive."""
-    return one.chain_k_dyn / one.drive.k_dyn
+    return {"verified": [one.summary() for one in done], "verdict": {**found.summary(), **orders}}
 
 
 # tables ----------------------------------------------------------------------------------------------------
 
 
-def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verification] = ()) -> list[Table]:
+def tables(found: Reduction, beside: Reduction | None, off: TwoMassError | None = None) -> list[Table]:
     """Frequencies, steps, the two masses of both methods, and the starts on drive and chain."""
     shown = [frequencies_table(found.whole_vibration)]
     if found.steps:
@@ -190,8 +201,8 @@ def tables(found: Reduction, beside: Reduction | None, done: Sequence[Verificati
     shown.append(kept_table(found))
     if len(found.reduced.masses) == 2:
         shown.append(two_masses_table(found, beside))
-    if done:
-        shown.append(verified_table(done))
+    if off is not None and off.verified:
+        shown.append(verified_table(off.verified))
     return shown
 
 
@@ -277,16 +288,15 @@ def verified_table(done: Sequence[Verification]) -> Table:
         "largest in": [one.worst_place for one in done],
         "K_dyn\ndrive": [number(one.drive.k_dyn, 4) for one in done],
         "K_dyn\nchain": [number(one.chain_k_dyn, 4) for one in done],
-        "drive off\n%": [f"{100 * one.error:+.1f}" for one in done],
+        "chain off\n%": [f"{100 * one.error:+.1f}" for one in done],
         "start time\ndrive s": column_of([one.drive.start_time for one in done], 4),
         "start time\nchain s": column_of([one.chain.start_time for one in done], 4),
-        "largest K\nof a shaft": [number(one.worst_k_dyn, 4) for one in done],
     }
-    title = "Designed on the two masses, verified on the chain (K_dyn: the shaft beside the motor)"
+    title = "Designed on the two masses, verified on the chain"
     return Table.of(title, cells, texts=["strategy", "largest in"])
 
 
-def files(found: Reduction, done: Sequence[Verification]) -> dict[str, tuple[Sequence[str], list[list[Any]]]]:
+def files(found: Reduction, off: TwoMassError | None) -> dict[str, tuple[Sequence[str], list[list[Any]]]]:
     """The tables of --out with all digits: headings and rows by file name."""
     vibration = found.whole_vibration
     names = [mass.name for mass in found.chain.masses]
@@ -310,8 +320,8 @@ def files(found: Reduction, done: Sequence[Verification]) -> dict[str, tuple[Seq
         "partial-systems.csv": (("kind", "masses", "Omega [rad/s]"), systems),
         "steps.csv": ((*first, *columns), steps),
     }
-    if done:
-        rows = [{k: v for k, v in one.summary().items() if k != "chain"} for one in done]
+    if off is not None and off.verified:
+        rows = [{k: v for k, v in one.summary().items() if k != "chain"} for one in off.verified]
         made["verified.csv"] = (list(rows[0]), [list(row.values()) for row in rows])
     return made
 

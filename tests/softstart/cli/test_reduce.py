@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from softstart import Drive
-from softstart.chain import Chain, natural_vibration, reduce_chain
+from softstart.chain import Chain, Mass, natural_vibration, reduce_chain
 
 
 def test_json_is_the_summary(run):
-    code, out, err = run("reduce", "--json")
+    code, out, err = run("reduce", "--json", "--no-starts")
     assert (code, err) == (0, "")
     told = json.loads(out, parse_constant=pytest.fail)
     found = reduce_chain(Chain.load("crane-4-mass"), 2)
@@ -34,7 +35,7 @@ def test_the_tables_are_shown(run, monkeypatch):
 
 
 def test_what_is_written_can_be_used(run, place):
-    code, _, _ = run("reduce", "--set", "shaft[3].gap=0.02", "--out", "found")
+    code, _, _ = run("reduce", "--set", "shaft[3].gap=0.02", "--out", "found", "--no-starts")
     assert code == 0
     folder = place / "found"
     drive = Drive.load(folder / "drive.toml")
@@ -67,11 +68,11 @@ def test_refused_with_the_ratio_unless_forced(run, nothing_left):
     assert "(206.66/69.1286)^2 = 8.94 is below the 10" in err
     assert "--force" in err
     nothing_left()
-    assert run("reduce", "tractor-like", "--force", "--json").code == 0
+    assert run("reduce", "tractor-like", "--force", "--json", "--no-starts").code == 0
 
 
 def test_the_modal_method_in_json(run):
-    told = json.loads(run("reduce", "tractor-like", "--method", "modal", "--json").out)
+    told = json.loads(run("reduce", "tractor-like", "--method", "modal", "--json", "--no-starts").out)
     assert told["reduced"]["node"] == pytest.approx(told["whole"]["node"], rel=1e-12)
     assert abs(told["frequencies"][0]["error"]) < 1e-14
 
@@ -123,7 +124,7 @@ def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
         assert one["chain_k_dyn"] == whole.k_dyn
         assert one["chain_start_time"] == whole.start_time
         assert one["worst_shaft"] == "rotor - pinion"
-        assert one["k_dyn_error"] == pytest.approx(one["k_dyn"] / one["chain_k_dyn"] - 1.0)
+        assert one["k_dyn_error"] == pytest.approx(one["chain_k_dyn"] / one["k_dyn"] - 1.0)
     rows = (place / "found" / "verified.csv").read_text().splitlines()
     assert len(rows) == 3
     assert "verified on the chain" in (place / "found" / "report.md").read_text()
@@ -146,14 +147,34 @@ def test_another_order_on_the_chain_is_told(run, place):
     verdict = told["verdict"]
     assert verdict["order_differs"]
     assert verdict["order_on_chain"] == ["ramp", "pulse-coast-hold"] == verdict["order_on_drive"][::-1]
-    assert verdict["largest_ratio"] == pulse["chain_k_dyn"] / pulse["k_dyn"]
-    assert verdict["caution"].startswith("On the chain ramp is gentler than pulse-coast-hold (K_dyn 3.13 and")
-    assert "pulse-coast-hold has 3.98 times its K_dyn on the drive" in verdict["caution"]
-    assert verdict["caution"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
+    assert verdict["of_strategies"]["pulse-coast-hold"] == pulse["chain_k_dyn"] / pulse["k_dyn"] - 1.0
+    assert not verdict["enough"]
+    assert "On the chain ramp is gentler than pulse-coast-hold (K_dyn 3.13 and 3.91)" in verdict["said"]
+    assert "pulse-coast-hold has K_dyn 3.91 on the chain and 0.981 on them" in verdict["said"]
+    assert verdict["said"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
     (place / "two.toml").write_text(Chain.from_drive(Drive.load("crane-4amtkf")).to_toml())
     out = run("reduce", "two.toml", "--verify", "pulse-coast-hold,ramp").out
     assert "verified on the chain" in out
-    assert "choose by the chain" not in out
+    assert "Two masses are enough: K_dyn of pulse-coast-hold, ramp and under 128 torques" in out
+    assert "Choose by the chain" not in out
+
+
+def test_a_command_for_drives_takes_a_chain_that_two_masses_stand_for(run, place):
+    two = Chain.from_drive(Drive.load("crane-4amtkf"))
+    motor, load = two.masses
+    light = Mass(0.01 * motor.inertia, name="coupling")
+    stiff = two.shafts[0].replace(stiffness=300.0 * two.shafts[0].stiffness, gap=0.0, damping_ratio=0.02)
+    near = replace(two, masses=(motor, light, load), shafts=(stiff, two.shafts[0]))
+    (place / "near.toml").write_text(near.to_toml())
+    code, out, err = run("linear", "near.toml", "--controller", "ramp", "--json")
+    assert code == 0
+    assert "reduced to two masses" in json.loads(out)["drive"]
+    assert err.startswith('"near.toml" is a chain. Two masses are enough')
+    for command in (("linear", "--controller", "ramp"), ("tune", "--controller", "ramp")):
+        code, out, err = run(*command, "crane-4-mass")
+        assert (code, out) == (2, "")
+        assert "this command takes a drive. Two masses are not enough: " in err
+        assert "simulate, compare, optimize, pareto and fatigue take it" in err
 
 
 @pytest.mark.parametrize(
@@ -161,6 +182,7 @@ def test_another_order_on_the_chain_is_told(run, place):
     [
         (("--verify", "rampp"), '--verify = "rampp": there is no controller'),
         (("tractor-like", "--up-to", "70", "--verify", "direct"), "3 are left"),
+        (("--verify", "ramp", "--no-starts"), "give one of the two"),
         (("--param", "ramp.time=1"), "--param: it sets up a controller of --verify"),
     ],
 )
