@@ -29,6 +29,7 @@ the torque-speed curve before it, and |T| <= P where the dead zone pulls.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -275,10 +276,11 @@ class _Dual:
             return
         here = s.tail + sum(self.by.durations)
         on_demand = self._along_program(q)
-        psi = _rate_multipliers(0.5 * (on_demand[0] + on_demand[1]), s)
+        mean, first = 0.5 * on_demand.sum(axis=0), s.problem.first_demand
+        self.psi[1 : here + 1] = s.h * _rate_multipliers(mean, s.rate * s.h, s.low, s.high, first)
+        self.psi[here:] = self.psi[here]
         # q - psi' is constant in a step, 0 where neither limit of the torque holds
-        self.psi[: here + 1], self.psi[here:] = psi, psi[-1]
-        self.slope[:, :here] = on_demand - 0.5 * on_demand.sum(axis=0) + np.diff(psi) / s.h
+        self.slope[:, :here] = on_demand - mean + np.diff(self.psi[: here + 1]) / s.h
         bent = np.abs(self.slope[1] - self.slope[0]) / 6.0
         self.by_rate = s.rate * 0.5 * s.h * (np.abs(self.psi[:-1]) + np.abs(self.psi[1:]) + s.h * bent)
 
@@ -334,24 +336,44 @@ class _Dual:
         return q, np.abs(by_E)[:, None] / s.lag**2 * E[:-1]
 
 
-def _rate_multipliers(q: Vector, start: _Start) -> Vector:
-    """The values of psi at the nodes of the demand that makes the sum of q r least within its limits."""
-    n, rise = q.size, start.rate * start.h
-    k = np.arange(n - 1)
-    step = Sparse.of(n - 1, k + 1, np.ones(n - 1)) - Sparse.of(n - 1, k, np.ones(n - 1))  # from step to step
-    D = Sparse.stacked([step, Sparse.single({n - 1: -1.0})])
-    limit = np.full(n, rise)
-    limit[-1] = 0.5 * rise
-    first = np.zeros(n)
-    first[-1] = start.problem.first_demand
-    unit, most = max(float(np.abs(q).max()), 1e-300), start.most
-    rights = np.concatenate([limit - first, limit + first]) / most
-    none = Sparse.stacked([]), np.zeros(0)
-    bounds = np.tile([start.low / most, start.high / most], (n, 1))
-    found = Limits(q / unit, Sparse.stacked([D, -1.0 * D]), rights, *none).solved(bounds)
-    if found is None:
-        return np.zeros(n + 1)
-    return np.concatenate([[0.0], (found.above[n:] - found.above[:n]) * start.h * unit])
+def _rate_multipliers(q: Vector, rise: float, low: float, high: float, first: float) -> Vector:
+    """Multipliers of |r_k+1 - r_k| <= rise, and last of |first - r_n-1| <= rise/2, where sum q r is least.
+
+    V_k(r) = q_k r + min V_k-1(s) over |s - r| <= rise is convex and piecewise linear between low and high. It
+    is known by its kinks left and right of the minimum, which each step moves apart by `rise`. The multiplier
+    p_k is its slope at r_k: p_k-1 = p_k - q_k, kept between the slopes of the minimum over s at low and high.
+    """
+    left: deque[tuple[float, float]] = deque()  # (where + moved, change of the slope), rising
+    right: deque[tuple[float, float]] = deque()  # (where - moved, change of the slope), rising
+    at_low, at_high, moved = 0.0, 0.0, 0.0
+    limits = []
+    for k, slope in enumerate(q.tolist()):
+        more = abs(slope)  # to be taken from the kinks on one side, for which the minimum moves there
+        while slope > 0.0 and more > 0.0:
+            where, change = left.pop() if left else (low + moved, more)
+            right.appendleft((where - 2.0 * moved, min(change, more)))
+            if change > more:
+                left.append((where, change - more))
+            more -= min(change, more)
+        while slope < 0.0 and more > 0.0:
+            where, change = right.popleft() if right else (high - moved, more)
+            left.append((where + 2.0 * moved, min(change, more)))
+            if change > more:
+                right.appendleft((where, change - more))
+            more -= min(change, more)
+        at_low, at_high = min(at_low + slope, 0.0), max(at_high + slope, 0.0)
+        moved += rise if k < q.size - 1 else 0.5 * rise
+        while left and left[0][0] - moved <= low:
+            at_low = min(at_low + left.popleft()[1], 0.0)
+        while right and right[-1][0] + moved >= high:
+            at_high = max(at_high - right.pop()[1], 0.0)
+        limits.append((at_low, at_high))
+    at_first = sum(change for where, change in right if where + moved < first)
+    at_first -= sum(change for where, change in left if where - moved > first)
+    p = [float(at_first)]
+    for (lowest, highest), slope in zip(limits[-2::-1], q[:0:-1].tolist(), strict=True):
+        p.append(min(max(p[-1] - slope, lowest), highest))
+    return np.array(p[::-1])
 
 
 # a load that is free to move at once -----------------------------------------------------------------------

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile, optimize
 from softstart.optimal.exact import replay
@@ -19,6 +20,7 @@ from softstart.optimal.whole_certificate import (
     _Dual,
     _Free,
     _Program,
+    _rate_multipliers,
     _Resting,
     _Start,
     not_certified,
@@ -191,6 +193,29 @@ def test_the_gap_is_below_half_a_per_cent(given: dict[str, Any], end: float, opt
     assert "half an elastic period longer" in best.bound.covers
     assert best.bound.k_dyn <= best.k_dyn <= 1.005 * best.bound.k_dyn
     assert best.bound.k_dyn > 1.005 * momentum_bound(best.problem).k_dyn
+
+
+def test_multipliers_of_the_rate_limit_are_the_best_of_all() -> None:
+    """Their dual value is the minimum of the linear program, ties and limits that cannot bind included."""
+    rng = np.random.default_rng(15)
+    for _ in range(300):
+        n = int(rng.integers(1, 60))
+        q = [rng.normal(size=n), np.cumsum(rng.normal(size=n)), rng.integers(-2, 3, n)][rng.integers(3)] * 1.0
+        low, high = -float(rng.choice([0.0, 1.0])), float(rng.choice([1.0, rng.uniform(0.1, 2.0)]))
+        rise = float(rng.choice([0.02, 0.25, 1.0, 5.0]))
+        first = float(rng.choice([0.0, low, high, rng.uniform(low, high)]))
+        p = _rate_multipliers(q, rise, low, high, first)
+        left = q - np.diff(p, prepend=0.0)
+        paid = rise * (np.abs(p[:-1]).sum() + 0.5 * abs(p[-1])) - p[-1] * first
+        steps = np.eye(n, k=1) - np.eye(n)  # the last one ends at `first`
+        limit, end = np.full(n, rise), np.zeros(n)
+        limit[-1], end[-1] = 0.5 * rise, first
+        best = linprog(
+            q, A_ub=np.vstack([steps, -steps]), b_ub=np.concatenate([limit - end, limit + end]),
+            bounds=(low, high),
+        ).fun  # fmt: skip
+        dual = np.minimum(left * low, left * high).sum() - paid
+        assert dual == pytest.approx(best, abs=1e-9 * max(np.abs(q).sum(), 1.0))
 
 
 @pytest.mark.slow
