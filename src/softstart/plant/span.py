@@ -424,7 +424,8 @@ def friction_event(p: Plant, x: State, m: Motion, load: Septuple, end: float) ->
     start = WATCH
     if x.v + x.w2 == 0.0:  # it has just begun to slide; but an impact at this very instant may hold it
         torque = shaft_torque(p, x)
-        if x.motor * (x.u - torque) < p.friction - HELD * (p.friction + abs(x.u) + abs(torque)):
+        rounding = HELD * (p.friction + abs(x.u) + abs(x.ref) + abs(torque))
+        if x.motor * (x.u - torque) < p.friction - rounding:
             return MOTOR_STOP, 0.0
         start = RISING
     s = first_crossing(m, 0.0, 0.0, x.motor * side, 0.0, x.motor, load, start, 0.0, end)

@@ -220,3 +220,11 @@ def test_what_does_not_know_friction_says_so(name: str) -> None:
         optimize(rough, 0.5)
     with pytest.raises(InputError, match=f"{name} = 0.01 .*a chain has no such friction; set it to 0"):
         Chain.from_drive(rough)
+
+
+@pytest.mark.parametrize("friction", [1e-12, 1e-9, 7.5e-7, 1e-5])
+def test_a_friction_of_next_to_nothing_behind_a_lag_ends_no_start(friction: float) -> None:
+    """The torque passes it within 1e-9 s, where what it lacks is lost in the rounding of the time."""
+    drive = CRANE.replace(torque_lag=0.004)
+    smooth, run = simulate(drive, "direct"), simulate(drive.replace(motor_friction=friction), "direct")
+    assert run.k_dyn == pytest.approx(smooth.k_dyn, rel=1e-6)
