@@ -40,7 +40,8 @@ BUDGET = {
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     # 30 lines: S-N curves; 50: one limit and what a figure leaves of it
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
-    "drive": (1602, 6, 1, 0),  # 5: a reactive load may be anywhere; 55: friction of motor and load
+    # 3: names of the frictions
+    "drive": (1605, 6, 1, 0),  # 5: a reactive load may be anywhere; 55: friction of motor and load
     # the drive from logs of its starts, and experiments that tell it
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
     # 100: identifications kept on disk, drawn by the intervals that are shown
@@ -48,7 +49,8 @@ BUDGET = {
     # 350 and a file: wear of the gap over the years
     # 135 and a file: chains through their reduction
     # 150: torques designed by CasADi, and one that leaves the load at rest
-    "identification": (3030, 9, 3, 0),  # 20: units of another scale
+    # 160: friction, which may be 0; ends of intervals along bent valleys
+    "identification": (3190, 9, 3, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),
@@ -72,8 +74,8 @@ BUDGET = {
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart
-    # 290 and a file: friction of the motor; viscous friction, which couples three speeds in one series
-    "plant": (3170, 16, 2, 0),
+    # 291 and a file: friction of the motor; viscous friction, which couples three speeds in one series
+    "plant": (3171, 16, 2, 0),
     # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed
     "reporting": (3417, 14, 4, 0),
@@ -98,9 +100,9 @@ BUDGET = {
     # 40: optima of chains; 75: lives of the shafts of a chain
     # 90: wear
     # 5: what designed a torque
-    # 5: friction
+    # 6: friction
     # 15: whether two masses are enough
-    "views": (5265, 19, 6, 0),
+    "views": (5266, 19, 6, 0),
 }
 
 

@@ -1,13 +1,15 @@
 """How often `identify` holds the truth, whether its search finds the best minimum, what plans tell.
 
     python -m tests.robustness.test_identification results.jsonl coverage --fits 200 --lines 64 --period 4e-3
+    python -m tests.robustness.test_identification results.jsonl coverage --fits 50 --drive friction
     python -m tests.robustness.test_identification results.jsonl search --fits 200
     python -m tests.robustness.test_identification results.jsonl plan --fits 30
 
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
-every parameter); `search` fits one log from 200 such guesses. `plan` compares the planned experiment of
-random drives with the standard ones. What the file has already is not computed again.
+every parameter). `--drive friction` has friction of motor and load, which is found too. `search` fits one log
+from 200 such guesses. `plan` compares the planned experiment of random drives with the standard ones. What
+the file has already is not computed again.
 """
 
 from __future__ import annotations
@@ -24,12 +26,15 @@ from tests.softstart.optimal.test_from_positions import random_unknown
 
 from softstart import Drive, Identification, identify, plan_experiments, simulate
 from softstart.controller import make_controller
+from softstart.drive import FRICTIONS
 from softstart.errors import InputError
 from softstart.identification.planning import made_up_log
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
 )
+FRICTION = DRIVE.replace(motor_friction=1.0, motor_viscous_friction=0.02, load_viscous_friction=0.02)
+DRIVES = {"smooth": DRIVE, "friction": FRICTION}
 NAMES = (
     "motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque", "torque_lag",
 )  # fmt: skip
@@ -55,18 +60,21 @@ def told(found: Identification) -> dict[str, Any]:
     return {"estimates": estimates, "seconds": found.seconds, "ripple": found.ripple, "agreed": found.agreed}
 
 
-def covered(experiment: str, lines: float, period: float, factor: float, number: int) -> dict[str, Any]:
+def covered(
+    experiment: str, lines: float, period: float, factor: float, number: int, drive: str = "smooth"
+) -> dict[str, Any]:
     """A simulated log and its fit."""
     generator = np.random.default_rng([number, round(1e6 * period), round(lines)])
-    drive = DRIVE.replace(encoder_lines=lines)
+    truth = DRIVES[drive].replace(encoder_lines=lines)
     position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
     log = made_up_log(
-        drive, experiment, log_period=period, ripple=RIPPLE, position=position, phase=phase,
+        truth, experiment, log_period=period, ripple=RIPPLE, position=position, phase=phase,
         seed=int(generator.integers(2**31)),
     )  # fmt: skip
-    guess = off_by(drive, factor, generator)
+    guess = off_by(truth, factor, generator)
     found = identify(log, guess, searches=1 if factor == 1.0 else 12, seed=number)
-    return {"truth": {"position 1": position}, **told(found)}
+    rubs = {name: float(getattr(truth, name)) for name in FRICTIONS}
+    return {"truth": {"position 1": position, **rubs}, **told(found)}
 
 
 def searched(lines: float, period: float, factor: float, number: int) -> dict[str, Any]:
@@ -144,7 +152,7 @@ def coverage_of(rows: list[dict[str, Any]]) -> str:
         truth = {name: float(getattr(DRIVE, name)) for name in NAMES} | row["truth"]
         for name, distance in half_widths(row, truth).items():
             off[name].append(distance)
-            if name in NAMES:
+            if truth.get(name) and not name.startswith("position"):
                 errors[name].append(row["estimates"][name][0] / truth[name] - 1.0)
     seconds = np.array([row["seconds"] for row in fits])
     lines = [
@@ -199,21 +207,26 @@ def main() -> None:
     parser.add_argument("kind", choices=("coverage", "search", "plan"))
     parser.add_argument("--experiment", default=REVERSE)
     parser.add_argument("--fits", type=int, default=200)
+    parser.add_argument("--drive", choices=list(DRIVES), default="smooth")
     parser.add_argument("--lines", type=float, default=1024.0)
     parser.add_argument("--period", type=float, default=4e-3)
     parser.add_argument("--factor", type=float)
     given = parser.parse_args()
     kind, lines, period = given.kind, given.lines, given.period
     factor = given.factor or (1.0 if kind == "coverage" else 3.0)
+    log = {"experiment": given.experiment, "lines": lines, "period": period, "factor": factor}
     keys = {
-        "coverage": {"experiment": given.experiment, "lines": lines, "period": period, "factor": factor},
+        "coverage": log if given.drive == "smooth" else log | {"drive": given.drive},
         "search": {"lines": lines, "period": period, "factor": factor},
         "plan": {},
     }[kind]
     work = {"coverage": covered, "search": searched, "plan": planned}[kind]
     wanted = {"kind": kind, **keys}
     text = given.file.read_text(encoding="utf-8") if given.file.exists() else ""
-    rows = [row for row in map(json.loads, text.splitlines()) if wanted.items() <= row.items()]
+    rows = [
+        row for row in map(json.loads, text.splitlines())
+        if wanted.items() <= row.items() and ("drive" in row) == ("drive" in wanted)
+    ]  # fmt: skip
     for number in sorted({*range(kind != "search", given.fits + 1)} - {row["number"] for row in rows}):
         try:
             found = work(**keys, number=number)

@@ -14,7 +14,7 @@ from scipy.stats import norm
 from softstart import Drive, InputError, Log, Run, identify, plan_experiments, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.identification.fitting import rounding
+from softstart.identification.fitting import Fitter, Space, rounding
 from softstart.identification.model import FILTER, LogModel, filtered
 from softstart.identification.planning import Experiment, Plan, _Bench, _profile, made_up_log
 from softstart.plant import record
@@ -172,17 +172,70 @@ def test_a_log_slower_than_any_standard_experiment_is_told_to_be_quicker() -> No
     assert any("take samples more often than each 10 ms" in note for note in notes)
 
 
-def test_friction_of_the_motor_is_named(log: Log) -> None:
-    values, speed = {"position": -0.6}, played(log, log.torque, {"position": -0.6})[:, record.W1_OUT]
-    generator = np.random.default_rng(5)
-    error = 0.5 * generator.standard_normal(speed.size)
-    for _ in range(4):  # its sign is that of a speed that depends on it
-        states = played(log, log.torque + error - 1.5 * np.sign(speed) * (np.abs(speed) > 0.05), values)
-        speed = states[:, record.W1_OUT]
-    angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
-    rubbed = Log(log.time, log.torque, angle=angle, torque_is="demand")
+RUBBED = TRUTH.replace(motor_friction=1.0)
+
+
+@pytest.fixture(scope="module")
+def rubbed() -> Log:
+    return made_up_log(RUBBED, REVERSE, log_period=2e-3, ripple=1.0, seed=7, position=0.2)
+
+
+def test_friction_that_the_drive_has_not_is_named_and_one_option_finds_it(rubbed: Log) -> None:
     notes = identify(rubbed, TRUTH, searches=1).notes
-    assert any("friction of the motor" in note for note in notes)
+    (note,) = [one for one in notes if "Coulomb friction of the motor" in one]
+    assert "--free +motor.friction" in note
+    size, error = (float(note.split(sign)[1].split()[0]) for sign in ("motor of ", "+- "))
+    assert abs(size - 1.0) < 1.5 * error
+    found = identify(rubbed, TRUTH, free=["+motor.friction"], searches=1)
+    assert {one.name for one in found.shared} == {*NAMES, "motor_friction"}
+    assert found["motor_friction"].known
+    assert found["motor_friction"].lower < 1.0 < found["motor_friction"].upper
+    assert len(found.notes) == 1  # nothing is left that the model has not
+
+
+def test_friction_of_the_drive_is_found_where_nothing_is_said(rubbed: Log) -> None:
+    found = identify(rubbed, RUBBED.replace(motor_friction=4.0), searches=1)
+    assert found["motor_friction"].lower < 1.0 < found["motor_friction"].upper
+    assert found.drive.motor_friction == found["motor_friction"].value
+
+
+def test_friction_that_is_none_has_an_interval_from_zero(log: Log) -> None:
+    found = identify(log, TRUTH, free=["+motor_viscous_friction"], searches=1)
+    one = found["motor_viscous_friction"]
+    assert one.lower == 0.0
+    assert one.value < one.upper < 0.05
+
+
+@pytest.mark.parametrize(
+    ("free", "names"),
+    [
+        (["gap", "shaft.stiffness"], {"gap", "stiffness"}),
+        (["+load.viscous_friction"], {*NAMES, "load_viscous_friction"}),
+    ],
+)
+def test_parameters_are_named_as_in_the_file_and_a_plus_adds_one(
+    log: Log, free: list[str], names: set[str]
+) -> None:
+    assert {one.name for one in identify(log, TRUTH, free=free, searches=1).shared} == names
+
+
+def test_the_ends_of_an_interval_are_where_the_fit_gets_worse(log: Log) -> None:
+    """Against fits at fixed values: at each end the weighted squares are larger by the quantile's square."""
+    space = Space.of(NAMES, TRUTH, [True], [True])
+    fitter = Fitter([LogModel(log, TRUTH.replace(start_position="mid-gap"))], space)
+    x = np.array([*space.point(TRUTH), -0.6, 0.0])
+    reach = np.array([2.0] * len(NAMES) + [0.399, 0.1])
+    solution = fitter.refine(x, x - reach, x + reach)
+    for name in ("gap", "damping", "position 1"):
+        i = space.names.index(name)
+        for sign in (-1.0, 1.0):
+            end, at, _ = fitter._traced(solution, i, sign, solution.x, solution.errors, solution.least, 2.0)
+            assert at[i] == pytest.approx(end, abs=0.05 * abs(end - solution.x[i]))
+            lower, upper = solution.lower.copy(), solution.upper.copy()
+            lower[i], upper[i] = end - 1e-9, end + 1e-9
+            point = fitter.fit(np.clip(solution.x, lower, upper), solution.errors, lower, upper)
+            residual = fitter.whitened(point, solution.errors, False).residual
+            assert float(residual @ residual) - solution.least == pytest.approx(4.0, rel=0.12)
 
 
 def test_a_clipped_torque_is_noticed(log: Log) -> None:
@@ -364,6 +417,7 @@ def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_on
     ("given", "sentence"),
     [
         ({"wanted": ["gpa"]}, "did you mean gap"),
+        ({"free": ["gap", "motor.friction"]}, "it is 0 in the drive; give a guess of it"),
         ({"most_torque": "0.01 N*m"}, "raise the limit"),
         ({"most_travel": 0.0}, "a limit is above 0"),
     ],
@@ -371,3 +425,10 @@ def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_on
 def test_plans_that_cannot_be_are_refused(given: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         plan_experiments(TRUTH, log_period="8 ms", **given)
+
+
+def test_a_plan_tells_the_interval_of_friction(rubbed: Log) -> None:
+    plan = plan_experiments(RUBBED, log_period="2 ms", ripple=1.0, optimise=False)
+    one = identify(rubbed, RUBBED, searches=1)["motor_friction"]
+    assert plan[REVERSE].widths["motor_friction"] == pytest.approx(0.5 * (one.upper - one.lower), rel=0.4)
+    assert "motor_friction" not in plan_experiments(TRUTH, optimise=False)[REVERSE].widths

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from softstart.drive.checks import FRICTIONS
 from softstart.drive.limits import LIMIT_TABLES, Limit, Limits, SNCurve
 from softstart.drive.model import (
     PARAMETERS,
@@ -20,6 +21,7 @@ from softstart.drive.model import (
 )  # fmt: skip
 
 __all__ = [
+    "FRICTIONS",
     "LIMIT_TABLES",
     "PARAMETERS",
     "TABLES",

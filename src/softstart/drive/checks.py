@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from softstart.input.parameters import Parameter, Wording
 from softstart.quantities import Value, show
 
-__all__ = ["contradictions", "elastic_frequency"]
+__all__ = ["FRICTIONS", "contradictions", "elastic_frequency"]
+
+FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
 
 Values = Mapping[str, Any]
 
@@ -138,8 +140,7 @@ def _friction_too_large(both: _Pairs) -> Iterator[str]:
     """Friction against which the motor cannot start, or not reach the target speed of the load."""
     needed = ("starting_torque", "maximum_torque", "load_torque", "target_speed")
     Ms, most, Mc, target = (both.values.get(name) for name in needed)
-    names = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
-    friction, b1, b2 = (both.values.get(name, 0.0) for name in names)
+    friction, b1, b2 = (both.values.get(name, 0.0) for name in FRICTIONS)
     if Ms is None or Mc is None:
         return
     yield from both.broken(
@@ -150,7 +151,7 @@ def _friction_too_large(both: _Pairs) -> Iterator[str]:
         return
     left = np.maximum(Ms, Ms if most is None else most) - friction - Mc
     slow = (left > 0.0) & ((np.add(b1, b2)) * target >= left)
-    for name in names[1:]:
+    for name in FRICTIONS[1:]:
         yield from both.broken(
             name, "target_speed", lambda one, _: (one > 0.0) & slow,
             "at {other} this takes more torque than the motor has left; lower the one or the other",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args,
 
 import numpy as np
 
-from softstart.drive.checks import contradictions, elastic_frequency
+from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -404,7 +404,7 @@ class Drive(ParameterSet):
         >>> list(Drive.load("crane-4amtkf").replace(motor_friction=1.5).without_friction("a chain has none"))
         ['motor_friction = 1.5 N*m: a chain has none; set it to 0.']
         """
-        for name in ("motor_friction", "motor_viscous_friction", "load_viscous_friction"):
+        for name in FRICTIONS:
             value = getattr(self, name)
             if np.any(value != 0.0):
                 yield f"{name} = {show(value)} {self.PARAMETERS[name].unit}: {reason}; set it to 0."

@@ -15,7 +15,7 @@ Amer. Statist. Assoc. 72 (1977) 320-338).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -24,14 +24,18 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import least_squares, minimize
 from scipy.special import ndtr
 from scipy.stats import qmc
+from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
+from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.identification.model import POSITION, LogModel
+from softstart.identification.result import CONFIDENCE, WIDEST
+from softstart.quantities import nearest, show
 
 FREE: Final = (
     "motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque",
-    "torque_lag", "computing_delay", "speed_filter",
+    "torque_lag", "computing_delay", *FRICTIONS, "speed_filter",
 )  # fmt: skip
 HORIZONS: Final = (0.07, 0.13, 0.27, 0.5, 1.0)  # of each log, in which the search follows it step by step
 FACTOR: Final = 4.0  # how far from the guess searches begin; they may go 3 times as far
@@ -41,29 +45,81 @@ SETTLED: Final = 5e-4  # in logarithms
 # beforehand a torque error of 2.5 % of the largest torque, within a factor of 3: a log that cannot tell how
 # large it is (coarse encoder, few samples) must not conclude that there is none
 RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
+MOST_STEPS, HALVINGS = 20, 7  # towards an end of an interval
+ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
+LONGEST_STEP: Final = 0.7  # of a number of x, towards it
+CLOSE: Final = 0.04  # how far the root of the squares may be off there
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
+WIDEST_FRICTION: Final = 1.0  # units of a friction, see `Space.of`; its interval is wider if it is unknown
+MOST_FRICTION: Final = 3.0  # units; as far as a search goes
+
 
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Space:
-    """The unknowns as a vector x: logarithms of what is above 0, positions in the gap, offsets of angles.
+    """The unknowns x: logarithms, frictions over their units, positions in the gap, offsets of angles.
 
     First come the parameters that all logs share, then for each log its position (where that is free) and its
-    offset (where it holds angles).
+    offset (where it holds angles). Frictions may be 0, and a motion depends on them linearly: they have no
+    logarithms.
     """
 
     shared: tuple[str, ...]
     positions: tuple[bool, ...]
     offsets: tuple[bool, ...]
-    signs: tuple[float, ...]  # of the shared ones
+    units: tuple[float, ...]  # of the shared ones: sign of a logarithm, value of a friction at x = 1
+
+    @classmethod
+    def of(
+        cls, shared: Sequence[str], drive: Drive, positions: Sequence[bool], offsets: Sequence[bool]
+    ) -> Space:
+        """The space of these parameters of a drive.
+
+        The unit of a friction is the one that takes a tenth of the torque that accelerates, at the target
+        speed if it is viscous.
+
+        >>> crane = Drive.load("crane-4amtkf").replace(motor_friction=1.5)
+        >>> space = Space.of(["gap", "motor_friction"], crane, [True], [False])
+        >>> space.values(np.array([*space.point(crane), 0.2]), 0)["motor_friction"]
+        1.5
+        """
+        torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
+        of_speed = torque / float(drive.target_speed)
+        units = {"motor_friction": torque} | dict.fromkeys(FRICTIONS[1:], of_speed)
+        sign = {name: math.copysign(1.0, float(getattr(drive, name, 1.0))) for name in shared}
+        return cls(
+            tuple(shared), tuple(positions), tuple(offsets), tuple(units.get(n, sign[n]) for n in shared)
+        )
+
+    def point(self, drive: Drive) -> list[float]:
+        """The shared part of x at the parameters of a drive, none of which with a logarithm is 0."""
+        scaled = [
+            (name, float(getattr(drive, name)) / unit)
+            for name, unit in zip(self.shared, self.units, strict=True)
+        ]
+        return [value if name in FRICTIONS else math.log(value) for name, value in scaled]
+
+    def narrow(self, i: int, lower: float, upper: float) -> bool:
+        """Whether an interval of x_i, of a shared parameter, tells what it is: within a factor of 3."""
+        return upper - lower < (WIDEST_FRICTION if self.shared[i] in FRICTIONS else math.log(WIDEST))
+
+    def value(self, i: int, x: float) -> float:
+        """The value of the shared parameter i at this x_i."""
+        return self.units[i] * (x if self.shared[i] in FRICTIONS else math.exp(x))
 
     @property
     def names(self) -> tuple[str, ...]:
         """What each number of x stands for."""
         own = [f"{POSITION} {i}" for i, free in enumerate(self.positions, 1) if free]
         return (*self.shared, *own, *(f"offset {i}" for i, free in enumerate(self.offsets, 1) if free))
+
+    @property
+    def weak(self) -> Vector:
+        """1/variance of each number of x beforehand: e^3, 3 units of a friction, 1/2 of a position."""
+        shared, places = len(self.shared), sum(self.positions)
+        return np.array([1.0 / 9.0] * shared + [4.0] * places + [0.0] * sum(self.offsets)) + 1e-12
 
     def place(self, log: int) -> tuple[int | None, int | None]:
         """Where in x the position and the offset of a log stand."""
@@ -75,12 +131,45 @@ class Space:
 
     def values(self, x: Vector, log: int) -> dict[str, float]:
         """The parameters of the model of one log."""
-        found = {
-            name: sign * math.exp(value)
-            for name, sign, value in zip(self.shared, self.signs, x.tolist(), strict=False)
-        }
+        found = {name: self.value(i, float(x[i])) for i, name in enumerate(self.shared)}
         position, _ = self.place(log)
         return found if position is None else found | {POSITION: float(x[position])}
+
+
+def usual(drive: Drive, *, lag: bool) -> list[str]:
+    """What is found where nothing is said: what the drive has, and the lag of its torque if that shows.
+
+    >>> usual(Drive.load("crane-4amtkf").replace(motor_friction=1.5), lag=True)[-2:]
+    ['load_torque', 'motor_friction']
+    """
+    others = ("gap", "load_torque", *(["torque_lag"] if lag else []), *FRICTIONS)
+    missing = {name for name in others if float(getattr(drive, name)) == 0.0}
+    names = (*FREE[:5], *others[1:])
+    return [name for name in names if name not in missing]
+
+
+def chosen(
+    free: Iterable[str] | None, usual: Sequence[str], possible: Sequence[str], where: str
+) -> list[str]:
+    """The parameters to find: those named, or with a plus before a name the usual ones and that one.
+
+    Names of the drive file stand for those of Python. `where` says what cannot tell any other parameter.
+
+    >>> chosen(["+motor.friction"], ["gap", "stiffness"], FREE, "logs")
+    ['gap', 'stiffness', 'motor_friction']
+    """
+    if free is None:
+        return list(usual)
+    asked, paths = list(free), {one.path: name for name, one in PARAMETERS.items()}
+    found = list(usual) if any(name.startswith("+") for name in asked) else []
+    for given in asked:
+        name = paths.get(given.removeprefix("+"), given.removeprefix("+"))
+        if name not in possible:
+            near = nearest(name, possible)
+            hint = f"did you mean {near}?" if near else f"those are {', '.join(possible)}."
+            raise InputError(f"free = {show(given)}: it is no parameter that {where} can tell; {hint}")
+        found.append(name)
+    return list(dict.fromkeys(found))
 
 
 class Part(NamedTuple):
@@ -403,62 +492,105 @@ class Fitter:
             pulled = one.rotation.T @ ((one.rotation @ part.residual) / size)
             model.error = -(errors.ripple**2) * (one.response.T @ pulled)
 
-    def fit(
-        self, x: Vector, errors: Errors, lower: Vector, upper: Vector, fixed: tuple[int, float] | None = None
-    ) -> Vector:
-        """The weighted least squares from x; `fixed` is a number of x and the value that it keeps."""
-        free = np.arange(x.size) if fixed is None else np.delete(np.arange(x.size), fixed[0])
-        whole = x.copy()
-        if fixed is not None:
-            whole[fixed[0]] = fixed[1]
-
-        def full(part: Vector) -> Vector:
-            point = whole.copy()
-            point[free] = part
-            return point
-
+    def fit(self, x: Vector, errors: Errors, lower: Vector, upper: Vector) -> Vector:
+        """The weighted least squares from x."""
         found = least_squares(
-            lambda part: self.whitened(full(part), errors, False).residual,
-            np.clip(whole, lower + 1e-12, upper - 1e-12)[free],
-            jac=lambda part: self.whitened(full(part), errors).jacobian[:, free],
-            bounds=(lower[free], upper[free]),
+            lambda point: self.whitened(point, errors, False).residual,
+            np.clip(x, lower + 1e-12, upper - 1e-12),
+            jac=lambda point: self.whitened(point, errors).jacobian,
+            bounds=(lower, upper),
             x_scale="jac",
             max_nfev=30,
             xtol=1e-9,
         )
-        return full(np.asarray(found.x, dtype=np.float64))
+        return np.asarray(found.x, dtype=np.float64)
 
-    def profiled(self, solution: Solution, i: int, step: float, quantile: float) -> float:
-        """Where x_i lies when the weighted squares, all else fitted anew, are larger by quantile^2.
+    def end(self, solution: Solution, i: int, sign: float, half: float) -> float:
+        """The end of the interval of x_i above (sign 1) or below; `half` is half the quadratic one.
 
-        The search begins with `step` from the solution, and ends at the bound if the squares never get there.
+        The largest x_i whose weighted squares are larger by at most the square of Student's quantile. All
+        other numbers move along, until J' r = lambda e_i. Each step solves this for linear residuals, so it
+        follows a bent valley, along which a fit at fixed x_i creeps (D. J. Venzon, S. H. Moolgavkar, Appl.
+        Statist. 37 (1988) 87-94). The first step ends where a quadratic has its interval; where the squares
+        are right there, that is the end. So is a bound that they do not exclude.
+
+        A fit that went far along a valley has explained errors as motion: the deviations are found anew from
+        what is left at the end, and hold for both places. The response to the torque error is that of the
+        solution; were it to follow, squares could only be smaller, so no end lies nearer than the quadratic.
         """
-        middle = float(solution.x[i])
-        bound = float((solution.upper if step > 0.0 else solution.lower)[i])
-        reach = abs(bound - middle)
-        size, sign, point = min(abs(step), reach), math.copysign(1.0, step), solution.x
-        if reach < 1e-9:
-            return bound
-        below, above = (0.0, 0.0), (math.inf, math.inf)
-        for _ in range(6):
-            fixed = i, middle + sign * size
-            point = self.fit(point, solution.errors, solution.lower, solution.upper, fixed)
-            residual = self.whitened(point, solution.errors, False).residual
-            root = math.sqrt(max(float(residual @ residual) - solution.least, 0.0))
-            if abs(root - quantile) < 0.05 * quantile:
+        bound = float((solution.upper if sign > 0.0 else solution.lower)[i])
+        middle, errors, least = float(solution.x[i]), solution.errors, solution.least
+        quantile = quantile_of(solution.freedom[i])
+        end, x, straight = self._traced(solution, i, sign, solution.x, errors, least, quantile)
+        for _ in range(0 if straight else ROUNDS_OF_ENDS):
+            errors, freedom = self.deviations(self.parts(x), errors)
+            residual, jacobian = self.whitened(solution.x, errors)
+            pull = jacobian.T @ residual
+            least = float(residual @ residual - pull @ covariance_of(jacobian, self.space) @ pull)
+            quantile, last = quantile_of(freedom[i]), end
+            end, x, _ = self._traced(solution, i, sign, x, errors, least, quantile)
+            if abs(end - last) < CLOSE * abs(end - middle):
                 break
-            if root < quantile and size >= reach:
-                return bound
-            if root < quantile:
-                below = max(below, (size, root))
+        return sign * min(sign * bound, max(sign * end, sign * middle + half))
+
+    def _traced(
+        self,
+        solution: Solution,
+        i: int,
+        sign: float,
+        x: Vector,
+        errors: Errors,
+        least: float,
+        quantile: float,
+    ) -> tuple[float, Vector, bool]:
+        """The end for these deviations, from x; where that is in x; whether one step sufficed."""
+        part = self.whitened(x, errors)
+        middle, bound = float(solution.x[i]), float((solution.upper if sign > 0.0 else solution.lower)[i])
+        best, straight = middle, False
+
+        def ratio_of(residual: Vector) -> float:
+            return math.sqrt(max(float(residual @ residual) - least, 0.0)) / quantile
+
+        over = max(ratio_of(part.residual) - 1.0, 0.0)
+        for number in range(MOST_STEPS):
+            step = self._outward(x, part, solution, i, sign, least + quantile**2)
+            length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
+            for cut in 0.5 ** np.arange(HALVINGS):
+                point = np.clip(x + cut * length * step, solution.lower, solution.upper)
+                ratio = ratio_of(self.whitened(point, errors, False).residual)
+                if ratio <= 1.0 + max(0.1, 0.5 * over) and (
+                    ratio < 1.0 + over or sign * float(point[i] - x[i]) > 0.0
+                ):
+                    break
             else:
-                above = min(above, (size, root))
-            if math.isinf(above[0]):
-                size = min(reach, size * min(3.0, quantile / max(root, quantile / 3.0)))
-            else:
-                share = (quantile - below[1]) / (above[1] - below[1])
-                size = below[0] + (above[0] - below[0]) * min(max(share, 0.1), 0.9)
-        return middle + sign * size
+                break
+            moved, x, over = abs(float(point[i] - x[i])), point, max(ratio - 1.0, 0.0)
+            best = sign * max(sign * best, sign * (middle + float(x[i] - middle) / max(ratio, 1.0)))
+            straight = number == 0 and cut * length == 1.0 and abs(ratio - 1.0) < CLOSE
+            if over < CLOSE and (straight or x[i] == bound or moved < 0.5 * CLOSE * abs(best - middle)):
+                break
+            part = self.whitened(x, errors)
+        return best, x, straight
+
+    def _outward(self, x: Vector, part: Part, solution: Solution, i: int, sign: float, most: float) -> Vector:
+        """The step to the end of x_i, were residuals linear; numbers at bounds stay there."""
+        residual, jacobian = part
+        step, free = np.zeros(x.size), np.ones(x.size, dtype=bool)
+        for _ in range(x.size + 1):
+            rest, columns = residual + jacobian[:, ~free] @ step[~free], jacobian[:, free]
+            spread = np.linalg.inv(columns.T @ columns + np.diag(self.space.weak[free]))
+            pull = columns.T @ rest
+            step[free] = -spread @ pull
+            if free[i]:
+                along = spread[:, int(free[:i].sum())]
+                left = most - float(rest @ rest - pull @ spread @ pull)
+                step[free] += sign * math.sqrt(max(left, 0.0) / float(along[int(free[:i].sum())])) * along
+            outside = free & ((x + step < solution.lower) | (x + step > solution.upper))
+            if not outside.any():
+                break
+            step[outside] = (np.clip(x + step, solution.lower, solution.upper) - x)[outside]
+            free &= ~outside
+        return step
 
     def innovations(self, x: Vector, errors: Errors) -> list[Vector]:
         """What is left of each log, sample by sample, made independent and of unit size."""
@@ -470,9 +602,16 @@ class Fitter:
         return left
 
 
+def quantile_of(freedom: float) -> float:
+    """Student's quantile of an interval, for a variance with these degrees of freedom.
+
+    >>> round(quantile_of(1e9), 4)
+    1.96
+    """
+    return float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+
+
 def covariance_of(jacobian: Matrix, space: Space) -> Matrix:
-    """Covariance of x; what the logs do not tell has a spread of e^3 beforehand, positions of 1/2."""
-    before = np.array([1.0 / 9.0 if i < len(space.shared) else 4.0 for i in range(jacobian.shape[1])])
-    before[len(space.shared) + sum(space.positions) :] = 0.0
-    found = np.linalg.inv(jacobian.T @ jacobian + np.diag(before + 1e-12))
+    """Covariance of x; what the logs do not tell is as uncertain as it was beforehand, see `Space.weak`."""
+    found = np.linalg.inv(jacobian.T @ jacobian + np.diag(space.weak))
     return np.asarray(found, dtype=np.float64)

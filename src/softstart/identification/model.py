@@ -101,9 +101,10 @@ class LogModel:
         """What would have been logged under each set of values: a row for each."""
         rows = self.plants(values)
         out = np.empty((len(values), self.times.size))
+        delays = [row.get(DEAD_TIME, self.dead_time) for row in values]
+        numbers = {delay: self.numbers(delay) for delay in set(delays)}
         for i, row in enumerate(values):
-            numbers = self.numbers(row.get(DEAD_TIME, self.dead_time))
-            out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers, row.get(FILTER, 0.0))
+            out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers[delays[i]], row.get(FILTER, 0.0))
         return out
 
     def torque_responses(self, values: Mapping[str, float]) -> Matrix:

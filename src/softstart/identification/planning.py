@@ -14,12 +14,12 @@ from scipy.stats import norm
 
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.drive import Drive
+from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import FREE, Fitter, Space, covariance_of
+from softstart.identification.fitting import Fitter, Space, chosen, covariance_of, usual
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
-from softstart.identification.result import CONFIDENCE, WIDEST
+from softstart.identification.result import CONFIDENCE
 from softstart.late import late
 from softstart.plant import record
 from softstart.profile import TorqueProfile
@@ -351,21 +351,12 @@ def _at_rest(drive: Drive) -> Drive:
 
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:
-    names = (
-        *FREE[:5],
-        *(["load_torque"] if float(drive.load_torque) else []),
-        *(["torque_lag"] if float(drive.torque_lag) else []),
-    )
-    if free is None:
-        return tuple(name for name in names if float(getattr(drive, name)) != 0.0)
-    for name in free:
-        if name not in names:
-            near = nearest(name, names)
-            hint = f"did you mean {near}?" if near else f"those are {', '.join(names)}."
-            raise InputError(f"free = {show(name)}: it is no parameter that this log could tell; {hint}")
-        if float(getattr(drive, name)) == 0.0:
-            raise InputError(f"free = {show(name)}: it is 0 in the drive; give a guess of it.")
-    return tuple(free)
+    names = usual(drive, lag=True)
+    asked = chosen(free, names, list(dict.fromkeys([*names, *FRICTIONS])), "this log")
+    missing = [name for name in asked if float(getattr(drive, name)) == 0.0]
+    if free is not None and missing:
+        raise InputError(f"free = {show(missing[0])}: it is 0 in the drive; give a guess of it.")
+    return tuple(name for name in asked if name not in missing)
 
 
 def _level(drive: Drive) -> float:
@@ -430,14 +421,9 @@ class _Bench:
         time = np.arange(0.0, end + 0.5 * period, period)
         model = LogModel(_demand(time, profile.at(time), self.signal), self.base)
         model.block = max(model.block, math.ceil(time.size / blocks))
-        space = Space(
-            self.free,
-            (self.moving,),
-            (self.signal == "angle",),
-            tuple(math.copysign(1.0, float(getattr(self.drive, one))) for one in self.free),
-        )
+        space = Space.of(self.free, self.drive, [self.moving], [self.signal == "angle"])
         x = np.array(
-            [math.log(abs(float(getattr(self.drive, one)))) for one in self.free]
+            space.point(self.drive)
             + ([-0.6] if self.moving else [])
             + ([0.0] if self.signal == "angle" else [])
         )
@@ -449,9 +435,15 @@ class _Bench:
         # a longer period stands for samples left out: the same error of the torque in each of them
         ripple = self.ripple * math.sqrt(self.period / period)
         sizes = np.sqrt(np.diag(covariance_of(fitter.foreseen(x, ripple), space)))[: len(self.free)]
-        widths = np.sinh(np.minimum(self.quantile * sizes, 50.0))
+        half = np.minimum(self.quantile * sizes, 50.0)
+        widths = np.array(
+            [
+                one / x[i] if name in FRICTIONS else math.sinh(one)
+                for i, (name, one) in enumerate(zip(self.free, half.tolist(), strict=True))
+            ]
+        )
         if not rough:  # a design needs their slope
-            widths[2.0 * self.quantile * sizes > math.log(WIDEST)] = math.inf
+            widths[[not space.narrow(i, -one, one) for i, one in enumerate(half.tolist())]] = math.inf
         peaks, travels = self.loads = self.load(profile, end, rough)
         told = dict(zip(self.free, widths.tolist(), strict=True))
         return Experiment(name, profile, end, told, float(peaks.max()), float(travels.max()), self.wanted)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Matrix, Vector, plain_fields
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.identification.logs import Log
 from softstart.input.files import read_text, write_whole
@@ -43,7 +43,8 @@ class Estimate:
     value, lower, upper : float
         In SI. What is unknown has the value at which the search ended.
     known : bool
-        False if the interval is wider than a factor of 3.
+        False if the interval is wider than a factor of 3; of a friction, than a tenth of the torque that
+        accelerates.
     by_profile : bool
         Whether the interval is where the fit gets worse, with all other parameters fitted anew, because its
         quadratic would mislead.
@@ -70,18 +71,24 @@ class Estimate:
 
     @property
     def half_width(self) -> float:
-        """Half the interval over the value, as a share."""
+        """Half the interval over the value, as a share; infinite if the value is 0."""
         return 0.5 * (self.upper - self.lower) / abs(self.value) if self.value else math.inf
 
     def moved(self, shares: ArrayLike) -> Vector:
         """Values so many half intervals away: 1 is the end further from 0, -1 the other end, by logarithms.
 
-        None is more than a factor of 3 off: what is unknown is left that far.
+        None is more than a factor of 3 off: what is unknown is left that far. Frictions, which may be 0, move
+        in proportion, from 0 to two half intervals above the value.
 
         >>> Estimate("gap", 0.08, 0.076, 0.085, known=True).moved([-1.0, 0.0, 1.0]).round(4).tolist()
         [0.076, 0.08, 0.085]
+        >>> Estimate("motor_friction", 0.2, 0.0, 0.5, known=True).moved([-2.0, 0.0, 1.0]).tolist()
+        [0.0, 0.2, 0.5]
         """
         given = np.asarray(shares, dtype=np.float64)
+        if self.name in FRICTIONS:
+            sides = np.where(given > 0.0, self.upper - self.value, self.value - self.lower)
+            return np.asarray(np.maximum(self.value + sides * np.minimum(given, 2.0), 0.0))
         near, far = sorted((abs(self.lower), abs(self.upper)))
         size = abs(self.value)
         steps = np.where(given > 0.0, math.log(far / size), math.log(size / near)) * given
@@ -103,7 +110,7 @@ class Identification:
     estimates : tuple of Estimate
         One for each parameter that was free, then the position of each log.
     correlations : array of shape (k, k)
-        Of the logarithms of the estimates (of the positions themselves).
+        Of the logarithms of the estimates (of positions and frictions themselves).
     ripple : float
         Standard deviation of the torque error in each sample, N m.
     searches, agreed : int
@@ -257,7 +264,11 @@ class Identification:
         return {
             "drive": self.drive.given() | {"name": self.drive.name},
             "estimates": [
-                {**plain_fields(one), "half_width_percent": 100.0 * one.half_width} for one in self.estimates
+                {
+                    **plain_fields(one),
+                    "half_width_percent": 100.0 * one.half_width if one.value else None,
+                }
+                for one in self.estimates
             ],
             "correlations": self.correlations.tolist(),
             "ripple": self.ripple,
@@ -291,7 +302,7 @@ def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
             raise RefusedError(
                 f"{one.name}: its value {one.value} does not lie in {one.lower} to {one.upper}"
             )
-        if one.name in PARAMETERS and one.lower * one.upper <= 0.0:
+        if one.name in PARAMETERS and one.name not in FRICTIONS and one.lower * one.upper <= 0.0:
             raise RefusedError(f"{one.name}: its interval {one.lower} to {one.upper} has 0 in it")
     size = len(estimates)
     if correlations.shape != (size, size) or not np.allclose(correlations, correlations.T, atol=1e-9):

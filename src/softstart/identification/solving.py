@@ -10,22 +10,33 @@ from typing import Any, Final
 
 import numpy as np
 from scipy.stats import chi2
-from scipy.stats import t as student
 
 from softstart.arrays import Matrix, Vector
 from softstart.chain.model import Chain, load_machine
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, listed
 from softstart.identification.chains import reduced_drive, reduction_note
-from softstart.identification.fitting import FACTOR, FREE, Fitter, Solution, Space, Tell, covariance_of
+from softstart.identification.fitting import (
+    FACTOR,
+    FREE,
+    MOST_FRICTION,
+    STEP,
+    Fitter,
+    Solution,
+    Space,
+    Tell,
+    chosen,
+    covariance_of,
+    quantile_of,
+    usual,
+)  # fmt: skip
 from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.planning import plan_experiments
-from softstart.identification.result import CONFIDENCE, WIDEST, Estimate, Identification
-from softstart.plant import record
-from softstart.quantities import nearest, show
+from softstart.identification.result import Estimate, Identification
+from softstart.quantities import show
 
-CURVED: Final = 0.05  # half an interval in logarithms beyond which its ends are looked for
+CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
 SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
@@ -121,12 +132,7 @@ def identify(
     for one in read:
         _check_inertia(one, drive)
     base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
-    space = Space(
-        asked,
-        tuple(moving for _ in read),
-        tuple(one.kind == "angle" for one in read),
-        tuple(-1.0 if float(getattr(drive, name, 1.0)) < 0.0 else 1.0 for name in asked),
-    )
+    space = Space.of(asked, drive, [moving for _ in read], [one.kind == "angle" for one in read])
     fitter = Fitter([LogModel(one, base) for one in read], space, tell)
     guess, lower, upper = _bounds(space, drive, read)
     found = fitter.search(guess, lower, upper, searches, seed)
@@ -188,18 +194,10 @@ def _standing(drive: Drive) -> Drive:
 def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[tuple[str, ...], bool]:
     """The parameters to find, and whether the position of each log is among them."""
     demand = any(one.torque_is == "demand" for one in logs)
-    if free is None:
-        names = [name for name in FREE[:5] if name != "gap" or float(drive.gap) > 0.0]
-        names += ["load_torque"] if float(drive.load_torque) else []
-        names += ["torque_lag"] if demand and float(drive.torque_lag) > 0.0 else []
-        moving = drive.start_position == "unknown" or drive.load_kind == "reactive"
-        return tuple(names), moving and float(drive.gap) > 0.0
-    asked = list(dict.fromkeys(free))
-    for name in asked:
-        if name not in (*FREE, POSITION):
-            near = nearest(name, (*FREE, POSITION))
-            hint = f"did you mean {near}?" if near else f"those are {', '.join((*FREE, POSITION))}."
-            raise InputError(f"free = {show(name)}: it is no parameter that logs can tell; {hint}")
+    moving = (drive.start_position == "unknown" or drive.load_kind == "reactive") and float(drive.gap) > 0.0
+    names = usual(drive, lag=demand)
+    asked = chosen(free, [*names, *([POSITION] if moving else [])], (*FREE, POSITION), "logs")
+    for name in asked if free is not None else ():
         if name == FILTER and any(one.kind == "angle" for one in logs):
             raise InputError(f"free = {show(name)}: an angle has no filter of the speed; leave it out.")
         if name in FREE[6:8] and not demand:
@@ -212,8 +210,8 @@ def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tupl
             raise InputError(f"free = {show(name)}: the guess is 0; give one that has the right sign.")
     if asked in ([], [POSITION]):
         raise InputError("free: there is nothing to find; name parameters, as gap and stiffness.")
-    names = [name for name in FREE if name in asked]  # the filter, which is not the drive's, last
-    return tuple(names), POSITION in asked
+    # the filter, which is not the drive's, last
+    return tuple(name for name in FREE if name in asked), POSITION in asked
 
 
 def _check_inertia(log: Log, drive: Drive) -> None:
@@ -238,9 +236,14 @@ def _check_inertia(log: Log, drive: Drive) -> None:
 def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Vector, Vector]:
     """Where the search begins, and how far it may go."""
     typical = float(np.median(np.diff(logs[0].time)))
-    guess, lower, upper = [], [], []
-    for name in space.shared:
+    guess: list[float] = []
+    lower: list[float] = []
+    upper: list[float] = []
+    for name, unit in zip(space.shared, space.units, strict=True):
         value = abs(float(getattr(drive, name, 0.0)))
+        if name in FRICTIONS:
+            guess, lower, upper = [*guess, value / unit], [*lower, 0.0], [*upper, MOST_FRICTION]
+            continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
             reduced = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
             value = 0.04 * math.sqrt(float(drive.c * reduced))
@@ -262,24 +265,22 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
 
 
 def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[Estimate]:
-    """Values and intervals: quadratic where they are narrow, else where the fit gets worse."""
+    """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
     space, found = fitter.space, []
     for i, name in enumerate(space.names):
         if name.startswith("offset"):
             continue
         position = i >= len(space.shared)
-        quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, solution.freedom[i]))
-        middle, half = float(solution.x[i]), quantile * math.sqrt(float(covariance[i, i]))
-        ends = [middle - half, middle + half]
-        wide = half > (0.1 if position else CURVED)
-        if wide or ends[0] < solution.lower[i] or ends[1] > solution.upper[i]:
-            fitter.tell(f"interval of {name}")
-            ends = [fitter.profiled(solution, i, step, quantile) for step in (-half, half)]
-        known = ends[1] - ends[0] < (1.0 if position else math.log(WIDEST))
+        middle = float(solution.x[i])
+        half = quantile_of(solution.freedom[i]) * math.sqrt(float(covariance[i, i]))
+        fitter.tell(f"interval of {name}")
+        ends = [fitter.end(solution, i, sign, half) for sign in (-1.0, 1.0)]
+        bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
+        known = ends[1] - ends[0] < 1.0 if position else space.narrow(i, *ends)
         reason = "" if known else _why(i, covariance, space)
         if not position:
-            middle, *ends = (space.signs[i] * math.exp(one) for one in (middle, *ends))
-        found.append(Estimate(name, middle, min(ends), max(ends), known, wide, reason))
+            middle, *ends = (space.value(i, one) for one in (middle, *ends))
+        found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
     return found
 
 
@@ -301,6 +302,7 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
     if not unknown:
         return []
     names = [one.name for one in unknown]
+    drive = drive.replace(**{one.name: 0.5 * one.upper for one in unknown if one.value == 0.0})
     reasons: dict[str, list[str]] = {}
     for one in unknown:
         reasons.setdefault(one.reason, []).append(one.name)
@@ -336,20 +338,24 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
     """What the logs show that the model has not, each tried as a torque of its own shape."""
     notes = []
     errors, part = solution.errors, solution.part
+    drive = fitter.models[0].guess
+    extra = [name for name in FRICTIONS if name not in fitter.space.shared]
+    had = {name: float(getattr(drive, name)) for name in extra}
+    steps = {
+        name: STEP * unit for name, unit in zip(extra, Space.of(extra, drive, (), ()).units, strict=True)
+    }
     columns: dict[str, list[Vector]] = {}
     for i, (model, weights) in enumerate(zip(fitter.models, errors.weights, strict=True)):
-        values = fitter.space.values(solution.x, i)
-        response = model.torque_responses(values)[fitter.counts[i]] * math.sqrt(model.block)
-        speed = model.states(values)[:, record.W1_OUT]
-        still = np.abs(speed) < 1e-3 * float(np.max(np.abs(speed)))
+        values = fitter.space.values(solution.x, i) | had
+        signals = model.signals([values, *(values | {name: had[name] + steps[name]} for name in extra)])
+        shapes = {
+            name: (signal - signals[0]) / steps[name] for name, signal in zip(extra, signals[1:], strict=True)
+        }
+        response = model.torque_responses(values)
+        shapes["offset"] = math.sqrt(model.block) * response.sum(axis=1)
         size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
-        for name, shape in (
-            ("friction of the motor", np.where(still, 0.0, -np.sign(speed))),
-            ("viscous friction of the motor", -speed),
-            ("an offset of the torque signal", np.ones(speed.size)),
-        ):
-            means = np.add.reduceat(shape, np.arange(0, shape.size, model.block)) / model.block
-            columns.setdefault(name, []).append((weights.rotation @ (response @ means)) / size)
+        for name, shape in shapes.items():
+            columns.setdefault(name, []).append((weights.rotation @ shape[fitter.counts[i]]) / size)
     best = ("", 0.0, 0.0)
     for name, parts in columns.items():
         column = np.concatenate(parts)
@@ -358,15 +364,22 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         if strength < 1e-6 * float(column @ column):
             continue
         amount, error = -float(alone @ part.residual) / strength, 1.0 / math.sqrt(strength)
-        if "friction" in name and amount < 0.0:
+        if amount < -had.get(name, math.inf):
             continue  # it would drive
         if abs(amount) > SURE * error and abs(amount) / error > abs(best[1]) / max(best[2], 1e-300):
             best = (name, amount, error)
-    if best[0]:
-        unit = "N m s/rad" if "viscous" in best[0] else "N m"
+    name, amount, error = best
+    if name in FRICTIONS:
+        one = PARAMETERS[name]
         notes.append(
-            f"The logs show {best[0]} of {best[1]:.3g} +- {2.0 * best[2]:.2g} {unit}, which the model "
-            "has not: gap and load torque may be off by more than their intervals."
+            f"The logs show {one.meaning} of {had[name] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
+            f"the drive has {had[name]:.3g}: gap and load torque may be off by more than their intervals. "
+            f"Remedy: find it too, --free +{one.path}."
+        )
+    elif name:
+        notes.append(
+            f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
+            "the model has not: gap and load torque may be off by more than their intervals."
         )
     usual, ripple = max(fitter.largest_torque, 0.5 * float(fitter.models[0].guess.Ms)), errors.ripple
     if ripple > LARGE_RIPPLE * usual:

@@ -48,7 +48,8 @@ def estimates_table(found: Identification) -> Table:
         "guess": [_guess(found, one) for one in rows],
         "found": [_digits(one.value, one) if one.known else "unknown" for one in rows],
         "+- %": [
-            number(100.0 * one.half_width, 2) if one.known and _shared(one) else NOTHING for one in rows
+            number(100.0 * one.half_width, 2) if one.known and one.value and _shared(one) else NOTHING
+            for one in rows
         ],
         "from": [_digits(one.lower, one) for one in rows],
         "to": [_digits(one.upper, one) for one in rows],
