@@ -80,7 +80,7 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 @click.option(
     "--free",
     metavar="NAME,...",
-    help="What to find, as gap,stiffness,position. By default all that is usual.",
+    help="What to find, as gap,stiffness,position. By default all that is usual; +motor.friction adds one.",
 )
 @click.option("--searches", metavar="N", help="At most so many searches for the best fit; 12 by default.")
 @click.option(

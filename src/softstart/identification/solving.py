@@ -75,8 +75,9 @@ def identify(
         dominant gap the two masses that stand for it are found, and the error of that is predicted. The
         position in the gap is free for each log where the load is reactive or the drive says "unknown".
     free : iterable of str, optional
-        What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping and
-        load torque, and with a torque demand the lag.
+        What to find: names of parameters, and "position". By default inertias, stiffness, gap, damping, load
+        torque, with a torque demand the lag, and each friction that the guess has; a name after a plus, as
+        "+motor_friction", is found beside these.
     torque_is : {"measured", "demand"}
         What the torque of files is, see `Log`.
     columns : dict, optional
