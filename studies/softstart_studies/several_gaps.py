@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from softstart import Drive, optimize, simulate
 from softstart.chain import Chain, reduce_chain
@@ -17,9 +17,6 @@ from softstart.controller import ready_controller_names
 from softstart.optimal.result import InfeasibleError, NotConverged, Optimum, OptimumError
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.views.drawing import COLOURS, GREY, MARKERS, drawing, head, new_figure
-
-if TYPE_CHECKING:
-    pass
 
 RATIO = 0.02  # of each shaft
 ALIKE = 0.02  # by which the searches may differ

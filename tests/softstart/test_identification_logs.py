@@ -146,7 +146,8 @@ def test_a_unit_in_columns_takes_the_place_of_that_of_the_file(log: Log, tmp_pat
 
 def measurement(path: Path, *channels: tuple[str, str, Vector, Vector]) -> Path:
     """An MDF4 file, written by asammdf: name, unit, instants and values of each channel."""
-    asammdf = pytest.importorskip("asammdf")
+    import asammdf
+
     with asammdf.MDF(version="4.10") as made:
         for name, unit, time, values in channels:
             made.append([asammdf.Signal(values, time, unit=unit, name=name, encoding="utf-8")])
@@ -219,7 +220,6 @@ def test_instants_that_differ_by_rounding_are_one(tmp_path: Path) -> None:
 
 
 def test_what_is_no_measurement_file_is_refused(tmp_path: Path) -> None:
-    pytest.importorskip("asammdf")
     broken = tmp_path / "a.mf4"
     broken.write_bytes(b"no measurement")
     with pytest.raises(InputError, match="cannot be read as an MDF file"):
