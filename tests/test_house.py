@@ -49,8 +49,8 @@ BUDGET = {
     # 350 and a file: wear of the gap over the years
     # 135 and a file: chains through their reduction
     # 150: torques designed by CasADi, and one that leaves the load at rest
-    # 160: friction, which may be 0; ends of intervals along bent valleys
-    "identification": (3190, 9, 3, 0),  # 20: units of another scale
+    # 170: friction, which may be 0; ends of intervals along bent valleys
+    "identification": (3200, 9, 3, 0),  # 20: units of another scale
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

@@ -7,9 +7,10 @@
 
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
-every parameter). `--drive friction` has friction of motor and load, which is found too. `search` fits one log
-from 200 such guesses. `plan` compares the planned experiment of random drives with the standard ones. What
-the file has already is not computed again.
+every parameter). `--drive friction` has friction of motor and load, which is found too; `--experiment
+"reversed three times"` is twice as long as the standard reversal. `search` fits one log from 200 such
+guesses. `plan` compares the planned experiment of random drives with the standard ones. What the file has
+already is not computed again.
 """
 
 from __future__ import annotations
@@ -28,7 +29,16 @@ from softstart import Drive, Identification, identify, plan_experiments, simulat
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS
 from softstart.errors import InputError
-from softstart.identification.planning import made_up_log
+from softstart.identification.fitting import usual
+from softstart.identification.planning import (
+    Experiment,
+    _Bench,
+    _edges,
+    _level,
+    _profile,
+    _standard,
+    made_up_log,
+)  # fmt: skip
 
 DRIVE = Drive.load("crane-4amtkf").replace(
     damping=0.3, torque_lag=0.004, load_kind="reactive", gap=0.08, start_position="unknown"
@@ -38,7 +48,7 @@ DRIVES = {"smooth": DRIVE, "friction": FRICTION}
 NAMES = (
     "motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque", "torque_lag",
 )  # fmt: skip
-REVERSE = "two levels, then reverse"
+REVERSE, LONGER = "two levels, then reverse", "reversed three times"
 RIPPLE = 1.0  # N m, 2.5 % of the level of the experiments
 SAME = 0.1  # half widths between two fits that ended at the same minimum
 
@@ -60,6 +70,23 @@ def told(found: Identification) -> dict[str, Any]:
     return {"estimates": estimates, "seconds": found.seconds, "ripple": found.ripple, "agreed": found.agreed}
 
 
+def reversed_three_times(drive: Drive) -> Experiment:
+    """The standard reversal, and two more of the same torque and length."""
+    level = _level(drive)
+    durations, levels = _standard(drive, level)[REVERSE]
+    last = float(levels[-1])
+    profile, end = _profile(np.append(durations, durations[[2, 2]]), np.append(levels, [-last, last]))
+    return Experiment(LONGER, profile, end, {}, math.nan, math.nan)
+
+
+def bounds_of(drive: Drive, one: Experiment, period: float) -> dict[str, float]:
+    """The Cramer-Rao bound of the relative rms error of each parameter, for a torque error that is known."""
+    bench = _Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)), "angle", (), lambda _: None)
+    edges = _edges(one)
+    found = bench.experiment(one.name, np.diff([*edges, one.end]), one.profile.at(edges))
+    return {name: width / bench.quantile for name, width in found.widths.items()}
+
+
 def covered(
     experiment: str, lines: float, period: float, factor: float, number: int, drive: str = "smooth"
 ) -> dict[str, Any]:
@@ -67,8 +94,9 @@ def covered(
     generator = np.random.default_rng([number, round(1e6 * period), round(lines)])
     truth = DRIVES[drive].replace(encoder_lines=lines)
     position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
+    demand = reversed_three_times(truth) if experiment == LONGER else experiment
     log = made_up_log(
-        truth, experiment, log_period=period, ripple=RIPPLE, position=position, phase=phase,
+        truth, demand, log_period=period, ripple=RIPPLE, position=position, phase=phase,
         seed=int(generator.integers(2**31)),
     )  # fmt: skip
     guess = off_by(truth, factor, generator)
@@ -198,6 +226,18 @@ def test_intervals_hold_the_truth() -> None:
     assert np.mean(np.array(every) <= 1.0) >= 0.8
     assert max(every) < 3.0
     assert np.mean(every) > 0.2  # nor are they far too wide
+
+
+def test_what_a_gap_within_1_percent_takes() -> None:
+    """At 1024 lines and 4 ms, where no estimator without bias gets below the bound."""
+    drive = DRIVE.replace(encoder_lines=1024.0)
+    once = plan_experiments(drive, log_period=4e-3, ripple=RIPPLE, optimise=False)[REVERSE]
+    bound = bounds_of(drive, once, 4e-3)
+    assert 0.010 < bound["gap"] < 0.011
+    assert 0.006 < bound["stiffness"] < 0.007
+    longer = bounds_of(drive, reversed_three_times(drive), 4e-3)
+    assert longer["gap"] < 0.009
+    assert longer["stiffness"] < 0.005
 
 
 def main() -> None:

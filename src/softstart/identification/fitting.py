@@ -52,6 +52,7 @@ CLOSE: Final = 0.04  # how far the root of the squares may be off there
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 WIDEST_FRICTION: Final = 1.0  # units of a friction, see `Space.of`; its interval is wider if it is unknown
 MOST_FRICTION: Final = 3.0  # units; as far as a search goes
+LEAST_FRICTION: Final = 1e-8  # units; less is none, which the plant's events could not tell from rounding
 
 
 Tell = Callable[[str], None]
@@ -107,7 +108,9 @@ class Space:
 
     def value(self, i: int, x: float) -> float:
         """The value of the shared parameter i at this x_i."""
-        return self.units[i] * (x if self.shared[i] in FRICTIONS else math.exp(x))
+        if self.shared[i] not in FRICTIONS:
+            return self.units[i] * math.exp(x)
+        return self.units[i] * x if x > LEAST_FRICTION else 0.0
 
     @property
     def names(self) -> tuple[str, ...]:

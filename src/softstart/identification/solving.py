@@ -267,7 +267,7 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
 
 def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
-    space, found = fitter.space, []
+    space, found, lost = fitter.space, [], set[str]()
     for i, name in enumerate(space.names):
         if name.startswith("offset"):
             continue
@@ -277,8 +277,11 @@ def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[E
         fitter.tell(f"interval of {name}")
         ends = [fitter.end(solution, i, sign, half) for sign in (-1.0, 1.0)]
         bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
-        known = ends[1] - ends[0] < 1.0 if position else space.narrow(i, *ends)
+        narrow = ends[1] - ends[0] < 1.0 if position else space.narrow(i, *ends)
+        known = narrow and not (position and "gap" in lost)  # a share of the gap
         reason = "" if known else _why(i, covariance, space)
+        if not known:
+            lost.add(name)
         if not position:
             middle, *ends = (space.value(i, one) for one in (middle, *ends))
         found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
