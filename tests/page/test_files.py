@@ -208,15 +208,23 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     put(page, "guess.toml", guess.to_toml().encode())
     page.get_by_text("is loaded").first.wait_for()
     page.get_by_role("tab", name="Log", exact=True).click()
+    strip = page.locator(".panel-tabs .q-tabs__content")
+    assert strip.evaluate("all => all.scrollWidth <= all.clientWidth")  # no tab is behind an arrow
     upload = page.locator('[data-testid="log-upload"] input[type="file"]')
     upload.set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
     page.get_by_test_id("log-trouble").get_by_text("names neither of angle and speed").wait_for(
         timeout=30_000
     )
+    upload.set_input_files({"name": "y.csv", "mimeType": "text/csv", "buffer": b"1,2\n" * 300_000})
+    page.get_by_test_id("log-trouble").get_by_text("more than 1000 kB; cut the log to the start").wait_for()
     content = (tmp_path / "rig.csv").read_bytes()
     upload.set_input_files({"name": "rig.csv", "mimeType": "text/csv", "buffer": content})
     page.get_by_test_id("log-found").wait_for(timeout=60_000)
-    assert "shaft.gap" in page.get_by_test_id("log-found").inner_text()
+    wide = page.get_by_test_id("log-found").evaluate(
+        "one => [one.scrollWidth, one.parentElement.clientWidth]"
+    )
+    assert wide[0] <= wide[1], wide
+    assert "shaft.gap, rad" in page.get_by_test_id("log-found").inner_text()
     name, saved_drive = saved(page, "log-save")
     assert name == "identified-drive.toml"
     found = Drive.from_toml(saved_drive.decode())

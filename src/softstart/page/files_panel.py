@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
@@ -24,16 +23,16 @@ from softstart.page.panel_parts import (
     jobs_of,
     notify,
     save,
+    upload,
 )
-from softstart.page.sentences import clipped, sentence_of
+from softstart.page.sentences import clipped
 from softstart.page.session import Session
 
 if TYPE_CHECKING:
-    from nicegui.events import UploadEventArguments
-
     from softstart.profile import TorqueProfile
 
 LARGEST = 64 * 1024  # bytes of a drive file
+USUAL = "a drive file has one or two"
 LONGEST_LINE = 2000  # letters; a key of thousands of parts is read for many seconds
 
 
@@ -60,22 +59,7 @@ class DriveFiles:
         self._session = session
         shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box().classes("panel-form"):
-            own = weakref.ref(self)  # the route of an upload outlives its tab, and must not keep its session
-
-            async def uploaded(event: UploadEventArguments) -> None:
-                if (panel := own()) is not None:
-                    await panel._uploaded(event)
-
-            def rejected() -> None:
-                if (panel := own()) is not None:
-                    panel._rejected()
-
-            self._upload = ui.upload(
-                on_upload=uploaded, on_rejected=rejected, max_file_size=LARGEST, auto_upload=True
-            ).classes("panel-upload")
-            self._upload.props('accept=".toml,text/plain" data-testid="drive-upload"')
-            pick = action("Load a file ...", lambda: None, "drive-load", main=True)
-            pick.on("click", js_handler=f"() => getElement({self._upload.id}).pickFiles()")
+            upload("Load a file ...", "drive", ".toml", LARGEST, USUAL, self._uploaded, self._refuse)
             action("Save as TOML", guarded(self._save), "drive-save")
             self._shipped = choice("Shipped drives", shipped, "", "drive-shipped")
             self._shipped.on_value_change(lambda event: self._take(str(event.value or "")))
@@ -86,23 +70,9 @@ class DriveFiles:
             pass
         self._troubles.set_visibility(False)
 
-    async def _uploaded(self, event: UploadEventArguments) -> None:
-        name = event.file.name
-        large = event.file.size() > LARGEST  # the browser refuses that itself; others may ask
-        content = b"" if large else await event.file.read()
-        self._upload.reset()
-        try:
-            if large:
-                raise InputError(TOO_LARGE)
-            self._session.take(drive_of(content, name))
-        except Exception as error:  # a file may hold anything
-            self._refuse(name, error)
-        else:
-            self._taken()
-
-    def _rejected(self) -> None:
-        self._upload.reset()
-        self._refuse("The file", InputError(TOO_LARGE))
+    def _uploaded(self, content: bytes, name: str) -> None:
+        self._session.take(drive_of(content, name))
+        self._taken()
 
     def _take(self, name: str) -> None:
         if name:
@@ -114,19 +84,16 @@ class DriveFiles:
         self._troubles.set_visibility(False)
         notify(f"{clipped(self._session.drive.name)} is loaded.")
 
-    def _refuse(self, name: str, error: Exception) -> None:
+    def _refuse(self, name: str, error: InputError) -> None:
         self._troubles.clear()
         self._troubles.set_visibility(True)
         with self._troubles:
             ui.label(f"{clipped(name)} was not loaded; the drive is unchanged.").classes("trouble-title")
-            for sentence in few(error.sentences if isinstance(error, InputError) else [sentence_of(error)]):
+            for sentence in few(error.sentences):
                 ui.label(sentence).classes("trouble")
 
     def _save(self) -> None:
         save(self._session.drive.to_toml(), drive_file(self._session.drive))
-
-
-TOO_LARGE = f"It has more than {LARGEST // 1024} kB; a drive file has one or two."
 
 
 def drive_of(content: bytes, name: str) -> Drive:

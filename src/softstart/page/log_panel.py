@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Hashable
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
@@ -23,14 +21,13 @@ from softstart.page.panel_parts import (
     notify,
     save,
     table,
+    upload,
 )
-from softstart.page.sentences import clipped, sentence_of
+from softstart.page.sentences import clipped
 from softstart.page.session import Session
 
-if TYPE_CHECKING:
-    from nicegui.events import UploadEventArguments
-
-LARGEST = 1_000_000  # bytes of a log; a request may have little more
+LARGEST = 1000 * 1024  # bytes of a log; a request may have little more
+SHORTER = "cut the log to the start, or use softstart identify"
 
 
 class LogPanel:
@@ -47,58 +44,36 @@ class LogPanel:
         with box().classes("panel-form"):
             kinds = {"demand": "a demand", "measured": "measured"}
             self._torque_is = choice("The torque is", kinds, "demand", "log-torque-is")
-            self._columns = field(
-                "Columns, if they are named otherwise", "", "log-columns", "torque=M, speed=n[rpm]"
+            self._columns = field("Column names, optional", "", "log-columns", "torque=M, speed=n[rpm]")
+            self._pick = upload(
+                "Load a log ...", "log", ".csv,text/csv", LARGEST, SHORTER, self._uploaded, self._refuse
             )
-            own = weakref.ref(self)  # the route of an upload outlives its tab, and must not keep its session
-
-            async def uploaded(event: UploadEventArguments) -> None:
-                if (panel := own()) is not None:
-                    await panel._uploaded(event)
-
-            def rejected() -> None:
-                if (panel := own()) is not None:
-                    panel._view.refuse(InputError(TOO_LARGE))
-
-            self._upload = ui.upload(
-                on_upload=uploaded, on_rejected=rejected, max_file_size=LARGEST, auto_upload=True
-            ).classes("panel-upload")
-            self._upload.props('accept=".csv,text/csv,text/plain" data-testid="log-upload"')
-            self._pick = action("Load a log ...", lambda: None, "log-load", main=True)
-            self._pick.on("click", js_handler=f"() => getElement({self._upload.id}).pickFiles()")
         self._view = JobView(jobs_of(user), user, "log", on_done=self._done, on_state=self._state)
-        with box() as self._result:
-            self._table = ui.html("", sanitize=False)
+        with box().classes("panel-result") as self._result:
+            self._table = ui.html("", sanitize=False).classes("panel-scroll")
             self._notes = box().classes("panel-form")
             with box().classes("panel-actions"):
                 action("Use this drive", guarded(self._use), "log-use", main=True)
                 action("Save drive as TOML", guarded(self._save), "log-save")
         self._result.set_visibility(False)
 
-    async def _uploaded(self, event: UploadEventArguments) -> None:
-        name = event.file.name
-        large = event.file.size() > LARGEST
-        content = b"" if large else await event.file.read()
-        self._upload.reset()
-        try:
-            if large:
-                raise InputError(TOO_LARGE)
-            columns = tasks.columns_of(str(self._columns.value or ""))
-        except Exception as error:
-            self._view.refuse(error if isinstance(error, InputError) else InputError(sentence_of(error)))
-            return
+    def _uploaded(self, content: bytes, name: str) -> None:
+        columns = tasks.columns_of(str(self._columns.value or ""))
         self._result.set_visibility(False)
         self._view.begin(
             f"drive from {clipped(name)}", tasks.identified, content, name, self._session.drive,
             str(self._torque_is.value), columns,
         )  # fmt: skip
 
+    def _refuse(self, name: str, error: InputError) -> None:
+        self._view.refuse(error)
+
     def _state(self) -> None:
         self._view.settle(self._pick, self._result)
 
     def _done(self, found: tasks.Identified) -> None:
         self._found = found
-        self._table.set_content(table(found.headings, found.rows, 2, "log-found"))
+        self._table.set_content(table(found.headings, found.rows, 1, "log-found"))
         self._notes.clear()
         with self._notes:
             for note in few(found.notes):
@@ -113,6 +88,3 @@ class LogPanel:
     def _save(self) -> None:
         if self._found is not None:
             save(self._found.drive.to_toml(), "identified-drive.toml")
-
-
-TOO_LARGE = f"It has more than {LARGEST // 1000} kB; cut the log to the start, or use softstart identify."

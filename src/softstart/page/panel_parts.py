@@ -8,7 +8,8 @@ import html
 import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
+from weakref import WeakMethod
 
 from nicegui import app, context, ui
 
@@ -18,6 +19,9 @@ from softstart.page.jobs import Job, Jobs, State
 from softstart.page.sentences import changed_since, sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import NOTHING
+
+if TYPE_CHECKING:
+    from nicegui.events import UiEventArguments, UploadEventArguments
 
 POLL = 0.2  # s between two checks of a job
 MOST_SENTENCES = 12  # about one input; whoever has mended these sees the next ones
@@ -72,6 +76,53 @@ def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> 
         f'dense no-caps {"unelevated" if main else "flat"} data-testid="{name}"'
     )
     return made.classes("panel-main" if main else "panel-action")
+
+
+def upload(
+    text: str,
+    name: str,
+    media: str,
+    largest: int,
+    remedy: str,
+    take: Callable[[bytes, str], None],
+    refuse: Callable[[str, InputError], None],
+) -> Any:
+    """A button that hands the file a user chooses to the method `take(content, name)`.
+
+    The method `refuse(name, error)` is called where `take` raises, and, with the remedy, for a file of
+    more than `largest` bytes.
+    """
+    # the route of an upload outlives its tab, and must not keep its session
+    taking, refusing = WeakMethod(take), WeakMethod(refuse)
+
+    def refused(file: str, error: Exception) -> None:
+        if (method := refusing()) is not None:
+            method(file, error if isinstance(error, InputError) else InputError(sentence_of(error)))
+
+    too_large = InputError(f"It has more than {largest // 1024} kB; {remedy}.")
+
+    def rejected(event: UiEventArguments) -> None:
+        event.sender.reset()  # type: ignore[attr-defined]
+        refused("The file", too_large)
+
+    async def uploaded(event: UploadEventArguments) -> None:
+        file = event.file.name
+        large = event.file.size() > largest  # the browser refuses that itself; others may ask
+        content = b"" if large else await event.file.read()
+        event.sender.reset()  # type: ignore[attr-defined]
+        if (method := taking()) is None:
+            return
+        try:
+            if large:
+                raise too_large
+            method(content, file)
+        except Exception as error:  # a file may hold anything
+            refused(file, error)
+
+    chooser = ui.upload(on_upload=uploaded, on_rejected=rejected, max_file_size=largest, auto_upload=True)
+    chooser.classes("panel-upload").props(f'accept="{media},text/plain" data-testid="{name}-upload"')
+    made = action(text, lambda: None, f"{name}-load", main=True)
+    return made.on("click", js_handler=f"() => getElement({chooser.id}).pickFiles()")
 
 
 def number(value: float | None, digits: int = 4) -> str:

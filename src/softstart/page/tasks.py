@@ -26,6 +26,7 @@ from softstart.processes import Tell
 from softstart.quantities import show
 from softstart.start.simulation import simulate
 from softstart.tuning.solving import tune
+from softstart.views.printed import unit
 
 if TYPE_CHECKING:
     from softstart import reporting
@@ -246,8 +247,11 @@ def identified(
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
     found = fits.identify(log, guess, tell=lambda doing: tell(None, doing))
     table = shown.estimates_table(found)
-    headings = [column.heading for column in table.columns]
-    return Identified(found.drive, headings, [list(row) for row in table.rows], list(found.notes))
+    rows = [dict(zip([column.heading for column in table.columns], row, strict=True)) for row in table.rows]
+    figures = ("found", "from", "to")  # the guess is in the fields of the page
+    cells = [[one["parameter"] + ("" if one["unit"] == "1" else f", {unit(one['unit'])}"),
+              *(one[each] for each in figures)] for one in rows]  # fmt: skip
+    return Identified(found.drive, ["parameter", *figures], cells, list(found.notes))
 
 
 def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> str:
