@@ -17,6 +17,7 @@ from softstart.cli.options import (
     command_line,
     drive_names,
     json_option,
+    named_as_options,
     out_option,
     read_count,
     read_drive,
@@ -193,12 +194,13 @@ def identify(
     with mistakes.noted():
         strategies = read_names(controllers)
     with mistakes.noted():
-        called = read_params(tuple(columns.split(","))) if columns else {}
+        texts = tuple(columns.split(",")) if columns else ()
+        called = read_params(texts, "--columns", "speed=n_act")
     mistakes.settle()
 
     with output_folder(out) as folder:
         if plan is not None:
-            with working("planning experiments ...") as tell:
+            with working("planning experiments ...") as tell, named_as_options():
                 made = softstart.plan_experiments(
                     cast("Drive", guess), log_period=log_period or "4 ms", ripple=ripple, free=names,
                     most_torque=most_torque, most_travel=most_travel, optimise=not standard, tell=tell,
@@ -214,7 +216,7 @@ def identify(
                 print_tables(to, [views.plan_table(made)])
                 print_conclusion(to, [views.plan_conclusion(made)], [])
         else:
-            with working("fitting the drive to the logs ...") as tell:
+            with working("fitting the drive to the logs ...") as tell, named_as_options():
                 found = softstart.identify(
                     list(logs),
                     guess,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.cli.commands import did_you_mean
-from softstart.cli.options import Decorator, Mistakes
+from softstart.cli.options import Decorator, Mistakes, as_option
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import StartTime
@@ -23,11 +22,6 @@ else:  # no numba for a help, a wrong option or the Tab key
     result = late("softstart.optimal.result")
 
 METHODS = ("auto", "closed-form", "collocation", "lp")
-OPTION_OF = {"start_time": "--start-time", "k_dyn": "--max-k-dyn", "heat": "--max-heat"}
-KEYWORDS = ("terminal", "minimise", "method", "torque_speed", "smoothness", "limits", "confirm", "workers",
-            "scheduler")  # fmt: skip
-OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in KEYWORDS}
-OPTION_OF |= {name: f"--{name.replace('_', '-')}" for name in ("gaps", "inertias", "load_torques")}
 
 
 # the options ---------------------------------------------------------------------------------------------
@@ -154,27 +148,6 @@ def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
             found.append(read(part))
     mistakes.settle()
     return found
-
-
-@contextmanager
-def named_as_options() -> Iterator[None]:
-    """Sentences about keywords of the Python functions, as sentences about the options."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
-
-
-def as_option(sentence: str) -> str:
-    """The sentence with the option's name where the keyword's was.
-
-    >>> as_option("terminal = 'x': choose one of ..."), as_option("smoothing is hard.")
-    ("--terminal = 'x': choose one of ...", 'smoothing is hard.')
-    """
-    found = re.match(r"(\w+)(?= =|:)", sentence)
-    if found is None or found[1] not in OPTION_OF:
-        return sentence
-    return OPTION_OF[found[1]] + sentence[found.end() :]
 
 
 # what comes of them --------------------------------------------------------------------------------------

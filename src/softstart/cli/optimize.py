@@ -16,9 +16,7 @@ from softstart.chain.model import Chain
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
-    OPTION_OF,
     method_option,
-    named_as_options,
     no_solution_reported,
     read_choice,
     read_corners,
@@ -31,9 +29,11 @@ from softstart.cli.optimal_options import (
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
+    as_option,
     command_line,
     drive_argument,
     json_option,
+    named_as_options,
     out_option,
     read_machine,
     read_names,
@@ -227,8 +227,8 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
     """What cannot be asked of one profile for several drives."""
     fixed = {"terminal": "reached", "method": "auto", "minimise": "k_dyn"}
     return [
-        f"{OPTION_OF[name]}: one profile for several drives is judged by its largest K_dyn, with terminal "
-        "reached; leave this option out."
+        as_option(f"{name}: one profile for several drives is judged by its largest K_dyn, with terminal ")
+        + "reached; leave this option out."
         for name, value in bounds.items()
         if fixed.get(name) != value
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shlex
 import sys
 import tomllib
@@ -39,6 +40,9 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_DRIVE = "crane-4amtkf"
 CODE = "softstart.allow_code"
+# keywords of Python functions that are called otherwise than the option
+KEYWORDS = {"k_dyn": "--max-k-dyn", "heat": "--max-heat", "start_time": "--start-times", "grid": "--axis",
+            "tolerances": "--tolerance", "to": "--out"}  # fmt: skip
 
 
 class Mistakes:
@@ -241,6 +245,39 @@ def read_until(text: str | None) -> float | None:
     return value
 
 
+@contextmanager
+def named_as_options() -> Iterator[None]:
+    """Sentences about keywords of Python functions, as sentences about options of the command that runs."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
+
+
+def as_option(sentence: str) -> str:
+    """The sentence with the option's name where the keyword's was.
+
+    >>> command = click.Command("sweep", params=[click.Option(["--chunk"])])
+    >>> with click.Context(command):
+    ...     as_option("chunk = 3: ...; leave chunk out to go on"), as_option("gap = -1: a gap is 0 or more.")
+    ('--chunk = 3: ...; leave --chunk out to go on', 'gap = -1: a gap is 0 or more.')
+    """
+    found = re.match(r"(\w+)(?= =|:|,)", sentence)
+    option = found and _options().get(found[1])
+    return re.sub(rf"\b{found[1]}(?= =|:|,| out\b)", option, sentence) if found and option else sentence
+
+
+def _options() -> dict[str, str]:
+    """The options of the command that runs, by the keywords that they stand for."""
+    context = click.get_current_context(silent=True)
+    given = (
+        [] if context is None else [one for one in context.command.params if isinstance(one, click.Option)]
+    )
+    named = {one.opts[0].lstrip("-").replace("-", "_"): one.opts[0] for one in given}
+    others = {keyword: option for keyword, option in KEYWORDS.items() if option in named.values()}
+    return {**others, **{str(one.name): one.opts[0] for one in given}, **named}
+
+
 def read_count(text: str | None, option: str) -> int | None:
     """A whole number of 1 or more; None where the option was left out.
 
@@ -293,13 +330,15 @@ def check_name(name: str, option: str, several: str = "") -> str:
     return name
 
 
-def read_params(texts: Sequence[str]) -> dict[str, str]:
-    """The `key=value` texts of --param as a mapping; the controller reads the values.
+def read_params(
+    texts: Sequence[str], option: str = "--param", example: str = 'torque="15 N*m"'
+) -> dict[str, str]:
+    """The `key=value` texts of an option as a mapping; what asked for it reads the values.
 
     >>> read_params(["torque=15 N*m"])
     {'torque': '15 N*m'}
     """
-    return _pairs(texts, "--param", 'a key, an equals sign and a value, as torque="15 N*m"')
+    return _pairs(texts, option, f"a key, an equals sign and a value, as {example}")
 
 
 def read_params_of(texts: Sequence[str], names: Sequence[str]) -> dict[str, dict[str, str]]:

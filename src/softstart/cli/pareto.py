@@ -14,9 +14,7 @@ from softstart.chain.model import Chain
 from softstart.cli.commands import Command
 from softstart.cli.optimal_options import (
     METHODS,
-    as_option,
     method_option,
-    named_as_options,
     no_solution_reported,
     read_choice,
     read_corners,
@@ -27,10 +25,12 @@ from softstart.cli.optimal_options import (
 from softstart.cli.options import (
     DEFAULT_DRIVE,
     Mistakes,
+    as_option,
     command_line,
     controller_option,
     drive_argument,
     json_option,
+    named_as_options,
     out_option,
     read_count,
     read_machine,

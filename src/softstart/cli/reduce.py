@@ -19,6 +19,7 @@ from softstart.cli.options import (
     command_line,
     controller_option,
     json_option,
+    named_as_options,
     out_option,
     param_option,
     read_changes,
@@ -170,8 +171,8 @@ def reduce(
     assert one is not None
 
     with output_folder(out) as folder:
-        with working("reducing the chain ..."):
-            found = reduced(one, asked)
+        with working("reducing the chain ..."), named_as_options():
+            found = reduction.reduce_chain(one, **asked)
             beside = beside_it(found)
         check(found, names)
         off: TwoMassError | None = None
@@ -272,25 +273,6 @@ def check(found: Reduction, names: Sequence[str] | None) -> None:
                 "--verify: a start needs the tables [motor] and [start] with a target_speed; add them."
             )
     mistakes.settle()
-
-
-def reduced(chain: Chain, asked: dict[str, Any]) -> Reduction:
-    """The reduction asked for; keywords in sentences as options."""
-    try:
-        return reduction.reduce_chain(chain, **asked)
-    except InputError as error:
-        said = error.sentences
-        for keyword, option in (
-            ("to", "--to"),
-            ("up_to", "--up-to"),
-            ("method", "--method"),
-            ("factor", "--factor"),
-        ):
-            said = tuple(
-                s.replace(f"{keyword} = ", f"{option} = ", 1) if s.startswith(f"{keyword} = ") else s
-                for s in said
-            )
-        raise InputError(said) from error
 
 
 def beside_it(found: Reduction) -> Reduction | None:

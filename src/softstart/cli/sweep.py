@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -27,6 +26,7 @@ from softstart.cli.options import (
     drive_argument,
     fitted_to_option,
     json_option,
+    named_as_options,
     out_option,
     param_option,
     read_count,
@@ -151,7 +151,7 @@ def sweep(
     assert one is not None
 
     begin = time.monotonic()
-    with output_folder(out) as folder, _kept(out) as to, _as_options():
+    with output_folder(out) as folder, _kept(out) as to, named_as_options():
         results, last = _computed(one, controller, values, axes, asked, to)
 
         with working("summing up ..."):
@@ -222,31 +222,6 @@ def _kept(out: str | None) -> Iterator[Path | None]:
         if to is not None and to.exists():
             print(f"softstart: finished chunks are kept in {to}; the same command goes on.", file=sys.stderr)
         raise
-
-
-@contextmanager
-def _as_options() -> Iterator[None]:
-    """Sentences about keywords of `sweep`, as sentences about the options."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
-
-
-def as_option(sentence: str) -> str:
-    """The sentence with the option's name where the keyword's was.
-
-    >>> as_option("to = here/sweep.zarr: it holds ..."), as_option("chunk = 3: ...; leave chunk out to go on")
-    ('--out: here/sweep.zarr: it holds ...', '--chunk = 3: ...; leave --chunk out to go on')
-    """
-    found = re.match(r"(to|netcdf|scheduler|workers|chunk|figures|grid|fitted_to)\b", sentence)
-    if found is None:
-        return sentence
-    word = found[1]
-    if word == "to":
-        return "--out: " + sentence.removeprefix("to = ")
-    option = "--axis" if word == "grid" else f"--{word.replace('_', '-')}"
-    return re.sub(rf"\b{word}(?= =|:|,| out\b)", option, sentence)
 
 
 MOST_VALUES = 1_000_000  # of a range

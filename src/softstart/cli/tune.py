@@ -20,6 +20,7 @@ from softstart.cli.options import (
     controller_option,
     drive_argument,
     json_option,
+    named_as_options,
     out_option,
     param_option,
     read_drive,
@@ -194,7 +195,7 @@ def _computed(
     with working("starting the drive ...") as progress:
         make_controllers([controller], {controller: asked["parameters"]}, prefix=False)
 
-        with Attributed(), named_as_options():
+        with Attributed(), named_as_options(), _free_as_option():
             return softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
 
 
@@ -311,30 +312,20 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str | list[str]]:
 
 
 @contextmanager
-def named_as_options() -> Iterator[None]:
-    """Sentences about keywords of `tune`, as sentences about the options."""
+def _free_as_option() -> Iterator[None]:
+    """Sentences about ranges of gains, as one types them."""
     try:
         yield
     except InputError as error:
-        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
+        raise InputError([_as_typed(sentence) for sentence in error.sentences]) from error
 
 
-def as_option(sentence: str) -> str:
-    """The sentence with the option's name where the keyword's was.
+def _as_typed(sentence: str) -> str:
+    """The sentence with ranges as they are typed behind --free.
 
-    >>> as_option("start_time = 'soon': give a time."), as_option("tolerances: gap is off.")
-    ("--start-time = 'soon': give a time.", '--tolerance: gap is off.')
-    >>> as_option('controller = mine: name one with its range, as free={"rise": ("0.5x", "2x")}.')
+    >>> _as_typed('controller = mine: name one with its range, as free={"rise": ("0.5x", "2x")}.')
     'controller = mine: name one with its range, as --free rise=0.5x:2x.'
     """
     sentence = re.sub(r'free=\{"(\w+)": \("([^"]+)", "([^"]+)"\)\}', r"--free \1=\2:\3", sentence)
     sentence = re.sub(r"^(free: \w+ = )\('([^']+)', '([^']+)'\)", r"\1\2:\3", sentence)
-    sentence = sentence.replace("workers, scheduler: ", "--workers, --scheduler: ", 1)
-    found = re.match(r"(\w+)(?= |:)", sentence)
-    if found is None:
-        return sentence
-    if found[1] == "tolerances":
-        return "--tolerance" + sentence[found.end() :]
-    if found[1] in OPTIONS:
-        return f"--{found[1].replace('_', '-')}" + sentence[found.end() :]
-    return sentence
+    return sentence.replace("workers, scheduler: ", "workers, --scheduler: ", 1)

@@ -57,6 +57,14 @@ def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> N
             ["identify", "a.csv", "--drive", "crane-4amtkf", "--torque-is", "guess"],
             "write measured or demand",
         ),
+        (
+            ["identify", "--plan", "crane-4amtkf", "--tell", "gpa"],
+            '--tell = "gpa": it is no parameter that is to be found; did you mean gap?',
+        ),
+        (
+            ["identify", "a.csv", "--drive", "crane-4amtkf", "--columns", "torque="],
+            '--columns "torque=": write a key, an equals sign and a value, as speed=n_act.',
+        ),
     ],
 )
 def test_the_command_refuses_in_one_sentence(run, line: list[str], sentence: str) -> None:

@@ -127,7 +127,7 @@ def test_no_feasible_start_time(run):
     code, out, err = run("pareto", *SIXTY, "--start-times", "0.1,0.2", "--controllers", "ramp", "--json")
     assert code == 3
     assert err.count("\n") == 1
-    assert err.startswith("softstart: --start-time = 0.2 s")
+    assert err.startswith("softstart: --start-times = 0.2 s")
     told = json.loads(out)
     assert [point["status"] for point in told["points"]] == ["INFEASIBLE", "INFEASIBLE"]
     assert 0.2 < told["shortest_start_time"] < 0.26

@@ -76,7 +76,7 @@ def test_the_files_and_the_same_command_again(run, place):
     code, out, err = run(*command, "--until", "0.1")
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
-    assert err.startswith("softstart: --out: deep/grid/sweep.zarr: it holds a sweep with another until;")
+    assert err.startswith("softstart: --out = deep/grid/sweep.zarr: it holds a sweep with another until;")
 
 
 def test_controllers_as_an_axis(run):
