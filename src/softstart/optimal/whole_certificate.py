@@ -29,7 +29,6 @@ the torque-speed curve before it, and |T| <= P where the dead zone pulls.
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -45,6 +44,7 @@ from softstart.optimal.lp.whole import ONE, SLOPE, STATES, W2, Kind, R, U, V, Z,
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
+from softstart.plant.jit import compiled
 
 ACROSS = 8.0  # steps of the first grid in a radian of the elastic oscillation
 FEWEST, MOST, MOST_RESTING = 150, 1000, 300  # steps of the first grid in the start
@@ -232,14 +232,12 @@ class _Dual:
         sources[:, STATES] -= by.curve.T @ right
         added = sources @ G
         p = np.zeros((n + 1, size))
-        after_end = np.zeros(size)
-        for i in range(n):
-            if i == s.tail:
-                after_end = p[i].copy()  # just after te
-                p[i, W2] -= by.speed
-                p[i, V] -= by.rate
-                p[i, :STATES] -= by.end_torque * s.T
-            p[i + 1] = p[i] @ E + added[i]
+        _recursion(E, added, p, 0, s.tail)
+        after_end = p[s.tail].copy()  # just after te
+        p[s.tail, W2] -= by.speed
+        p[s.tail, V] -= by.rate
+        p[s.tail, :STATES] -= by.end_torque * s.T
+        _recursion(E, added, p, s.tail, n)
         starts, ends = p[:-1].copy(), p[1:].copy()
         if s.tail:
             ends[s.tail - 1] = after_end
@@ -343,37 +341,67 @@ def _rate_multipliers(q: Vector, rise: float, low: float, high: float, first: fl
     is known by its kinks left and right of the minimum, which each step moves apart by `rise`. The multiplier
     p_k is its slope at r_k: p_k-1 = p_k - q_k, kept between the slopes of the minimum over s at low and high.
     """
-    left: deque[tuple[float, float]] = deque()  # (where + moved, change of the slope), rising
-    right: deque[tuple[float, float]] = deque()  # (where - moved, change of the slope), rising
-    at_low, at_high, moved = 0.0, 0.0, 0.0
-    limits = []
-    for k, slope in enumerate(q.tolist()):
-        more = abs(slope)  # to be taken from the kinks on one side, for which the minimum moves there
-        while slope > 0.0 and more > 0.0:
-            where, change = left.pop() if left else (low + moved, more)
-            right.appendleft((where - 2.0 * moved, min(change, more)))
+    p, n = np.empty(q.size), q.size
+    _by_kinks(q, rise, low, high, first, np.empty((4, n + 1)), np.empty((2, n)), p)
+    return p
+
+
+@compiled
+def _by_kinks(q: Any, rise: float, low: float, high: float, first: float, kinks: Any, limits: Any,
+              p: Any) -> None:  # fmt: skip
+    """Fill p by the recursion of `_rate_multipliers`; on both sides the kink nearest to the minimum is last."""
+    left, by_left, right, by_right = kinks  # where + moved, where - moved, and by how much the slope changes
+    l0 = l1 = r0 = r1 = 0  # those in use
+    at_low = at_high = moved = 0.0
+    n = q.size
+    for k in range(n):
+        more = q[k]  # to be taken from the kinks of one side: the minimum moves there
+        while more > 0.0:
+            at, change = (left[l1 - 1], by_left[l1 - 1]) if l1 > l0 else (low + moved, more)
+            taken = min(change, more)
+            right[r1], by_right[r1] = at - 2.0 * moved, taken
+            r1 += 1
             if change > more:
-                left.append((where, change - more))
-            more -= min(change, more)
-        while slope < 0.0 and more > 0.0:
-            where, change = right.popleft() if right else (high - moved, more)
-            left.append((where + 2.0 * moved, min(change, more)))
-            if change > more:
-                right.appendleft((where, change - more))
-            more -= min(change, more)
-        at_low, at_high = min(at_low + slope, 0.0), max(at_high + slope, 0.0)
-        moved += rise if k < q.size - 1 else 0.5 * rise
-        while left and left[0][0] - moved <= low:
-            at_low = min(at_low + left.popleft()[1], 0.0)
-        while right and right[-1][0] + moved >= high:
-            at_high = max(at_high - right.pop()[1], 0.0)
-        limits.append((at_low, at_high))
-    at_first = sum(change for where, change in right if where + moved < first)
-    at_first -= sum(change for where, change in left if where - moved > first)
-    p = [float(at_first)]
-    for (lowest, highest), slope in zip(limits[-2::-1], q[:0:-1].tolist(), strict=True):
-        p.append(min(max(p[-1] - slope, lowest), highest))
-    return np.array(p[::-1])
+                by_left[l1 - 1] = change - more
+            elif l1 > l0:
+                l1 -= 1
+            more -= taken
+        while more < 0.0:
+            at, change = (right[r1 - 1], by_right[r1 - 1]) if r1 > r0 else (high - moved, -more)
+            taken = min(change, -more)
+            left[l1], by_left[l1] = at + 2.0 * moved, taken
+            l1 += 1
+            if change > -more:
+                by_right[r1 - 1] = change + more
+            elif r1 > r0:
+                r1 -= 1
+            more += taken
+        at_low, at_high = min(at_low + q[k], 0.0), max(at_high + q[k], 0.0)
+        moved += rise if k < n - 1 else 0.5 * rise
+        while l1 > l0 and left[l0] - moved <= low:
+            at_low = min(at_low + by_left[l0], 0.0)
+            l0 += 1
+        while r1 > r0 and right[r0] + moved >= high:
+            at_high = max(at_high - by_right[r0], 0.0)
+            r0 += 1
+        limits[0, k], limits[1, k] = at_low, at_high
+    p[n - 1] = 0.0
+    for i in range(r0, r1):
+        p[n - 1] += by_right[i] if right[i] + moved < first else 0.0
+    for i in range(l0, l1):
+        p[n - 1] -= by_left[i] if left[i] - moved > first else 0.0
+    for k in range(n - 1, 0, -1):
+        p[k - 1] = min(max(p[k] - q[k], limits[0, k - 1]), limits[1, k - 1])
+
+
+@compiled
+def _recursion(E: Any, added: Any, p: Any, first: int, last: int) -> None:
+    """p[i + 1] = p[i] E + added[i] for i from `first` to `last` - 1."""
+    for i in range(first, last):
+        for k in range(E.shape[0]):
+            p[i + 1, k] = added[i, k]
+            for j in range(E.shape[0]):
+                p[i + 1, k] += p[i, j] * E[j, k]
 
 
 # a load that is free to move at once -----------------------------------------------------------------------
