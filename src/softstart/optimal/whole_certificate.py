@@ -349,7 +349,7 @@ def _rate_multipliers(q: Vector, rise: float, low: float, high: float, first: fl
 @compiled
 def _by_kinks(q: Any, rise: float, low: float, high: float, first: float, kinks: Any, limits: Any,
               p: Any) -> None:  # fmt: skip
-    """Fill p by the recursion of `_rate_multipliers`; on both sides the kink nearest to the minimum is last."""
+    """Fill p by the recursion of `_rate_multipliers`; on both sides the kink next to the minimum is last."""
     left, by_left, right, by_right = kinks  # where + moved, where - moved, and by how much the slope changes
     l0 = l1 = r0 = r1 = 0  # those in use
     at_low = at_high = moved = 0.0
@@ -809,11 +809,11 @@ class _Program:
             row[:, -1] -= (u - slope * w) / s.most
             lines.append(row)
         count = len(equal)
-        columns = demands + 2 * count + 2  # demand, slack of the equations, slack of T >= 0, P
+        columns = demands + 2 * count + 2  # demand, slack of the equations, of T >= 0 and curve, P
         unit = np.append(np.full(demands, s.most), 1.0)
         blocks = [_rows(peak * unit, demands, columns, {columns - 1: -1.0})]
         blocks.append(_rows(-kept * unit, demands, columns, {columns - 2: -1.0}))
-        blocks += [_rows(row * unit, demands, columns, {}) for row in lines]
+        blocks += [_rows(row * unit, demands, columns, {columns - 2: -1.0}) for row in lines]
         if s.rate < math.inf:
             rise = np.zeros((m, columns + 1))
             rise[np.arange(m), np.arange(m)] = -1.0
