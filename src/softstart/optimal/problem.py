@@ -11,8 +11,11 @@ from typing import Any, Literal, get_args
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.quantities import to_si
 from softstart.start import metrics
+
+_collocation = late("softstart.optimal.collocation.search")  # a module above this one
 
 Terminal = Literal["synchronous", "steady", "reached"]
 Objective = Literal["k_dyn", "heat", "start_time"]
@@ -221,6 +224,25 @@ class Problem:
     def base_torque(self) -> float:
         """M12avg_base in N m, the torque to which K_dyn refers."""
         return float(metrics.base_torque(self.base or self.drive))
+
+    def casadi(self) -> Any:
+        """The problem as one nonlinear program of CasADi, for your own solver, options or sensitivities.
+
+        minimise P / M12avg_base (or heat, or t_f) over x = (P, durations, demands, states), subject to
+        Legendre collocation of x' = f(x, u) in the phases of the likeliest order, |T| <= P, the limits of
+        the motor and the terminal conditions. Sparsity and scaling: `CasadiProblem`, which it returns. Raises
+        InputError for a problem of no class known to the collocation. Source: docs/theory/optimum.md.
+
+        >>> import casadi
+        >>> problem = Problem(Drive.load("crane-4amtkf").replace(target_speed=60), start_time=0.2883042)
+        >>> nlp = problem.casadi()
+        >>> quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
+        >>> solver = casadi.nlpsol("s", "ipopt", nlp.nlp, quiet)
+        >>> out = solver(x0=nlp.x0, p=nlp.p, lbx=nlp.lbx, ubx=nlp.ubx, lbg=nlp.lbg, ubg=nlp.ubg)
+        >>> round(nlp.k_dyn(out["x"]), 3), round(nlp.profile(out["x"]).torque.max(), 1).item()
+        (0.909, 62.0)
+        """
+        return _collocation.as_casadi(self)
 
     @property
     def ideal_torque(self) -> bool:

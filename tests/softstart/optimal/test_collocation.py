@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 from tests.softstart.optimal.test_collocation_march import march
@@ -185,3 +187,20 @@ def test_a_start_time_that_is_too_short_is_no_result():
 def test_starts_of_no_known_class_are_refused_with_a_reason(changes, word):
     with pytest.raises(InputError, match=word):
         solve(Problem(CRANE.replace(**changes), start_time=0.3))
+
+
+@pytest.mark.parametrize(
+    ("given", "options"),
+    [({}, {}), ({"torque_lag": 0.005, "damping": 0.5, "torque_rate": 2500.0}, {"terminal": "reached"})],
+)
+def test_the_program_of_casadi_is_that_of_the_method(given: dict[str, float], options: Any) -> None:
+    """Solved by IPOPT with its own settings on the first mesh; the method refines it."""
+    problem = Problem(CRANE.replace(**given), 0.3, **options)
+    one = problem.casadi()
+    solver = ca.nlpsol("solver", "ipopt", one.nlp, {"ipopt.print_level": 0, "print_time": False})
+    x = solver(x0=one.x0, p=one.p, lbx=one.lbx, ubx=one.ubx, lbg=one.lbg, ubg=one.ubg)["x"]
+    assert len(one.slots) == x.shape[0] == one.lbx.size
+    assert one.k_dyn(x) == pytest.approx(solve(problem).claimed, rel=1e-3)
+    assert replay(problem.drive, one.profile(x), 0.3).k_dyn == pytest.approx(one.k_dyn(x), rel=2e-3)
+    with pytest.raises(InputError, match="x: 3 numbers"):
+        one.k_dyn([0.0, 1.0, 2.0])

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.errors import InputError
 from softstart.optimal.collocation.guess import (
     Trajectory,
     first_mesh,
@@ -29,6 +30,7 @@ from softstart.optimal.collocation.guess import (
 from softstart.optimal.collocation.program import BEYOND, Numbers, Program, numbers, programs
 from softstart.optimal.collocation.transcription import (
     Mesh,
+    Slot,
     Transcribed,
     parameter_vector,
     tail_rows,
@@ -317,6 +319,64 @@ def _from(problem: Problem, warm: Warm) -> Solution:
 
 def _parameters(program: Program, p: Numbers) -> Vector:
     return parameter_vector(p, tail_rows(program, p))
+
+
+@dataclass(frozen=True, eq=False)
+class CasadiProblem:
+    """The problem as one nonlinear program of CasADi, f least over x with lbx <= x <= ubx, lbg <= g <= ubg.
+
+    `nlp` has the symbols x (n,), p, f and g (m,) for `casadi.nlpsol`; `x0` and `p` are the first guess and
+    the numbers of the drive. Times are in units of the start time, torques of Ms, speeds of the target
+    speed, and states besides of their size in the gap or in contact: x and g are of the order of 1. Ordered
+    along the start: peak of T, then for each arc its duration, demands, and the states of each interval (its
+    beginning and three Gauss points). dg/dx is banded with intervals, but for full columns of the peak and
+    of the durations; the Hessian alike. `slots[i]` says what x[i] stands for.
+
+    Made by `Problem.casadi`. The mesh is the first one, which the collocation method refines.
+    """
+
+    problem: Problem
+    nlp: dict[str, Any]
+    x0: Vector
+    p: Vector
+    lbx: Vector
+    ubx: Vector
+    lbg: Vector
+    ubg: Vector
+    _transcribed: Transcribed
+    _numbers: Numbers
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """What each variable stands for: kind, arc, share of its duration, component of the state."""
+        return self._transcribed.slots
+
+    def _claim(self, x: Any) -> Claim:
+        at = np.array(x, dtype=float).ravel()
+        if at.shape != self.x0.shape:
+            raise InputError(f"x: {at.size} numbers; give the {self.x0.size} of nlpsol's out['x'].")
+        none = np.zeros(0)
+        end = Solution(self._transcribed, self._numbers, self.p, at, none, none, np.nan, "", np.nan, 0)
+        return claim(self.problem, end)
+
+    def profile(self, x: Any) -> TorqueProfile:
+        """The torque demand of a solution x (n,): N m over s, up to t_f."""
+        return self._claim(x).profile
+
+    def k_dyn(self, x: Any) -> float:
+        """K_dyn of a solution x (n,) by its own collocation; `replay` of the profile is exact."""
+        return self._claim(x).peak / self.problem.base_torque
+
+
+def as_casadi(problem: Problem) -> CasadiProblem:
+    """The likeliest order of phases on the first mesh; see `Problem.casadi`."""
+    program, p = programs(problem)[0], numbers(problem)
+    trajectory = _trajectory(program, p, likely_contact(problem, p))
+    transcribed = transcribe(program, first_mesh(program, p, trajectory))
+    parameters = _parameters(program, p)
+    lbx, ubx, lbg, ubg = (np.array(one).ravel() for one in transcribed.limits(parameters))
+    x0 = trajectory.values(program, p, transcribed.slots)
+    return CasadiProblem(problem, transcribed.nlp, x0, parameters, lbx, ubx, lbg, ubg, transcribed, p)
 
 
 # ---- first solutions -------------------------------------------------------------------------------------
