@@ -71,7 +71,8 @@ BUDGET = {
     # 110 and a file: the form of the data sheet
     # 150 and a file: a log is identified
     # 3: fields of friction
-    "page": (4663, 20, 3, 0),
+    # 4: angles and speeds of copied commands in deg, arcmin or rpm
+    "page": (4667, 20, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart

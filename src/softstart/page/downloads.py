@@ -18,12 +18,14 @@ from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
 from softstart.input.parameters import Parameter
 from softstart.page.sentences import changes
+from softstart.quantities import parse
 
 if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
 
 MOST_SETTINGS = 8  # more than that are better kept in a file
 LONGEST = 60
+TYPED = {"rad": ("deg", "arcmin"), "rad/s": ("rpm",)}  # units that people write instead of the SI unit
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
 
@@ -73,6 +75,8 @@ def command_text(
     >>> crane = Drive.load("crane-4amtkf").replace(gap=1.0)
     >>> command_text(crane, {name: make_controller(name) for name in ("direct", "ramp")})
     'softstart compare crane-4amtkf --set shaft.gap=1.0 --controllers direct,ramp'
+    >>> command_text(crane.with_settings(["gap=4 deg"]), {"direct": make_controller("direct")})
+    'softstart compare crane-4amtkf --set shaft.gap=4deg --controllers direct'
     >>> command_text(crane, {"ramp": make_controller("ramp", {"time": 0.2})})
     'softstart compare crane-4amtkf --set shaft.gap=1.0 --controllers ramp --param ramp.time=0.2'
     """
@@ -128,7 +132,13 @@ def shipped_drives() -> dict[str, Drive]:
 
 def _literal(drive: Drive, parameter: Parameter) -> str:
     value = getattr(drive, parameter.name)
-    return value if isinstance(value, str) else repr(float(value))
+    if isinstance(value, str):
+        return value
+    value = float(value)
+    # in another unit where that is the same value and shorter: 880 rpm has 15 digits in rad/s
+    typed = [f"{value / float(parse(f'1{one}', parameter.unit)):.10g}{one}"
+             for one in TYPED.get(parameter.unit, ())]  # fmt: skip
+    return min([repr(value), *(one for one in typed if parse(one, parameter.unit) == value)], key=len)
 
 
 def drive_file(drive: Drive) -> str:
