@@ -202,7 +202,7 @@ def _free_corner(
             dx = c * (away + 0.5 * width) - 0.5 * width
             dy = s * (away + 0.5 * height) - 0.5 * height
             box = (spot[0] + dx, spot[1] + dy, spot[0] + dx + width, spot[1] + dy + height)
-            covered = sum(shared(box, other) for other in taken) + 10.0 * (
+            covered = 5.0 * sum(shared(box, other) for other in taken) + 10.0 * (
                 width * height - shared(box, frame)
             )
             if any(_distance(box, other) < 1.5 * _distance(box, spot) for other in others):
