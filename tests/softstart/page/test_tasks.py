@@ -53,8 +53,8 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     assert {name: getattr(found.drive, name) for name in ("gap", "stiffness", "J1", "J2")} == {
         name: getattr(alone.drive, name) for name in ("gap", "stiffness", "J1", "J2")
     }
-    assert found.headings[:4] == ["parameter", "unit", "guess", "found"]
-    assert [row[0] for row in found.rows][:2] == ["motor.inertia", "load.inertia"]
+    assert found.headings == ["parameter", "found", "from", "to"]
+    assert [row[0] for row in found.rows][:2] == ["motor.inertia, kg m²", "load.inertia, kg m²"]
     assert tuple(found.notes) == alone.notes
     assert len(heard.shares) > 2
     with pytest.raises(InputError, match=r"^log = rig.csv: its first line"):
