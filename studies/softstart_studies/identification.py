@@ -1,0 +1,404 @@
+"""`identify` beside peers on the same simulated logs: least squares on LSODA, multiple shooting, speed drop.
+
+The drive is the crane of [G] with a gap of 80 mrad, damped, without load torque, so that no peer has to model
+dry friction. It starts from a random place in its gap. Each log has the torque demand and the angle of an
+encoder with 1024 lines every 4 ms; the torque is 1 N m (2.5 %) off in each sample, which nobody is told. The
+guess, the same for all, is off by up to a factor of 1.5 in every parameter, or true.
+
+The peers: (a) the usual residual of a simulation, scipy's `least_squares` on LSODA, intervals from its
+Jacobian and the variance of the residual; (b) multiple shooting in CasADi with IPOPT, Runge-Kutta of order 4
+four times a sample, the edges of the gap rounded, intervals from the Gauss-Newton matrix of the constrained
+problem; (c) by hand from speeds, as drives with backlash are commissioned: the inertias from accelerations in
+contact and while the gap is crossed, the gap as what the motor turns further than the load between the
+speed's two bends, the stiffness from the swing after the impact (M. Nordin, P.-O. Gutman, Controlling
+mechanical systems with backlash - a survey, Automatica 38 (2002) 1633-1649; G. Brandenburg, H. Unger,
+A. Wagenpfeil, Stability problems of a speed controlled drive in an elastic system with backlash, 1986).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from scipy.integrate import odeint
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from softstart import Drive, identify
+from softstart.arrays import Matrix, Vector
+from softstart.errors import InputError
+from softstart.identification.logs import Log
+from softstart.identification.planning import Experiment, made_up_log
+from softstart.late import late
+from softstart.profile import TorqueProfile
+from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
+from softstart.views.drawing import COLOURS, drawing, head, new_figure
+
+casadi = late("casadi")
+
+NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping")
+SYMBOLS = ("J1", "J2", "c", "gap", "d")
+PERIOD, RIPPLE, LINES = 4e-3, 1.0, 1024.0
+ASTRAY = 1.5  # factor by which a gap or a stiffness is off where a fit has failed
+RANGE = math.log(5.0)  # of each parameter about its guess, in the multiple shooting
+ROUNDED = 1e-3  # rad, edges of the gap in the multiple shooting
+SUBSTEPS = 4  # of a sample period there
+
+
+def drive() -> Drive:
+    """The truth.
+
+    >>> drive().load_torque, drive().gap
+    (0.0, 0.08)
+    """
+    return Drive.load("crane-4amtkf").replace(
+        gap=0.08, damping=0.3, load_torque=0.0, torque_lag=0.0, encoder_lines=LINES, start_position="unknown"
+    )
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What is computed: so many logs, fitted from guesses that are off by up to each of these factors."""
+
+    logs: int = 10
+    factors: tuple[float, ...] = (1.5, 1.0)
+
+
+class Fit(NamedTuple):
+    """Values in the order of `NAMES`, their intervals of 95 % (none: (k, 0)), and processor time in s."""
+
+    values: Vector
+    intervals: Matrix
+    seconds: float
+
+
+EDGES = (0.0, 0.1, 0.3, 0.44, 0.56, 0.68)  # s, of the torque demand
+LEVELS = (20.0, 40.0, -10.0, -40.0, -20.0)  # N m
+
+Method = Callable[[Log, Drive], tuple[Vector, Matrix]]
+
+
+# the peers -----------------------------------------------------------------------------------------------
+
+
+def moved(x: Sequence[float], log: Log) -> Vector:
+    """Angle of the motor at the samples, rad: x = logarithms of `NAMES`, and 1 + artanh of the position
+    in the gap, 1 + offset: none is near 0, so that relative steps are fit for differences.
+    """
+    J1, J2, c, gap, d = np.exp(x[:5]).tolist()
+    half, last = 0.5 * gap, log.time.size - 1
+    torque, begin = log.torque.tolist(), float(log.time[0])
+
+    def rates(state: Any, now: float) -> tuple[float, float, float, float]:
+        phi1, w1, phi2, w2 = state
+        u = torque[min(int((now - begin) / PERIOD + 1e-9), last)]
+        twist, T = phi1 - phi2, 0.0
+        if twist > half:
+            T = max(c * (twist - half) + d * (w1 - w2), 0.0)
+        elif twist < -half:
+            T = min(c * (twist + half) + d * (w1 - w2), 0.0)
+        return w1, (u - T) / J1, w2, T / J2
+
+    start = [0.0, 0.0, -half * math.tanh(x[5] - 1.0), 0.0]
+    path = odeint(rates, start, log.time, rtol=1e-7, atol=1e-9, hmax=0.5 * PERIOD, mxstep=5000)
+    found: Vector = path[:, 0] + x[6] - 1.0
+    return found
+
+
+def by_lsoda(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
+    """Least squares of the angle, the motion simulated by LSODA."""
+    x0 = np.array([*(math.log(float(getattr(guess, name))) for name in NAMES), 1.0, 1.0])
+    found = least_squares(
+        lambda x: moved(x, log) - log.values, x0, x_scale="jac", diff_step=1e-4, max_nfev=60
+    )
+    spare = log.time.size - x0.size
+    covariance = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * found.cost / spare
+    return _with_intervals(found.x[:5], np.sqrt(np.diag(covariance))[:5], spare)
+
+
+def by_shooting(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
+    """Multiple shooting: all states at the samples are unknowns, tied by the equations of motion."""
+    n = log.time.size
+    p, s, u = casadi.MX.sym("p", 7), casadi.MX.sym("s", 4), casadi.MX.sym("u")
+    J1, J2, c, gap, d = (casadi.exp(p[i]) for i in range(5))
+
+    def edge(y: Any) -> tuple[Any, Any]:
+        root = casadi.sqrt(y * y + ROUNDED**2)
+        return 0.5 * (y + root), 0.5 * (1.0 + y / root)
+
+    def rates(state: Any) -> Any:
+        twist, slip = state[0] - state[2], state[1] - state[3]
+        (up, pressed), (down, pulled) = edge(twist - 0.5 * gap), edge(-twist - 0.5 * gap)
+        T = c * (up - down) + d * slip * (pressed + pulled)
+        return casadi.vertcat(state[1], (u - T) / J1, state[3], T / J2)
+
+    state, h = s, PERIOD / SUBSTEPS
+    for _ in range(SUBSTEPS):
+        k1 = rates(state)
+        k2 = rates(state + 0.5 * h * k1)
+        k3 = rates(state + 0.5 * h * k2)
+        state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rates(state + h * k3))
+    step = casadi.Function("step", [s, u, p], [state]).map(n - 1)
+    states, unknown = casadi.MX.sym("states", 4, n), casadi.MX.sym("unknown", 7)
+    parameters = casadi.repmat(unknown, 1, n - 1)
+    ties = casadi.vec(step(states[:, :-1], log.torque[:-1].reshape(1, -1), parameters) - states[:, 1:])
+    place = 0.5 * casadi.exp(unknown[3]) * casadi.tanh(unknown[5])
+    begun = states[:, 0] - casadi.vertcat(0.0, 0.0, -place, 0.0)
+    x, g = casadi.vertcat(unknown, casadi.vec(states)), casadi.vertcat(begun, ties)
+    residual = (states[0, :].T + unknown[6] - log.values) / 1e-3
+    # Gauss-Newton: the residual is linear in the states, which the ties hold to the motion
+    f, lam_f, lam_g = 0.5 * casadi.sumsqr(residual), casadi.MX.sym("lam_f"), casadi.MX.sym("lam_g", g.size1())
+    slope = casadi.jacobian(residual, x)
+    none = casadi.MX.sym("none", 0)
+    bent = casadi.Function("bent", [x, none, lam_f, lam_g], [casadi.triu(lam_f * slope.T @ slope)])
+    options = {
+        "ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.max_iter": 300,
+        "show_eval_warnings": False, "ipopt.acceptable_tol": 1e-4, "hess_lag": bent,
+    }  # fmt: skip
+    solver = casadi.nlpsol("shooting", "ipopt", {"x": x, "f": f, "g": g}, options)
+    speed = np.gradient(log.values, PERIOD)
+    share = float(guess.J2) / float(guess.J1 + guess.J2)  # the shaft is wound up and on its flank throughout
+    twist = 0.5 * float(guess.gap) * np.sign(log.torque) + log.torque * share / float(guess.c)
+    path = np.vstack([log.values, speed, log.values - twist, speed])
+    start = [*(math.log(float(getattr(guess, name))) for name in NAMES), 0.0, 0.0]
+    x0 = np.concatenate([start, path.ravel("F")])
+    room = np.concatenate([np.full(5, RANGE), [3.0, 0.01], np.full(4 * n, math.inf)])
+    found = solver(x0=x0, lbx=x0 - room, ubx=x0 + room, lbg=0.0, ubg=0.0)
+    if not solver.stats()["success"]:
+        raise InputError(f"shooting: IPOPT ended with {solver.stats()['return_status']}.")
+    both = casadi.Function("both", [x], [casadi.jacobian(residual, x), casadi.jacobian(g, x)])
+    slope, tied = (np.array(one) for one in both(found["x"]))
+    # Gauss-Newton matrix where the ties hold, on a basis of the directions that keep them
+    fixed = np.linalg.solve(tied[:, 7:], tied[:, :7])  # states follow the parameters
+    reduced = slope[:, :7] - slope[:, 7:] @ fixed
+    spare = n - 7
+    covariance = np.linalg.pinv(reduced.T @ reduced) * 2.0 * float(found["f"]) / spare
+    return _with_intervals(np.array(found["x"]).ravel()[:5], np.sqrt(np.diag(covariance))[:5], spare)
+
+
+def _with_intervals(logarithms: Vector, sizes: Vector, spare: int) -> tuple[Vector, Matrix]:
+    half = student.ppf(0.975, spare) * sizes
+    return np.exp(logarithms), np.exp(np.clip(np.array([logarithms - half, logarithms + half]).T, -50, 50))
+
+
+def by_speed_drop(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
+    """Inertias, gap and stiffness from the bends of the speed after the torque has changed its sign.
+
+    Before it, u/(J1 + J2) accelerates both; while the gap is crossed u/J1 the motor alone, and the load
+    coasts with the momentum that is left; the impact throws the motor back. The damping is the guess.
+    """
+    turned = np.flatnonzero(np.diff(np.sign(log.torque)) != 0)
+    if turned.size == 0:
+        raise InputError("speed drop: the torque never changes its sign; the gap is not crossed.")
+    k = int(turned[0]) + 1  # the first sample of the other torque
+    u, speed = log.torque, np.gradient(log.values, PERIOD)
+    change = np.diff(log.values, 2) / PERIOD**2  # change[i] at the sample i + 1
+    own = change[k:] * np.sign(u[k])
+    closed = k + int(np.argmax(own[1:] < 0.0)) + 1
+    plateau = own[: closed - k]
+    opened = k + int(np.argmax(plateau <= 1.5 * np.median(plateau[plateau.size // 2 :])))
+    if closed - opened < 3:
+        raise InputError("speed drop: the gap is crossed within three samples.")
+    rest = slice(k // 2, k)
+    whole = float(u[rest].mean() / np.polyfit(log.time[rest], speed[rest], 1)[0])
+    J1 = float(u[k] / np.median(change[opened : closed - 1]))
+    J2 = whole - J1
+    momentum = float(np.sum(u[:opened]) * PERIOD)
+    coast = (momentum - J1 * float(speed[opened])) / J2 if J2 > 0.0 else math.nan
+    gap = float(np.abs(log.values[closed] - log.values[opened] - coast * (closed - opened) * PERIOD))
+    swing = speed[closed + 2 :] - np.polyval(np.polyfit(log.time[closed + 2 :], speed[closed + 2 :], 3),
+                                             log.time[closed + 2 :])  # fmt: skip
+    spectrum = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 4096))
+    Omega = 2.0 * math.pi * float(np.argmax(spectrum)) / (4096 * PERIOD)
+    values = np.array([J1, J2, Omega**2 * J1 * J2 / whole, gap, float(guess.damping)])
+    if not np.all(values > 0.0):
+        raise InputError("speed drop: the speed has no two bends after the reversal.")
+    return values, np.zeros((5, 0))
+
+
+def by_softstart(log: Log, guess: Drive) -> tuple[Vector, Matrix]:
+    """`identify`, with its defaults."""
+    found = {one.name: one for one in identify(log, guess).estimates}
+    ends = [[found[name].lower, found[name].upper] for name in NAMES]
+    return np.array([found[name].value for name in NAMES]), np.array(ends)
+
+
+METHODS: Mapping[str, Method] = {
+    "softstart": by_softstart,
+    "least squares on LSODA": by_lsoda,
+    "multiple shooting": by_shooting,
+    "speed drop": by_speed_drop,
+}
+
+
+# what they find ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Findings:
+    """By case and method: the fits of all logs, None where there is none."""
+
+    fits: Mapping[tuple[str, str], tuple[Fit | None, ...]]
+
+    def kept(self, case: str, method: str) -> list[Fit]:
+        """Those that did not fail: gap and stiffness within a factor of 1.5."""
+        truth = np.array([float(getattr(drive(), name)) for name in NAMES])
+        return [
+            one
+            for one in self.fits[case, method]
+            if one is not None and np.all(np.abs(np.log(one.values / truth)[2:4]) < math.log(ASTRAY))
+        ]
+
+
+def logs(off: float, count: int) -> list[tuple[Log, Drive]]:
+    """Simulated logs and a guess for each, off by up to a factor.
+
+    >>> log, guess = logs(1.5, 1)[0]
+    >>> log.torque_is, bool(guess.gap != drive().gap)
+    ('demand', True)
+    """
+    made = []
+    reversal = Experiment("reversal", TorqueProfile.steps(EDGES, LEVELS), EDGES[-1], {}, math.nan, math.nan)
+    for number in range(count):
+        rng = np.random.default_rng(number)
+        truth = drive()
+        log = made_up_log(
+            truth, reversal, log_period=PERIOD, ripple=RIPPLE, position=rng.uniform(-1.0, 1.0),
+            phase=rng.uniform(), seed=int(rng.integers(2**31)),
+        )  # fmt: skip
+        moves = np.exp(math.log(off) * rng.uniform(-1.0, 1.0, len(NAMES))).tolist()
+        guess = {name: float(getattr(truth, name)) * move for name, move in zip(NAMES, moves, strict=True)}
+        made.append((log, truth.replace(**guess)))
+    return made
+
+
+def fitted(method: Method, log: Log, guess: Drive) -> Fit | None:
+    """The fit, None where the method gives none."""
+    begun = time.process_time()
+    try:
+        values, intervals = method(log, guess)
+    except (InputError, np.linalg.LinAlgError, RuntimeError, ValueError):
+        return None
+    return Fit(values, intervals, time.process_time() - begun)
+
+
+def find(extent: Extent, progress: Progress) -> Findings:
+    """All fits."""
+    found: dict[tuple[str, str], tuple[Fit | None, ...]] = {}
+    for off in extent.factors:
+        made = logs(off, extent.logs)
+        case = f"within a factor of {off:g}" if off > 1.0 else "true"
+        for name, method in METHODS.items():
+            progress(f"guess {case}: {name}")
+            found[case, name] = tuple(fitted(method, log, guess) for log, guess in made)
+    return Findings(found)
+
+
+def errors(fits: Sequence[Fit]) -> Vector:
+    """Root mean square of the relative error of each parameter."""
+    truth = np.array([float(getattr(drive(), name)) for name in NAMES])
+    if not fits:
+        return np.full(len(NAMES), math.nan)
+    found: Vector = np.sqrt(np.mean(np.log(np.array([one.values for one in fits]) / truth) ** 2, axis=0))
+    return found
+
+
+def coverage(fits: Sequence[Fit]) -> tuple[int, int]:
+    """How many intervals hold the truth, of how many."""
+    truth = np.array([float(getattr(drive(), name)) for name in NAMES])
+    with_ends = [one.intervals for one in fits if one.intervals.size]
+    held = sum(int(np.sum((ends[:, 0] <= truth) & (truth <= ends[:, 1]))) for ends in with_ends)
+    return held, len(NAMES) * len(with_ends)
+
+
+def table(found: Findings) -> Table:
+    """One row for each case and method."""
+    rows: list[tuple[object, ...]] = []
+    for case, name in found.fits:
+        fits = found.kept(case, name)
+        held, of = coverage(fits)
+        failed = len(found.fits[case, name]) - len(fits)
+        off = [None if math.isnan(one) else float(f"{100.0 * one:.3g}") for one in errors(fits)]
+        seconds = float(f"{np.median([one.seconds for one in fits]):.2g}") if fits else None
+        rows.append((case, name, *off, f"{held} of {of}" if of else "none", failed, seconds))
+    return Table(
+        "Relative rms error in %, intervals that hold the truth, failed fits",
+        ("guess", "method", *SYMBOLS, "intervals of 95 %", "failed", "processor time, s"),
+        rows,
+    )
+
+
+def claims(found: Findings) -> tuple[Claim, ...]:
+    """Each with its verdict and number."""
+    shares: dict[str, list[float]] = {}
+    gaps: dict[str, list[float]] = {}
+    for case, name in found.fits:
+        fits = found.kept(case, name)
+        held, of = coverage(fits)
+        if of:
+            shares.setdefault(name, []).append(held / of)
+        if fits:
+            gaps.setdefault(name, []).append(float(errors(fits)[3]))
+    own, others = shares.pop("softstart", [0.0]), [one for many in shares.values() for one in many]
+    told = "; ".join(
+        f"{name} {', '.join(f'{100.0 * one:.0f} %' for one in many)}"
+        for name, many in {"softstart": own, **shares}.items()
+    )
+    best = min(gaps, key=lambda name: max(gaps[name])) if gaps else "none"
+    return (
+        Claim(
+            "The intervals of softstart hold the truth in 90 % of all cases or more.",
+            Verdict.of(*(one >= 0.9 for one in own)),
+            f"Over all parameters and logs: {told}.",
+        ),
+        Claim(
+            "The usual intervals of least squares, with the variance of the residual, hold it less often.",
+            Verdict.of(*(one < 0.9 for one in others)),
+            f"{len(others)} cases: {', '.join(f'{100.0 * one:.0f} %' for one in others)}.",
+        ),
+        Claim(
+            "softstart finds the gap of a reversal best.",
+            Verdict.of(best == "softstart"),
+            "Relative rms error, the larger of both guesses: "
+            f"{'; '.join(f'{name} {100.0 * max(one):.2f} %' for name, one in gaps.items())}.",
+        ),
+    )
+
+
+def figure(found: Findings) -> Any:
+    """Relative error of the gap of each fit that has not failed."""
+    truth = drive()
+    cases = list(dict.fromkeys(case for case, _ in found.fits))
+    with drawing():
+        drawn, axes = new_figure(len(cases), 1, (7.0, 1.2 + 2.0 * len(cases)), squeeze=False)
+        for ax, case in zip(axes[:, 0], cases, strict=True):
+            for i, name in enumerate(METHODS):
+                fits = found.kept(case, name)
+                off = [100.0 * (one.values[3] / float(truth.gap) - 1.0) for one in fits]
+                ax.plot(off, np.full(len(off), float(i)), "o", ms=4, alpha=0.6, color=COLOURS[i])
+            ax.axvline(0.0, color="black", lw=0.8)
+            ax.set_yticks(range(len(METHODS)), list(METHODS))
+            ax.set_ylim(len(METHODS) - 0.5, -0.5)
+            head(ax, f"guess {case}: error of the gap, % (each point a log)", "")
+    return drawn
+
+
+class IdentificationStudy(Study):
+    """Peers of `identify`."""
+
+    name: ClassVar[str] = "identification"
+    title: ClassVar[str] = "The drive from logs: softstart beside LSODA, multiple shooting and speed drop"
+    pictures: ClassVar[tuple[str, ...]] = ("identification",)
+
+    def __init__(self, extent: Extent | None = None) -> None:
+        self.extent = extent or Extent()
+
+    def run(self, out: Path | None, progress: Progress) -> StudyResult:
+        """Make the logs, fit them by each method, compare."""
+        found = find(self.extent, progress)
+        return self.result([table(found)], claims(found), [figure(found)])
