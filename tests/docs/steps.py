@@ -63,6 +63,7 @@ def blocks(text: str) -> Iterator[Block]:
     """The fenced and indented blocks of a page, in order."""
     lines = text.splitlines()
     comments: list[str] = []
+    directives: list[str] = []  # the marks of those that are open
     after = False
     i = 0
     while i < len(lines):
@@ -73,7 +74,11 @@ def blocks(text: str) -> Iterator[Block]:
             comments.append(comment[1])
             i += 1
         elif fence and fence["language"].startswith("{"):
+            directives.append(fence["marks"])
             i += 1  # a directive: what stands in it is read like the page
+        elif fence and directives and line.strip() == directives[-1]:
+            directives.pop()
+            comments, after, i = [], False, i + 1
         elif fence and fence["marks"][0] != ":":
             end = next(
                 (j for j in range(i + 1, len(lines)) if lines[j].strip() == fence["marks"]), len(lines)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.docs import reader
-from tests.docs.steps import Step
+from tests.docs.steps import Step, steps
 
 SERVES = "import time\nprint('ready at 7', flush=True)\ntime.sleep(60)\n"
 WORKS = "while True: pass"
@@ -41,3 +41,9 @@ def test_the_work_of_helpers_is_work_too(tmp_path: Path) -> None:
             time.sleep(0.1)
             own, together = reader._work_of(process)
     assert together >= 1.0 > own
+
+
+def test_what_follows_a_directive_is_read_too() -> None:
+    page = "```{math}\na = b\n```\n\n```python\nprint(1)\n```\n\n```text\n1\n```\n"
+    (one,) = steps(page)
+    assert (one.kind, one.text, one.output) == ("python", "print(1)\n", "1")
