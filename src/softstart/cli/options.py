@@ -246,12 +246,15 @@ def read_until(text: str | None) -> float | None:
 
 
 @contextmanager
-def named_as_options() -> Iterator[None]:
-    """Sentences about keywords of Python functions, as sentences about options of the command that runs."""
+def named_as_options(typed: Callable[[str], str] = str) -> Iterator[None]:
+    """Sentences about keywords of Python functions, as sentences about options of the command that runs.
+
+    `typed` rewrites what else is typed otherwise than in Python.
+    """
     try:
         yield
     except InputError as error:
-        raise InputError([as_option(sentence) for sentence in error.sentences]) from error
+        raise InputError([as_option(typed(sentence)) for sentence in error.sentences]) from error
 
 
 def as_option(sentence: str) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -195,7 +194,7 @@ def _computed(
     with working("starting the drive ...") as progress:
         make_controllers([controller], {controller: asked["parameters"]}, prefix=False)
 
-        with Attributed(), named_as_options(), _free_as_option():
+        with Attributed(), named_as_options(_as_typed):
             return softstart.tune(drive, controller, save_to=state, progress=progress, **asked)
 
 
@@ -309,15 +308,6 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str | list[str]]:
             found[name] = values_in(value, f"--tolerance {key}") if several else value
     mistakes.settle()
     return found
-
-
-@contextmanager
-def _free_as_option() -> Iterator[None]:
-    """Sentences about ranges of gains, as one types them."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError([_as_typed(sentence) for sentence in error.sentences]) from error
 
 
 def _as_typed(sentence: str) -> str:
