@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -110,6 +111,35 @@ class Spinner(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         return np.zeros((*drive.shape, 1))
+
+
+def test_a_controller_that_comes_while_the_watch_ends_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It finds a watch that is alive and starts none: that one has to stay."""
+    slept = 0
+
+    class Clock:
+        """Each sleep takes as long as it is told to, at once; a controller computes from the tenth on."""
+
+        def sleep(self, seconds: float) -> None:
+            nonlocal slept
+            slept += 1
+            if slept == 10:
+                engine._watched[0] = self.monotonic(), "late"
+            elif slept == 20:
+                engine._watched.clear()
+
+        def monotonic(self) -> float:
+            return 0.1 * slept
+
+    monkeypatch.setattr(engine, "time", Clock())
+    monkeypatch.setattr(engine, "SILENCE", 0.2)
+    monkeypatch.setattr(engine, "_watched", {})
+    monkeypatch.setattr(engine, "_watcher", [threading.current_thread()])
+    engine._watch()
+    assert capsys.readouterr().err.count("The controller late has not returned for 0.2 s") == 1
+    assert engine._watcher == []
 
 
 @pytest.mark.parametrize("controller", [Sleeper(), Spinner()], ids=["plain", "compiled"])

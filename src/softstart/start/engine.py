@@ -54,8 +54,13 @@ def _watch() -> None:
     """Look at the controllers that compute, until there are none for some seconds."""
     named: set[tuple[float, str]] = set()
     idle = 0
-    while idle < 10:  # between two steps of a plain controller there is none
-        idle = 0 if _watched else idle + 1
+    while True:
+        idle = 0 if _watched else idle + 1  # between two steps of a plain controller there is none
+        if idle > 10:
+            _watcher.clear()  # from here on a controller starts a watch of its own
+            if not _watched or _watcher:
+                return
+            _watcher[:] = [threading.current_thread()]
         time.sleep(0.1 if SILENCE < 1.0 else 0.5)
         for began, name in set(_watched.values()) - named:
             if time.monotonic() - began >= SILENCE:
