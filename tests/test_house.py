@@ -89,12 +89,8 @@ BUDGET = {
     # 20: damage of cycles, for chains too
     # 80: intervals of starts whose drive is known within intervals
     # 15: friction in the energy balance
-    "start": (
-        2875,
-        10,
-        1,
-        0,
-    ),  # 5: the watch of controllers ends without a race; 30: what starts of drives and of chains have in common; 50: margins
+    # 5: the watch of controllers ends without a race
+    "start": (2875, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
     # 100 lines: damaged chunks and descriptions are found, named and made again; 20: margins to limits
     "sweeping": (1790, 8, 0, 0),
     # 40: drives drawn from an identification as scenarios
