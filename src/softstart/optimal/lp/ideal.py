@@ -133,6 +133,7 @@ class ContactProgram:
         mix: Vector | None = None,
         checks: tuple[float, ...] = QUARTERS,
         margin: float = MARGIN,
+        warm: WarmStarts | None = None,
     ) -> None:
         drive = problem.drive
         grid = np.linspace(0.0, 1.0, grid + 1) if isinstance(grid, int) else grid
@@ -151,7 +152,7 @@ class ContactProgram:
         self.share = (self.edges[checked] + s) / tau
         self.T, self.kept = (self._mixed(rows, mix) for rows in self._limited(checked, s))
         self.mix = mix
-        self.warm = WarmStarts()
+        self.warm = warm or WarmStarts()
         # the exact plant must not part the flanks by rounding; at first T is 0
         self.least = np.where(np.arange(self.kept[1].size) < 2 * len(checks), 0.0, margin)
         reach = min(contact.half_period, np.pi / contact.Omega)
@@ -454,12 +455,13 @@ def _near_entry(problem: Problem, entry: Entry, end: float, near: Answer) -> Ans
     """The best start to `end` with an entry near that of another end."""
     contact = Contact.of(problem.drive)
     answers: dict[float, Answer | None] = {}
+    warm = WarmStarts()
 
     def peak_at(te: float) -> float:
         if te not in answers:
             tau = end - te
             grid = contact_grid(contact, tau, COARSE) if tau > 0.0 else None
-            answers[te] = None if grid is None else ContactProgram(problem, tau, grid).solve(te)
+            answers[te] = None if grid is None else ContactProgram(problem, tau, grid, warm=warm).solve(te)
         return _peak(answers[te])
 
     last = min(entry.latest, end)
@@ -489,11 +491,13 @@ def _best_entry(problem: Problem, entry: Entry, end: float, steps: int) -> Answe
     if entry.earliest >= end:
         return None
     answers: dict[float, Answer | None] = {}
+    warm = WarmStarts()
 
     def peak_at(te: float) -> float:
         if te not in answers:
             tau = end - te
-            answers[te] = ContactProgram(problem, tau, contact_grid(contact, tau, steps)).solve(te)
+            grid = contact_grid(contact, tau, steps)
+            answers[te] = ContactProgram(problem, tau, grid, warm=warm).solve(te)
         return _peak(answers[te])
 
     def latest_for(P: float) -> float:
@@ -553,13 +557,15 @@ def greatest_speed(
     """The greatest load speed at `end`, rad/s, and the te it needs; -inf where the terminal cannot be met."""
     contact = Contact.of(problem.drive)
     known: dict[float, float] = {}
+    warm = WarmStarts()
 
     def short_by(te: float) -> float:
         te = min(max(te, entry.earliest), entry.latest)
         if te not in known:
             found = None
             if end > te:
-                program = ContactProgram(problem, end - te, contact_grid(contact, end - te, steps))
+                grid = contact_grid(contact, end - te, steps)
+                program = ContactProgram(problem, end - te, grid, warm=warm)
                 found = program.greatest_speed(te)
             known[te] = math.inf if found is None else -found
         return known[te]
@@ -617,12 +623,13 @@ def _refined(problem: Problem, entry: Entry, best: Answer) -> Answer:
 def _moved(problem: Problem, entry: Entry, best: Answer, grid: Vector, width: float, within: float) -> Answer:
     """The best entry within `width` of the one known, on another grid."""
     answers: dict[float, Answer | None] = {}
+    warm = WarmStarts()
     end = best.end_time
 
     def peak_at(te: float) -> float:
         te = min(max(te, entry.earliest), entry.latest, end)
         if te not in answers:
-            answers[te] = ContactProgram(problem, end - te, grid).solve(te)
+            answers[te] = ContactProgram(problem, end - te, grid, warm=warm).solve(te)
         return _peak(answers[te])
 
     peak_at(best.te)
