@@ -188,7 +188,9 @@ def optimize(
                 [f"{name}: limits asks for the least start time; leave this out." for name in wrong]
             )
         within_limits.check_limits(about.drive)
-        return within_limits.quickest(about, lambda one: solve(one, method, warm), time_limit)
+        return within_limits.quickest(
+            about, lambda one: solve(one, method, warm, certify=False), certified, time_limit
+        )
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
     best = solve(replace(about, start_time=seconds), method, warm, tolerance, time_limit, confirm)
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
@@ -216,8 +218,9 @@ def solve(
     tolerance: float = TOLERANCE,
     time_limit: float = 0.0,
     confirm: bool = False,
+    certify: bool = True,
 ) -> Optimum:
-    """The optimum of a problem; see `optimize`."""
+    """The optimum of a problem; see `optimize`. Without `certify` its bound is that of momentum."""
     began = time.perf_counter()
     if len(problem.drive.positions) > 1:
         return _over_positions(problem, method)
@@ -236,7 +239,7 @@ def solve(
             found = _bouncing(hold, "no start with one contact is that quick", began)
             return replace(found, tried=(_trial(found),))
         raise
-    work = MOST_WORK if time_limit > 0.0 else LITTLE_WORK
+    work = 0.0 if not certify else MOST_WORK if time_limit > 0.0 else LITTLE_WORK
     best = _checked(hold, candidate, why, began, work)
     tried = [_trial(best)]
     goes_on = method == "auto" and best.method == "lp" and best.gap_percent > 100.0 * tolerance
@@ -316,6 +319,16 @@ def _beside_shipped(hold: Hold, best: Optimum, work: float) -> tuple[Optimum, li
     return best, tried
 
 
+def certified(found: Optimum) -> Optimum:
+    """The same start with the bound that little work proves; checked against it."""
+    if found.method == "robust":
+        return found
+    hold = hold_of(found.problem)
+    bound = _bound(hold, found.end_time - hold.until, found.run, LITTLE_WORK)
+    check(found.problem, found.profile, found.end_time, found.claimed, bound)
+    return replace(found, bound=bound)
+
+
 def _trial(found: Optimum) -> Trial:
     return Trial(found.method, found.minimised, found.seconds, "")
 
@@ -327,10 +340,10 @@ def _checked(
     problem = hold.problem
     end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
     profile = with_tail(problem, hold.before(candidate.profile), end)
-    if bounces:  # the certificates are about one contact
+    if bounces or work == 0.0:  # the certificates are about one contact
         bound = momentum_bound(problem)
     else:
-        bound = _bound(hold, candidate, replay(problem.drive, profile, end, problem.base), work)
+        bound = _bound(hold, candidate.end_time, replay(problem.drive, profile, end, problem.base), work)
     run = check(problem, profile, end, claimed, bound, bounces=bounces)
     return Optimum(
         problem=problem,
@@ -362,7 +375,7 @@ def _over_positions(problem: Problem, method: Choice) -> Optimum:
     alone = {}
     for name, one in drive.positions.items():
         with suppress(InfeasibleError, OptimumError, NotConverged):
-            alone[name] = solve(replace(problem, drive=one))
+            alone[name] = solve(replace(problem, drive=one), certify=False)  # the bound is that of all
     return Optimum(
         problem=problem,
         profile=found.profile,
@@ -450,7 +463,7 @@ def _refusal(problem: Problem) -> InfeasibleError | OptimumError:
     return InfeasibleError(verdict)
 
 
-def _bound(hold: Hold, candidate: Candidate, run: Run, work: float) -> LowerBound:
+def _bound(hold: Hold, end_time: float, run: Run, work: float) -> LowerBound:
     """The certificate where there is one for this class of problems, else the bound by momentum.
 
     It is that of the motor without its brake, in the time that is left after the earliest release.
@@ -458,7 +471,7 @@ def _bound(hold: Hold, candidate: Candidate, run: Run, work: float) -> LowerBoun
     problem = hold.free
     timed = problem
     if problem.start_time is None:
-        timed = replace(problem, start_time=candidate.end_time, minimise="k_dyn", k_dyn=None)
+        timed = replace(problem, start_time=end_time, minimise="k_dyn", k_dyn=None)
     by_momentum = momentum_bound(timed)
     if problem.minimise != "k_dyn" or run.k_dyn <= by_momentum.k_dyn * (1.0 + TIGHT):
         return by_momentum  # nothing better can be proved
@@ -466,7 +479,7 @@ def _bound(hold: Hold, candidate: Candidate, run: Run, work: float) -> LowerBoun
     if not (problem.ideal_torque and not not_certified(problem)) and not no_whole(problem):
         entry = _entry_of(run, hold.until)
         contact = run.first_contact - hold.until if problem.drive.theta0 < 0.5 * problem.drive.gap else 0.0
-        near = contact, max(entry, contact), candidate.end_time
+        near = contact, max(entry, contact), end_time
         known.append(whole_bound(problem, run.k_dyn, near, work=work))
     best = max(known, key=lambda one: one.k_dyn)
     far = run.k_dyn > best.k_dyn * (1.0 + TOLERANCE) and (work == MOST_WORK or len(known) == 1)

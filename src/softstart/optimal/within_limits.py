@@ -49,15 +49,21 @@ def check_limits(drive: Drive) -> None:
         )
 
 
-def quickest(problem: Problem, solve: Callable[[Problem], Optimum], seconds: float = math.inf) -> Optimum:
-    """The quickest of the gentlest starts that keep the limits; `solve` finds the gentlest one of a time.
+def quickest(
+    problem: Problem,
+    solve: Callable[[Problem], Optimum],
+    certified: Callable[[Optimum], Optimum],
+    seconds: float = math.inf,
+) -> Optimum:
+    """The quickest of the gentlest starts that keep the limits.
 
+    `solve` finds the gentlest one of a time, `certified` proves its bound, which the search does not need.
     The start time of `problem` does not count. After `seconds` of the clock no further start time is tried
     once a start that keeps the limits is known. Raises InfeasibleError where there is none.
     """
     began = time.perf_counter()
-    search = _Search(problem, solve)
-    found = search.first_that_keeps(began + seconds)
+    search = _Search(problem, solve, certified)
+    found = certified(search.first_that_keeps(began + seconds))
     at_least, covers = search.proved(found)
     margins = search.margins(found, checked_limits(problem.drive))
     return replace(
@@ -71,8 +77,13 @@ def quickest(problem: Problem, solve: Callable[[Problem], Optimum], seconds: flo
 class _Search:
     """Start times that were tried, each with its gentlest start."""
 
-    def __init__(self, problem: Problem, solve: Callable[[Problem], Optimum]) -> None:
-        self.problem, self.solve = problem, solve
+    def __init__(
+        self,
+        problem: Problem,
+        solve: Callable[[Problem], Optimum],
+        certified: Callable[[Optimum], Optimum],
+    ) -> None:
+        self.problem, self.solve, self.certified = problem, solve, certified
         self.limits = replace(checked_limits(problem.drive), start_time=None)
         most = self.limits.shaft_torque
         self.allowed = math.inf if most is None else most / problem.base_torque
@@ -172,8 +183,9 @@ class _Search:
             best = self._gentlest(end)
             if best is None and end <= self.shortest:
                 break
-            if best is not None and best.bound.k_dyn > self.allowed:
-                return end, best.bound.covers
+            bound = None if best is None else self.certified(best).bound
+            if bound is not None and bound.k_dyn > self.allowed:
+                return end, bound.covers
             step *= 2.0
         return by_momentum
 
