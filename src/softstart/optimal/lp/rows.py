@@ -205,7 +205,6 @@ class Limits:
             above, equal = np.asarray(found.ineqlin.marginals), np.asarray(found.eqlin.marginals)
             return Solution(np.asarray(found.x), float(found.fun), above, equal)
         size = self.cost.size, self.b_ub.size, self.b_eq.size
-        program = self._program(bounds)
         basis = None if warm is None else warm.begin(size)
         for solver, start in (("simplex", basis), ("ipm", None)):
             engine = highs._Highs()
@@ -214,7 +213,7 @@ class Limits:
             if not presolve:
                 engine.setOptionValue("presolve", "off")
             engine.setOptionValue("simplex_iteration_limit", int(FEW_ITERATIONS + sum(size)))
-            engine.passModel(program)
+            self._passed_to(engine, bounds)
             if start is not None:
                 engine.setBasis(start)
             engine.run()
@@ -233,20 +232,17 @@ class Limits:
                 return None
         return None
 
-    def _program(self, bounds: Matrix) -> Any:
-        """The program as HiGHS takes it."""
+    def _passed_to(self, engine: Any, bounds: Matrix) -> None:
+        """Give HiGHS the program as arrays: what is set on its `HighsLp` is copied number by number."""
         A = Sparse.stacked([self.A_ub, self.A_eq]).csr(self.cost.size).tocsc()
-        program = highs.HighsLp()
-        program.num_col_, program.num_row_ = A.shape[1], A.shape[0]
-        program.col_cost_ = self.cost
-        program.col_lower_, program.col_upper_ = bounds[:, 0].copy(), bounds[:, 1].copy()
-        program.row_lower_ = np.concatenate([np.full(self.b_ub.size, -np.inf), self.b_eq])
-        program.row_upper_ = np.concatenate([self.b_ub, self.b_eq])
-        matrix = program.a_matrix_
-        matrix.num_col_, matrix.num_row_ = A.shape[1], A.shape[0]
-        matrix.format_ = highs.MatrixFormat.kColwise
-        matrix.start_, matrix.index_, matrix.value_ = A.indptr, A.indices, A.data
-        return program
+        rows, columns = A.shape
+        below = np.concatenate([np.full(self.b_ub.size, -np.inf), self.b_eq])
+        above = np.concatenate([self.b_ub, self.b_eq])
+        engine.passModel(
+            columns, rows, A.nnz, int(highs.MatrixFormat.kColwise), int(highs.ObjSense.kMinimize), 0.0,
+            self.cost, bounds[:, 0].copy(), bounds[:, 1].copy(), below, above,
+            A.indptr, A.indices, A.data, np.zeros(columns, dtype=np.int32),
+        )  # fmt: skip
 
 
 def below(rows: Rows, variable: Sparse, sign: float = 1.0) -> Rows:
