@@ -333,6 +333,52 @@ def test_a_page_loaded_anew_goes_on_with_its_drive(page, visit):
     shows(linked, "strategy.time", "0.2")
 
 
+def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit, screenshot):
+    page = opened(visit())
+    direct = simulate(CRANE, "direct")
+    keep, foot = page.get_by_text("Keep as reference"), page.locator(".strategies tfoot")
+    clear = page.get_by_label("clear the reference")
+    assert not foot.is_visible()
+    keep.click()
+    foot.wait_for(state="visible")
+    field(page, "shaft.gap").fill("4 deg")
+    field(page, "shaft.gap").press("Enter")
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    wait_for_k(page, simulate(CRANE.replace(gap="4 deg"), "ramp").k_dyn)
+    assert foot.locator('[data-key="k_dyn"]').inner_text() == f"{direct.k_dyn:.3f}"
+    assert foot.locator(".title span").inner_text() == "reference: direct, shaft.gap 0.5 rad"
+    peak = page.evaluate("""() => {
+      const { plots } = window.getElement(document.querySelector(".instrument")).instrument;
+      return plots.reference.peak[1];
+    }""")
+    assert peak == direct.peak_torque
+    with page.expect_download() as download:
+        page.get_by_text("SVG", exact=True).click()
+    drawn = Path(download.value.path()).read_text(encoding="utf-8")
+    assert f"reference: direct, shaft.gap 0.5 rad, {direct.k_dyn:.3f}" in drawn
+    assert drawn.count('stroke-dasharray="7 4"') == 4  # in three plots and the legend
+    page.wait_for_function(
+        "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"
+    )
+    page.wait_for_timeout(700)
+    for width, height in ((1280, 800), (1920, 1080)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(1500)
+        screenshot(page, f"reference-{width}")
+        wide = "one => one.scrollWidth - one.clientWidth"
+        assert page.locator(".strategies").evaluate(wide) == 0
+        assert page.locator(".strategy .other >> visible=true").count() == 0  # there is no column for it
+    linked = opened(visit(url=page.url, select=""))
+    linked.locator(".strategies tfoot").wait_for(state="visible")
+    page.reload()
+    opened(page)
+    foot.wait_for(state="visible")
+    clear.click()
+    foot.wait_for(state="hidden")
+    page.get_by_label("Undo", exact=True).click()
+    foot.wait_for(state="visible")
+
+
 def test_undo_and_redo_by_buttons_and_keys(visit):
     page = opened(visit(select=""))  # to select another one would be a step to undo
     first = k_dyn(page)

@@ -141,6 +141,7 @@ class Controls:
             "show": (session.show, {"name": str, "visible": bool}),
             "remove": (session.remove, {"name": str}),
             "keep": (self._keep, {"kept": bool}),
+            "reference": (session.keep_reference, {"kept": bool}),
             "window": (self._window, {"begin": float, "end": float}),
             "hello": (self._hello, {"kept": object, "link": object}),
         }

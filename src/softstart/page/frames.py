@@ -21,8 +21,8 @@ from softstart.drive import PARAMETERS, Drive
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.ranges import Axes, Scale, axes_about, scales_about, scales_of
-from softstart.page.sentences import sentence_of
-from softstart.page.session import Bench, Session, Strategy
+from softstart.page.sentences import differences, sentence_of
+from softstart.page.session import Bench, Reference, Session, Strategy
 from softstart.plant import layout as at
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -67,6 +67,7 @@ class Screen:
         self._bench_kept: Bench | None = None  # by its tab
         self.strategy_scales: Mapping[str, Scale] = {}  # sliders of the selected strategy
         self._strategy_of: tuple[object, ...] = ()  # what these and the rows in the browser are for
+        self._reference_of: tuple[object, ...] = ()  # the reference that the browser has, and its window
 
     @property
     def version(self) -> int:
@@ -88,7 +89,7 @@ class Screen:
         """The browser has lost what it had: send the map again."""
         self._map_of = None
         self._map_seen = False
-        self._strategy_of = ()
+        self._strategy_of = self._reference_of = ()
         self._bench_kept = None
 
     def glance(self) -> Frame | None:
@@ -207,9 +208,21 @@ class Screen:
             "figure": figure(session, found),
             "traces": {session.selected: drawn(found, PACKED, self.window)},
             "rows": [row(session, found)],
+            "reference": self._reference(),
             "here": here(session.drive),
             "map_is_old": self._map_seen and not self._map_is_right(),
         }
+
+    def _reference(self) -> Frame | None:
+        """What the strategies are compared with, in words and figures; its trace if that is new."""
+        kept, found = self.session.bench.reference, self.session.reference()
+        if kept is None or found is None:
+            return None
+        line = outcomes(found) | {"name": ", ".join(filter(None, reference_words(kept, self.session)))}
+        if self._reference_of != (kept, self.window):
+            self._reference_of = kept, self.window
+            line["trace"] = drawn(found, PACKED, self.window)
+        return line
 
     def others(self) -> Iterator[Frame | None]:
         """Rows of the other strategies and the traces of those that are shown, a few ms at a time.
@@ -431,13 +444,38 @@ def row(session: Session, found: Strategy) -> dict[str, Any]:
 
 def judged(session: Session, found: Strategy) -> dict[str, Any]:
     """What a strategy is judged by."""
+    lost = number(session.time_lost(found.name)) if found.run is not None else None
+    return outcomes(found) | {"time_lost": lost}
+
+
+def outcomes(found: Strategy) -> dict[str, Any]:
+    """What came out of a start by itself."""
     return {
         "name": found.name,
         "k_dyn": number(found.k_dyn),
         "start_time": number(found.start_time),
         "peak_torque": number(found.peak_torque),
-        "time_lost": number(session.time_lost(found.name)) if found.run is not None else None,
     }
+
+
+def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
+    """A reference's strategy, and what of it and of its drive is not as it is now.
+
+    >>> session = Session()
+    >>> session.select("ramp")
+    >>> session.keep_reference()
+    >>> session.set("gap", 1.0)
+    >>> session.set_parameter("time", "200 ms")
+    >>> reference_words(session.bench.reference, session)
+    ('ramp', 'time default', 'shaft.gap 0.5 rad')
+    """
+    controller, other = kept.controller, session.controllers.get(kept.label)
+    own = [
+        f"{one.name} {'default' if value is None else value}"
+        for one in (parameters_of(controller) if type(other) is type(controller) else ())
+        if (value := getattr(controller, one.name)) != getattr(other, one.name)
+    ]
+    return kept.label, *own, differences(kept.drive, session.drive)
 
 
 def drawn(

@@ -1,7 +1,8 @@
 """A bench in the address of the page, so that a link brings back the same picture; and those in memory.
 
-A link holds the drive, the parameters of installed strategies, and what is selected and drawn. Tuned gains
-and profiles come from files and are not part of it; the server keeps them for a tab that is loaded anew.
+A link holds the drive, the parameters of installed strategies, what is selected and drawn, and the reference.
+Tuned gains and profiles come from files and are not part of it; the server keeps them for a tab that is
+loaded anew.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.page.session import Bench, Session
+from softstart.page.session import Bench, Reference, Session
 
 MOST_KEPT = 64  # benches of tabs that may be loaded anew
 LONGEST = 16_384  # letters of a link
@@ -55,6 +56,7 @@ def link_of(session: Session) -> str:
     (1.0, 'ramp', 0.2)
     """
     bench, installed = session.bench, controller_names()
+    kept = bench.reference
     content = {
         "drive": bench.drive.to_toml(),
         "origin": bench.origin.to_toml() if bench.origin is not bench.drive else "",
@@ -62,6 +64,9 @@ def link_of(session: Session) -> str:
                        if name in installed and (given := _given(controller))},
         "selected": bench.selected,
         "drawn": sorted(bench.drawn),
+        "reference": None if kept is None or kept.label not in installed else {
+            "drive": kept.drive.to_toml(), "label": kept.label, "parameters": _given(kept.controller),
+        },
     }  # fmt: skip
     packed = zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 9)
     return urlsafe_b64encode(packed).decode("ascii").rstrip("=")
@@ -86,12 +91,13 @@ def bench_of(link: str, now: Bench) -> Bench:
         parameters = content["parameters"]
         given = {name: dict(parameters[name]) for name in now.controllers if name in parameters}
         selected, drawn = str(content["selected"]), frozenset(map(str, content["drawn"]))
+        reference = _reference(content.get("reference"), now)
     except (KeyError, TypeError, ValueError, RecursionError, binascii.Error, zlib.error):
         raise InputError(
             "the address after #: this is no bench that softstart has written; copy the whole link again, "
             "or delete what follows the #."
         ) from None
-    if drive.shape != () or origin.shape != ():
+    if any(one.shape != () for one in (drive, origin, *([reference.drive] if reference else []))):
         raise InputError("the address after #: it holds several drives, and the page starts one.")
     made = {name: make_controller(name, values) for name, values in given.items()}
     return Bench(
@@ -100,7 +106,16 @@ def bench_of(link: str, now: Bench) -> Bench:
         {**now.controllers, **made},
         selected if selected in now.controllers else now.selected,
         drawn & set(now.controllers),
+        reference,
     )
+
+
+def _reference(content: Any, now: Bench) -> Reference | None:
+    """The reference of a link; like all strategies, only one that the page has can be given parameters."""
+    if content is None or (label := str(content["label"])) not in now.controllers:
+        return None
+    drive, parameters = Drive.from_toml(content["drive"]), dict(content["parameters"])
+    return Reference(drive, label, make_controller(label, parameters))
 
 
 def _content(link: str) -> Mapping[str, Any]:

@@ -64,14 +64,25 @@ def changed_since(computed: Drive, now: Drive) -> str:
     >>> changed_since(crane, crane.replace(gap=1.0))
     'For shaft.gap 0.5 rad; the drive has changed since.'
     """
-    changed = [p for p in changes(computed, now) if p.name not in WORDS]
-    if not changed:
+    named = differences(computed, now)
+    if not named:
         return ""
-    if computed.name != now.name:
-        return f"For {clipped(computed.name)}; another drive is loaded now."
-    named = ", ".join(f"{p.path} {_value(p, getattr(computed, p.name))}" for p in changed[:NAMED])
-    more = f" and {len(changed) - NAMED} more" if len(changed) > NAMED else ""
-    return f"For {named}{more}; the drive has changed since."
+    other = computed.name != now.name
+    return f"For {named}; {'another drive is loaded now' if other else 'the drive has changed since'}."
+
+
+def differences(drive: Drive, other: Drive) -> str:
+    """What tells a drive from another one: its name, else its values; empty where both start alike.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
+    'shaft.gap 1 rad, load.inertia 0.2 kg m2'
+    """
+    changed = [p for p in changes(drive, other) if p.name not in WORDS]
+    if changed and drive.name != other.name:
+        return clipped(drive.name)
+    named = ", ".join(f"{p.path} {_value(p, getattr(drive, p.name))}" for p in changed[:NAMED])
+    return named + (f" and {len(changed) - NAMED} more" if len(changed) > NAMED else "")
 
 
 def changes(old: Drive, new: Drive) -> list[Parameter]:

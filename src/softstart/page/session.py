@@ -67,6 +67,15 @@ class Strategy:
 
 
 @dataclass(frozen=True, eq=False)
+class Reference:
+    """A start that stays drawn while drive and strategies change: a controller, its label then, its drive."""
+
+    drive: Drive
+    label: str
+    controller: Controller
+
+
+@dataclass(frozen=True, eq=False)
 class Bench:
     """All that a user can change.
 
@@ -77,6 +86,7 @@ class Bench:
     controllers : all strategies of the table, by label, shown or not.
     selected : label of the strategy whose figure is large and whose map is drawn.
     drawn : labels of the strategies that are drawn beside it.
+    reference : what all of them are compared with, if something is.
     """
 
     drive: Drive
@@ -84,6 +94,7 @@ class Bench:
     controllers: Mapping[str, Controller]
     selected: str
     drawn: frozenset[str]
+    reference: Reference | None = None
 
 
 class Session:
@@ -118,6 +129,7 @@ class Session:
         self._cases: dict[tuple[str, str], Case] = {}
         self._rows: dict[str, Row] = {}
         self._direct: list[Run | None] = []  # empty until it is computed
+        self._reference: tuple[Reference, Strategy] | None = None
 
     # the state -----------------------------------------------------------------------------------------
 
@@ -279,6 +291,23 @@ class Session:
         if visible != (label in self._bench.drawn):
             self._put(drawn=self._bench.drawn ^ {label})
 
+    def keep_reference(self, kept: bool = True) -> None:
+        """Compare with the selected strategy on the drive as both are now; with nothing if not `kept`.
+
+        >>> session = Session()
+        >>> session.select("direct")
+        >>> session.keep_reference()
+        >>> session.set("gap", 1.0)
+        >>> session.reference().k_dyn < session.result("direct").k_dyn
+        True
+        """
+        label = self.selected
+        made = Reference(self.drive, label, self.controllers[label]) if kept else None
+        if made is not None and (known := self.ready(label)) is not None:
+            self._reference = made, known
+        if made is not self._bench.reference:
+            self._put(reference=made)
+
     def select_gentlest(self) -> None:
         """Select the strategy with the least K_dyn of those that reach the target speed in good time."""
         latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.start_time)
@@ -306,17 +335,19 @@ class Session:
         if known is not None:
             return known
         self._known(label)
-        began = time.thread_time()
-        try:
-            run = simulate(self.drive, self.controllers[label], max_events=max_events)
-        except Exception as error:  # a controller is anyone's code and may fail in any way
-            found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
-            if isinstance(error, SimulationError) and max_events < MOST_EVENTS:
-                return found
-        else:
-            found = Strategy(label, run, "", time.thread_time() - began)
-        self._results[label] = found
+        found, given_up = _started(label, self.drive, self.controllers[label], max_events)
+        if not given_up or max_events >= MOST_EVENTS:
+            self._results[label] = found
         return found
+
+    def reference(self) -> Strategy | None:
+        """The start that all are compared with, on the drive that it was kept with; None if none was kept."""
+        kept = self._bench.reference
+        if kept is None:
+            return None
+        if self._reference is None or self._reference[0] is not kept:
+            self._reference = kept, _started(kept.label, kept.drive, kept.controller, MOST_EVENTS)[0]
+        return self._reference[1]
 
     def worn(self, label: str) -> float:
         """K_dyn of a strategy, set up for this drive, when the gap is 4 times as wide; NaN where it fails.
@@ -387,7 +418,7 @@ class Session:
         """Let go of all results and listeners: the user has gone."""
         self._listeners.clear()
         self._forget(list(self.controllers))
-        self._past, self._future = [], []
+        self._past, self._future, self._reference = [], [], None
 
     # ---------------------------------------------------------------------------------------------------
 
@@ -434,6 +465,17 @@ class Session:
             near = nearest(label, list(self.controllers))
             hint = f"did you mean {near}?" if near else f"there are {', '.join(self.controllers)}."
             raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
+
+
+def _started(label: str, drive: Drive, controller: Controller, max_events: int) -> tuple[Strategy, bool]:
+    """A start, and whether it was given up for its events; what goes wrong in it becomes its sentence."""
+    began = time.thread_time()
+    try:
+        run = simulate(drive, controller, max_events=max_events)
+    except Exception as error:  # a controller is anyone's code and may fail in any way
+        found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
+        return found, isinstance(error, SimulationError)
+    return Strategy(label, run, "", time.thread_time() - began), False
 
 
 def _single(drive: Drive) -> Drive:

@@ -132,6 +132,34 @@ def test_a_link_brings_back_drive_strategies_and_selection():
     assert other.result("shaped").k_dyn == session.result("shaped").k_dyn
 
 
+def test_a_reference_stays_while_drive_and_strategies_change_and_travels_in_the_link():
+    session = Session()
+    session.select("ramp")
+    session.set("shaft.gap", "4 deg")
+    kept = simulate(session.drive, "ramp").k_dyn
+    session.keep_reference()
+    session.set_parameter("time", "200 ms")
+    session.set("shaft.gap", 1.0)
+    assert session.reference().k_dyn == kept
+    assert session.result("ramp").k_dyn != kept
+    other = Session()
+    other.restore(bench_of(link_of(session), other.bench))
+    assert other.reference().k_dyn == kept
+    session.take(Drive.load("servo-axis-small"))  # two drives
+    assert session.reference().k_dyn == kept
+    session.keep_reference(False)
+    assert session.reference() is None
+    assert bench_of(link_of(session), other.bench).reference is None
+    session.undo()
+    assert session.reference().k_dyn == kept
+    steps = session.steps
+    for _ in range(4):
+        session.undo()
+    assert session.reference() is None
+    session.keep_reference(False)  # there is none: no step
+    assert session.steps == (steps[0] - 4, steps[1] + 4)
+
+
 BOMB = urlsafe_b64encode(zlib.compress(b"[" * 5_000_000)).decode()
 
 
@@ -151,6 +179,8 @@ def test_a_link_that_holds_no_bench_is_refused_in_a_sentence(link):
         {"parameters": 3},
         {"drawn": 3},
         {"drive": 3},
+        {"reference": 3},
+        {"reference": {"label": "direct", "drive": 3, "parameters": {}}},
     ],
 )
 def test_a_link_with_parts_of_another_kind_is_refused_in_the_same_sentence(change):

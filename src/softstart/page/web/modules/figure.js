@@ -11,8 +11,10 @@ const FACTS = [
 ];
 
 export class Figure {
-  constructor(place) {
+  constructor(place, say) {
     this.name = element("div", { class: "name" });
+    const keep = element("button", { type: "button", class: "keep", title: "Keep this start drawn, dashed and grey, while drive and strategies change" }, "Keep as reference");
+    keep.addEventListener("click", () => say({ what: "reference", kept: true }));
     this.value = element("output", { class: "k-dyn", id: "k-dyn", "aria-live": "off" });
     this.status = element("div", { class: "status", role: "status" });
     this.facts = new Map();
@@ -23,7 +25,7 @@ export class Figure {
       list.append(element("div", {}, element("dt", {}, label), value, element("dd", { class: "unit" }, unit)));
     }
     const head = element("div", { class: "head" }, element("div", { class: "caption" }, "K", element("sub", {}, "dyn")), this.value);
-    place.append(this.name, head, list, this.status);
+    place.append(element("div", { class: "of" }, this.name, keep), head, list, this.status);
   }
 
   show(figure) {

@@ -25,7 +25,7 @@ export class Instrument {
     this.scheme = new Scheme(root.querySelector(".controls"));
     this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), groups, say);
     this.steps = new Steps(root.querySelector(".steps"), say);
-    this.figure = new Figure(root.querySelector(".figure"));
+    this.figure = new Figure(root.querySelector(".figure"), say);
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);
     this.advice = root.querySelector(".advice");
     const windowed = (window) => say({ what: "window", begin: window?.[0] ?? 0, end: window?.[1] ?? 0 });
@@ -76,6 +76,7 @@ export class Instrument {
       Object.assign(state, { order, shown, added, changed, selected });
       state.stamp = frame.stamp;
       state.here = frame.here;
+      state.reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
       state.fields = frame.fields;
       this.steps.show(frame.steps);
       if (frame.strategy) this.controls.strategy(frame.strategy);
@@ -134,6 +135,8 @@ export class Instrument {
     if (!this.plotted) {
       this.plotted = true;
       for (const [name, packed] of this.state.traces) if (packed.data) this.state.traces.set(name, unpack(packed));
+      const { reference } = this.state;
+      if (reference?.trace?.data) reference.trace = unpack(reference.trace);
       this.plots.draw(this.state);
     }
     this.map.draw(this.state);

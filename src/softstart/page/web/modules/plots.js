@@ -1,11 +1,12 @@
 // Torques, speeds and the twist within the gap over time, on one canvas with one time axis. The window on it is
 // moved by wheel, drag and keys; an instant is pointed at by the mouse, or held by a press, the keys and the player.
-import { label, Range, sharp, significant, ticks } from "./numbers.js";
+import { fixed, label, Range, sharp, significant, ticks } from "./numbers.js";
 import { SvgPen } from "./svg.js";
 import { extent, indexAt, valueAt } from "./trace.js";
 
 const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24, LINE = 15;
 const SHARES = [0.5, 0.25, 0.25];
+const DASH = [7, 4]; // of the reference
 const FINEST = 1e-7; // of the whole start: a shorter window has no digits left in single precision
 
 export class Plots {
@@ -173,7 +174,7 @@ export class Plots {
       y += panel.h + BETWEEN;
       return panel;
     });
-    const end = Math.max(main.t.at(-1), ...others.map((name) => state.traces.get(name).t.at(-1)));
+    const end = Math.max(main.t.at(-1), ...others.map((name) => state.traces.get(name).t.at(-1)), this.reference?.t.at(-1) ?? 0);
     const whole = this.ranges[3].fit(0, end, 0.01, 20).high;
     this.box = { w, end: main.t.at(-1), whole };
     if (this.window && this.window[0] >= end) this.window = null;
@@ -193,9 +194,11 @@ export class Plots {
   // lines of legend entries: those of the selected start last, names before them, as many lines as they need
   named(pen, w, state, others) {
     const flagged = (name) => (state.rows.get(name)?.flag ? ` (${state.rows.get(name).flag})` : "");
+    const { reference } = state;
+    const kept = this.reference ? [[`reference: ${reference.name}, ${fixed(reference.k_dyn, 3)}`, this.theme.colours.quiet, DASH, 1.4]] : [];
     const entries = others.map((name) => [`T, ${name}${flagged(name)}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
     if (state.traces.get(state.selected).allowed) entries.push(["permissible", this.theme.colours.warn, [], 1]);
-    entries.push(["motor u", this.theme.colours.ink, [5, 3], 1.2], [`shaft T${flagged(state.selected)}`, this.own(state), [], 2.4]);
+    entries.push(...kept, ["motor u", this.theme.colours.ink, [5, 3], 1.2], [`shaft T${flagged(state.selected)}`, this.own(state), [], 2.4]);
     const lines = [[]];
     let free = w - 90; // the heading stands in the lowest line
     for (const entry of entries.reverse()) {
@@ -277,6 +280,21 @@ export class Plots {
       pen.setLineDash([]);
       at -= 30;
     }
+  }
+
+  // the start that the others are compared with, if one was kept and can be drawn
+  get reference() {
+    return this.state.reference?.trace?.T ? this.state.reference.trace : null;
+  }
+
+  compared(panel, channel) {
+    if (this.reference) this.curve(panel, this.reference.t, this.reference[channel], this.theme.colours.quiet, 1.4, DASH);
+  }
+
+  // least and largest of what is seen of a channel of the selected start and of the reference
+  reach(main, channel, low, high) {
+    for (const trace of [main, this.reference]) if (trace) [low, high] = extent(trace, channel, this.seen, low, high);
+    return [low, high];
   }
 
   own(state) {
@@ -363,7 +381,7 @@ export class Plots {
   }
 
   torques(panel, state, main, others, named) {
-    let [low, high] = extent(main, "T", this.seen, 0, 0);
+    let [low, high] = this.reach(main, "T", 0, 0);
     [low, high] = extent(main, "u", this.seen, low, high);
     for (const name of others) [low, high] = extent(state.traces.get(name), "T", this.seen, low, high);
     const { quiet, ink, paper } = this.theme.colours;
@@ -384,6 +402,7 @@ export class Plots {
         this.curve(panel, trace.t, trace.T, this.theme.strategy(state.order.indexOf(name)), 1);
       }
       this.startLine(panel, state);
+      this.compared(panel, "T");
       this.curve(panel, main.t, main.u, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.T, own, 2.2);
       this.peaks(panel, state, main, others);
@@ -429,7 +448,7 @@ export class Plots {
   speeds(panel, state, main) {
     let [low, high] = this.window ? [Infinity, -Infinity] : [0, main.target];
     [low, high] = extent(main, "w1", this.seen, low, high);
-    [low, high] = extent(main, "w2", this.seen, low, high);
+    [low, high] = this.reach(main, "w2", low, high);
     const { ink, quiet } = this.theme.colours;
     const own = this.own(state);
     const range = this.ranges[1].fit(low, high);
@@ -440,6 +459,7 @@ export class Plots {
     this.inside(panel, () => {
       this.level(panel, main.target, quiet, [1, 3]);
       this.startLine(panel, state);
+      this.compared(panel, "w2");
       this.curve(panel, main.t, main.w1, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.w2, own, 2);
     });
@@ -447,7 +467,7 @@ export class Plots {
 
   twist(panel, state, main) {
     const half = main.gap / 2;
-    const [low, high] = extent(main, "theta", this.seen, -half, half);
+    const [low, high] = this.reach(main, "theta", -half, half);
     const { quiet, shade } = this.theme.colours;
     const range = this.ranges[2].fit(low, high);
     Object.assign(panel, { low: range.low, high: range.high });
@@ -457,6 +477,7 @@ export class Plots {
     this.inside(panel, () => {
       this.level(panel, half, quiet);
       this.level(panel, -half, quiet);
+      this.compared(panel, "theta");
       this.curve(panel, main.t, main.theta, this.own(state), 2);
     });
   }
@@ -480,6 +501,7 @@ export class Plots {
     const at = this.x(panels[0], t);
     const own = (channel) => valueAt(main, channel, t);
     const among = others.map((name) => [this.theme.strategy(state.order.indexOf(name)), name, valueAt(state.traces.get(name), "T", t), ""]);
+    if (this.reference) among.push([quiet, "reference", valueAt(this.reference, "T", t), ""]);
     const texts = [
       [["", "t", t, "s"], ["", "T", own("T"), "N m"], ["", "u", own("u"), "N m"]],
       [["", "\u03c9\u2081", own("w1"), ""], ["", "\u03c9\u2082", own("w2"), "rad/s"]],
@@ -533,8 +555,10 @@ export class Plots {
     const [from, to] = this.seen;
     const channels = ["t", "T", "u", "w1", "w2", "theta"];
     const lines = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad"];
-    for (const name of state.order.filter((one) => one === state.selected || state.shown.includes(one))) {
-      const trace = state.traces.get(name);
+    const drawn = state.order.filter((one) => one === state.selected || state.shown.includes(one));
+    const traces = drawn.map((name) => [name, state.traces.get(name)]);
+    if (this.reference) traces.push([`reference: ${state.reference.name}`, this.reference]);
+    for (const [name, trace] of traces) {
       trace?.t?.forEach((t, i) => {
         if (t < from || t > to) return;
         lines.push([`"${name.replaceAll('"', '""')}"`, ...channels.map((one) => (trace[one] ? Number(trace[one][i].toPrecision(7)) : ""))].join(","));

@@ -31,7 +31,7 @@ export class Table {
     const first = element("th", { scope: "col", class: "eye" }, element("span", { class: "hidden" }, "drawn"));
     const last = element("th", { class: "bar-head", scope: "col" }, element("span", {}, "K, line at 1"));
     const head = element("tr", {}, first, ...heads, last);
-    place.append(element("table", {}, element("thead", {}, head), this.body));
+    place.append(element("table", {}, element("thead", {}, head), this.body, this.foot()));
   }
 
   sort(key) {
@@ -43,6 +43,7 @@ export class Table {
   show(state) {
     this.state = state;
     this.arrange(state);
+    this.compare(state.reference);
     const largest = Math.max(2, ...[...state.rows.values()].map((row) => row.k_dyn ?? 0));
     for (const name of state.order) {
       const line = this.lines.get(name);
@@ -73,6 +74,23 @@ export class Table {
       line.bar.style.setProperty("--share", `${(100 * (row.k_dyn ?? 0)) / largest}%`);
       line.bar.style.setProperty("--one", `${100 / largest}%`);
     }
+  }
+
+  // the start that all are compared with
+  foot() {
+    this.name = element("span");
+    const out = element("button", { type: "button", class: "out", title: "Clear the reference", "aria-label": "clear the reference" }, "\u00d7");
+    out.addEventListener("click", () => this.say({ what: "reference", kept: false }));
+    this.compared = COLUMNS.slice(1).map(([key]) => element("td", { class: "number", "data-key": key }));
+    const title = element("td", { class: "title" }, element("div", {}, this.name, out));
+    return (this.reference = element("tfoot", { hidden: true }, element("tr", {}, element("td"), title, ...this.compared, element("td"))));
+  }
+
+  compare(reference) {
+    this.reference.hidden = !reference;
+    if (!reference) return;
+    this.name.textContent = this.name.title = `reference: ${reference.name}`;
+    this.compared.forEach((cell, index) => (cell.textContent = COLUMNS[index + 1][3](reference)));
   }
 
   arrange(state) {
