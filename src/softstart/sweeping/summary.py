@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 SHARES = (0.05, 0.5, 0.95)
 Pieces = Callable[[], Iterator[Any]]
+READ_WHOLE = 1 << 20  # starts: of so many a figure takes 8 MiB of memory
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,14 @@ def plan_of(results: xarray.Dataset) -> Plan:
 
 
 def _pieces(results: xarray.Dataset, name: str, plan: Plan) -> Pieces:
-    return lambda: (results[name][plan.place(number)].values for number in range(plan.chunks))
+    """Chunk by chunk, several times over; what is small is read once and as a whole."""
+    whole = results[name].values if plan.starts <= READ_WHOLE else None
+
+    def pieces() -> Iterator[Any]:
+        for place in map(plan.place, range(plan.chunks)):
+            yield results[name][place].values if whole is None else whole[place]
+
+    return pieces
 
 
 def spread(pieces: Pieces, shares: Sequence[float] = SHARES) -> Spread:
@@ -158,9 +166,8 @@ def _value(key: int) -> float:
 def _worst(results: xarray.Dataset, name: str, plan: Plan) -> dict[str, float | str]:
     """The coordinates of the largest value; the first one of several."""
     best, where = -math.inf, None
-    for number in range(plan.chunks):
+    for number, piece in enumerate(_pieces(results, name, plan)()):
         place = plan.place(number)
-        piece = results[name][place].values
         if not np.isnan(piece).all() and (most := float(np.nanmax(piece))) > best:
             best = most
             index = np.unravel_index(int(np.nanargmax(piece)), piece.shape)
