@@ -175,6 +175,17 @@ def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[
     assert told.value.verdict.shortest_start_time == pytest.approx(shortest, rel=1e-5)
 
 
+@pytest.mark.parametrize("damping", [0.1, 0.5])
+def test_a_steady_end_without_load_torque_takes_little_longer(damping: float) -> None:
+    """T and w1 - w2 vanish together only as exp(-c t/d) while the shaft pushes."""
+    idle = CRANE.replace(load_torque=0.0, torque_rate=2e4, damping=damping)
+    loaded = idle.replace(load_torque=0.1)
+    longer, shorter = (shortest_start_time(Problem(drive, 1.0, "steady")) for drive in (idle, loaded))
+    decay = damping / float(idle.c) * math.log(0.1 / 1e-3)  # on from the smaller torque to 1 mN m
+    momentum = shorter * 0.1 / float(idle.Ms)  # spent against it
+    assert shorter - 2.0 * momentum <= longer <= shorter + decay
+
+
 @pytest.mark.slow
 def test_more_time_than_the_load_leaves_is_not_used() -> None:
     """An active load comes back by itself: however much time there is, the gap is closed after a while."""

@@ -339,8 +339,7 @@ class WholeProgram:
         driven = (kinds == "contact") & before
         kept = self.c * z if self.pulls else T
         rows, constant = self.rows(step[driven], kept[driven] / self.U)
-        least = np.where(np.arange(constant.size) < 2 * len(QUARTERS), 0.0, MARGIN)
-        limits.add(-1.0 * rows, constant - least)
+        limits.add(-1.0 * rows, constant - self._least_torque(step[driven], s[driven]))
         if drive.load_kind == "reactive":
             rows, constant = self.rows(step[driven], moved[driven, W2] / self.problem.target)
             limits.add(-1.0 * rows, constant)
@@ -354,6 +353,20 @@ class WholeProgram:
         self._add_landing(limits, with_P)
         self._add_demand_limits(limits)
         return limits
+
+    def _least_torque(self, step: Steps, s: Vector) -> Vector:
+        """What T keeps above at instants in contact, over U: MARGIN, 0 where the contact begins.
+
+        With a load torque of 0 `steady` ends at T = 0 and z = 0. Behind a damped shaft that pushes all the
+        time, z' >= -(c/d) z, that takes forever: at the end T may lie so much below 0, where the exact plant
+        has T = 0.
+        """
+        least = np.where(np.arange(step.size) < 2 * len(QUARTERS), 0.0, MARGIN)
+        if self.problem.terminal == "steady" and self.Mc < MARGIN * self.U:
+            half = math.pi / self.Omega
+            last = max(half, -math.log(MARGIN) * self.d / self.c)
+            least[self.at.end - self.edges[step] - s < last] = -MARGIN * half / last
+        return least
 
     def _add_landing(self, limits: RowList, with_P: bool) -> None:
         """A damped contact begins with T = d z'; without a wound-up shaft it must move the load at once."""
@@ -523,7 +536,8 @@ class WholeProgram:
         kept = rows.csr(self.columns) @ found + constant if self.pulls else T
         contact = np.array(self.kinds)[step] == "contact"
         over = np.abs(T) if self.pulls else T
-        bad = contact & ((over > P * (1.0 + EXCESS)) | ((kept < -1e-9) & (step < self.steps)))
+        least = np.minimum(self._least_torque(step, s), 0.0) - 1e-9
+        bad = contact & ((over > P * (1.0 + EXCESS)) | ((kept < least) & (step < self.steps)))
         for rows, right in self._under_curve(SIXTEENTHS):
             bad[step < self.steps] |= rows.csr(self.columns) @ found > right
         broken: Marks = np.bincount(step, weights=bad, minlength=self.n)[: self.steps] > 0.0
