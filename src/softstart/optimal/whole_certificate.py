@@ -56,10 +56,7 @@ GAP_STEPS, WINDING_STEPS = 24, 16  # of the torque
 SPANS = 60  # at least, and at least two a radian
 PRICES = (4.0, 40.0, 400.0)  # of missing an equation by as much as its unit, in units of the torque
 PROGRAMS = 12  # on a grid
-FAILURES, APART = (
-    3,
-    2,
-)  # programs on a grid that may raise nothing, and how many cells from these others are tried
+FAILURES, APART = 3, 2  # programs on a grid that may raise nothing; others are tried so many cells away
 KEPT = 8  # sets of multipliers that the next grid begins with
 MOST_WORK, LITTLE_WORK = 1.2e8, 1.5e7  # numbers computed in all; a drive is judged alike on every machine
 ROUNDING = 1e-9

@@ -18,7 +18,10 @@ from softstart import Drive, optimize
 from softstart.errors import InputError
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.collocation import search as collocation
+from softstart.optimal.exact import replay, torque_allowed, with_tail
 from softstart.optimal.lp import ideal, whole_search
+from softstart.optimal.lp.whole import Instants, WholeProgram
+from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import InfeasibleError
 from softstart.optimal.shortest import shortest_start_time
@@ -184,6 +187,26 @@ def test_a_steady_end_without_load_torque_takes_little_longer(damping: float) ->
     decay = damping / float(idle.c) * math.log(0.1 / 1e-3)  # on from the smaller torque to 1 mN m
     momentum = shorter * 0.1 / float(idle.Ms)  # spent against it
     assert shorter - 2.0 * momentum <= longer <= shorter + decay
+
+
+@pytest.mark.parametrize("terminal", ["synchronous", "reached"])
+def test_a_torque_that_lags_stays_below_the_curve_after_the_start(terminal: Terminal) -> None:
+    """At t_f the torque is on the curve, which falls on, and the demand is above the torque."""
+    drive = Drive(
+        motor_inertia=0.38, load_inertia=2.86, starting_torque=5.8, minimum_torque=-2.9, load_torque=0.0,
+        stiffness=1.08e4, gap=0.005, start_position=-0.0025, load_kind="reactive", target_speed=0.0592,
+        torque_lag=5.6e-4, torque_rate=500.0,
+    )  # fmt: skip
+    curve = ((0.0, 5.8), (0.0415, 5.51), (0.1185, 1.74))
+    problem, at = Problem(drive, 0.0927, terminal, torque_speed=curve), Instants(0.0486, 0.0486, 0.0927)
+    grid = whole_search.first_grid(problem, next(phase_orders(problem)), at, 80)
+    found = WholeProgram(problem, at, grid).solve()
+    assert found is not None
+    later = at.end + float(drive.elastic_period) * np.linspace(0.0, 1.0, 2000)
+    run = replay(drive, with_tail(problem, found.profile(problem), at.end), float(later[-1]))
+    left = torque_allowed(problem, run.at(later)["w1"]) - run.at(later)["u"]
+    assert left.min() > 0.0
+    assert left[0] < 1e-4 * drive.Ms  # else it tests nothing
 
 
 @pytest.mark.slow

@@ -54,11 +54,9 @@ from softstart.profile import TorqueProfile
 
 Z, V, W2, U, R, SLOPE, ONE = range(7)
 STATES = 4
-TAIL_STEPS, TAIL_POINTS = (
-    12,
-    96,
-)  # after t_f: steps while the demand falls, checks of T
+TAIL_STEPS, TAIL_POINTS = 12, 96  # after t_f: steps while the demand falls, checks of T
 SETTLED = 8.0  # lags, after which the torque follows its demand to 0.03 %
+YIELDING, YIELDING_POINTS = 0.1, 16  # of the time in which U falls to 0, in which the curve is kept after t_f
 BELOW_CURVE = 3e-5  # of U, by which the torque stays below its curve where it is checked
 EXCESS = 1e-4  # relative: T above P between the checks by more counts
 
@@ -185,6 +183,8 @@ class WholeProgram:
             kinds += [kind] * (shares.size - 1)
             edges.append(begin + shares[1:] * (end - begin))
         self.steps = len(kinds)  # up to t_f
+        curved = self.shape == "continuous" and bool(problem.torque_speed)
+        self.yields = curved and problem.terminal == "synchronous"  # the curve may leave less than holds T
         self.releases = self.shape == "continuous" and problem.terminal == "reached"
         if self.releases:
             kinds += ["contact"] * TAIL_STEPS
@@ -305,15 +305,19 @@ class WholeProgram:
         terminal = self.problem.terminal
         if terminal != "reached":
             equal.add(self.single(self.steps, {V: 1.0 / self.scale[V]}), np.zeros(1))
-            if self.shape == "continuous":  # what holds T is demanded already
-                total = (self.J1 + self.J2) / self.J2
-                row = self.single(self.steps, {i: value * total for i, value in T.items()})
-                held = Sparse.single({int(self.second[self.steps - 1]): 1.0})
-                equal.add(row - held, np.array([self.Mc * self.J1 / self.J2 / self.U]))
+            if self.shape == "continuous" and not self.yields:
+                equal.add(*self._beyond_held())
         if terminal == "steady":
             equal.add(self.single(self.steps, T), np.array([self.Mc / self.U]))
         equal.add(self.single(self.steps, {W2: 1.0 / self.problem.target}), np.array([AIM]))
         return equal
+
+    def _beyond_held(self) -> Rows:
+        """By how much the torque that holds T at t_f is above the demand there: equal where T is held."""
+        total = (self.J1 + self.J2) / self.J2
+        T = {Z: self.c / self.U * total, V: self.d / self.U * total}
+        demand = Sparse.single({int(self.second[self.steps - 1]): 1.0})
+        return self.single(self.steps, T) - demand, np.array([self.Mc * self.J1 / self.J2 / self.U])
 
     def _limits(self, with_P: bool) -> RowList:
         """Everything that is an inequality."""
@@ -389,20 +393,41 @@ class WholeProgram:
         # also at the beginning of each step, where the demand may jump
         for rows, right in self._under_curve((0.0, *QUARTERS)):
             limits.add(rows, right - BELOW_CURVE)
+        if self.yields:
+            rows, right = self._beyond_held()
+            limits.add(-1.0 * rows, -right)
+        if self.shape == "continuous":
+            for rows, right in self._under_curve_later():
+                limits.add(rows, right - BELOW_CURVE)
 
     def _under_curve(self, fractions: tuple[float, ...]) -> Iterator[Rows]:
         """For each line of the torque-speed curve, rows of u - slope w1 and what they may be, over U."""
-        corners = self.problem.torque_speed
-        if not corners:
+        if not self.problem.torque_speed:
             return
         step, s = self.instants(fractions)
         step, s = step[step < self.steps], s[step < self.steps]
-        moved = self.moved(step, s)
+        for weights, most in self._excess(self.moved(step, s)):
+            rows, constant = self.rows(step, weights / self.U)
+            yield rows, most / self.U - constant
+
+    def _excess(self, moved: Matrix) -> Iterator[tuple[Matrix, float]]:
+        """For each line of the curve, u - slope w1 after the motions (m, 7, 7), and what it may be, N m."""
         u = moved[:, U if self.lag > 0.0 else R]
-        for (w_a, u_a), (w_b, u_b) in pairwise(corners):
+        for (w_a, u_a), (w_b, u_b) in pairwise(self.problem.torque_speed):
             slope = (u_b - u_a) / (w_b - w_a)
-            rows, constant = self.rows(step, (u - slope * (moved[:, W2] + moved[:, V])) / self.U)
-            yield rows, (u_a - slope * w_a - constant) / self.U
+            yield u - slope * (moved[:, W2] + moved[:, V]), u_a - slope * w_a
+
+    def _under_curve_later(self) -> Iterator[Rows]:
+        """The same after t_f, while the demand falls as fast as it may and the torque comes after it."""
+        length = 3.0 * self.lag + YIELDING * self.U / self.rate
+        times = length * np.arange(1, YIELDING_POINTS + 1) / YIELDING_POINTS
+        moved = expm(self.matrix("contact")[None] * times[:, None, None])
+        for weights, most in self._excess(moved):
+            values = (weights[:, :STATES] * self.scale).T.ravel() / self.U
+            states = np.repeat(STATES * self.steps + np.arange(STATES), times.size)
+            demand = np.full(times.size, self.second[self.steps - 1])
+            rows = Sparse.of(times.size, np.append(states, demand), np.append(values, weights[:, R]))
+            yield rows, (most - weights[:, ONE] + self.rate * weights[:, SLOPE]) / self.U
 
     def _tail(self) -> Rows:
         """T after t_f, from the state there: the torque is held, or the motor coasts.
