@@ -400,11 +400,25 @@ def _beyond(torques: Vector, low: float, high: float) -> Iterator[tuple[float, i
 
 
 def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:
-    """Motor torque against the curve: densely in each span, then the worst instant located."""
-    if not problem.torque_speed:
-        return
-    step = float(problem.drive.elastic_period) / CURVE_SAMPLES
+    worst, when, span = beyond_curve(problem, run)
+    if worst > SHORT * problem.highest_torque:
+        state = run.states_in(np.array([span]), np.array([when]))
+        u, w1 = float(state["u"][0]), float(state["w1"][0])
+        yield (
+            f"The motor torque is {u:.6g} N m at {when:.6g} s and {w1:.6g} rad/s, where the torque-speed "
+            f"curve allows {u - worst:.6g} N m."
+        )
+
+
+def beyond_curve(problem: Problem, run: Run) -> tuple[float, float, int]:
+    """By how much the motor torque exceeds the curve at worst, N m; when, s, and in which span.
+
+    Densely in each span, then the worst instant located; minus infinity without a curve.
+    """
     worst, when, span = -math.inf, 0.0, 0
+    if not problem.torque_speed:
+        return worst, when, span
+    step = float(problem.drive.elastic_period) / CURVE_SAMPLES
     for index, (start, end) in enumerate(run.segments[:, [at.S_START, at.S_END]].tolist()):
         times = np.linspace(start, end, 2 + math.ceil((end - start) / step))
         excess = _excess(problem, run, index, times)
@@ -422,13 +436,7 @@ def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:
         )
         if -float(found.fun) > worst:
             worst, when = -float(found.fun), float(found.x)
-    if worst > SHORT * problem.highest_torque:
-        state = run.states_in(np.array([span]), np.array([when]))
-        u, w1 = float(state["u"][0]), float(state["w1"][0])
-        yield (
-            f"The motor torque is {u:.6g} N m at {when:.6g} s and {w1:.6g} rad/s, where the torque-speed "
-            f"curve allows {u - worst:.6g} N m."
-        )
+    return worst, when, span
 
 
 def _excess(problem: Problem, run: Run, index: int, times: Vector) -> Vector:

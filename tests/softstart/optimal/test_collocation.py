@@ -13,9 +13,10 @@ from tests.softstart.optimal.test_collocation_march import march
 
 from softstart import Drive
 from softstart.errors import InputError
+from softstart.optimal.collocation import search as collocation
 from softstart.optimal.collocation.search import solve
 from softstart.optimal.exact import replay
-from softstart.optimal.problem import Problem
+from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import NotConverged
 from softstart.profile import TorqueProfile
 
@@ -204,3 +205,18 @@ def test_the_program_of_casadi_is_that_of_the_method(given: dict[str, float], op
     assert replay(problem.drive, one.profile(x), 0.3).k_dyn == pytest.approx(one.k_dyn(x), rel=2e-3)
     with pytest.raises(InputError, match="x: 3 numbers"):
         one.k_dyn([0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize(("start_time", "lag"), [(0.4, 0.0), (0.4, 0.003)])
+def test_the_exact_plant_keeps_the_torque_speed_curve(start_time: float, lag: float) -> None:
+    """Between its points the first mesh is above the curve; the claim is that of the start below it."""
+    curve = ((0.0, 62.0), (30.0, 60.0), (80.0, 20.0))
+    terminal: Terminal = "reached" if lag else "synchronous"
+    problem = Problem(CRANE.replace(torque_lag=lag), start_time, terminal, torque_speed=curve)
+    solution, _ = collocation._first(problem, collocation._contacts(problem, None)[0])
+    before = collocation.replayed(problem, collocation.claim(problem, solution))
+    assert before.excess > 1e-5 * CRANE.Ms
+    lower, _ = collocation._aimed_inside(problem, solution, before)
+    after = collocation.claim(problem, lower)
+    assert collocation.replayed(problem, after).excess < 5e-7 * CRANE.Ms
+    assert 1.0 <= after.value / collocation.claim(problem, solution).value < 1.001

@@ -227,8 +227,11 @@ class Numbers:
         return math.sqrt(self.c / self.J1 + self.c / self.J2)
 
 
-def numbers(problem: Problem, beyond: float = BEYOND) -> Numbers:
-    """The problem in units of Ms, of its target speed, and of its start time."""
+def numbers(problem: Problem, beyond: float = BEYOND, below: float = 0.0) -> Numbers:
+    """The problem in units of Ms, of its target speed, and of its start time.
+
+    The target is higher by the share `beyond`, the torque-speed curve lower by `below` N m.
+    """
     drive: Any = problem.drive
     units = Units(time_unit(problem), float(drive.Ms), problem.target)
     inertia = units.torque * units.time / units.speed
@@ -246,6 +249,7 @@ def numbers(problem: Problem, beyond: float = BEYOND) -> Numbers:
         "highest": problem.highest_torque / units.torque,
         "target": problem.target * (1.0 + beyond) / units.speed,
         "base": problem.base_torque / units.torque,
+        "below": below / units.torque,
         "smoothness": problem.smoothness / units.time,
         "latest": (problem.start_time or 100.0 * units.time) / units.time,
         "largest_peak": min(1e3, (problem.k_dyn or math.inf) * problem.base_torque / units.torque),
@@ -257,7 +261,7 @@ def numbers(problem: Problem, beyond: float = BEYOND) -> Numbers:
     lines = []
     for (w_a, u_a), (w_b, u_b) in pairwise(problem.torque_speed):
         slope = (u_b - u_a) / (w_b - w_a)
-        lines.append(((u_a - slope * w_a) / units.torque, slope * units.speed / units.torque))
+        lines.append(((u_a - below - slope * w_a) / units.torque, slope * units.speed / units.torque))
     twist = 1.0 / values["c"]
     Omega = math.sqrt(values["c"] / values["J1"] + values["c"] / values["J2"])
     travel = max(abs(values["z_start"]), 1e-3 * twist)

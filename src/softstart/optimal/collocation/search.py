@@ -36,7 +36,7 @@ from softstart.optimal.collocation.transcription import (
     tail_rows,
     transcribe,
 )
-from softstart.optimal.exact import replay
+from softstart.optimal.exact import beyond_curve, replay
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate, NotConverged, demanded, heat_of
 from softstart.profile import TorqueProfile
@@ -184,6 +184,7 @@ class Replayed:
     landing: float  # largest error of the terminal conditions, relative to target and Ms
     parted: NDArray[np.bool_]  # intervals in which the flanks part before t_f
     overshoot: Vector  # largest T in each interval over the claimed peak, relative
+    excess: float  # of the motor torque over the torque-speed curve up to t_f, N m; 0 or more
 
 
 def claim(problem: Problem, solution: Solution) -> Claim:
@@ -213,6 +214,7 @@ def replayed(problem: Problem, own: Claim) -> Replayed:
         profile = profile.followed_by(own.end_time, TorqueProfile([0.0], [problem.lowest_torque]))
         until += math.pi / drive.Omega + 5.0 * drive.torque_lag
     run = replay(drive, profile, until, problem.base)
+    excess = max(beyond_curve(problem, run)[0], 0.0)
     width = np.diff(own.edges)
     checks = (np.arange(CHECKS) + 0.5) / CHECKS
     times = own.edges[:-1, None] + width[:, None] * checks
@@ -229,7 +231,7 @@ def replayed(problem: Problem, own: Claim) -> Replayed:
     parted = np.histogram(openings, own.edges)[0] > 0
     heat = heat_of(run, own.end_time)
     value = {"k_dyn": run.k_dyn, "heat": heat, "start_time": own.end_time}[problem.minimise]
-    return Replayed(float(value), shortfall, max(map(abs, errors)), parted, overshoot)
+    return Replayed(float(value), shortfall, max(map(abs, errors)), parted, overshoot, excess)
 
 
 OTHERWISE = (1.6, 0.7)  # contact instants tried where the likely one fails, in units of that
@@ -239,6 +241,7 @@ NEAR_BARRIER = 1e-4
 WORSE = 1e-3  # relative: so much a finer mesh may cost
 CLEARLY = 1.02  # of the start time: a quickest start on the first mesh is known to about 1 %
 SIMILAR = 0.02  # relative: within this the mesh of a warm start may stay as it is
+BELOW_CURVE = 5e-7  # of the largest torque: how well the exact plant must keep the torque-speed curve
 LANDING = 1e-6  # of target speed and Ms: how well the exact plant must meet the terminal conditions
 CONTRADICTED = 2e-3  # relative: what the exact plant contradicts by more is no solution
 STRIDE = 0.35  # rad of the elastic oscillation an interval may span where the landing is to be exact
@@ -482,14 +485,15 @@ def _refine(
     while True:
         own = claim(problem, solution)
         exact = replayed(problem, own)
-        if exact.shortfall > 0.0 and exact.landing <= LANDING:
-            solution, cost = _aimed_higher(problem, solution, exact)
+        above = BELOW_CURVE * problem.highest_torque
+        if (exact.shortfall > 0.0 and exact.landing <= LANDING) or exact.excess > above:
+            solution, cost = _aimed_inside(problem, solution, exact)
             spent += cost
             own = claim(problem, solution)
             exact = replayed(problem, own)
         agrees = abs(exact.value - own.value) <= tolerance * abs(own.value)
         still = min(abs(exact.value - before[0]), abs(own.value - before[1])) <= tolerance * abs(own.value)
-        lands = exact.landing <= LANDING and not exact.parted.any()
+        lands = exact.landing <= LANDING and not exact.parted.any() and exact.excess <= above
         if known is not None and refinements == 0:
             still = abs(own.value - known) <= SIMILAR * abs(known)
         settled = agrees and still and lands
@@ -529,10 +533,16 @@ def _refine(
     return Candidate(own.profile, own.end_time, own.value, "collocation", note, warm)
 
 
-def _aimed_higher(problem: Problem, solution: Solution, exact: Replayed) -> tuple[Solution, int]:
-    """The load missed its target speed by the error of the collocation: aim that much beyond it."""
+def _aimed_inside(problem: Problem, solution: Solution, exact: Replayed) -> tuple[Solution, int]:
+    """The exact start misses the target speed, or leaves the curve, by the error of the collocation: aim that
+    much beyond the target and below the curve.
+    """
     program, mesh = solution.transcribed.program, solution.transcribed.mesh
-    p = numbers(problem, solution.p.target - 1.0 + 2.0 * exact.shortfall + BEYOND)
+    beyond = solution.p.target - 1.0
+    if exact.shortfall > 0.0:
+        beyond = beyond + 2.0 * exact.shortfall + BEYOND
+    below = solution.p.below * solution.p.units.torque + 1.5 * exact.excess
+    p = numbers(problem, beyond, below)
     multipliers = (solution.lam_x, solution.lam_g)
     better = run(transcribe(program, mesh), p, _parameters(program, p), solution.x, multipliers, 1e-8)
     return (better if better.found else solution), better.iterations

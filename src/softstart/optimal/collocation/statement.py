@@ -153,8 +153,15 @@ def terminal(program: Program, p: Any, phase: Phase, x: State, demand: SX) -> li
     conditions = [equal("load speed", x.w2, p.target)]
     if program.terminal in ("synchronous", "steady"):
         conditions.append(equal("motor speed", x.v, 0.0))
-        if program.demand == "continuous":
-            conditions.append(equal("held demand", demand, holding_torque(p, x, T)))
+        held = holding_torque(p, x, T)
+        if program.demand == "continuous" and program.lines and program.terminal == "synchronous":
+            conditions.append(at_most("held demand", demand, held))
+            if program.lagged:  # the torque goes on rising to the demand while the curve falls
+                w1 = x.w1 + p.lag * (x.u - T) / p.J1
+                later = [intercept + slope * w1 for intercept, slope in p.lines]
+                conditions += [at_most("torque-speed curve after the start", demand, one) for one in later]
+        elif program.demand == "continuous":
+            conditions.append(equal("held demand", demand, held))
     if program.terminal == "steady":
         conditions.append(equal("steady torque", T, p.Mc))
     return conditions
