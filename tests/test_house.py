@@ -95,7 +95,8 @@ BUDGET = {
     # 5: the watch of controllers ends without a race
     "start": (2875, 10, 1, 0),  # 30: what starts of drives and of chains have in common; 50: margins
     # 100 lines: damaged chunks and descriptions are found, named and made again; 20: margins to limits
-    "sweeping": (1790, 8, 0, 0),
+    # 1: a summary reads each figure once
+    "sweeping": (1791, 8, 0, 0),
     # 40: drives drawn from an identification as scenarios
     "tuning": (2380, 10, 1, 0),  # 15: the margin to limits
     # small cells beside a large one; where a start begins, torque cut off, in words; 180 and a file: lives
