@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]  # one dimension, or one quantity of any shape
 Matrix = NDArray[np.float64]  # two dimensions
 Complex = NDArray[np.complex128]
+Indices = NDArray[np.intp]
 
 
 def plain_fields(of: Any, *but: str) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Indices, Vector
 from softstart.optimal.lp.ideal import ContactProgram, Multipliers
 from softstart.optimal.lp.motion import Contact, Entry, ThroughStandstill, entry_of, no_ideal
 from softstart.optimal.lp.rows import HALVES
@@ -44,6 +44,7 @@ ATOM = 0.03  # share of all multipliers from which an instant counts by itself
 TRAPEZOIDS = 2000  # at least, and at least 150 a radian of the elastic oscillation
 PRICE = 40.0  # of missing the terminal condition by as much as the target speed, in Ms
 MOST_PROGRAMS = 60
+FEW, LITTLE = 4, 1e-5  # the work ends when so many programs raise the bound by less than this share
 MOST_CELLS = 3000
 NARROWEST = 1e-6  # cell of tau, as a share of the longest
 
@@ -162,12 +163,13 @@ class _Envelope:
 
 
 class _Dual:
-    """One set of multipliers: D without its part in te, at any tau."""
+    """One set of multipliers: D without its part in te, at any tau; they are best for one."""
 
     def __init__(
-        self, problem: Problem, entry: Entry, by: Multipliers, envelope: _Envelope, v: float
+        self, problem: Problem, entry: Entry, by: Multipliers, envelope: _Envelope, v: float, tau: float
     ) -> None:
         self.problem, self.entry, self.by, self.envelope = problem, entry, by, envelope
+        self.tau = tau  # that they are best for
         self.contact = envelope.contact
         self.v = v
         self.pulls = problem.drive.contact_law == "dead-zone" and problem.drive.d > 0.0
@@ -175,6 +177,8 @@ class _Dual:
         used = (net != 0.0) | (by.closed != 0.0)
         self.share, self.net = by.share[used], net[used]
         self.open = by.closed[used] if self.pulls else np.zeros(self.share.size)
+        self._weigh()
+        self.grids: dict[int, tuple[Vector, Vector, tuple[Indices, Indices]]] = {}
         self.known: dict[float, tuple[float, float]] = {}
         self.bends: dict[float, float] = {}
 
@@ -208,16 +212,25 @@ class _Dual:
         """Ms times the integral of min(q, 0), from below."""
         if tau <= 0.0:
             return 0.0
-        contact = self.contact
-        wanted = max(TRAPEZOIDS, int(150.0 * contact.Omega * tau))
-        even = np.linspace(0.0, tau, wanted + 1)
-        s = np.unique(np.concatenate([even, self.share * tau]))
-        Ms = self.problem.highest_torque
-        step = float(np.max(np.diff(s)))
+        wanted = max(TRAPEZOIDS, int(150.0 * self.contact.Omega * tau))
+        shares, widths, first = self._grid(wanted)
+        Ms, step = self.problem.highest_torque, tau / wanted
         # q jumps at the kinks of a damped shaft, and at tau: each interval has its own values at its ends
-        after, before = (np.minimum(q, 0.0) for q in self._weights(s, tau))
-        area = float(np.sum(0.5 * np.diff(s) * (after[:-1] + before[1:])))
+        after, before = (np.minimum(q, 0.0) for q in self._weights(shares * tau, tau, first))
+        area = 0.5 * tau * float(widths @ (after[:-1] + before[1:]))
         return Ms * (area - self._bend() * step * step / 8.0 * tau)
+
+    def _grid(self, wanted: int) -> tuple[Vector, Vector, tuple[Indices, Indices]]:
+        """Instants as shares of tau, even ones and the kinks; their distances; the first kinks there."""
+        if wanted not in self.grids:
+            shares = np.unique(np.concatenate([np.linspace(0.0, 1.0, wanted + 1), self.share]))
+            self.grids[wanted] = shares, np.diff(shares), self._first(shares)
+        return self.grids[wanted]
+
+    def _first(self, shares: Vector) -> tuple[Indices, Indices]:
+        """For each instant, a share of tau, the first kink after it, and not before it."""
+        kinks = np.where(self.later > 0.0, np.inf, self.kinks)
+        return np.searchsorted(kinks, shares, side="right"), np.searchsorted(kinks, shares)
 
     def _bend(self) -> float:
         """Bound of |q''| between the kinks."""
@@ -230,18 +243,24 @@ class _Dual:
             + abs(by.speed) * k["w2"][2]
         )
 
-    def _weights(self, s: Vector, tau: float) -> tuple[Vector, Vector]:
-        """q(s): what a torque impulse just after s, and just before it, adds."""
+    def _weigh(self) -> None:
+        """q(s) as a sum over rising instants `kinks` tau + `later`: the weights of h and of h' there."""
         by, contact = self.by, self.contact
         J1, J2, c, d = contact.J1, contact.J2, contact.c, contact.d
-        at = np.concatenate([self.share * tau, [tau], tau + by.tail_at])
-        weight_h = np.concatenate([c * (self.net - self.open), [-c * by.torque], c * by.tail]) / J1
-        weight_dh = np.concatenate([d * self.net, [-d * by.torque], d * by.tail]) / J1
-        last = self.share.size
-        weight_dh[last] += by.speed / (J1 + J2) - by.rate / J1
-        kept = (weight_h != 0.0) | (weight_dh != 0.0)
-        after, before = contact.sums(s, at[kept], weight_h[kept], weight_dh[kept])
-        return after - by.speed / (J1 + J2), before - by.speed / (J1 + J2)
+        kinks = np.concatenate([self.share, np.ones(1 + by.tail_at.size)])
+        later = np.concatenate([np.zeros(self.share.size + 1), by.tail_at])
+        of_h = np.concatenate([c * (self.net - self.open), [-c * by.torque], c * by.tail]) / J1
+        of_dh = np.concatenate([d * self.net, [-d * by.torque], d * by.tail]) / J1
+        of_dh[self.share.size] += by.speed / (J1 + J2) - by.rate / J1
+        order = np.lexsort((later, kinks))
+        order = order[(of_h[order] != 0.0) | (of_dh[order] != 0.0)]
+        self.kinks, self.later, self.of_h, self.of_dh = (one[order] for one in (kinks, later, of_h, of_dh))
+
+    def _weights(self, s: Vector, tau: float, first: tuple[Indices, Indices]) -> tuple[Vector, Vector]:
+        """q(s): what a torque impulse just after s, and just before it, adds."""
+        after, before = self.contact.sums(s, self.kinks * tau + self.later, self.of_h, self.of_dh, first)
+        end = self.by.speed / (self.contact.J1 + self.contact.J2)
+        return after - end, before - end
 
     def curvature(self, tau: float) -> float:
         """M: bound of the second derivative in tau, for a contact of length <= tau."""
@@ -297,8 +316,8 @@ class _Search:
         self.envelope = _Envelope(contact, self.end + coasting)
         self.impact = self._impact()
         self.duals: list[_Dual] = []
-        # of each cell the bounds so far, and from how many sets of multipliers
-        self.seen: dict[tuple[float, float], tuple[Vector | None, int]] = {}
+        # of each cell the bounds so far, and the sets of multipliers that they are from
+        self.seen: dict[tuple[float, float], tuple[Vector, set[int]]] = {}
 
     def _impact(self) -> Vector:
         """The peak that the entry alone brings, N m: T is nowhere below that of coasting from the least v."""
@@ -320,12 +339,23 @@ class _Search:
         for a, b in zip(*self._cells(longest), strict=True):
             self._push(heap, a, b)
         done = math.inf
-        for _ in range(MOST_CELLS):
+        splits, before = 0, list[float]()
+        while splits < MOST_CELLS:
             value, a, b = heapq.heappop(heap)
-            if value >= min(self.goal, done):
-                return min(value, done)
+            if value >= done:
+                return done
+            if value >= self.goal:  # enough; as much as all multipliers prove is said
+                most = self._cell(a, b, all_of_them=True)[0]
+                if most == value:
+                    return value
+                heapq.heappush(heap, (most, a, b))
+                continue
+            splits += 1
             value, k = self._cell(a, b)  # multipliers may have come since
             if value < self.goal and not self._loose(a, b, k) and len(self.duals) < MOST_PROGRAMS:
+                if len(before) >= FEW and value - before[-FEW] < LITTLE * self.goal:
+                    return min(value, done, *(lowest for lowest, _, _ in heap[:1]))
+                before.append(value)
                 self._program(float(self.edges[k + 1]), b)
                 value, k = self._cell(a, b)
             if value >= self.goal:
@@ -357,20 +387,26 @@ class _Search:
         bend = min((dual.curvature(b) for dual in self.duals), default=0.0)
         return bend * (b - a) ** 2 / 8.0 > 1e-4 * self.goal
 
-    def _cell(self, a: float, b: float) -> tuple[float, int]:
-        """Bound over tau from a to b and all te that leave that much time; the te cell where it is least."""
+    def _cell(self, a: float, b: float, all_of_them: bool = False) -> tuple[float, int]:
+        """Bound over tau from a to b and all te that leave that much time; the te cell where it is least.
+
+        Multipliers are tried, the nearest first, until the bound is enough, or `all_of_them`.
+        """
         count = int(np.searchsorted(self.edges[:-1], self.end - a, side="right"))
         count = max(min(count, self.low.size), 1)
-        J2, Mc = self.problem.drive.J2, self.problem.drive.Mc
-        best, seen = self.seen.get((a, b), (None, 0))
-        if best is None:
+        if (a, b) not in self.seen:
             need = np.minimum(self.missing[:-1], self.missing[1:])[:count]
-            best = np.maximum(Mc + J2 * need / b, self.impact[:count])
-            if float(best.min()) >= self.goal:
-                seen = MOST_PROGRAMS + 1  # no multipliers are needed here
-        for dual in self.duals[seen:]:
-            best = np.maximum(best, self._dual(dual, a, b, count))
-        self.seen[a, b] = best, max(seen, len(self.duals))
+            plain = self.problem.drive.Mc + self.problem.drive.J2 * need / b
+            self.seen[a, b] = np.maximum(plain, self.impact[:count]), set()
+        best, tried = self.seen[a, b]
+        if tried or float(best.min()) < self.goal:  # else no multipliers are needed here
+            left = [k for k in range(len(self.duals)) if k not in tried]
+            for k in sorted(left, key=lambda k: abs(self.duals[k].tau - b)):
+                if not all_of_them and float(best.min()) >= self.goal:
+                    break
+                best = np.maximum(best, self._dual(self.duals[k], a, b, count))
+                tried.add(k)
+        self.seen[a, b] = best, tried
         k = int(np.argmin(best))
         return float(best[k]), k
 
@@ -414,4 +450,4 @@ class _Search:
         if fine is not None:
             by = fine.multipliers
         if math.isclose(float(by.peak.sum() + by.trough.sum() + by.tail.sum()), 1.0, rel_tol=1e-9):
-            self.duals.append(_Dual(self.problem, self.entry, by, self.envelope, self.fastest))
+            self.duals.append(_Dual(self.problem, self.entry, by, self.envelope, self.fastest, tau))

@@ -313,18 +313,16 @@ def test_any_numbers_at_all_make_a_bound(given: dict[str, Any], terminal: Termin
     for _ in range(2):
         by = random_multipliers(rng, problem, coasting * np.linspace(0.2, 1.0, 5))
         v = float(entry.slowest(np.array([entry.earliest]))[0]) * rng.uniform(0.2, 1.0)
-        dual = _Dual(problem, entry, by, envelope, v)
         tau = 0.25 * 10 ** rng.uniform(-1.5, 0.0)
+        dual = _Dual(problem, entry, by, envelope, v, tau)
         width = 0.1 * tau * rng.random()
         taus = np.linspace(tau - width, tau, 3)
         ends = [
             sum(part * times for part, times in zip(dual.at(t), (1.0, v), strict=True)) for t in taus[[0, -1]]
         ]
         least = min(ends) - dual.curvature(tau) * width**2 / 8.0
-        q = [
-            dual._weights(np.linspace(0.0, tau, 41)[:-1] + tau / 80.0, tau)[0],
-            rng.normal(size=40),
-        ]
+        shares = (np.arange(40) + 0.5) / 40
+        q = [dual._weights(shares * tau, tau, dual._first(shares))[0], rng.normal(size=40)]
         for weights in q:  # the torque that presses most, and any
             u = np.where(weights < 0.0, Ms, 0.0)
             for t in taus:

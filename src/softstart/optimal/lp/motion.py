@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from softstart.arrays import Vector
+from softstart.arrays import Indices, Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
 
@@ -406,22 +406,24 @@ class Contact:
         settled = (1.0 - dh - 2.0 * self.zeta * h) / self.Omega**2
         return np.where(np.asarray(s) >= 0.0, settled, 0.0)
 
-    def sums(self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector) -> tuple[Vector, Vector]:
-        """Sum over j with at_j > s of of_h_j h(at_j - s) + of_dh_j dh(at_j - s), for rising s.
+    def sums(
+        self, s: Vector, at: Vector, of_h: Vector, of_dh: Vector, first: tuple[Indices, Indices]
+    ) -> tuple[Vector, Vector]:
+        """Sum over j with at_j > s of of_h_j h(at_j - s) + of_dh_j dh(at_j - s), for rising s and rising at.
+
+        `first` has for each s the first j with at_j > s, and with at_j >= s (`searchsorted`, right and left).
 
         It jumps at every at_j, as dh does at 0: the second answer counts at_j = s too, the limit from below.
         By running sums over the two exponentials of h, so that it costs no more than s.size + at.size.
         """
         r1, r2 = self._exponents
-        order = np.argsort(at)
-        at, of_h, of_dh = at[order], of_h[order], of_dh[order]
-        after, before = (np.searchsorted(at, s, side=side) for side in ("right", "left"))
+        after, before = first
         longest = float(max(at[-1], s[-1])) if at.size else 0.0
         if (
             max(abs(r1.real), abs(r2.real)) * longest > 300.0
         ):  # the sums would lose themselves in huge factors
 
-            def dense(first: NDArray[np.int64]) -> Vector:
+            def dense(first: Indices) -> Vector:
                 counted = np.arange(at.size)[None, :] >= first[:, None]
                 lag = np.where(counted, at[None, :] - s[:, None], -1.0)
                 total: Vector = self.h(lag) @ of_h + self.dh(lag) @ of_dh
