@@ -38,6 +38,7 @@ __all__ = [
     "nearest",
     "parse",
     "read_unit",
+    "shortest",
     "show",
     "to_si",
     "values_in",
@@ -148,10 +149,22 @@ kNm mNm J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
 ORDINARY = {
     ("rpm", "rad/s"): 0.10471975511965977,
     ("deg", "rad"): 0.017453292519943295,
+    ("arcmin", "rad"): 0.0002908882086657216,
+    ("N*m/deg", "N*m/rad"): 57.29577951308232,
+    ("N*m/arcmin", "N*m/rad"): 3437.746770784939,
+    ("lbf*ft", "N*m"): 1.3558179483314003,
+    ("hp", "W"): 745.6998715822702,
     ("ms", "s"): 0.001,
     ("mm", "m"): 0.001,
     ("kW", "W"): 1000.0,
     ("kg*cm^2", "kg*m^2"): 0.0001,
+}
+
+MOST_DIGITS = 9  # of a number that a person may have written
+# Units that people write, in which a value has few digits where it has 17 in SI.
+TYPED = {
+    unit: tuple(name for name, of in ORDINARY if of == unit)
+    for unit in ("rad", "rad/s", "N*m/rad", "N*m", "W")
 }
 
 _SYMBOLS = str.maketrans(
@@ -297,6 +310,23 @@ def parse(value: object, unit: str, *, infinite: bool = False) -> Value:
             numbers[index] = _at(index, cells[index], lambda cell: _single(cell, unit, infinite))
         return _finished(numbers)
     return _single(value, unit, infinite)
+
+
+def shortest(value: float, unit: str) -> str:
+    """The shortest text that `parse` reads back to this very float: in SI, or in the unit it was written in.
+
+    Another unit than that of SI is named only where the number would have more than `MOST_DIGITS` digits.
+
+    >>> shortest(0.5, "rad"), shortest(0.06981317007977318, "rad"), shortest(92.1533845053006, "rad/s")
+    ('0.5', '4 deg', '880 rpm')
+    >>> shortest(1.0 / 3.0, "rad"), shortest(15000.0 * 57.29577951308232, "N*m/rad")
+    ('0.3333333333333333', '15000 N*m/deg')
+    """
+    plain = repr(float(value))
+    if len(plain) <= MOST_DIGITS or not math.isfinite(value):
+        return plain
+    texts = [f"{value / ORDINARY[one, unit]:.{MOST_DIGITS}g} {one}" for one in TYPED.get(unit, ())]
+    return min((one for one in texts if parse(one, unit) == value), key=len, default=plain)
 
 
 def _cells(value: list[Any] | tuple[Any, ...] | NDArray[Any]) -> NDArray[np.object_]:

@@ -345,6 +345,9 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit, screenshot):
     field(page, "shaft.gap").press("Enter")
     page.locator('tr[data-name="ramp"] input[type=radio]').check()
     wait_for_k(page, simulate(CRANE.replace(gap="4 deg"), "ramp").k_dyn)
+    shows(page, "shaft.gap", "4 deg")
+    assert not page.locator('[data-path="shaft.gap"] .unit').is_visible()
+    assert page.locator('[data-path="load.inertia"] .unit').is_visible()
     assert foot.locator('[data-key="k_dyn"]').inner_text() == f"{direct.k_dyn:.3f}"
     assert foot.locator(".title span").inner_text() == "reference: direct, shaft.gap 0.5 rad"
     peak = page.evaluate("""() => {

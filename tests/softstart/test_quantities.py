@@ -18,8 +18,10 @@ from softstart.errors import InputError
 from softstart.quantities import (
     OTHER_NOUNS,
     QUANTITIES,
+    TYPED,
     nearest,
     read_unit,
+    shortest,
     show,
     to_si,
     values_in,
@@ -233,6 +235,21 @@ def test_there_and_back(unit, forms, data):
     one = to_si(f"1 {form}", unit)
     assert to_si(f"{x / one!r} {form}", unit) == pytest.approx(x, rel=4e-16)
     assert to_si(f"{x!r} {unit}", unit) == x
+
+
+@given(
+    st.sampled_from(sorted(QUANTITIES)),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.integers(1, 99_999),
+    st.integers(0, 3),
+)
+def test_the_shortest_text_is_read_back_to_the_bit(unit, number, count, decimals):
+    assert to_si(shortest(number, unit), unit) == number
+    for one in TYPED.get(unit, ()):
+        typed = f"{count / 10**decimals} {one}"
+        text = shortest(to_si(typed, unit), unit)
+        assert to_si(text, unit) == to_si(typed, unit)
+        assert len(text) <= max(9, len(typed), len("99.99 N*m/arcmin"))
 
 
 @settings(deadline=None)  # the first example imports pint

@@ -17,7 +17,7 @@ import numpy as np
 
 from softstart.errors import MOST, InputError
 from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of
-from softstart.quantities import nearest, show
+from softstart.quantities import nearest, shortest, show
 
 T = TypeVar("T")
 
@@ -401,20 +401,24 @@ def _misspelt(
 
 
 def table_text(table: Table, values: Mapping[str, object], *, units: bool = True) -> str:
-    """The lines of a table in SI, each with unit and meaning in a comment (`units`); None is left out.
+    """The lines of a table, each with unit and meaning in a comment (`units`); None is left out.
 
-    >>> print(table_text(Table("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),)), {"gap": 0.5}))
+    Numbers are in SI, or as `shortest` writes them.
+
+    >>> shaft = Table("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),))
+    >>> print(table_text(shaft, {"gap": 0.5}), table_text(shaft, {"gap": 0.06981317007977318}), sep="\\n")
     [shaft]
     gap = 0.5  # rad: total gap
+    [shaft]
+    gap = "4 deg"  # total gap
     """
     lines = [table.bracket] if table.name else []
     for p in table.parameters:
         value = values.get(p.name)
         if value is not None:
-            unit = "" if p.unit == "1" else f"{p.unit}: "
-            lines.append(
-                f"{p.key} = {literal(value)}" + (f"  # {unit}{p.meaning}" if p.unit and units else "")
-            )
+            text = literal(value, p.unit)
+            unit = "" if p.unit == "1" or text.startswith('"') else f"{p.unit}: "
+            lines.append(f"{p.key} = {text}" + (f"  # {unit}{p.meaning}" if p.unit and units else ""))
     return "\n".join(lines)
 
 
@@ -424,8 +428,8 @@ def document_text(blocks: Iterable[tuple[Table, Mapping[str, object]]], *, units
     return "\n\n".join(text for name, text in texts if text and (name == "" or "\n" in text)) + "\n"
 
 
-def literal(value: object) -> str:
-    """A value as TOML; numbers in as few digits as give back their bits.
+def literal(value: object, unit: str = "") -> str:
+    """A value as TOML; numbers in as few digits as give back their bits, of the quantity with this SI unit.
 
     >>> literal(0.1), literal("a \\"b\\""), literal((1.0, True)), literal(np.array([1.0, 2.0]))
     ('0.1', '"a \\\\"b\\\\""', '[1.0, true]', '[1.0, 2.0]')
@@ -435,7 +439,10 @@ def literal(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(literal, value))}]"
+        return f"[{', '.join(literal(one, unit) for one in value)}]"
+    if isinstance(value, float):
+        text = shortest(value, unit)
+        return f'"{text}"' if " " in text else text
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)

@@ -16,16 +16,14 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
-from softstart.input.parameters import Parameter
 from softstart.page.sentences import changes
-from softstart.quantities import parse
+from softstart.quantities import shortest
 
 if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
 
 MOST_SETTINGS = 8  # more than that are better kept in a file
 LONGEST = 60
-TYPED = {"rad": ("deg", "arcmin"), "rad/s": ("rpm",)}  # units that people write instead of the SI unit
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
 
@@ -91,8 +89,11 @@ def command_text(
             params.append(f"profile.file={profile_file(label)}")
         elif label in controller_names():
             names.append(label)
-            own = {one.name: getattr(controller, one.name) for one in fields(controller)}
-            params += [f"{label}.{key}={value}" for key, value in own.items() if value is not None]
+            params += [
+                f"{label}.{one.name}={_literal(value, one.metadata.get('unit', ''))}"
+                for one in fields(controller)
+                if (value := getattr(controller, one.name)) is not None
+            ]
     profiles = [param for param in params if param.startswith("profile.")]
     if profiles or names != list(ready_controller_names()):
         words += ["--controllers", ",".join(dict.fromkeys(names))]
@@ -121,7 +122,8 @@ def drive_words(drive: Drive) -> list[str]:
         return [drive_file(drive)]
     if any(p.name in ("name", "source") for p in differing):
         return [drive_file(drive)]
-    return [name, *(word for p in differing for word in ("--set", f"{p.path}={_literal(drive, p)}"))]
+    settings = (f"{p.path}={_literal(getattr(drive, p.name), p.unit)}" for p in differing)
+    return [name, *(word for setting in settings for word in ("--set", setting))]
 
 
 @cache
@@ -130,15 +132,11 @@ def shipped_drives() -> dict[str, Drive]:
     return {name: Drive.load(name) for name in library.names()}
 
 
-def _literal(drive: Drive, parameter: Parameter) -> str:
-    value = getattr(drive, parameter.name)
-    if isinstance(value, str):
-        return value
-    value = float(value)
-    # in another unit where that is the same value and shorter: 880 rpm has 15 digits in rad/s
-    typed = [f"{value / float(parse(f'1{one}', parameter.unit)):.10g}{one}"
-             for one in TYPED.get(parameter.unit, ())]  # fmt: skip
-    return min([repr(value), *(one for one in typed if parse(one, parameter.unit) == value)], key=len)
+def _literal(value: object, unit: str) -> str:
+    """A value as one word of a command line."""
+    if not isinstance(value, float):
+        return str(value)
+    return shortest(value, unit).replace(" ", "")
 
 
 def drive_file(drive: Drive) -> str:

@@ -21,7 +21,7 @@ from softstart.drive import PARAMETERS, Drive
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.ranges import Axes, Scale, axes_about, scales_about, scales_of
-from softstart.page.sentences import differences, sentence_of
+from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
 from softstart.plant import layout as at
 from softstart.start import metrics
@@ -150,7 +150,7 @@ class Screen:
         """Values of the selected strategy's parameters on the drive of the moment, as `fields` has them."""
         session = self.session
         controller = session.controllers[session.selected]
-        names = [one.name for one in parameters_of(controller)]
+        units = {one.name: one.metadata["unit"] for one in parameters_of(controller)}
         try:
             if self._strategy_of != (session.selected, type(controller), self._origin):
                 self.strategy_scales = scales_of(controller, self._origin)
@@ -165,7 +165,7 @@ class Screen:
             and (known := session.ready(label)) is not None and known.run is not None
         ]  # fmt: skip
         shown: dict[str, list[Any]] = {}
-        for name in names:
+        for name, si in units.items():
             given = getattr(controller, name)
             value = default.get(name) if given is None else given
             if isinstance(value, str):
@@ -180,7 +180,8 @@ class Screen:
                     for label, other in tuned
                     if (at := getattr(other, name, None)) is not None
                 ]
-            text = "" if math.isnan(number) else f"{number:.4g}" if given is None else written(number)
+            text = f"{number:.4g}" if given is None else written(number, si)
+            text = "" if math.isnan(number) else text
             position = scale.position(number) if scale is not None else None
             shown[STRATEGY + name] = [text, position, "" if given is None else "changed", marks]
         return shown
@@ -370,39 +371,33 @@ def fields(drive: Drive, origin: Drive, scales: Mapping[str, Scale]) -> dict[str
         if name == "source" or value is None:
             continue
         if isinstance(value, tuple):
-            shown[parameter.path] = ["; ".join(map(written, value)), None, ""]
+            shown[parameter.path] = ["; ".join(written(one, parameter.unit) for one in value), None, ""]
             continue
-        text = value if isinstance(value, str) else written(float(value))
+        text = value if isinstance(value, str) else written(float(value), parameter.unit)
         scale = scales.get(name)
         position = scale.position(float(value)) if scale else None
         first = getattr(origin, name)
-        marks = [[scale.position(float(first)), f"as loaded: {written(float(first))}"]] if scale else []
+        loaded = f"as loaded: {written(float(first), parameter.unit)}" if scale else ""
+        marks = [[scale.position(float(first)), loaded]] if scale else []
         shown[parameter.path] = [text, position, otherwise(parameter.unit, value), marks]
     return shown
 
 
-def written(value: float) -> str:
-    """A value as the field shows it: six digits, or all where six would be another value of a slider.
+def otherwise(si: str, value: Any) -> str:
+    """An angle in degrees, a speed in revolutions a minute; in SI what was written in another unit.
 
-    >>> written(0.0698131700797732), written(880.0), written(0.1235)
-    ('0.0698132', '880', '0.1235')
-    """
-    return f"{value:.6g}"
-
-
-def otherwise(unit: str, value: Any) -> str:
-    """An angle in degrees, a speed in revolutions a minute, for those who think in them.
-
-    >>> otherwise("rad", 0.5), otherwise("rad/s", 92.15)
-    ('28.6\N{DEGREE SIGN}', '880 rpm')
+    >>> otherwise("rad", 0.5), otherwise("rad/s", 92.15), otherwise("rad", 0.06981317007977318)
+    ('28.6\N{DEGREE SIGN}', '880 rpm', '0.06981 rad')
     """
     if isinstance(value, str):
         return ""
-    if unit == "rad":
+    if " " in written(value, si):
+        return f"{value:.4g} {unit(si)}"
+    if si == "rad":
         return f"{math.degrees(value):.3g}\N{DEGREE SIGN}"
-    if unit == "rad/s":
+    if si == "rad/s":
         return f"{value * 30.0 / math.pi:.4g} rpm"
-    if unit == "s":
+    if si == "s":
         return f"{1e3 * value:.3g} ms"
     return ""
 

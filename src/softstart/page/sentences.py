@@ -8,6 +8,7 @@ from typing import Any
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
+from softstart.quantities import shortest
 
 log = logging.getLogger("softstart.page")
 LONGEST = 300  # letters of an exception
@@ -101,5 +102,15 @@ def _value(parameter: Parameter, value: Any) -> str:
     if isinstance(value, str):
         return value
     unit = "" if parameter.unit in ("", "1") else " " + parameter.unit.replace("*", " ").replace("^", "")
-    values = value if isinstance(value, tuple) else (value,)
-    return f"{', '.join(f'{float(one):.6g}' for one in values)}{unit}"
+    texts = [written(float(one), parameter.unit) for one in (value if isinstance(value, tuple) else (value,))]
+    return ", ".join(texts) + ("" if " " in texts[-1] else unit)
+
+
+def written(value: float, unit: str) -> str:
+    """A value as a person reads it: in the unit in which it was written, else six digits in SI.
+
+    >>> written(0.06981317007977318, "rad"), written(0.07, "rad"), written(1.0 / 3.0, "rad")
+    ('4 deg', '0.07', '0.333333')
+    """
+    text = shortest(value, unit)
+    return text if " " in text else f"{value:.6g}"

@@ -165,6 +165,7 @@ export class Controls {
       if (parts.text !== text || parts.position !== position) {
         parts.text = text;
         parts.position = position;
+        parts.line.classList.toggle("typed", text.includes(" ")); // with a unit of its own
         if (slider) {
           this.fill(parts);
           slider.setAttribute("aria-valuetext", other ? `${text}, ${other}` : text);
