@@ -93,6 +93,22 @@ class Server:
         assert "Traceback" not in self.said(), self.said()
 
 
+def settled(page: Any, expression: str) -> Any:
+    """The value of an expression that has not changed for a second: a busy machine is behind the hand."""
+    value = None
+    while value != (value := page.evaluate(expression)):
+        page.wait_for_timeout(1000)
+    return value
+
+
+def wait_for_rows(page: Any) -> None:
+    """Wait until each strategy has its figures, and the table its order."""
+    page.wait_for_function("""() => {
+      const cells = [...document.querySelectorAll(".strategies tbody td[data-key=k_dyn]")];
+      return cells.length > 5 && cells.every((cell) => cell.textContent);
+    }""")
+
+
 def marked(mark: str) -> dict[int, str]:
     """Living processes with the mark in their environment."""
     found = {}

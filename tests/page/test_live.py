@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.page.conftest import settled, wait_for_rows
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
@@ -69,21 +70,12 @@ def drag(page: Any, path: str, start: float, end: float, steps: int) -> None:
     page.mouse.up()
 
 
-def settled(page: Any, expression: str) -> Any:
-    """The value of an expression that has not changed for a second: a busy machine is behind the hand."""
-    value = None
-    while value != (value := page.evaluate(expression)):
-        page.wait_for_timeout(1000)
-    return value
-
-
 def test_a_slider_moved_by_mouse_gives_the_k_dyn_of_simulate(page):
     opened(page)
     assert k_dyn(page) == simulate(CRANE, "direct").k_dyn
     drag(page, "shaft.gap", 0.25, 0.8, 12)
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
-    page.wait_for_timeout(300)
-    gap = float(field(page, "shaft.gap").input_value())
+    gap = float(settled(page, "document.getElementById('field-shaft-gap').value"))
     wait_for_k(page, simulate(CRANE.replace(gap=gap), "direct").k_dyn)
     for name in ("shaped", "ramp"):
         shown = page.locator(f'tr[data-name="{name}"] td[data-key="k_dyn"]').inner_text()
@@ -172,7 +164,7 @@ def test_everything_is_reached_by_keyboard(page):
 def test_strategies_are_drawn_hidden_and_sorted(page):
     opened(page)
     page.locator('tr[data-name="ramp"] input[type=checkbox]').check()
-    page.wait_for_timeout(400)
+    wait_for_rows(page)
     assert page.locator('tr[data-name="ramp"] input[type=checkbox]').is_checked()
     rows = page.locator(".strategies tbody tr")
     names = rows.evaluate_all("all => all.map((tr) => tr.dataset.name)")
@@ -304,8 +296,7 @@ def test_a_lost_line_is_taken_up_again_with_the_same_drive(page):
     page.wait_for_function(
         "document.querySelector('[data-path=\"load.inertia\"] input[type=text]').value > 0.2"
     )
-    page.wait_for_timeout(400)
-    inertia = float(field(page, "load.inertia").input_value())
+    inertia = float(settled(page, "document.getElementById('field-load-inertia').value"))
     wait_for_k(page, simulate(CRANE.replace(gap=1.0, load_inertia=inertia), "direct").k_dyn)
 
 
@@ -387,8 +378,7 @@ def test_undo_and_redo_by_buttons_and_keys(visit):
     first = k_dyn(page)
     drag(page, "shaft.gap", 0.25, 0.8, 12)
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 1.2")
-    page.wait_for_timeout(600)
-    dragged = k_dyn(page)
+    dragged = settled(page, "Number(document.querySelector('#k-dyn').dataset.value)")
     assert dragged != first
     page.get_by_label("Undo", exact=True).click()
     wait_for_k(page, first)  # the figure comes before the frame with all else

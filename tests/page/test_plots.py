@@ -5,17 +5,20 @@ from __future__ import annotations
 import csv
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.page.conftest import wait_for_rows
 
 from softstart import Drive, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 DIRECT = simulate(CRANE, "direct")
 HALF = float(CRANE.gap) / 2.0
+INSTANT = "Number.parseFloat(document.querySelector('.player .instant').textContent) / 1000"
 MODULE = """name => import(performance.getEntriesByType("resource").map((one) => one.name)
   .find((one) => one.endsWith(`/${name}.js`)))"""
 
@@ -50,17 +53,22 @@ def points(page: Any) -> dict[str, np.ndarray]:
     return found
 
 
+def seen(page: Any, right: Callable[[dict[str, np.ndarray]], bool]) -> dict[str, np.ndarray]:
+    """The points, when they are as they must be."""
+    for _ in range(50):
+        if right(found := points(page)):
+            return found
+        page.wait_for_timeout(200)
+    raise AssertionError(f"these points came last: {found}")
+
+
 def refined(page: Any, least: int) -> dict[str, np.ndarray]:
     """The points, when the server has sent those of the window for all that is drawn."""
     ticked = page.locator(".strategies tbody tr:has(input:checked)").evaluate_all(
         "(rows) => rows.map((one) => one.dataset.name)"
     )
-    for _ in range(50):
-        found = points(page)
-        if {f"{name} time_s" for name in ticked} <= found.keys() and found["direct time_s"].size >= least:
-            return found
-        page.wait_for_timeout(200)
-    raise AssertionError("no finer points came")
+    wanted = {f"{name} time_s" for name in ticked}
+    return seen(page, lambda found: wanted <= found.keys() and found["direct time_s"].size >= least)
 
 
 def scheme(page: Any) -> dict[str, str]:
@@ -78,7 +86,9 @@ def hold(page: Any, share: float) -> float:
         "(one, share) => { one.value = share * one.max; one.dispatchEvent(new Event('input')); }", share
     )
     page.wait_for_function("document.querySelector('.player .instant').textContent !== ''")
-    page.wait_for_timeout(100)
+    page.evaluate(
+        "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))"
+    )  # drawn with the next picture
     return instant(page)
 
 
@@ -121,23 +131,22 @@ def test_wheel_drag_and_keys_move_the_window(page):
     page.mouse.move(place["x"] + 200, place["y"] + 90, steps=4)
     page.mouse.up()
     page.keyboard.up("Shift")
-    page.wait_for_timeout(1000)
-    second = points(page)["direct time_s"]
-    assert second[0] > first[0]
-    assert second[-1] - second[0] == pytest.approx(first[-1] - first[0], rel=0.02)
+    span = first[-1] - first[0]
+
+    def spans(found: dict[str, np.ndarray], share: float) -> bool:
+        times = found["direct time_s"]
+        return times[-1] - times[0] == pytest.approx(share * span, rel=0.02)
+
+    seen(page, lambda found: found["direct time_s"][0] > first[0] and spans(found, 1.0))
     page.locator(".plots canvas").focus()
     page.keyboard.press("+")
-    page.wait_for_timeout(1000)
-    third = points(page)["direct time_s"]
-    assert third[-1] - third[0] == pytest.approx(0.5 * (first[-1] - first[0]), rel=0.02)
+    seen(page, lambda found: spans(found, 0.5))
     page.locator(".plots canvas").focus()
     page.keyboard.press("0")
-    page.wait_for_timeout(1000)
-    assert points(page)["direct time_s"][-1] == pytest.approx(DIRECT.end_time, rel=1e-6)
+    seen(page, lambda found: found["direct time_s"][-1] == pytest.approx(DIRECT.end_time, rel=1e-6))
     page.locator(".plots canvas").focus()
     page.keyboard.press("ArrowRight")
-    page.wait_for_timeout(100)
-    assert instant(page) > 0.0
+    page.wait_for_function(f"{INSTANT} > 0")
 
 
 def test_the_scheme_stands_as_the_drive_does(page):
@@ -160,18 +169,16 @@ def test_the_scheme_stands_as_the_drive_does(page):
 def test_a_start_is_played_to_its_end(page):
     page.locator(".player select").select_option("3")
     button(page, "\u25b6").click()
-    page.wait_for_timeout(500)
-    first = instant(page)
-    assert 0.0 < first <= DIRECT.end_time
+    page.wait_for_function(f"{INSTANT} > 0")
+    assert instant(page) <= DIRECT.end_time * 1.001  # shown with a few digits
     page.wait_for_function("document.querySelector('.player [title=\"Play\"]')")
-    page.wait_for_timeout(300)
-    assert instant(page) == pytest.approx(DIRECT.end_time, rel=1e-3)
+    page.wait_for_function(f"Math.abs({INSTANT} / {DIRECT.end_time!r} - 1) < 1e-3")
 
 
 def test_what_is_seen_is_saved_as_svg(page):
     for name in ("ramp", "shaped", "s-curve", "state-feedback", "reduced-two-stage"):
         page.locator(f'tr[data-name="{name}"] input[type=checkbox]').check()
-    page.wait_for_timeout(1500)
+    refined(page, 2)
     name, text = saved(page, "SVG")
     assert name.endswith(".svg")
     root = ET.fromstring(text)
@@ -190,9 +197,8 @@ def test_what_is_seen_is_saved_as_svg(page):
 
 def test_the_gentlest_is_selected_at_first(visit):
     page = visit(select="")
-    page.wait_for_function("document.querySelectorAll('.strategies tbody tr').length > 5")
-    page.wait_for_timeout(1000)
-    cells = page.locator('.strategies td[data-key="k_dyn"]').all_inner_texts()
+    wait_for_rows(page)
+    cells = page.locator('.strategies tbody td[data-key="k_dyn"]').all_inner_texts()
     assert float(page.locator("#k-dyn").inner_text()) == min(float(cell) for cell in cells)
     assert page.locator("tbody tr").first.get_attribute("class") == "selected"
     assert page.locator('tr[data-name="direct"] input[type=checkbox]').is_checked()
@@ -215,13 +221,15 @@ def test_contours_lie_on_their_level(page):
 
 
 def test_maps_of_two_strategies_are_compared(page):
-    ready = "() => !document.querySelector('#map-other').disabled"
-    page.wait_for_function(ready)
-    page.wait_for_timeout(6000)  # a whole map of direct
+    whole = """(strategy) => {
+      const { map } = window.getElement(document.querySelector(".instrument")).instrument;
+      return map.head?.strategy === strategy && map.fresh.size === map.rows.length;
+    }"""
+    page.wait_for_function(whole, arg="direct")
     page.locator("#map-other").check()
     assert page.locator("#map-other").is_checked()
     page.locator('tr[data-name="ramp"] input[type=radio]').check()
-    page.wait_for_timeout(6000)
+    page.wait_for_function(whole, arg="ramp")
     place = page.locator(".map-canvas canvas").bounding_box()
     page.mouse.move(place["x"] + 150, place["y"] + 60)
     page.wait_for_function("document.querySelector('.map .said').textContent.includes('(direct: ')")
