@@ -1,7 +1,8 @@
 """The least K_dyn through several gaps: the chain of four masses, its two-mass drive, and the strategies.
 
 The chain is `crane-4-mass` with a damping ratio of 2 % in each shaft. For each start time three global
-searches (package cma), each with its own random numbers, are carried on by successive linear programs.
+searches (package cma), each with its own random numbers, are carried on by successive linear programs; each
+also starts from its own answer for the start time before, stretched.
 """
 
 from __future__ import annotations
@@ -77,12 +78,15 @@ def find(extent: Extent, progress: Progress) -> Findings:
     machine = chain()
     drive = reduce_chain(machine, to=2).to_drive()
     rows: list[Row] = []
+    before: dict[str, Any] = {}
     for t in extent.start_times:
         progress(f"start time {t:g} s")
         begun = time.perf_counter()
         optima = tuple(
-            optimize(machine, t, seeds=[seed], tolerance=extent.tolerance) for seed in extent.seeds
+            optimize(machine, t, seeds=[seed], tolerance=extent.tolerance, warm=before.get(seed))
+            for seed in extent.seeds
         )
+        before = {seed: one.warm for seed, one in zip(extent.seeds, optima, strict=True)}
         seconds = time.perf_counter() - begun
         known = min([one.k_dyn for one in optima] + [row.gentlest for row in rows])
         rows.append(Row(t, optima, _two_masses(drive, t), known, seconds))

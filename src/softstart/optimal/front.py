@@ -279,14 +279,15 @@ def pareto(
 ) -> Front:
     """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
-    The sweep goes from long start times to short ones. An optimum by collocation starts from the one before,
-    so such points are computed one after another; all others at once. The results do not depend on who
-    computes them. Start times too short for any start are marked infeasible, no error.
+    The sweep goes from long start times to short ones, on a chain from short to long ones. An optimum by
+    collocation, or of a chain, starts from the one before, so such points are computed one after another; all
+    others at once. The results do not depend on who computes them. Start times too short for any start are
+    marked infeasible, no error.
 
     Parameters
     ----------
     drive : Drive or Chain
-        The drive, or the chain: of its local optima each starts from that of the next longer start time and
+        The drive, or the chain: of its local optima each starts from that of the next shorter start time and
         from the strategies, the best of these.
     start_times : sequence of float, optional
         Bounds on the start time, s; by default `default_start_times(drive, terminal)`.
@@ -424,9 +425,10 @@ def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
     terminal, start_time, warm = asked.terminal, asked.start_time, asked.warm
     why = ""
     for start in (warm, None) if warm is not None else (None,):
+        seconds = math.inf if start is None and isinstance(asked.drive, Chain) else 0.0  # all seeds at first
         try:
             best = optimize(
-                asked.drive, start_time, terminal=terminal, warm=start, time_limit=0.0, **asked.options
+                asked.drive, start_time, terminal=terminal, warm=start, time_limit=seconds, **asked.options
             )
         except InfeasibleError as error:
             return FrontPoint.of_verdict(error.verdict, start_time, terminal), warm
@@ -439,7 +441,11 @@ def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """Optima for many start times, the longest first."""
+    """Optima for many start times: of drives the longest first, of chains the shortest.
+
+    An answer of a chain, stretched over more time, leads to a good local optimum; pressed into less time it
+    misses the target. Of a drive, what is impossible in a long time needs no search in a shorter one.
+    """
 
     drive: Drive | Chain
     options: dict[str, Any]
@@ -451,7 +457,8 @@ class _Sweep:
     def through(self, asked: set[tuple[Terminal, float]]) -> dict[tuple[Terminal, float], FrontPoint]:
         """All points asked for."""
         found: dict[tuple[Terminal, float], FrontPoint] = {}
-        order = sorted(asked, key=lambda one: (one[0], -one[1]))
+        first = 1.0 if isinstance(self.drive, Chain) else -1.0
+        order = sorted(asked, key=lambda one: (one[0], first * one[1]))
         for terminal in dict.fromkeys(terminal for terminal, _ in order):
             chain = _Chain(self, terminal, [t for other, t in order if other == terminal])
             too_short: FrontPoint | None = None
@@ -469,13 +476,14 @@ class _Sweep:
                     point = chain.computed(start_time)
                     if point.status != "NOT_FOUND":  # another attempt may find it
                         self.saved.add(point.record())
-                if point.status == "INFEASIBLE":
+                if point.status == "INFEASIBLE" and first < 0.0:
                     too_short = point
                     chain.stopped = True
                 found[terminal, start_time] = point
                 if self.each is not None:
                     self.each(point)
-            found |= {(terminal, t): point for t, point in _monotone(found, terminal, chain.start_times)}
+            longest_first = sorted(chain.start_times, reverse=True)
+            found |= {(terminal, t): point for t, point in _monotone(found, terminal, longest_first)}
         return found
 
 
@@ -509,10 +517,10 @@ def _monotone(
 
 
 class _Chain:
-    """Points of one terminal condition, from long start times to short ones.
+    """Points of one terminal condition, in the order of the sweep.
 
-    A point of the collocation leaves something for the next one to start from: these are computed one after
-    another. Where the first point leaves nothing, the others are computed at once, in advance.
+    A point of the collocation, and of a chain, leaves something for the next one to start from: these are
+    computed one after another. Where the first point leaves nothing, the others are computed in advance.
     """
 
     def __init__(self, sweep: _Sweep, terminal: Terminal, start_times: list[float]) -> None:

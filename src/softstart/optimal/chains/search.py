@@ -16,16 +16,18 @@ located peak of that start. The trust region follows how far the program was rig
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog, lsq_linear
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.optimal.chains.problem import ChainProblem, carried_loads, terminal_miss
 from softstart.optimal.chains.starts import Answer, Played, Player
+from softstart.optimal.lp.rows import Limits, Sparse
 from softstart.plant import layout
 from softstart.profile import TorqueProfile
 
@@ -33,14 +35,19 @@ KNOTS_PER_PERIOD = 14
 INSTANTS = 32  # of the fastest period, at which shaft torques are limited
 PENALTY = 20.0  # of a miss, in mean torques for the whole of the target
 FIRST_TRUST, MOST_TRUST, LEAST_TRUST = 0.1, 0.5, 1e-4  # of the highest torque
-NEAR, LOW = 0.75, 0.5  # of the peak: rows that a program begins with; torques that are looked at
-THIN = 8
+NEAR, LOW = 0.85, 0.5  # of the peak: rows that a program begins with; torques that are looked at
+THIN = 64
 ROUNDS = 6
 LET_THROUGH = 1e-3  # of P
 MOST_STEPS = 60
 MISSED, DEAREST = 1e-5, 1e4
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 NEWTON_STEPS = 6
+TASTE = 6  # programs after which the best of several first demands are chosen
+STRETCH, BUMPS, HEIGHT = 0.07, 8, 0.12  # of time; their number; of the highest torque
+PROMISE = 0.1  # of the tolerance: a program that promises less ends the search
+IN_VAIN = 0.06  # over the tolerance: searches in turn, each without a decrease by a fifth of it
+HOPEFUL = 1.03  # merit over the best up to which a search is carried on
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +161,33 @@ class Search:
                     return found
         return found
 
+    def beyond(self, found: Found, tolerance: float, until: float) -> Found:
+        """Local optima around one: its demand stretched in time, or with bumps, and down from there.
+
+        It begins at the best so far each time, and ends when several in turn were no better, 12 for a
+        tolerance of 0.5 %, or at `until` (`time.perf_counter`).
+        """
+        least = PROMISE * tolerance
+        rng, vain, stretched = np.random.default_rng(1), 0, True
+        while vain < IN_VAIN / tolerance and time.perf_counter() < until:
+            if stretched:
+                far = self.knots * rng.uniform(1.0 - STRETCH, 1.0 + STRETCH)
+                torques = np.interp(far, self.knots, found.torques)
+            else:
+                bumps = rng.normal(0.0, HEIGHT * self.high, BUMPS)
+                even = np.linspace(0.0, self.until, BUMPS)
+                torques = found.torques + np.interp(self.knots, even, bumps)
+            stretched = not stretched
+            down = self.descended(self.allowed(torques), TASTE, least)
+            if down is not None and down.merit < HOPEFUL * found.merit:
+                down = self.descended(down.torques, least=least)
+                down = None if down is None else self.finished(down)
+            vain += 1
+            if down is not None and down.miss.max() <= MISSED and down.merit < found.merit:
+                vain = 0 if down.merit < (1.0 - 0.2 * tolerance) * found.merit else vain
+                found = down
+        return found
+
     def finished(self, found: Found, reserve: float = 1e-9) -> Found | None:
         """The same with the terminal condition met to rounding: smallest changes of the torques that do."""
         for _ in range(NEWTON_STEPS):
@@ -228,7 +262,7 @@ class _Model:
         terminal, missing = search.terminal_rows(found.played, answer)
         return cls(search, found, rows, np.abs(T[j, k]), edges, terminal, missing)
 
-    def peaks(self, values: Vector) -> Vector:
+    def peaks(self, values: Vector) -> NDArray[np.bool_]:
         """Which rows are local maxima over time."""
         left = np.where(self.edges[:-1], -np.inf, np.concatenate([[-np.inf], values[:-1]]))
         right = np.where(self.edges[1:], -np.inf, np.concatenate([values[1:], [-np.inf]]))
@@ -244,41 +278,38 @@ class _Model:
         high = np.minimum(trust, search.high - found.torques).clip(min=0.0)
         if math.isfinite(search.rate):
             low[0] = high[0] = 0.0
-        ends = sparse.csr_array(np.hstack([-self.terminal, np.zeros((misses, 1)), -np.eye(misses)]))
-        fixed, limits = [ends], [-self.missing]
+        miss = np.eye(misses)
+        fixed, limits = [np.hstack([-self.terminal, np.zeros((misses, 1)), -miss])], [-self.missing]
         if both:
-            fixed.append(sparse.csr_array(np.hstack([self.terminal, np.zeros((misses, 1)), -np.eye(misses)])))
+            fixed.append(np.hstack([self.terminal, np.zeros((misses, 1)), -miss]))
             limits.append(self.missing)
+        rows = [Sparse.dense(one) for one in fixed]
         if math.isfinite(search.rate):
-            rise = sparse.diags_array([-np.ones(count - 1), np.ones(count - 1)], offsets=[0, 1],
-                                      shape=(count - 1, count + 1 + misses)).tocsr()  # fmt: skip
+            k, ones = np.arange(count - 1), np.ones(count - 1)
+            rise = Sparse.of(count - 1, np.concatenate([k, k + 1]), np.concatenate([-ones, ones]))
             most, now = search.rate * np.diff(search.knots), np.diff(found.torques)
-            fixed += [rise, -rise]
+            rows += [rise, -1.0 * rise]
             limits += [most - now, most + now]
         cost = np.concatenate([np.zeros(count), [1.0], np.full(misses, search.penalty * base)])
         bounds = np.column_stack([
             np.concatenate([low, np.zeros(1 + misses)]), np.concatenate([high, np.full(1 + misses, np.inf)]),
         ])  # fmt: skip
-        near = self.torques > NEAR * found.played.peak
-        thinned = np.arange(self.torques.size) % THIN == 0
-        active = np.flatnonzero(near & (thinned | self.peaks(self.torques)))
+        every = np.arange(0, self.torques.size, THIN)
+        looked_at = np.union1d(np.flatnonzero(self.peaks(self.torques)), every)
+        active = looked_at[self.torques[looked_at] > NEAR * found.played.peak]
         for _ in range(ROUNDS):
-            part = self.rows[active]
-            shafts = sparse.hstack(
-                [sparse.csr_array(part), -np.ones((active.size, 1)), sparse.csr_array((active.size, misses))],
-                format="csr",
-            )
-            solved = linprog(
-                cost, A_ub=sparse.vstack([shafts, *fixed], format="csr"),
-                b_ub=np.concatenate([-self.torques[active], *limits]), bounds=bounds, method="highs-ipm",
-            )  # fmt: skip
-            if solved.x is None:
+            shafts = Sparse.dense(np.hstack([self.rows[active], -np.ones((active.size, 1))]))
+            solved = Limits(
+                cost, Sparse.stacked([shafts, *rows]), np.concatenate([-self.torques[active], *limits]),
+                Sparse.stacked([]), np.zeros(0),
+            ).solved(bounds, interior=True)  # fmt: skip
+            if solved is None:
                 return None
-            change, P = solved.x[:count], float(solved.x[count])
+            change, P, promised = solved.x[:count], float(solved.x[count]), found.merit - solved.cost
             after = self.torques + self.rows @ change
             over = np.flatnonzero((after > P * (1.0 + LET_THROUGH)) & self.peaks(after))
             new = np.setdiff1d(over, active, assume_unique=True)
             if new.size == 0:
                 break
             active = np.append(active, new)
-        return change, found.merit - float(solved.fun)
+        return change, promised

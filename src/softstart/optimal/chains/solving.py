@@ -24,7 +24,7 @@ from softstart.optimal.chains.problem import (
     earliest_pull,
     momentum_bound,
 )
-from softstart.optimal.chains.search import Found, Search
+from softstart.optimal.chains.search import PROMISE, TASTE, Found, Search
 from softstart.optimal.chains.starts import Player
 from softstart.optimal.problem import USUAL, StartTime
 from softstart.optimal.result import InfeasibleError, OptimumError, Trial, Verdict
@@ -35,10 +35,9 @@ global_search = late("softstart.optimal.chains.global_search")
 CMA = "cma"
 TRACE = 20_001  # instants of a trace that becomes a first demand
 RUNS = 4  # of the global search
-TASTE = 6  # programs from each seed before the best are chosen
 FINISHED = 2
 DAMPED = (0.02, 0.01, 0.004)  # damping ratios through which an undamped chain is approached
-PROMISE = 0.1  # of the tolerance: a program that promises less ends the search
+SIMILAR = "the demand of a similar problem"
 METHOD = "successive linear programs on the exact start, from {}"
 
 
@@ -72,18 +71,21 @@ def optimize_chain(
     first = _first_demands(search, names, warm)
     until = began + time_limit
     least = PROMISE * tolerance
-    # a few programs from each seed, then all the way from the best of these
+    # a few programs from each seed, then all the way from a similar problem's answer and the best of these
     tasted: list[tuple[str, Found]] = []
-    for name, found in first if time_limit > 0.0 else first[:1]:
+    for k, (name, found) in enumerate(first):
+        if time_limit <= 0.0 and k > 0 and name != SIMILAR:
+            continue
         if tasted and time.perf_counter() > until:
             break
         down = search.descended(found.torques, TASTE, least)
         tasted.append((name, found if down is None else down))
-    tasted.sort(key=lambda one: one[1].merit)
+    tasted.sort(key=lambda one: (one[0] != SIMILAR, one[1].merit))
     tried: list[Trial] = []
     best: tuple[str, Found] | None = None
     for name, start in tasted:
-        enough = len(tried) >= FINISHED or time.perf_counter() > until
+        more = isinstance(warm, Warm) or time.perf_counter() <= until
+        enough = len(tried) >= (FINISHED if more else 1)
         if best is not None and best[1].miss.max() <= SHORT and enough:
             break  # where all before missed the terminal condition, the next one too
         since = time.perf_counter()
@@ -99,6 +101,14 @@ def optimize_chain(
             best = one
     if best is None or best[1].miss.max() > SHORT:
         raise OptimumError(_none_found(problem))
+    if time.perf_counter() < until and any(shaft.gap for shaft in problem.drive.shafts):  # else one optimum
+        since = time.perf_counter()
+        around = search.finished(search.beyond(best[1], tolerance, until))
+        if around is not None:
+            tried.append(
+                Trial("slp", around.played.peak / problem.base_torque, time.perf_counter() - since, "")
+            )
+            best = min(best, (best[0], around), key=lambda one: _rank(one[1]))
     return _checked(search, *best, bound, tried, began, why)
 
 
@@ -163,7 +173,7 @@ def _first_demands(search: Search, names: Sequence[str], warm: Any) -> list[tupl
     demands = [(name, one) for name in names for one in _demands(search, name)]
     if isinstance(warm, Warm):
         scaled = warm.time * (search.end / warm.end)
-        demands.insert(0, ("the demand of a similar problem", lambda: search.sampled(scaled, warm.torque)))
+        demands.insert(0, (SIMILAR, lambda: search.sampled(scaled, warm.torque)))
     for name, demand in demands:
         try:
             played = search.play(demand())

@@ -187,18 +187,20 @@ class Limits:
     b_eq: Vector
 
     def solved(
-        self, bounds: Matrix, warm: WarmStarts | None = None, presolve: bool = True
+        self, bounds: Matrix, warm: WarmStarts | None = None, presolve: bool = True, interior: bool = False
     ) -> Solution | None:
         """The best x within the bounds (columns, 2); None where there is none.
 
         By the dual simplex method, from the last basis of `warm`; where that takes far longer than usual, by
-        the interior point method.
+        the interior point method. `interior` takes that one at once and stays in the middle of all best x,
+        where the simplex method goes to a corner.
         """
         if highs is None:
             A_ub, A_eq = (one.csr(self.cost.size) for one in (self.A_ub, self.A_eq))
             options = {"presolve": presolve}
             found = linprog(
-                self.cost, A_ub, self.b_ub, A_eq, self.b_eq, bounds, "highs-ds", options=options
+                self.cost, A_ub, self.b_ub, A_eq, self.b_eq, bounds, "highs-ipm" if interior else "highs-ds",
+                options=options,
             )  # fmt: skip
             if found.status != 0:
                 return None
@@ -206,12 +208,14 @@ class Limits:
             return Solution(np.asarray(found.x), float(found.fun), above, equal)
         size = self.cost.size, self.b_ub.size, self.b_eq.size
         basis = None if warm is None else warm.begin(size)
-        for solver, start in (("simplex", basis), ("ipm", None)):
+        for solver, start in (("simplex", basis), ("ipm", None))[interior:]:
             engine = highs._Highs()
             engine.setOptionValue("output_flag", False)
             engine.setOptionValue("solver", solver)
             if not presolve:
                 engine.setOptionValue("presolve", "off")
+            if interior:
+                engine.setOptionValue("run_crossover", "off")
             engine.setOptionValue("simplex_iteration_limit", int(FEW_ITERATIONS + sum(size)))
             self._passed_to(engine, bounds)
             if start is not None:
