@@ -56,6 +56,19 @@ def test_the_claim_is_the_exact_replay(crane):
     assert float(again.at(0.42)["w"][-1]) >= damped().target_speed * (1.0 - 1e-6)
 
 
+def test_searches_around_a_start_keep_the_time_and_the_better_one():
+    """Also from where a few programs have led; without time nothing is tried."""
+    search = Search(ChainProblem(damped(), 0.42), Player(damped()))
+    run = simulate_chain(damped(), "s-curve")
+    times = np.linspace(0.0, min(run.end_time, search.until), 2001)
+    first = search.descended(search.sampled(times, run.at(times)["u"]), 6, 5e-3)
+    assert first is not None
+    last = search.beyond(first, 0.05, math.inf)
+    assert last.merit <= first.merit
+    assert last.miss.max() <= 1e-5
+    assert search.beyond(first, 0.05, -math.inf) is first
+
+
 def test_no_strategy_as_quick_is_gentler(crane):
     for name in ("s-curve", "shaped", "ramp", "acceleration-delay", "state-feedback", "direct"):
         run = simulate_chain(damped(), name)

@@ -16,7 +16,7 @@ from softstart.optimal.exact import replay
 from softstart.optimal.lp import ideal
 from softstart.optimal.lp.ideal import Answer, ContactProgram
 from softstart.optimal.lp.motion import Contact, entry_of
-from softstart.optimal.lp.rows import Limits, Sparse, WarmStarts
+from softstart.optimal.lp.rows import Limits, Sparse, WarmStarts, highs
 from softstart.optimal.problem import Problem, Terminal
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -43,6 +43,28 @@ def test_a_warm_start_finds_the_same(limit: float) -> None:
     more = Limits(costs, Sparse.dense(wider), rights, no_rows, none).solved(box, warm)
     assert more is not None
     assert more.cost == pytest.approx(linprog(costs, wider, rights, bounds=box).fun, rel=1e-9)
+
+
+@pytest.mark.skipif(
+    highs is None, reason="before SciPy 1.15 HiGHS is reached through linprog, which goes to a corner"
+)
+def test_the_interior_answer_is_as_good_and_in_the_middle_of_all_the_best() -> None:
+    """Where P alone costs, torques below it are free: a corner of the best ones has some at their limits."""
+    one = np.eye(21)
+    rows = np.vstack([np.hstack([sign * one, -np.ones((21, 1))]) for sign in (1.0, -1.0)])
+    given = np.concatenate([[1.0], np.zeros(21)])[None, :]
+    program = Limits(
+        np.append(np.zeros(21), 1.0), Sparse.dense(np.vstack([rows, -given])), np.append(np.zeros(42), -0.5),
+        Sparse.stacked([]), np.zeros(0),
+    )  # fmt: skip
+    box = np.array([[-1.0, 1.0]] * 21 + [[0.0, np.inf]])
+    corner, middle = (program.solved(box, interior=inside) for inside in (False, True))
+    assert corner is not None
+    assert middle is not None
+    assert corner.cost == pytest.approx(0.5, abs=1e-9)
+    assert middle.cost == pytest.approx(0.5, abs=1e-6)
+    assert np.abs(corner.x[1:21]).max() == pytest.approx(0.5)
+    assert np.abs(middle.x[1:21]).max() < 0.25
 
 
 @pytest.mark.parametrize("given", [{}, {"start_position": -0.25, "load_torque": 12.0}])
