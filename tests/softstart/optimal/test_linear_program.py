@@ -129,7 +129,7 @@ def test_no_answer_is_below_its_own_dual(given: dict[str, Any], end: float, term
     assert low - 1e-9 <= answer.v <= high + 1e-9
     assert answer.levels.min() >= -1e-9
     assert answer.levels.max() <= problem.highest_torque * (1.0 + 1e-9)
-    dual = _Dual(problem, entry, answer.multipliers, _Envelope(contact, 1.5 * end), high)
+    dual = _Dual(problem, entry, answer.multipliers, _Envelope(contact, 1.5 * end), high, end - te)
     fixed, by_v = dual.at(answer.end_time - te)
     missing = problem.target - float(entry.load_speed(np.array([te]))[0])
     D = fixed + min(by_v * low, by_v * high) + answer.multipliers.speed * missing
