@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from softstart.chain.model import Chain
 from softstart.cli.commands import Command
 from softstart.cli.options import (
     DEFAULT_DRIVE,
@@ -22,8 +23,8 @@ from softstart.cli.options import (
     drive_argument,
     json_option,
     param_option,
-    read_drive,
     read_identified,
+    read_machine,
     read_names,
     read_params_of,
     set_option,
@@ -34,7 +35,7 @@ from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.quantities import to_si
-from softstart.views.drives import drive_lines
+from softstart.views.starts import machine_lines
 from softstart.views.terminal import console, print_json, print_lines, sentence
 
 if TYPE_CHECKING:
@@ -111,13 +112,14 @@ def report(
 ) -> None:
     """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives), or the folder of an
-    identification, whose figures have intervals; without it, the crane drive of the literature is taken. The
-    report recommends a strategy and gives its parameters, rounded to what the
-    inverter can be set to and started again after rounding.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
+    tractor-like), or the folder of an identification, whose figures have intervals; without it, the crane
+    drive of the literature is taken. The report recommends a strategy and gives its parameters, rounded to
+    what the inverter can be set to and started again after rounding. The report of a chain has its strategies
+    and starts, without optima and parameter sheets.
     """
     mistakes = Mistakes()
-    one: Drive | Identification | None = None
+    one: Drive | Chain | Identification | None = None
     names: Sequence[str] | None = None
     given: dict[str, dict[str, str]] = {}
     asked: dict[str, Any] = {}
@@ -132,7 +134,7 @@ def report(
         with mistakes.noted():
             browser = _browser()
     with mistakes.noted():
-        one = read_identified(drive, settings) or read_drive(drive, settings)
+        one = read_identified(drive, settings) or read_machine(drive, settings)
     with mistakes.noted():
         names = read_names(controllers)
     with mistakes.noted():
@@ -143,6 +145,12 @@ def report(
     if budget is not None:
         with mistakes.noted():
             asked["budget"] = _seconds(budget)
+    for option in asked if isinstance(one, Chain) else ():
+        with mistakes.noted():
+            raise InputError(
+                f'--{option}: "{drive}" is a chain, whose report has no optima and no parameter sheets; '
+                "leave it out."
+            )
     if project is not None:
         with mistakes.noted():
             asked["project"] = reporting.Project.load(project)
@@ -164,12 +172,12 @@ def report(
 
 
 def _made(
-    drive: Drive | Identification,
+    drive: Drive | Chain | Identification,
     names: Sequence[str] | None,
     given: dict[str, dict[str, str]],
     asked: dict[str, Any],
     drawn: bool,
-) -> tuple[reporting.Report, str]:
+) -> tuple[reporting.Report | reporting.ChainReport, str]:
     """The report and, if it is `drawn`, its page."""
     with working("starting the drive ...") as tell:
         controllers = make_controllers(names, given, prefix=True)
@@ -177,10 +185,13 @@ def _made(
         def progress(share: float, what: str) -> None:
             tell(f"{100.0 * share:.0f} %: {what}")
 
+        asked |= {"controllers": controllers, "progress": progress, "command": command_line()}
+        made: reporting.Report | reporting.ChainReport
         with Attributed():
-            made = reporting.report(
-                drive, controllers=controllers, progress=progress, command=command_line(), draw=drawn, **asked
-            )
+            if isinstance(drive, Chain):
+                made = reporting.report_chain(drive, **asked)
+            else:
+                made = reporting.report(drive, draw=drawn, **asked)
         tell("drawing the figures")
         return made, made.to_html() if drawn else ""
 
@@ -253,11 +264,16 @@ def _seconds(text: str) -> float:
     return value
 
 
-def _show(to: Console, made: reporting.Report, out: str) -> None:
-    print_lines(to, drive_lines(made.drive))
+def _show(to: Console, made: reporting.Report | reporting.ChainReport, out: str) -> None:
+    print_lines(to, machine_lines(made.drive))
     to.print()
-    sentence(to, document.answer(made), "bold")
-    for sheet in made.sheets:
+    if isinstance(made, reporting.ChainReport):
+        sentence(to, made.headline, "bold")
+        sheets: Sequence[Any] = ()
+    else:
+        sentence(to, document.answer(made), "bold")
+        sheets = made.sheets
+    for sheet in sheets:
         if sheet.rounded is None:
             sentence(to, f"{sheet.name}: cannot be started with rounded values ({sheet.failure})")
             continue

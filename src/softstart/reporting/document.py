@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -52,9 +52,14 @@ def _any_script() -> Iterator[None]:
 
 def document(report: Report) -> str:
     """The whole file."""
+    return whole(report.project, lambda: _document(report))
+
+
+def whole(project: Project, made: Callable[[], str]) -> str:
+    """The page that is `made`, its figures drawn with any letters, with the project's decimal sign."""
     with _any_script():
-        page = _document(report)
-    return with_comma(page) if report.project.decimal == "comma" else page
+        text = made()
+    return with_comma(text) if project.decimal == "comma" else text
 
 
 def _document(report: Report) -> str:
@@ -83,7 +88,13 @@ def _document(report: Report) -> str:
         ("validity", "What this report assumes, and where it holds", validity_section(drive, project)),
         ("provenance", "About this document", provenance_section(report.provenance, project)),
     ]
-    name, made = str(drive.name), report.provenance.made
+    return page(str(drive.name), project, report.provenance.made, first, sections)
+
+
+def page(
+    name: str, project: Project, made: str, first: Html, sections: Sequence[tuple[str, str, Html]]
+) -> str:
+    """A whole file: head, first page, contents, and numbered sections, each (key, title, content)."""
     contents = tag(
         "nav",
         tag("h2", "Contents", id="contents"),
@@ -172,7 +183,7 @@ def validity_section(drive: Drive, project: Project) -> Html:
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
 
 
-def provenance_section(about: Provenance, project: Project) -> Html:
+def provenance_section(about: Provenance, project: Project, what: str = "drive") -> Html:
     """Revisions, approval, versions, date, command, and the drive's file with all changes."""
     signed = [["made by", project.author], ["checked by", project.checked], ["approved by", project.approved]]
     signed = [[what, who or "\N{EN DASH}", ""] for what, who in signed]
@@ -197,7 +208,7 @@ def provenance_section(about: Provenance, project: Project) -> Html:
         table(["what", "which"], rows, caption="Made with", text_columns=(0, 1)),
         tag("p", "The command that made this report:", class_="lead") if about.command else None,
         tag("pre", about.command, class_="command") if about.command else None,
-        tag("p", "The drive as a file for softstart, with all changes (drive.toml):", class_="lead"),
+        tag("p", f"The {what} as a file for softstart, with all changes ({what}.toml):", class_="lead"),
         tag("pre", about.drive_toml),
     )
 

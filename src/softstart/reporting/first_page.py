@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from softstart.drive.limits import Limits
 from softstart.errors import listed
 from softstart.reporting.choice import Choice
 from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
 from softstart.reporting.strategies import before_after_figure
 from softstart.start.comparison import REFERENCE, Comparison
-from softstart.start.recommendation import Row
+from softstart.start.recommendation import Recommendation, Row
 from softstart.views.fatigue import factor
 from softstart.views.printed import digits, fixed, percent
 
@@ -27,24 +29,33 @@ def headline(report: Report) -> str:
     >>> headline(report("crane-4amtkf", controllers=["shaped"], budget=0.0))[:81]
     'Gentlest start: shaped. The shaft torque peaks at 53.06 N m instead of 164.8 N m '
     """
-    best, direct = report.choice.chosen, report.row(REFERENCE)
+    best = report.choice.chosen
+    return answer(report.choice.recommendation, best.row if best else None, report.row(REFERENCE))
+
+
+def answer(
+    recommendation: Recommendation,
+    best: Row | None,
+    direct: Row | None,
+    torque: str = "The shaft torque",
+) -> str:
+    """What the chosen strategy does to a `torque`, and what it costs; why there is none, else."""
     if best is None or direct is None:
-        return report.choice.recommendation.text
-    named = report.choice.recommendation.recommended is not None
+        return recommendation.text
+    named = recommendation.recommended is not None
     what = f"{'Recommended' if named else 'Gentlest start'}: {best.name}."
-    run, hard = best.row.run, direct.run
-    if best.row is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
+    run, hard = best.run, direct.run
+    if best is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
         return f"{what} No strategy that was examined is noticeably gentler than direct start."
     return (
-        f"{what} The shaft torque peaks at {digits(run.peak_torque)} N m instead of "
-        f"{digits(hard.peak_torque)} N m under direct start, {share_saved(report, best.row)} less; the start "
+        f"{what} {torque} peaks at {digits(run.peak_torque)} N m instead of "
+        f"{digits(hard.peak_torque)} N m under direct start, {share_saved(best, direct)} less; the start "
         f"takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
     )
 
 
-def share_saved(report: Report, row: Row) -> str:
+def share_saved(row: Row, direct: Row | None) -> str:
     """What a strategy saves of the peak of direct."""
-    direct = report.row(REFERENCE)
     saved = 1.0 - row.run.peak_torque / direct.run.peak_torque if direct else math.nan
     return percent(saved, 0 if abs(saved) >= 0.1 else 1)
 
@@ -60,7 +71,14 @@ def first_page(report: Report, figures: Figures) -> Html:
         tag("section", tag("p", headline(report)), class_="answer", aria_label="The answer"),
         figures.shown("before-after", lambda: before_after_picture(rows), caption),
         _tiles(report, rows[-1], rows[0]) if report.choice.chosen else None,
-        _verdicts(report, rows),
+        verdicts(limits, rows)
+        if (limits := report.choice.recommendation.limits)
+        else tag(
+            "p",
+            "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, the "
+            "longest start time or the life in [limits], and this page says what passes, with the margin.",
+            class_="verdict",
+        ),
         _choices(report),
     )
 
@@ -86,36 +104,32 @@ def _tiles(report: Report, best: Row, direct: Row) -> Html:
     """What it saves, costs and gains."""
     run, hard = best.run, direct.run
     gain = report.life_gain
-    tiles = [
+    return tiles([
         ("peak shaft torque", f"{digits(run.peak_torque)} N m",
-         f"direct {digits(hard.peak_torque)} N m: {share_saved(report, best)} less"),
+         f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"),
         ("costs in time", f"{digits(1e3 * best.time_lost, 3)} ms",
          f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s"),
         ("life of the shaft line", f"× {factor(gain)}" if gain is not None else "not given",
          f"over that of direct, S-N slope {report.life_slope:g}" if gain is not None
          else "needs a damping above 0 in the drive file"),
         ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start"),
-    ]  # fmt: skip
+    ])  # fmt: skip
+
+
+def tiles(shown: Sequence[tuple[str, str, str]]) -> Html:
+    """Figures side by side: what, value, and what it is compared with."""
     return tag(
         "dl",
         *(
             tag("div", tag("dt", what), tag("dd", value, tag("small", beside)))
-            for what, value, beside in tiles
+            for what, value, beside in shown
         ),
         class_="tiles",
     )
 
 
-def _verdicts(report: Report, rows: list[Row]) -> Html:
+def verdicts(limits: Limits, rows: list[Row]) -> Html:
     """Pass or fail of direct and of the chosen strategy, limit by limit, in the worst case."""
-    limits = report.choice.recommendation.limits
-    if not limits:
-        return tag(
-            "p",
-            "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, the "
-            "longest start time or the life in [limits], and this page says what passes, with the margin.",
-            class_="verdict",
-        )
     cells = []
     for row in rows:
         for margin in row.margins(limits):
@@ -138,7 +152,7 @@ def _choices(report: Report) -> Html:
     shown = dict.fromkeys([*([direct] if direct else []), *ordinary, *choice.recommendation.shown])
     rows = sorted(shown, key=lambda row: (row.effort.order, -row.run.k_dyn))
     cells = [
-        [row.name, row.effort.meaning, digits(row.run.peak_torque), share_saved(report, row),
+        [row.name, row.effort.meaning, digits(row.run.peak_torque), share_saved(row, direct),
          fixed(row.run.k_dyn, 3),
          digits(row.run.start_time)]
         for row in rows

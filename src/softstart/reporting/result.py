@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from softstart import __version__
+from softstart.chain.model import Chain
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
@@ -276,7 +277,7 @@ def report(
     drive = Drive.load(drive) if isinstance(drive, str) else drive
     steps = _checked(drive, resolution, budget)
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
-    made = _made(controllers, parameters or {})
+    made = controllers_of(controllers, parameters or {})
 
     def tell(share: float, what: str) -> None:
         if progress is not None:
@@ -354,9 +355,10 @@ def _checked(
     return steps
 
 
-def _made(
+def controllers_of(
     controllers: Sequence[str | Controller] | None, parameters: Mapping[str, Mapping[str, object]]
 ) -> list[Controller]:
+    """The controllers to examine, `direct` among them; two of one name are refused."""
     made = make_controllers(controllers, parameters)
     labels = [label_of(one) for one in made]
     wrong = [
@@ -371,7 +373,7 @@ def _made(
     return made
 
 
-def provenance(drive: Drive, command: str) -> Provenance:
+def provenance(drive: Drive | Chain, command: str) -> Provenance:
     """That of a report made now.
 
     >>> made = provenance(Drive.load("crane-4amtkf"), "softstart report")

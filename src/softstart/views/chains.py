@@ -422,9 +422,12 @@ def run_figure(run: ChainRun) -> Any:
         twist.set_ylabel("twist over half the gap")
         twist.set_xlabel("time, s")
         torque.set_title(f"{run.chain.name}, at the motor shaft")
+        few = len(masses) <= 8  # else their names would cover the curves
         for axes in (torque, speed, twist):
-            if axes.get_legend_handles_labels()[0]:
+            if axes.get_legend_handles_labels()[0] and few:
                 axes.legend(fontsize=7.5, ncols=2, loc="best")
+            elif axes.get_legend_handles_labels()[0]:
+                axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 

@@ -106,3 +106,21 @@ def test_a_browser_that_does_not_print_is_named(run, monkeypatch, nothing_left):
     assert (code, out) == (2, "")
     assert "--pdf: false did not print (exit code 1); print the HTML file of --out instead." in err
     nothing_left()
+
+
+def test_a_chain_has_a_report_of_its_own(run, place):
+    code, out, err = run(
+        "report", "crane-4-mass", "--controllers", "direct,ramp", "--out", "r.html", "--json"
+    )
+    assert (code, err) == (0, "")
+    made = json.loads(out)
+    assert made["chosen"] == "ramp"
+    assert "1. The strategies compared" in (place / "r.html").read_text(encoding="utf-8")
+
+
+def test_a_chain_has_no_optima_and_no_sheets(run, nothing_left):
+    code, out, err = run("report", "crane-4-mass", *CHEAP, "--resolution", "time=5ms", "--out", "r.html")
+    assert (code, out) == (2, "")
+    assert '--budget: "crane-4-mass" is a chain' in err
+    assert '--resolution: "crane-4-mass" is a chain' in err
+    nothing_left()

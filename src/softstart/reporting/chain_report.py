@@ -1,0 +1,336 @@
+"""`report_chain`: the report of a chain, from the contents of `softstart compare CHAIN`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from softstart.chain.model import Chain
+from softstart.chain.vibration import natural_vibration
+from softstart.controller import Controller
+from softstart.controller.base import label_of
+from softstart.errors import InputError, SimulationError
+from softstart.input.files import write_whole
+from softstart.reporting import document
+from softstart.reporting.first_page import answer, share_saved, tiles, verdicts
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
+from softstart.reporting.project import Project
+from softstart.reporting.result import Progress, Provenance, controllers_of, provenance
+from softstart.start.comparison import REFERENCE, Comparison, compared
+from softstart.start.recommendation import Row
+from softstart.start.simulation import simulate
+from softstart.views import chain_schemes, chains, starts
+from softstart.views.numbers import Table
+from softstart.views.printed import digits, fixed, short
+
+MOST_SHAFTS = 6  # with a column each in the table of strategies
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ChainReport:
+    """All data behind the report of a chain: the strategies compared, and those that could not be started.
+
+    Attributes
+    ----------
+    drive : Chain
+        The chain that is started.
+    comparison : Comparison
+        The strategies that could be started, one row each.
+    failed : tuple of (str, str)
+        Name of each strategy whose start could not be finished, and the reason.
+    provenance : Provenance
+        Versions, date, the chain's file and command.
+    project : Project
+        Customer, author, revisions; see `Project`.
+
+    Examples
+    --------
+    >>> from softstart.reporting import report_chain
+    >>> report_chain("crane-4-mass", controllers=["ramp"]).headline[:36]
+    'Gentlest start: ramp. The largest sh'
+    """
+
+    drive: Chain
+    comparison: Comparison
+    failed: tuple[tuple[str, str], ...]
+    provenance: Provenance
+    project: Project = field(default_factory=Project)
+
+    @property
+    def chosen(self) -> Row | None:
+        """The recommended strategy; without limits, the gentlest of those that no other one beats."""
+        shown = self.comparison.recommendation.shown
+        return shown[-1] if shown else None
+
+    @property
+    def direct(self) -> Row:
+        """The row of `direct`."""
+        return next(row for row in self.comparison.rows if label_of(row.run.controller) == REFERENCE)
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence or two."""
+        what = "The largest shaft torque, brought to the motor shaft,"
+        return answer(self.comparison.recommendation, self.chosen, self.direct, what)
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain data, for JSON: as `compare` gives it, what is chosen, and where it is from."""
+        return {
+            **self.comparison.summary(),
+            "chosen": self.chosen.name if self.chosen else None,
+            "failed": dict(self.failed),
+            "provenance": self.provenance.summary(),
+        }
+
+    def to_html(self) -> str:
+        """The report as one HTML file that needs nothing else."""
+        return document.whole(self.project, lambda: _page(self))
+
+    def write(self, path: str | Path) -> None:
+        """Write the HTML file, whole or not at all."""
+        text = self.to_html()
+        write_whole(Path(path), lambda stream: stream.write(text))
+
+
+def report_chain(
+    chain: Chain | str | Path,
+    *,
+    controllers: Sequence[str | Controller] | None = None,
+    parameters: Mapping[str, Mapping[str, object]] | None = None,
+    progress: Progress | None = None,
+    command: str = "",
+    project: Project | str | Path | None = None,
+) -> ChainReport:
+    """Start a chain under each strategy, for a report of it.
+
+    Parameters
+    ----------
+    chain : Chain, str or Path
+        The chain, or the name or file of one.
+    controllers, parameters, progress, command, project
+        As in `report`; the project's file must have no [[source]], which are for parameters of a drive.
+
+    Returns
+    -------
+    ChainReport
+        The data; `write` makes one HTML file of it.
+
+    Raises
+    ------
+    InputError
+        Bad input.
+    SimulationError
+        Not even the start under `direct` can be finished.
+
+    Examples
+    --------
+    >>> found = report_chain("crane-4-mass", controllers=["ramp"])
+    >>> [row.name for row in found.comparison.rows]
+    ['ramp', 'direct']
+
+    References
+    ----------
+    docs/howto/read-a-report.md; K_dyn: [G] (16); chains: docs/theory/reduction.md.
+    """
+    chain = chain if isinstance(chain, Chain) else Chain.load(chain)
+    about = project if isinstance(project, Project) else Project.load(project) if project else Project()
+    if about.sources:
+        raise InputError(
+            f'project: [[source]] "{about.sources[0].parameter}" is a parameter of a drive, and '
+            f'"{chain.name}" is a chain; leave these tables out, and name assumed values in its file.'
+        )
+    made = controllers_of(controllers, parameters or {})
+    reference = simulate(chain, REFERENCE)
+    rows: list[Row] = []
+    failed: list[tuple[str, str]] = []
+    for number, one in enumerate(made):
+        if progress is not None:
+            progress(number / len(made), f"starting the chain under {label_of(one)}")
+        try:
+            rows.append(compared(chain, one, reference))
+        except SimulationError as error:
+            if label_of(one) == REFERENCE:
+                raise
+            failed.append((label_of(one), " ".join(str(error).split())))
+    comparison = Comparison(chain, tuple(rows), worst_case=rows[0].worst_case)
+    return ChainReport(chain, comparison, tuple(failed), provenance(chain, command), about)
+
+
+def _page(report: ChainReport) -> str:
+    figures = Figures()
+    first = _first_page(report, figures)
+    sections = [
+        ("compared", "The strategies compared", _strategies(report)),
+        ("starts", "The starts in detail", _starts(report, figures)),
+        ("drive", "The chain", _chain(report.drive, figures)),
+        ("validity", "What this report assumes, and where it holds", _validity(report.drive)),
+        (
+            "provenance",
+            "About this document",
+            document.provenance_section(report.provenance, report.project, "chain"),
+        ),
+    ]
+    return document.page(report.drive.name, report.project, report.provenance.made, first, sections)
+
+
+def _first_page(report: ChainReport, figures: Figures) -> Html:
+    """Answer, picture, tiles, limits and the table of strategies."""
+    direct, best = report.direct, report.chosen
+    rows = _shown(report)
+    limits = report.comparison.recommendation.limits
+    caption = (
+        f"{' and '.join(row.name for row in rows)}: torques of motor and shafts, brought to the motor shaft, "
+        "computed for the chain as it is."
+    )
+    return html(
+        tag("section", tag("p", report.headline), class_="answer", aria_label="The answer"),
+        tag("p", " ".join(_sentences(report.drive)[:2]), class_="small"),
+        figures.shown(
+            "before-after",
+            lambda: inlined(starts.comparison_figure(rows, ""), "before-after", "Before and after."),
+            caption,
+        ),
+        _tiles(report, best, direct) if best is not None else None,
+        verdicts(limits, rows)
+        if limits
+        else tag(
+            "p",
+            "Neither passed nor failed: the chain's file permits no torque. Give the permissible_torque of a "
+            "shaft there, and this page says what passes, with the margin.",
+            class_="verdict",
+        ),
+        _table(_gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), "Strategies on this chain", best),
+    )
+
+
+def _tiles(report: ChainReport, best: Row, direct: Row) -> Html:
+    run, hard = best.run, direct.run
+    names = report.drive.shaft_names
+    return tiles([
+        ("largest shaft torque", f"{digits(run.peak_torque)} N m",
+         f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"),
+        ("costs in time", f"{digits(1e3 * best.time_lost, 3)} ms",
+         f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s"),
+        ("is largest in", names[run.worst_shaft], f"direct: {names[hard.worst_shaft]}"),
+        ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start"),
+    ])  # fmt: skip
+
+
+def _shown(report: ChainReport) -> list[Row]:
+    """Direct, and the chosen strategy, if there is one."""
+    return list(dict.fromkeys(row for row in (report.direct, report.chosen) if row is not None))
+
+
+def _gentlest_first(report: ChainReport) -> list[Row]:
+    return sorted(report.comparison.rows, key=lambda row: row.run.k_dyn)
+
+
+def _table(rows: Sequence[Row], columns: Sequence[starts.Figure], title: str, best: Row | None) -> Html:
+    strong = [index for index, row in enumerate(rows) if row is best]
+    return _printed(starts.comparison_table(rows, columns, title), strong)
+
+
+def _printed(one: Table, strong: Sequence[int] = ()) -> Html:
+    """A table of the terminal as one of the page."""
+    texts = [index for index, column in enumerate(one.columns) if not column.number]
+    headings = [column.heading.replace("-\n", "- ").replace("\n", " ") for column in one.columns]
+    return table(headings, one.rows, caption=one.title, text_columns=texts, strong=strong)
+
+
+def _strategies(report: ChainReport) -> Html:
+    """Times, K_dyn of each shaft, and what the columns mean."""
+    rows, best = _gentlest_first(report), report.chosen
+    count = len(report.drive.shaft_names)
+    shafts, others = starts.details(report.drive)[:-1], starts.details(report.drive)[-1:]
+    if report.drive.limits:
+        shafts, others = shafts[:-1], (*shafts[-1:], *others)
+    notes = [
+        *starts.notes(report.comparison),
+        *(f"{n} could not be examined: {why}" for n, why in report.failed),
+    ]
+    return html(
+        tag("p", report.comparison.recommendation.text),
+        _table(rows, (*starts.QUICK, *others), "How quick, and how often gaps close", best),
+        _table(rows, shafts, "K_dyn of each shaft", best) if 1 < count <= MOST_SHAFTS else None,
+        tag("ul", joined(tag("li", one) for one in notes), class_="notes"),
+    )
+
+
+def _starts(report: ChainReport, figures: Figures) -> Html:
+    """Torques, speeds and twists, and what each shaft carries, of the chosen strategy and of direct."""
+    parts, pictures = [], []
+    for row in reversed(_shown(report)):
+        key = f"start-{label_of(row.run.controller)}"
+        title = f"{row.name}: torques, speeds and twists"
+        values = [
+            f"{name} = {short(value) if isinstance(value, float) else value}"
+            for name, value in row.run.controller.parameters.items()
+            if value is not None
+        ]
+        parts += [
+            tag("h3", row.name),
+            tag("p", f"Parameters, in SI: {', '.join(values)}.") if values else None,
+            _printed(chains.shaft_table(row.run)),
+        ]
+        pictures.append(
+            figures.shown(
+                key,
+                partial(_start_picture, row, key, title),
+                f"{row.name}: torques with their peaks, speeds, and the twist of each shaft with a gap over "
+                "half its gap (within -1 and 1 the gap is open).",
+            )
+        )
+    return html(*parts, *pictures)
+
+
+def _start_picture(row: Row, key: str, title: str) -> Html:
+    figure = chains.run_figure(row.run)
+    if len(row.run.chain.shafts) <= MOST_SHAFTS:
+        figure.set_size_inches(8.0, 5.2)  # two on a page
+    return inlined(figure, key, title)
+
+
+def _chain(chain: Chain, figures: Figures) -> Html:
+    """Scheme, natural frequencies, and lowest shapes."""
+    vibration = natural_vibration(chain)
+    return html(
+        figures.shown(
+            "scheme",
+            lambda: Html(chain_schemes.scheme_svg(chain)),
+            "The chain: masses, shafts, gaps and gears, and below them its first elastic shape.",
+        ),
+        _printed(chains.frequencies_table(vibration)),
+        figures.shown(
+            "shapes",
+            lambda: inlined(chains.shapes_figure(vibration), "shapes", "Lowest elastic shapes"),
+            "Lowest elastic shapes with the gaps closed; circles: nodes.",
+        ),
+    )
+
+
+def _sentences(chain: Chain) -> list[str]:
+    """The chain in sentences: masses, gaps and sums; motor and load; where it starts, and what is assumed."""
+    lines = [line.strip() for line in chains.chain_lines(chain)[1:]]
+    return [f"{line[0].upper()}{line[1:]}." for line in lines]
+
+
+def _validity(chain: Chain) -> Html:
+    motor = chain.motor
+    assert motor is not None  # or nothing would have started
+    lag = f"with a lag of {short(1e3 * motor.torque_lag)} ms" if motor.torque_lag else "without lag"
+    notes = [
+        *_sentences(chain),
+        f"The motor is a source of torque from {short(float(motor.minimum_torque))} to "
+        f"{short(float(motor.maximum_torque))} N m that follows its demand {lag}. Currents, fluxes and a "
+        "motor started directly at the mains are not in the model.",
+        "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
+        "The equations are solved as Taylor series from event to event; peaks are located, not read off "
+        "a grid.",
+        "Not in this report: optima and bounds (softstart optimize and pareto take the chain), lives "
+        "(softstart fatigue), maps over wear and load, and parameter sheets for inverters (for the "
+        "drive that softstart reduce writes).",
+    ]
+    return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

@@ -1,0 +1,53 @@
+"""The report of a chain: its figures are those of the starts, and nothing else gets in."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from softstart import Chain, InputError, simulate_chain
+from softstart.reporting import ChainReport, Project, report_chain
+
+CHAIN = Chain.load("crane-4-mass")
+
+
+@pytest.fixture(scope="module")
+def made() -> ChainReport:
+    return report_chain(CHAIN, controllers=["ramp", "take-up"])
+
+
+def test_the_figures_are_those_of_the_starts_on_the_chain(made):
+    page = made.to_html()
+    ramp, gentle, direct = (simulate_chain(CHAIN, name) for name in ("ramp", "take-up", "direct"))
+    assert made.chosen.name == "take-up"
+    assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in made.headline
+    assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in made.headline
+    assert made.headline in page
+    for run in (ramp, gentle, direct):
+        row = re.findall(rf'<tr[^>]*><th scope="row" class="text">{run.controller_name}</th>(.*?)</tr>', page)
+        assert len(row) == 3  # page 1, times, shafts
+        assert f">{run.k_dyn:.3f}<" in row[0]
+        assert re.findall(r">([\d.]+)<", row[2]) == [f"{k:.3f}" for k in run.k_dyns]
+    for name in CHAIN.shaft_names:
+        assert name in page
+    assert page.count("<figure>") == 5
+
+
+def test_limits_pass_or_fail_by_the_worst_case(made):
+    assert "Neither passed nor failed" in made.to_html()
+    permitted = 1.5 * made.chosen.run.peak_torque
+    limited = Chain.load("crane-4-mass", also={"shaft[1].permissible_torque": permitted})
+    page = report_chain(limited, controllers=["take-up"]).to_html()
+    assert "Pass or fail" in page
+    assert "Neither passed" not in page
+
+
+def test_sources_of_a_drive_and_text_from_outside_stay_out():
+    about = Project.read('[[source]]\nparameter = "shaft.gap"\norigin = "guessed"')
+    with pytest.raises(InputError, match=r'"shaft\.gap" is a parameter of a drive'):
+        report_chain(CHAIN, controllers=["ramp"], project=about)
+    hostile = Chain.load("crane-4-mass", also={"name": "<script>alert(1)</script>"})
+    page = report_chain(hostile, controllers=["direct"]).to_html()
+    assert "<script" not in page
+    assert "default-src 'none'" in page or "default-src &#x27;none&#x27;" in page
