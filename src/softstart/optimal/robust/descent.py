@@ -18,7 +18,7 @@ PRICE = 100.0  # of lateness: torque range a start time asked for; more than any
 WATCHED = 0.8  # of the worst peak: torques that cannot come so high within the trust region are left out
 EDGE_REACH = 0.02  # s that an edge may move at full trust
 EDGE_SHARE = 0.4  # of the width beside it, at most
-FIRST_ROWS = 400  # of a linear program that is given its rows as they are needed
+FIRST_ROWS = 50  # of a linear program that is given its rows as they are needed
 BROKEN = 1e-9  # relative to the torques: a row is broken by more than rounding
 
 
