@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from tests.page.conftest import SOFTSTART
 
-from softstart import DataSheet, Drive, InputError, compare, simulate
+from softstart import Chain, DataSheet, Drive, InputError, compare, simulate, simulate_chain
 from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
@@ -231,3 +231,25 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     assert found.gap == pytest.approx(0.08, rel=0.05)
     page.get_by_test_id("log-use").click()
     page.get_by_text("as identified, is loaded").wait_for()
+
+
+def test_a_chain_file_gives_its_strategies_and_its_report(files: Any, screenshot: Any) -> None:
+    chain = Chain.load("crane-4-mass")
+    put(files, "mine.toml", chain.to_toml().encode())
+    about = files.get_by_test_id("chain-about")
+    about.wait_for(timeout=120_000)
+    assert "is a chain: 4 masses, 3 gaps" in about.inner_text()
+    assert "stay with the drive" in about.inner_text()
+    k_dyn(files, f"{simulate(CRANE, 'direct').k_dyn:.3f}")  # of the drive still
+    run = simulate_chain(chain, "ramp")
+    row = files.get_by_test_id("chain-table").locator("tr", has_text="ramp").inner_text().split()
+    assert row[:5] == ["ramp", *(f"{k:.3f}" for k in (run.k_dyn, *run.k_dyns))]
+    for width, height in ((1280, 800), (1920, 1080)):
+        files.set_viewport_size({"width": width, "height": height})
+        files.get_by_test_id("chain-report").scroll_into_view_if_needed()
+        screenshot(files, f"chain-{width}")
+        panel = files.locator(".instrument .panel").first
+        assert panel.evaluate("one => one.scrollWidth - one.clientWidth") <= 1
+    name, page = saved(files, "chain-report")
+    assert name.endswith("report.html")
+    assert b"The strategies compared" in page

@@ -602,6 +602,15 @@ def is_chain(given: str | os.PathLike[str]) -> bool:
     if not isinstance(given, str | os.PathLike) or not os.fspath(given) or refusal_of(given) is not None:
         return False
     try:
-        return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", read_text(given), re.MULTILINE))
+        return is_chain_text(read_text(given))
     except RefusedError:
         return False
+
+
+def is_chain_text(text: str) -> bool:
+    """Whether a text is that of a chain: it has a table [[mass]].
+
+    >>> is_chain_text("[[mass]]"), is_chain_text("[motor]")
+    (True, False)
+    """
+    return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
+from weakref import WeakMethod
 
 from nicegui import ui
 
+from softstart.chain.model import Chain, is_chain_text
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
+from softstart.page.jobs import Jobs
 from softstart.page.panel_parts import (
     POLL,
     JobView,
@@ -23,6 +26,7 @@ from softstart.page.panel_parts import (
     jobs_of,
     notify,
     save,
+    table,
     upload,
 )
 from softstart.page.sentences import clipped
@@ -41,7 +45,7 @@ class FilesPanel:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         _title("Drive")
-        DriveFiles(session)
+        DriveFiles(session, user)
         _title("Export")
         Exports(session, user)
         _title("Command line")
@@ -53,9 +57,9 @@ def _title(text: str) -> None:
 
 
 class DriveFiles:
-    """Load a drive from a file or from the shipped ones; save the present one."""
+    """Load a drive from a file or from the shipped ones; save the present one; the starts of a chain."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
         shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box().classes("panel-form"):
@@ -64,15 +68,55 @@ class DriveFiles:
             self._shipped = choice("Shipped drives", shipped, "", "drive-shipped")
             self._shipped.on_value_change(lambda event: self._take(str(event.value or "")))
         hint(
-            "A drive file holds strings with units or bare SI numbers; a mistake in it changes nothing here."
+            "A drive file holds strings with units or bare SI numbers; a mistake in it changes nothing here. "
+            "Of a chain file all strategies are started in the background."
         )
         with box().classes("troubles").props('role=alert data-testid="drive-trouble"') as self._troubles:
             pass
         self._troubles.set_visibility(False)
+        self._chain: tasks.ChainStarts | None = None
+        self._name = ""
+        started = WeakMethod(self._started)  # a timer that never ran outlives its tab
+        self._view = JobView(
+            jobs or jobs_of(user), user, "chain", on_done=lambda found: (one := started()) and one(found)
+        )
+        with box().classes("panel-result") as self._result:
+            self._about = ui.label().classes("panel-sentence").props('data-testid="chain-about"')
+            self._table = ui.html("", sanitize=False).classes("w-full").style("overflow-x: auto")
+            self._table.props("tabindex=0 role=group aria-label='Strategies on the chain'")
+            action("Report HTML of the chain", guarded(self._save_report), "chain-report")
+        self._result.set_visibility(False)
 
     def _uploaded(self, content: bytes, name: str) -> None:
-        self._session.take(drive_of(content, name))
+        machine = machine_of(content, name)
+        if isinstance(machine, Chain):
+            self._start_chain(machine, name)
+            return
+        self._session.take(machine)
         self._taken()
+
+    def _start_chain(self, chain: Chain, name: str) -> None:
+        """The page keeps its drive: of a chain it has the table and the report."""
+        if self._view.busy:
+            raise InputError("A chain is being started; wait for it, or cancel it.")
+        self._troubles.set_visibility(False)
+        self._result.set_visibility(False)
+        self._name = chain.name
+        self._view.begin("chain", tasks.chain, chain, name)
+
+    def _started(self, found: tasks.ChainStarts) -> None:
+        self._chain = found
+        self._about.set_text(
+            f"{clipped(self._name)} is a chain: {found.about}. The plots and sliders stay with the drive "
+            f"that was loaded before; of the chain the page shows the strategies and a report. {found.answer}"
+        )
+        headings = [column.heading.replace("\n", " ") for column in found.table.columns]
+        self._table.set_content(table(headings, found.table.rows, name="chain-table"))
+        self._result.set_visibility(True)
+
+    def _save_report(self) -> None:
+        assert self._chain is not None
+        save(self._chain.report, file_name(self._name, "report", suffix=".html"))
 
     def _take(self, name: str) -> None:
         if name:
@@ -96,10 +140,10 @@ class DriveFiles:
         save(self._session.drive.to_toml(), drive_file(self._session.drive))
 
 
-def drive_of(content: bytes, name: str) -> Drive:
-    """The drive in the bytes of a file; InputError with a sentence for each mistake.
+def machine_of(content: bytes, name: str) -> Drive | Chain:
+    """The drive or chain in the bytes of a file; InputError with a sentence for each mistake.
 
-    >>> drive_of(b"\\xff\\xfe", "mine.toml")
+    >>> machine_of(b"\\xff\\xfe", "mine.toml")
     Traceback (most recent call last):
     softstart.errors.InputError: mine.toml: the file is not UTF-8 text (line 1); save it as UTF-8.
     """
@@ -113,7 +157,7 @@ def drive_of(content: bytes, name: str) -> Drive:
             raise InputError(
                 f"{name}: line {number} has more than {LONGEST_LINE} letters, as no drive file has."
             )
-    return Drive.from_toml(text)
+    return Chain.from_toml(text) if is_chain_text(text) else Drive.from_toml(text)
 
 
 class Exports:

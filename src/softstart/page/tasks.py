@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
@@ -41,10 +43,12 @@ if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
     from softstart.tuning.outcome import Tuning
     from softstart.views import identification as shown
+    from softstart.views import starts
+    from softstart.views.numbers import Table
 else:  # they import scipy.optimize; in the server the first page would wait for that
     reporting, front = late("softstart.reporting"), late("softstart.optimal.front")
     logs, fits = late("softstart.identification.logs"), late("softstart.identification.solving")
-    shown = late("softstart.views.identification")
+    shown, starts = late("softstart.views.identification"), late("softstart.views.starts")
     shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
 
 LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
@@ -56,6 +60,7 @@ TUNING_SHARES = {
     "robust": (0.45, 0.8),
     "certified": (0.8, 1.0),
 }
+MOST_SHAFTS = 4  # of a chain, with a column each
 INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
 
@@ -258,6 +263,32 @@ def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> 
     """C code that plays a torque profile."""
     tell(None, "writing C code")
     return text_of(lambda path: profile.to_c(path, about=about), ".c")
+
+
+@dataclass(frozen=True)
+class ChainStarts:
+    """The strategies on a chain, as the page shows them: sentences, a table, and the report."""
+
+    about: str
+    answer: str
+    table: Table
+    report: str
+
+
+def chain(machine: Chain, name: str, *, tell: Tell) -> ChainStarts:
+    """Start a chain, whose file has this name, under each strategy."""
+    tell(0.0, "starting the chain")
+    found = reporting.report_chain(
+        machine,
+        progress=tell,
+        command=shlex.join(["softstart", "report", name, "--out=report.html"]),
+    )
+    rows = sorted(found.comparison.rows, key=lambda row: row.run.k_dyn)
+    shafts = len(found.drive.shaft_names)
+    own = starts.details(found.drive)[:shafts] if 1 < shafts <= MOST_SHAFTS else ()
+    shown = starts.comparison_table(rows, (starts.GENTLE[0], *own, starts.QUICK[0]))
+    about = " ".join(line.strip() for line in starts.machine_lines(found.drive)[1:2])
+    return ChainStarts(about, found.headline, shown, found.to_html())
 
 
 def report(drive: Drive, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:

@@ -110,9 +110,10 @@ def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
     """The web framework remembers the function of each upload's route."""
     from softstart.page.files_panel import DriveFiles
+    from softstart.page.jobs import Jobs
 
     session = Session(controllers=["direct"])
-    DriveFiles(session)
+    DriveFiles(session, "A", Jobs())
     kept = weakref.ref(session)
     del session
     gc.collect()
@@ -123,19 +124,19 @@ def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
 
 
 def test_a_file_of_mistakes_is_told_in_some_sentences_and_read_at_once() -> None:
-    from softstart.page.files_panel import LARGEST, drive_of
+    from softstart.page.files_panel import LARGEST, machine_of
     from softstart.page.panel_parts import MOST_SENTENCES, few
 
     with pytest.raises(InputError) as told:
-        drive_of(b"\n".join(b"k%d = 1" % k for k in range(5000)), "mine.toml")
+        machine_of(b"\n".join(b"k%d = 1" % k for k in range(5000)), "mine.toml")
     missing = 7  # keys that a drive needs
     said = few(told.value.sentences)
     assert len(said) == MOST_SENTENCES + 1
     assert said[-1].startswith(f"There are {5000 + missing - MOST_SENTENCES:,} more")
     with pytest.raises(InputError, match="line 1 has more than 2000 letters"):  # it would be read for 14 s
-        drive_of(b"a." * (LARGEST // 2 - 2) + b"b=1", "mine.toml")
+        machine_of(b"a." * (LARGEST // 2 - 2) + b"b=1", "mine.toml")
     named = Drive.load("crane-4amtkf").replace(name="Crane" * 24)
-    assert drive_of(named.to_toml().encode(), "mine.toml") == named
+    assert machine_of(named.to_toml().encode(), "mine.toml") == named
 
 
 def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> None:
