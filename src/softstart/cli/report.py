@@ -35,7 +35,6 @@ from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.quantities import to_si
-from softstart.views.starts import machine_lines
 from softstart.views.terminal import console, print_json, print_lines, sentence
 
 if TYPE_CHECKING:
@@ -44,8 +43,10 @@ if TYPE_CHECKING:
     from softstart import reporting
     from softstart.identification.result import Identification
     from softstart.reporting import document
+    from softstart.views import starts
 else:
     reporting, document = late("softstart.reporting"), late("softstart.reporting.document")
+    starts = late("softstart.views.starts")
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
@@ -265,7 +266,7 @@ def _seconds(text: str) -> float:
 
 
 def _show(to: Console, made: reporting.Report | reporting.ChainReport, out: str) -> None:
-    print_lines(to, machine_lines(made.drive))
+    print_lines(to, starts.machine_lines(made.drive))
     to.print()
     if isinstance(made, reporting.ChainReport):
         sentence(to, made.headline, "bold")
