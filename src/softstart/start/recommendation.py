@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
-from softstart.drive import Limit, Limits
+from softstart.drive import Drive, Limit, Limits
 from softstart.start.fatigue import worst_damage
 from softstart.start.run import BaseRun, Run
 
@@ -24,6 +24,10 @@ HARDER: Final = 1.001  # times the K_dyn of `direct`
 BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
 ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
 ENDS: Final = ("lower", "upper")  # of an interval, in names of figures
+REMEDIES: Final = {  # where nothing is asked, of a chain and of a drive
+    False: "each shaft a permissible_torque in the chain file",
+    True: "[limits] in the drive file",
+}
 CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
 
 
@@ -298,7 +302,8 @@ def recommend(drive: Any, rows: Iterable[Row]) -> Recommendation:
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _unbeaten(able)
-    found = _with_limits(limits, rows, able, best) if limits else _without_limits(limits, rows, best)
+    remedy = REMEDIES[isinstance(drive, Drive)]
+    found = _with_limits(limits, rows, able, best) if limits else _without_limits(limits, rows, best, remedy)
     return replace(found, text=f"{found.text}{unchecked_life(drive)}")
 
 
@@ -329,7 +334,9 @@ def unchecked_life(drive: Any) -> str:
     return "" if drive.d > 0.0 else " The life is not checked: without damping the shaft swings for all time."
 
 
-def _without_limits(limits: Limits, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:
+def _without_limits(
+    limits: Limits, rows: Sequence[Row], best: tuple[Row, ...], remedy: str
+) -> Recommendation:
     if not best:
         return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
     first = best[0]
@@ -341,7 +348,7 @@ def _without_limits(limits: Limits, rows: Sequence[Row], best: tuple[Row, ...]) 
     head = "No other strategy beats these" if len(best) > 1 else "No other strategy beats this one"
     text = (
         f"{head} in K_dyn and time at once: {'; '.join(parts)}. "
-        "Which one is enough depends on what the machine withstands: give [limits] in the drive file."
+        f"Which one is enough depends on what the machine withstands: give {remedy}."
     )
     return Recommendation(text, None, best, limits)
 
