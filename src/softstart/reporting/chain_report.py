@@ -165,7 +165,7 @@ def _page(report: ChainReport) -> str:
     sections = [
         ("compared", "The strategies compared", _strategies(report)),
         ("starts", "The starts in detail", _starts(report, figures)),
-        ("drive", "The chain", _chain(report.drive, figures)),
+        ("chain", "The chain", _chain(report.drive, figures)),
         ("validity", "What this report assumes, and where it holds", _validity(report.drive)),
         (
             "provenance",
