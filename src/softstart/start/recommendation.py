@@ -24,10 +24,6 @@ HARDER: Final = 1.001  # times the K_dyn of `direct`
 BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
 ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
 ENDS: Final = ("lower", "upper")  # of an interval, in names of figures
-REMEDIES: Final = {  # where nothing is asked, of a chain and of a drive
-    False: "each shaft a permissible_torque in the chain file",
-    True: "[limits] in the drive file",
-}
 CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
 
 
@@ -302,8 +298,7 @@ def recommend(drive: Any, rows: Iterable[Row]) -> Recommendation:
     rows, limits = list(rows), checked_limits(drive)
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _unbeaten(able)
-    remedy = REMEDIES[isinstance(drive, Drive)]
-    found = _with_limits(limits, rows, able, best) if limits else _without_limits(limits, rows, best, remedy)
+    found = _with_limits(limits, rows, able, best) if limits else _without_limits(drive, rows, best)
     return replace(found, text=f"{found.text}{unchecked_life(drive)}")
 
 
@@ -334,11 +329,9 @@ def unchecked_life(drive: Any) -> str:
     return "" if drive.d > 0.0 else " The life is not checked: without damping the shaft swings for all time."
 
 
-def _without_limits(
-    limits: Limits, rows: Sequence[Row], best: tuple[Row, ...], remedy: str
-) -> Recommendation:
+def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:
     if not best:
-        return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
+        return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, checked_limits(drive))
     first = best[0]
     parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f} in {first.run.settled_time:.4g} s"]
     for before, row in pairwise(best):
@@ -346,11 +339,9 @@ def _without_limits(
         cost = f"{less:.3f} less for {1e3 * later:.3g} ms, {1e-3 * less / later:.2g} per ms"
         parts.append(f"{row.name}, {row.run.k_dyn:.3f} in {row.run.settled_time:.4g} s ({cost})")
     head = "No other strategy beats these" if len(best) > 1 else "No other strategy beats this one"
-    text = (
-        f"{head} in K_dyn and time at once: {'; '.join(parts)}. "
-        f"Which one is enough depends on what the machine withstands: give {remedy}."
-    )
-    return Recommendation(text, None, best, limits)
+    told = "[limits] in the drive file" if isinstance(drive, Drive) else "shafts their permissible_torque"
+    text = f"{head} in K_dyn and time at once: {'; '.join(parts)}. Which one is enough depends on what the"
+    return Recommendation(f"{text} machine withstands: give {told}.", None, best, checked_limits(drive))
 
 
 def _refused(rows: Sequence[Row]) -> str:
