@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from signal import SIGCONT, SIGSTOP
+from threading import Timer
 from typing import Any
 
 import pytest
@@ -97,6 +99,24 @@ def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy):
         f"{lags[len(lags) // 2]:.0f} ms (median), {lags[-1]:.0f} ms (worst), last {page.inner_text('.pulse')}"
     )
     assert updates >= 55
+
+
+@pytest.mark.alone
+def test_a_halt_of_half_a_second_in_a_drag_loses_none_of_its_steps(page, server):
+    opened(page)
+    page.locator('tr[data-name="state-feedback"] input[type=radio]').check()
+    page.wait_for_timeout(1500)
+    page.evaluate(COUNT)
+    halts = [
+        Timer(0.3, server.process.send_signal, [SIGSTOP]),
+        Timer(0.8, server.process.send_signal, [SIGCONT]),
+    ]
+    for halt in halts:
+        halt.start()
+    drag(page, "shaft.gap", 0.02, 0.98, STEPS)
+    for halt in halts:
+        halt.join()
+    assert settled(page, "window.updates") >= 55
 
 
 def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):

@@ -33,7 +33,7 @@ from softstart.views.starts import position_notes
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
 QUICK = 0.010  # s, of a start that is computed at every step of a hand, even if no picture follows
 LONG = (math.inf, math.inf)
-TOO_LATE = 0.3  # s
+TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute overtakes the hand after a shorter halt
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded anew comes back, or does not
 PACKED = ("t", "T", "u", "w1", "w2", "theta")

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from softstart.page.sentences import log, sentence_of
 
 WINDOW = 3  # frames sent and not yet drawn
-GLANCES = 24  # small frames between two that were drawn: more, and the browser is not keeping up
+GLANCES = 60  # small frames between two that were drawn, a second of a hand: more, and the browser is behind
 PATIENCE = 1.0  # s, after which a frame that was never answered is taken as lost
 REST = 0.12  # s without a change, after which what is slow or secondary is computed
 
