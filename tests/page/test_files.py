@@ -7,13 +7,14 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.page.conftest import SOFTSTART
+from tests.page.conftest import SOFTSTART, settled
 
-from softstart import Chain, DataSheet, Drive, InputError, compare, simulate, simulate_chain
+from softstart import Chain, DataSheet, Drive, InputError, compare, simulate
 from softstart.identification.planning import made_up_log
 
 CRANE = Drive.load("crane-4amtkf")
@@ -233,23 +234,44 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     page.get_by_text("as identified, is loaded").wait_for()
 
 
-def test_a_chain_file_gives_its_strategies_and_its_report(files: Any, screenshot: Any) -> None:
+def test_a_chain_file_takes_the_place_of_the_drive(files: Any, screenshot: Any) -> None:
+    """Figures, fields and flanks are those of the chain; its report, a link and undo know it."""
     chain = Chain.load("crane-4-mass")
     put(files, "mine.toml", chain.to_toml().encode())
-    about = files.get_by_test_id("chain-about")
-    about.wait_for(timeout=120_000)
-    assert "is a chain: 4 masses, 3 gaps" in about.inner_text()
-    assert "stay with the drive" in about.inner_text()
-    k_dyn(files, f"{simulate(CRANE, 'direct').k_dyn:.3f}")  # of the drive still
-    run = simulate_chain(chain, "ramp")
-    row = files.get_by_test_id("chain-table").locator("tr", has_text="ramp").inner_text().split()
-    assert row[:5] == ["ramp", *(f"{k:.3f}" for k in (run.k_dyn, *run.k_dyns))]
+    field = files.locator('[data-path="shaft[2].gap"] input[type=text]')
+    field.wait_for(timeout=120_000)
+    k_dyn(files, f"{simulate(chain, 'direct').k_dyn:.3f}")
+    field.fill("0.1 rad")
+    field.press("Enter")
+    wider = replace(
+        chain, shafts=[one.replace(gap=gap) for one, gap in zip(chain.shafts, (0.1, 0.1, 0.01), strict=True)]
+    )
+    run = simulate(wider, "direct")
+    k_dyn(files, f"{run.k_dyn:.3f}")
+    files.locator(".plots canvas").focus()
+    for _ in range(60):
+        files.keyboard.press("ArrowRight")
+    when = float(files.locator(".instant").inner_text().removesuffix(" ms")) / 1000.0
+    twist = run.at([when])["twist"][0]
+    shares = [
+        max(-1.0, min(2.0 * angle / gap, 1.0))
+        for angle, gap in zip(twist, wider.at_motor_shaft().gap, strict=True)
+    ]
+    pins = [float(pin) for pin in files.locator(".scheme").get_attribute("data-pin").split()]
+    assert pins == pytest.approx(shares, abs=0.05)
     for width, height in ((1280, 800), (1920, 1080)):
         files.set_viewport_size({"width": width, "height": height})
-        files.get_by_test_id("chain-report").scroll_into_view_if_needed()
         screenshot(files, f"chain-{width}")
-        panel = files.locator(".instrument .panel").first
-        assert panel.evaluate("one => one.scrollWidth - one.clientWidth") <= 1
-    name, page = saved(files, "chain-report")
+        for part in (".instrument .panel", ".instrument .strategies", ".instrument .controls"):
+            assert files.locator(part).first.evaluate("one => one.scrollWidth - one.clientWidth") <= 1, part
+    link = settled(files, "location.href")
+    name, page = saved(files, "export-report", 120_000)
     assert name.endswith("report.html")
     assert b"The strategies compared" in page
+    files.get_by_role("button", name="Undo").click()
+    k_dyn(files, f"{simulate(chain, 'direct').k_dyn:.3f}")
+    files.get_by_role("button", name="Undo").click()
+    k_dyn(files, f"{simulate(CRANE, 'direct').k_dyn:.3f}")
+    files.goto("about:blank")
+    files.goto(link)
+    k_dyn(files, f"{run.k_dyn:.3f}")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from tests.page.conftest import settled, wait_for_rows
 
-from softstart import Drive, simulate
+from softstart import Chain, Drive, simulate
 from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
@@ -85,13 +85,28 @@ def test_a_slider_moved_by_mouse_gives_the_k_dyn_of_simulate(page):
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("strategy", ["direct", "state-feedback"])  # the quickest, and the slowest to design
-def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy):
+@pytest.mark.parametrize(
+    ("strategy", "machine", "path"),
+    [  # the quickest, and the slowest to design; four masses and three gaps
+        ("direct", "", "shaft.gap"),
+        ("state-feedback", "", "shaft.gap"),
+        ("direct", "crane-4-mass", "shaft[2].gap"),
+    ],
+)
+def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy, machine, path):
     opened(page)
+    if machine:
+        page.get_by_role("tab", name="Files", exact=True).click()
+        chain = Chain.load(machine).to_toml().encode()
+        page.locator('input[type="file"]').set_input_files(
+            {"name": "mine.toml", "mimeType": "application/toml", "buffer": chain}
+        )
+        field(page, path).wait_for(timeout=120_000)
+        wait_for_rows(page)
     page.locator(f'tr[data-name="{strategy}"] input[type=radio]').check()
     page.wait_for_timeout(1500)
     page.evaluate(COUNT)
-    drag(page, "shaft.gap", 0.02, 0.98, STEPS)
+    drag(page, path, 0.02, 0.98, STEPS)
     updates = settled(page, "window.updates")
     lags = sorted(page.evaluate("window.lags"))
     print(

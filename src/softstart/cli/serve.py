@@ -16,16 +16,17 @@ os.environ.setdefault("MKL_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from softstart.cli.commands import Command
-from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_drive, set_option
+from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_machine, set_option
 from softstart.cli.running import working
 from softstart.late import late
 from softstart.page.serve import Address, check_installed, listening, run
 
 if TYPE_CHECKING:
-    from softstart.page import frames, ranges
+    from softstart.page import machines
     from softstart.page import session as sessions
+    from softstart.page.machines import Machine
 else:
-    frames, ranges = late("softstart.page.frames"), late("softstart.page.ranges")
+    machines = late("softstart.page.machines")
     sessions = late("softstart.page.session")
 
 
@@ -61,11 +62,11 @@ def serve(
         with mistakes.noted():
             check()
     with mistakes.noted():
-        loaded = read_drive(drive, settings)
+        loaded = machines.single(read_machine(drive, settings))
     mistakes.settle()
     listener = listening(address)
     with listener:
-        _warm_up()
+        _warm_up(loaded)
 
         def ready(url: str) -> None:
             print(f"softstart is at {url}  (Ctrl-C ends it)", flush=True)
@@ -76,10 +77,11 @@ def serve(
         run(loaded, address, listener, ready)
 
 
-def _warm_up() -> None:
+def _warm_up(machine: Machine) -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
     with working("getting the engine ready ..."):
-        session = sessions.Session()
-        _ = session.strategies
-        axes = ranges.axes_about(session.drive, 3, 3)
-        frames.k_dyn_row(session.drive, session.controllers[session.selected], axes.gaps, axes.inertias[1])
+        for session in (sessions.Session(), sessions.Session(machine)):
+            _ = session.strategies
+            if (axes := machines.axes_about(session.machine, 3, 3)) is not None:
+                controller = session.controllers[session.selected]
+                machines.k_dyn_row(session.machine, controller, axes.gaps, axes.inertias[1])

@@ -7,92 +7,16 @@ from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
-from softstart.drive import PARAMETERS
 from softstart.errors import InputError
-from softstart.input.parameters import Parameter
 from softstart.page import links
 from softstart.page.frames import SERVER, STRATEGY, Screen
+from softstart.page.machines import Entry
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
-from softstart.views.printed import unit
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LARGEST = 1e15  # beyond any number of a message: clocks in ms, positions, values
 LONGEST_TEXT = 200  # letters in a field
-BY_PATH = {parameter.path: parameter for parameter in PARAMETERS.values()}
-
-# name, what stands before the field; the sliders are those of scales.scales_about
-GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
-    "Drive": (("name", "name"),),
-    "Motor": (
-        ("starting_torque", "starting torque"),
-        ("motor_inertia", "inertia"),
-        ("torque_lag", "torque lag"),
-        ("maximum_torque", "largest torque"),
-        ("minimum_torque", "braking torque"),
-        ("torque_rate", "torque rate"),
-        ("computing_delay", "dead time"),
-        ("motor_friction", "friction"),
-        ("motor_viscous_friction", "viscous friction"),
-        ("encoder_lines", "encoder lines"),
-        ("torque_noise", "torque noise"),
-    ),
-    "Shaft": (
-        ("gap", "total gap"),
-        ("stiffness", "stiffness"),
-        ("damping", "damping"),
-        ("contact_law", "contact law"),
-    ),
-    "Load": (
-        ("load_inertia", "inertia"),
-        ("load_torque", "torque"),
-        ("load_kind", "kind"),
-        ("load_viscous_friction", "viscous friction"),
-    ),
-    "Start": (
-        ("target_speed", "target speed"),
-        ("start_position", "position"),
-        ("brake", "brake"),
-        ("release", "release"),
-        ("initial_load_speed", "speed before"),
-    ),
-}  # fmt: skip
-SYMBOLS = {
-    "starting_torque": "Ms",
-    "motor_inertia": "J\N{SUBSCRIPT ONE}",
-    "torque_lag": "\N{GREEK SMALL LETTER TAU}",
-    "gap": "\N{GREEK SMALL LETTER DELTA}",
-    "stiffness": "c",
-    "damping": "d",
-    "start_position": "\N{GREEK SMALL LETTER THETA}",
-    "load_inertia": "J\N{SUBSCRIPT TWO}",
-    "load_torque": "Mc",
-    "target_speed": "\N{GREEK SMALL LETTER OMEGA}",
-}
-
-
-def groups(screen: Screen) -> list[dict[str, Any]]:
-    """The fields in their groups, as the browser builds them."""
-    return [
-        {"title": title, "rows": [_row(name, label, name in screen.scales) for name, label in rows]}
-        for title, rows in GROUPS.items()
-    ]
-
-
-def _row(name: str, label: str, slider: bool) -> dict[str, Any]:
-    parameter = PARAMETERS[name]
-    words = parameter.choices if parameter.unit else ()
-    return {
-        "path": parameter.path,
-        "symbol": SYMBOLS.get(name, ""),
-        "label": label,
-        "meaning": f"{parameter.meaning}; write for example {', '.join([*words, parameter.example])}",
-        "unit": unit(parameter.unit),
-        "slider": slider,
-        "choices": [] if parameter.unit else list(parameter.choices),
-        "suggestions": list(words),
-        "words": not parameter.unit and not parameter.choices,
-    }
 
 
 class Delay:
@@ -156,7 +80,7 @@ class Controls:
             return
         # without a field, the message appears next to the figure
         path = str(arguments.get("path"))
-        place = path if path in BY_PATH or path in self._screen.strategy_paths() else ""
+        place = path if path in self._screen.entries or path in self._screen.strategy_paths() else ""
         version = self._session.version
         stamp: Any = message.get("stamp")
         if _is_a(float, stamp):
@@ -173,7 +97,7 @@ class Controls:
 
     def _slide(self, path: str, position: float) -> None:
         own = path in self._screen.strategy_paths()
-        name = _own(path) if own else _parameter(path).name
+        name = _own(path) if own else path
         scale = (self._screen.strategy_scales if own else self._screen.scales).get(name)
         if scale is None:
             raise InputError(f"{path}: there is no such slider.")
@@ -184,7 +108,7 @@ class Controls:
 
     def _edit(self, path: str, text: str) -> None:
         own = path in self._screen.strategy_paths()
-        example = "a value, or nothing for the default" if own else _parameter(path).example
+        example = "a value, or nothing for the default" if own else self._entry(path).parameter.example
         if len(text) > LONGEST_TEXT:
             raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {example}.")
         words = " ".join(text.split())
@@ -196,25 +120,29 @@ class Controls:
             raise InputError(f"{path}: the field is empty; write for example {example}.")
 
     def _reset(self, path: str) -> None:
-        """A parameter of the drive as it was loaded, or the default of one of the strategy."""
+        """A parameter of the machine as it was loaded, or the default of one of the strategy."""
         if path in self._screen.strategy_paths():
             self._session.set_parameter(_own(path), None)
         else:
-            self._session.set(path, getattr(self._session.origin, _parameter(path).name))
+            self._session.set(path, self._entry(path).value(self._session.origin))
+
+    def _entry(self, path: str) -> Entry:
+        if path not in self._screen.entries:
+            raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
+        return self._screen.entries[path]
 
     def _leave(self, path: str) -> None:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
 
     def _jump(self, gap: float, inertia: float) -> None:
-        self._session.set_all({"shaft.gap": gap, "load.inertia": inertia})
-        for path in ("shaft.gap", "load.inertia"):
-            self._screen.mistakes.pop(path, None)
+        self._session.move(gap, inertia)
+        self._screen.mistakes.clear()
 
     def _hello(self, kept: object, link: object) -> None:
         """A page that is loaded anew goes on with the bench that its tab has kept, or that of its address."""
         self._screen.forget()
         if isinstance(kept, Mapping) and kept.get("server") == SERVER and kept.get("link") == link:
-            known = links.kept(str(kept.get("bench")))
+            known = links.kept(str(kept.get("bench")), str(link))
             if known is not None:
                 self._session.restore(known)
                 return
@@ -227,12 +155,6 @@ class Controls:
     def _window(self, begin: float, end: float) -> None:
         """What of the starts is seen, in s; all of it if it has no length."""
         self._screen.window = (max(begin, 0.0), end) if end > max(begin, 0.0) else None
-
-
-def _parameter(path: str) -> Parameter:
-    if path not in BY_PATH:
-        raise InputError(f'"{path[:LONGEST_TEXT]}": there is no such field.')
-    return BY_PATH[path]
 
 
 def _own(path: str) -> str:

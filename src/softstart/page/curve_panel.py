@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from nicegui import ui
 
-from softstart.drive import Drive
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
+from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     TERMINALS,
@@ -57,7 +57,7 @@ class CurvePanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Drive | None = None
+        self._drive: Machine | None = None
         self._points: list[FrontPoint] = []
         self._drawn: tuple[object, ...] = ()
         with box().classes("panel-form"):
@@ -85,7 +85,7 @@ class CurvePanel:
     def _begin(self) -> None:
         if self._view.busy:
             return
-        self._drive, self._points, self._drawn = self._session.drive, [], ()
+        self._drive, self._points, self._drawn = self._session.machine, [], ()
         own = {found.start_time for found in self._session.strategies}
         times = sorted(one for one in own if math.isfinite(one))
         self._picture.set_content("")

@@ -12,10 +12,13 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.elements import LIBRARY
+from softstart.chain.model import Chain
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, ready_controller_names
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive, library
+from softstart.page.machines import Machine
 from softstart.page.sentences import changes
 from softstart.quantities import shortest
 
@@ -62,7 +65,7 @@ def text_of(write: Callable[[Path], Any], suffix: str) -> str:
 
 
 def command_text(
-    drive: Drive, strategies: Mapping[str, Controller], command: str = "compare", *more: str
+    drive: Machine, strategies: Mapping[str, Controller], command: str = "compare", *more: str
 ) -> str:
     """`softstart compare ...`, or another command, for a drive and strategies by label.
 
@@ -114,22 +117,28 @@ def profile_of(controller: Controller) -> TorqueProfile | None:
     return profile if hasattr(profile, "to_c") else None
 
 
-def drive_words(drive: Drive) -> list[str]:
-    """How a command line calls the drive: a shipped one with its changes, else the file it is saved in."""
-    shipped = [(name, changes(one, drive)) for name, one in shipped_drives().items()]
+def drive_words(drive: Machine) -> list[str]:
+    """How a command line calls the drive: a shipped one with its changes, else the file it is saved in.
+
+    >>> drive_words(Chain.load("crane-4-mass"))
+    ['crane-4-mass']
+    """
+    alike = {name: one for name, one in shipped_drives().items() if type(one) is type(drive)}
+    shipped = [(name, changes(one, drive)) for name, one in alike.items()]
     name, differing = min(shipped, key=lambda one: len(one[1]))
-    if len(differing) > MOST_SETTINGS or any(getattr(drive, p.name) is None for p in differing):
+    if len(differing) > MOST_SETTINGS or any(one.new is None for one in differing):
         return [drive_file(drive)]
-    if any(p.name in ("name", "source") for p in differing):
+    if any(one.parameter.name in ("name", "source") for one in differing):
         return [drive_file(drive)]
-    settings = (f"{p.path}={_literal(getattr(drive, p.name), p.unit)}" for p in differing)
+    settings = (f"{one.path}={_literal(one.new, one.parameter.unit)}" for one in differing)
     return [name, *(word for setting in settings for word in ("--set", setting))]
 
 
 @cache
-def shipped_drives() -> dict[str, Drive]:
-    """The drives that come with softstart, by name."""
-    return {name: Drive.load(name) for name in library.names()}
+def shipped_drives() -> dict[str, Machine]:
+    """The drives and chains that come with softstart, by name."""
+    drives: dict[str, Machine] = {name: Drive.load(name) for name in library.names()}
+    return drives | {name: Chain.load(name) for name in LIBRARY.names()}
 
 
 def _literal(value: object, unit: str) -> str:
@@ -139,7 +148,7 @@ def _literal(value: object, unit: str) -> str:
     return shortest(value, unit).replace(" ", "")
 
 
-def drive_file(drive: Drive) -> str:
+def drive_file(drive: Machine) -> str:
     """The file name under which a drive is saved."""
     return file_name(drive.name, suffix=".toml")
 

@@ -8,12 +8,12 @@ from weakref import WeakMethod
 
 from nicegui import ui
 
-from softstart.chain.model import Chain, is_chain_text
-from softstart.drive import Drive
+from softstart.chain.model import Chain
 from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
 from softstart.page.jobs import Jobs
+from softstart.page.machines import Machine, machine_from, single
 from softstart.page.panel_parts import (
     POLL,
     JobView,
@@ -26,7 +26,6 @@ from softstart.page.panel_parts import (
     jobs_of,
     notify,
     save,
-    table,
     upload,
 )
 from softstart.page.sentences import clipped
@@ -57,7 +56,7 @@ def _title(text: str) -> None:
 
 
 class DriveFiles:
-    """Load a drive from a file or from the shipped ones; save the present one; the starts of a chain."""
+    """Load a drive or chain from a file or from the shipped ones; save the present one."""
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
@@ -69,64 +68,40 @@ class DriveFiles:
             self._shipped.on_value_change(lambda event: self._take(str(event.value or "")))
         hint(
             "A drive file holds strings with units or bare SI numbers; a mistake in it changes nothing here. "
-            "Of a chain file all strategies are started in the background."
+            "A chain file is started under all strategies first, in the background."
         )
         with box().classes("troubles").props('role=alert data-testid="drive-trouble"') as self._troubles:
             pass
         self._troubles.set_visibility(False)
-        self._chain: tasks.ChainStarts | None = None
-        self._name = ""
         started = WeakMethod(self._started)  # a timer that never ran outlives its tab
         self._view = JobView(
             jobs or jobs_of(user), user, "chain", on_done=lambda found: (one := started()) and one(found)
         )
-        with box().classes("panel-result") as self._result:
-            self._about = ui.label().classes("panel-sentence").props('data-testid="chain-about"')
-            self._table = ui.html("", sanitize=False).classes("w-full").style("overflow-x: auto")
-            self._table.props("tabindex=0 role=group aria-label='Strategies on the chain'")
-            action("Report HTML of the chain", guarded(self._save_report), "chain-report")
-        self._result.set_visibility(False)
 
     def _uploaded(self, content: bytes, name: str) -> None:
-        machine = machine_of(content, name)
-        if isinstance(machine, Chain):
-            self._start_chain(machine, name)
-            return
+        self._begin(machine_of(content, name))
+
+    def _begin(self, machine: Machine) -> None:
+        """Take a drive at once, and a chain as soon as the engine is ready for it."""
+        self._troubles.set_visibility(False)
+        if not isinstance(machine, Chain):
+            self._started(machine)
+        elif self._view.busy:
+            raise InputError("A chain is being started; wait for it, or cancel it.")
+        else:
+            self._view.begin("chain", tasks.ready, single(machine))
+
+    def _started(self, machine: Machine) -> None:
         self._session.take(machine)
         self._taken()
 
-    def _start_chain(self, chain: Chain, name: str) -> None:
-        """The page keeps its drive: of a chain it has the table and the report."""
-        if self._view.busy:
-            raise InputError("A chain is being started; wait for it, or cancel it.")
-        self._troubles.set_visibility(False)
-        self._result.set_visibility(False)
-        self._name = chain.name
-        self._view.begin("chain", tasks.chain, chain, name)
-
-    def _started(self, found: tasks.ChainStarts) -> None:
-        self._chain = found
-        self._about.set_text(
-            f"{clipped(self._name)} is a chain: {found.about}. The plots and sliders stay with the drive "
-            f"that was loaded before; of the chain the page shows the strategies and a report. {found.answer}"
-        )
-        headings = [column.heading.replace("\n", " ") for column in found.table.columns]
-        self._table.set_content(table(headings, found.table.rows, name="chain-table"))
-        self._result.set_visibility(True)
-
-    def _save_report(self) -> None:
-        assert self._chain is not None
-        save(self._chain.report, file_name(self._name, "report", suffix=".html"))
-
     def _take(self, name: str) -> None:
         if name:
-            self._session.take(Drive.load(name))
             self._shipped.set_value("")
-            self._taken()
+            self._begin(shipped_drives()[name])
 
     def _taken(self) -> None:
-        self._troubles.set_visibility(False)
-        notify(f"{clipped(self._session.drive.name)} is loaded.")
+        notify(f"{clipped(self._session.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
         self._troubles.clear()
@@ -137,10 +112,10 @@ class DriveFiles:
                 ui.label(sentence).classes("trouble")
 
     def _save(self) -> None:
-        save(self._session.drive.to_toml(), drive_file(self._session.drive))
+        save(self._session.machine.to_toml(), drive_file(self._session.machine))
 
 
-def machine_of(content: bytes, name: str) -> Drive | Chain:
+def machine_of(content: bytes, name: str) -> Machine:
     """The drive or chain in the bytes of a file; InputError with a sentence for each mistake.
 
     >>> machine_of(b"\\xff\\xfe", "mine.toml")
@@ -157,7 +132,7 @@ def machine_of(content: bytes, name: str) -> Drive | Chain:
             raise InputError(
                 f"{name}: line {number} has more than {LONGEST_LINE} letters, as no drive file has."
             )
-    return Chain.from_toml(text) if is_chain_text(text) else Drive.from_toml(text)
+    return machine_from(text)
 
 
 class Exports:
@@ -203,7 +178,7 @@ class Exports:
         self._again.set_visibility(bool(self._text) and not self._view.busy and not self._view.failed)
 
     def _named(self, *parts: str, suffix: str) -> str:
-        return file_name(self._session.drive.name, *parts, suffix=suffix)
+        return file_name(self._session.machine.name, *parts, suffix=suffix)
 
     def _traces(self) -> None:
         found = self._session.result(self._session.selected)
@@ -222,7 +197,7 @@ class Exports:
 
     def _profile(self, suffix: str) -> None:
         profile = self._needed()
-        about = {"drive": self._session.drive.name, "strategy": self._session.selected}
+        about = {"drive": self._session.machine.name, "strategy": self._session.selected}
         write: Any = profile.to_csv if suffix == ".csv" else lambda path: profile.to_toml(path, about)
         save(text_of(write, suffix), file_name(self._session.selected, suffix=suffix))
 
@@ -231,7 +206,7 @@ class Exports:
             return
         profile = self._needed()
         self._saved_as, self._text = file_name(self._session.selected, suffix=".c"), ""
-        about = {"drive": self._session.drive.name, "strategy": self._session.selected}
+        about = {"drive": self._session.machine.name, "strategy": self._session.selected}
         self._view.begin("C code", tasks.code, profile, about)
 
     def _begin_report(self) -> None:
@@ -243,9 +218,9 @@ class Exports:
         self._view.begin(
             "report",
             tasks.report,
-            session.drive,
+            session.machine,
             list(strategies.values()),
-            command_text(session.drive, strategies, "report", f"--out={self._saved_as}"),
+            command_text(session.machine, strategies, "report", f"--out={self._saved_as}"),
         )
 
     def _done(self, text: str) -> None:
@@ -275,7 +250,7 @@ class CommandLine:
             return
         self._seen = self._session.version
         session = self._session
-        text = command_text(session.drive, {label: session.controllers[label] for label in session.shown})
+        text = command_text(session.machine, {label: session.controllers[label] for label in session.shown})
         self._text.set_text(text)
         needed = [
             word

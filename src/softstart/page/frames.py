@@ -6,7 +6,7 @@ import math
 import secrets
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass
+from dataclasses import Field
 from dataclasses import fields as fields_of
 from time import perf_counter
 from typing import Any
@@ -15,17 +15,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.chain.run import ChainRun, mean_torque_of
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
-from softstart.drive import PARAMETERS, Drive
+from softstart.drive import Drive
 from softstart.page import links
 from softstart.page.live import Frame
-from softstart.page.ranges import Axes, Scale, axes_about, scales_about, scales_of
+from softstart.page.machines import (
+    Axes,
+    Entry,
+    Machine,
+    Scale,
+    axes_about,
+    bases,
+    entries,
+    here,
+    k_dyn_row,
+    map_words,
+    placeless,
+    scales_about,
+    scales_of,
+    told,
+)
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
 from softstart.plant import layout as at
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
 from softstart.start.run import Run
 from softstart.views.printed import unit
 from softstart.views.starts import position_notes
@@ -36,14 +50,20 @@ LONG = (math.inf, math.inf)
 TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute overtakes the hand after a shorter halt
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded anew comes back, or does not
-PACKED = ("t", "T", "u", "w1", "w2", "theta")
 CHANNELS = ("T", "u", "w1", "w2", "theta")
+CONTACTS = {  # events in the gap of a chain's shaft: whether its flanks touch from then on
+    "gap closed": True,
+    "impacts over, flanks press": True,
+    "impact": False,
+    "gap opened": False,
+}
+MOST_STAGES = 400  # of one gap, shaded and lit up
 BUCKETS = 320  # about one for three pixels of the widest plot; each keeps the extrema of each channel
 WITHIN = 1600  # points in a window of the plots: one a pixel, nearly
 PER_PERIOD = 16  # points an elastic period before thinning: its crests are then within 2 % at worst
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
-MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
+AnyRun = Run | ChainRun
 STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
 
 
@@ -52,6 +72,7 @@ class Screen:
 
     def __init__(self, session: Session) -> None:
         self.session = session
+        self.entries = entries(session.origin)
         self.scales = scales_about(session.origin)
         self.axes = axes_about(session.origin)
         self.kept = False  # the map keeps the controller as it is set up for the drive of the moment
@@ -62,11 +83,12 @@ class Screen:
         self._costs: dict[str, tuple[float, float]] = {}  # of the last two starts of each strategy, s
         self._origin = session.origin
         self._next = 0  # whose turn it is among the other strategies
-        self._map_of: tuple[Drive, Controller, bool, Axes] | None = None  # of what the browser has all rows
+        self._map_of: tuple[Machine, Controller, bool, Axes] | None = None  # of what the browser has all rows
         self._map_seen = False  # it has some rows, of whatever
         self._bench_kept: Bench | None = None  # by its tab
         self.strategy_scales: Mapping[str, Scale] = {}  # sliders of the selected strategy
         self._strategy_of: tuple[object, ...] = ()  # what these and the rows in the browser are for
+        self._groups_of: tuple[object, ...] = ()  # the fields that the browser has
         self._reference_of: tuple[object, ...] = ()  # the reference that the browser has, and its window
 
     @property
@@ -79,6 +101,7 @@ class Screen:
         if self._origin is self.session.origin:
             return False
         self._origin = self.session.origin
+        self.entries = entries(self._origin)
         self.scales = scales_about(self._origin)
         self.axes = axes_about(self._origin)
         self._map_of = None
@@ -89,7 +112,7 @@ class Screen:
         """The browser has lost what it had: send the map again."""
         self._map_of = None
         self._map_seen = False
-        self._strategy_of = self._reference_of = ()
+        self._strategy_of = self._reference_of = self._groups_of = ()
         self._bench_kept = None
 
     def glance(self) -> Frame | None:
@@ -109,6 +132,19 @@ class Screen:
         found = self.session.result(label, QUICK_EVENTS)
         self._costs[label] = (self._costs.get(label, LONG)[1], found.cost)
         return found
+
+    def _groups(self) -> Frame:
+        """The fields of the machine in their groups, if the browser has others."""
+        wanted = tuple(
+            (path, one.group, one.label, path in self.scales) for path, one in self.entries.items()
+        )
+        if self._groups_of == wanted:
+            return {}
+        self._groups_of = wanted
+        found: dict[str, list[Frame]] = {}
+        for path, one in self.entries.items():
+            found.setdefault(one.group, []).append(_field(one, path in self.scales))
+        return {"groups": [{"title": title, "rows": rows} for title, rows in found.items()]}
 
     # parameters of the selected strategy ---------------------------------------------------------------
 
@@ -154,7 +190,7 @@ class Screen:
         try:
             if self._strategy_of != (session.selected, type(controller), self._origin):
                 self.strategy_scales = scales_of(controller, self._origin)
-            default = controller.defaults(session.drive.assumed)
+            default = controller.defaults(_told(session, found))
         except Exception as error:  # a controller is anyone's code; its start has said what is wrong
             sentence_of(error)  # which is logged
             return {}
@@ -190,27 +226,31 @@ class Screen:
 
     def first(self) -> Frame:
         """Fields, the large figure and the traces of the selected strategy."""
-        self.follow_origin()
+        other = self.follow_origin()
         session = self.session
         found = self._result(session.selected)
         return {
+            "other": other,
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": fields(session.drive, session.origin, self.scales) | self._strategy_fields(found),
+            "fields": fields(session.machine, session.origin, self.entries, self.scales)
+            | self._strategy_fields(found),
+            **self._groups(),
             **self._strategy_rows(),
             "steps": session.steps,
-            "drive": session.drive.name,
+            "drive": session.machine.name,
             "order": list(session.controllers),
             "shown": list(session.shown),
             "added": list(session.added),
             "changed": list(session.changed),
             "selected": session.selected,
             "figure": figure(session, found),
-            "traces": {session.selected: drawn(found, PACKED, self.window)},
+            "traces": {session.selected: drawn(found, window=self.window)},
             "rows": [row(session, found)],
             "reference": self._reference(),
-            "here": here(session.drive),
+            "mapped": self.axes is not None,
+            "here": here(session.machine),
             "map_is_old": self._map_seen and not self._map_is_right(),
         }
 
@@ -222,7 +262,7 @@ class Screen:
         line = outcomes(found) | {"name": ", ".join(filter(None, reference_words(kept, self.session)))}
         if self._reference_of != (kept, self.window):
             self._reference_of = kept, self.window
-            line["trace"] = drawn(found, PACKED, self.window)
+            line["trace"] = drawn(found, window=self.window)
         return line
 
     def others(self) -> Iterator[Frame | None]:
@@ -240,7 +280,7 @@ class Screen:
             found = self._result(label)
             frame["rows"].append(row(session, found))
             if label in session.shown:
-                frame["traces"][label] = drawn(found, ("t", "T"), self.window)
+                frame["traces"][label] = drawn(found, False, self.window)
             if perf_counter() - begun > SLICE:
                 yield frame
                 begun, frame = perf_counter(), {"rows": [], "traces": {}}
@@ -254,7 +294,8 @@ class Screen:
         session = self.session
         if self._bench_kept is not session.bench:
             self._bench_kept = session.bench
-            yield {"keep": {"server": SERVER, "bench": links.keep(session), "link": links.link_of(session)}}
+            name, link = links.keep(session)
+            yield {"keep": {"server": SERVER, "bench": name, "link": link}}
         for label in session.controllers:
             if session.ready(label) is None:
                 found = session.result(label)
@@ -262,7 +303,7 @@ class Screen:
                 if label == session.selected:
                     frame |= self.first() | {"at_rest": True}
                 elif label in session.shown:
-                    frame["traces"] = {label: drawn(found, ("t", "T"), self.window)}
+                    frame["traces"] = {label: drawn(found, False, self.window)}
                 yield frame
             yield from (None for _ in session.judged(label))
         rows = [row(session, found) for found in session.strategies]
@@ -271,14 +312,14 @@ class Screen:
 
     def _map(self) -> Iterator[Frame | None]:
         session, axes = self.session, self.axes
-        if self._map_is_right():
+        if axes is None or self._map_is_right():
             return
-        drive, controller = session.drive, session.controllers[session.selected]
-        wanted = self._map_drive(), controller, self.kept, axes
-        nominal = drive if self.kept else None
+        machine, controller = session.machine, session.controllers[session.selected]
+        wanted = self._map_machine(axes), controller, self.kept, axes
+        nominal = machine if self.kept else None
         cells = 4  # computed in one slice; as many as fit into it
-        head = self._map_head()
-        order = from_middle(len(axes.inertias), axes.nearest(*here(drive))[1])
+        head = self._map_head(axes)
+        order = from_middle(len(axes.inertias), axes.nearest(*here(machine))[1])
         self._map_of, self._map_seen = (
             None,
             True,
@@ -288,7 +329,8 @@ class Screen:
             while len(k) < len(axes.gaps):
                 begun = perf_counter()
                 part = axes.gaps[len(k) : len(k) + cells]
-                k += numbers(k_dyn_row(drive, controller, part, axes.inertias[index], nominal))
+                row = k_dyn_row(machine, controller, part, axes.inertias[index], nominal, session.origin)
+                k += numbers(row)
                 each = (perf_counter() - begun) / len(part)
                 cells = min(max(int(SLICE / each), 1), len(axes.gaps))
                 yield None
@@ -297,32 +339,40 @@ class Screen:
             yield {"map_row": {"index": index, "k": k}, "map": head}
 
     def _map_is_right(self) -> bool:
-        """True if the browser has the map of this drive and strategy."""
-        if self._map_of is None:
+        """True if the browser has the map of this machine and strategy."""
+        if self._map_of is None or self.axes is None:
             return False
-        drive, controller, kept, axes = self._map_of
+        machine, controller, kept, axes = self._map_of
         same = controller is self.session.controllers[self.session.selected]
-        return same and kept == self.kept and axes == self.axes and drive == self._map_drive()
+        return same and kept == self.kept and axes == self.axes and machine == self._map_machine(axes)
 
-    def _map_drive(self) -> Drive:
-        """What of the drive a map depends on: not its gap and inertia, unless the controller is kept."""
-        drive, axes = self.session.drive, self.axes
-        return drive if self.kept else drive.with_gap(axes.gaps[0], load_inertia=axes.inertias[0])
+    def _map_machine(self, axes: Axes) -> Machine:
+        """What of the machine a map depends on: not its gap and inertia, unless the controller is kept."""
+        machine = self.session.machine
+        return machine if self.kept else placeless(machine, axes, self.session.origin)
 
-    def _map_head(self) -> dict[str, Any]:
-        session, axes = self.session, self.axes
-        drive, inertias = self._map_drive(), list(axes.inertias)
-        allowed = session.drive.limits.shaft_torque
-        each = drive if self.kept else drive.with_gap([axes.gaps[0]] * len(inertias), load_inertia=inertias)
-        base = np.broadcast_to(metrics.base_torque(each), (len(inertias),))
+    def _map_head(self, axes: Axes) -> dict[str, Any]:
+        session = self.session
+        machine = session.machine
+        allowed = machine.limits.shaft_torque
+        inertias = (here(machine)[1],) * len(axes.inertias) if self.kept else axes.inertias
+        symbols, labels = map_words(machine)
         return {
             "gaps": list(axes.gaps),
-            "inertias": inertias,
+            "inertias": list(axes.inertias),
             "strategy": session.selected,
             "kept": self.kept,
-            "of": str(hash(drive)),
-            "limit": None if allowed is None else numbers(allowed / base),
+            "of": str(hash(self._map_machine(axes))),
+            "limit": None if allowed is None else numbers(allowed / bases(machine, inertias)),
+            "symbols": symbols,
+            "labels": labels,
         }
+
+
+def _told(session: Session, found: Strategy) -> Drive:
+    """The drive for which the strategy is set up."""
+    own = getattr(found.run, "told", None)
+    return told(session.machine) if own is None else own
 
 
 def parameters_of(controller: Controller) -> list[Field[Any]]:
@@ -360,26 +410,44 @@ def numbers(values: Any) -> list[float | None]:
     return [number(value) for value in values.tolist()]
 
 
-def fields(drive: Drive, origin: Drive, scales: Mapping[str, Scale]) -> dict[str, list[Any]]:
-    """By parameter: text of the field, position of the slider or None, the value in another unit, and marks.
+def _field(one: Entry, slider: bool) -> dict[str, Any]:
+    """A field as the browser builds it."""
+    parameter = one.parameter
+    words = parameter.choices if parameter.unit else ()
+    return {
+        "path": one.path,
+        "symbol": one.symbol,
+        "label": one.label,
+        "meaning": f"{parameter.meaning}; write for example {', '.join([*words, parameter.example])}",
+        "unit": unit(parameter.unit),
+        "slider": slider,
+        "choices": [] if parameter.unit else list(parameter.choices),
+        "suggestions": list(words),
+        "words": not parameter.unit and not parameter.choices,
+    }
+
+
+def fields(
+    machine: Machine, origin: Machine, shown_entries: Mapping[str, Entry], scales: Mapping[str, Scale]
+) -> dict[str, list[Any]]:
+    """By path: text of the field, position of the slider or None, the value in another unit, and marks.
 
     A mark is a position on the slider and what it means.
     """
     shown: dict[str, list[Any]] = {}
-    for name, parameter in PARAMETERS.items():
-        value = getattr(drive, name)
-        if name == "source" or value is None:
+    for path, one in shown_entries.items():
+        value, si = one.value(machine), one.parameter.unit
+        if value is None:
             continue
         if isinstance(value, tuple):
-            shown[parameter.path] = ["; ".join(written(one, parameter.unit) for one in value), None, ""]
+            shown[path] = ["; ".join(written(part, si) for part in value), None, ""]
             continue
-        text = value if isinstance(value, str) else written(float(value), parameter.unit)
-        scale = scales.get(name)
+        text = value if isinstance(value, str) else written(float(value), si)
+        scale = scales.get(path)
         position = scale.position(float(value)) if scale else None
-        first = getattr(origin, name)
-        loaded = f"as loaded: {written(float(first), parameter.unit)}" if scale else ""
-        marks = [[scale.position(float(first)), loaded]] if scale else []
-        shown[parameter.path] = [text, position, otherwise(parameter.unit, value), marks]
+        first = one.value(origin)
+        marks = [[scale.position(float(first)), f"as loaded: {written(float(first), si)}"]] if scale else []
+        shown[path] = [text, position, otherwise(si, value), marks]
     return shown
 
 
@@ -407,14 +475,14 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
     run = found.run
     facts = judged(session, found) | {
         "status": found.status,
-        "base": number(float(metrics.base_torque(session.drive))),
+        "base": number(mean_torque_of(session.machine)),
     }
     if run is not None:
         facts |= {
             "reached": math.isfinite(run.start_time),
             "peak_time": number(run.peak_time),
             "contacts": run.contacts,
-            "impact_speed": number(run.impact_speed),
+            "impact_speed": number(getattr(run, "impact_speed", math.nan)),
             "end_time": number(run.end_time),
             "position": "".join(position_notes([run])),
         }
@@ -474,89 +542,152 @@ def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
 
 
 def drawn(
-    found: Strategy, channels: tuple[str, ...] = PACKED, window: tuple[float, float] | None = None
+    found: Strategy, whole: bool = True, window: tuple[float, float] | None = None
 ) -> dict[str, Any] | None:
-    """Traces as the browser draws them: packed channels, the located peak, and stages."""
+    """Traces as the browser draws them: packed channels, the peak; if `whole` all channels and the parts."""
     run = found.run
     if run is None:
         return None
-    largest = max(run.stages, key=lambda stage: abs(stage.peak_torque), default=None)
+    traces = traces_of(run, window=window)
+    channels = list(traces) if whole else ["t", "T"]
+    rows = np.stack([traces[name] for name in channels]).astype("<f4")
+    peak = min(int(np.searchsorted(traces["t"], run.peak_time)), traces["t"].size - 1)
     picture: dict[str, Any] = {
-        "rows": len(channels),
-        "data": traces_of(run, window=window).packed(*channels),
-        "peak": [run.peak_time, largest.peak_torque if largest else 0.0],
+        "channels": channels,
+        "data": b64encode(rows.tobytes()).decode("ascii"),
+        "peak": [run.peak_time, float(traces["T"][peak])],
     }
-    if "u" in channels:
-        picture |= {
-            "stages": [(s.start, s.end, s.side) for s in run.stages[:400] if s.duration > 0.0],
-            "gap": float(run.drive.gap),
-            "target": float(run.drive.target_speed),
-            "allowed": run.drive.limits.shaft_torque,
+    if whole:
+        machine = run.drive
+        picture |= parts_of(run) | {
+            "target": machine.target_speed,
+            "allowed": machine.limits.shaft_torque,
         }
     return picture
 
 
-def here(drive: Drive) -> tuple[float, float]:
-    """Where the drive stands in the map: gap and load inertia."""
-    return float(drive.gap), float(drive.load_inertia)
+def parts_of(run: AnyRun) -> dict[str, Any]:
+    """The bodies and the shafts between them, each with its channels; stages of each shaft, and of all gaps.
+
+    A stage is a start and an end in s, and the flank that is touched: 0 while the gap is open.
+    """
+    if isinstance(run, Run):
+        stages = [(s.start, s.end, s.side) for s in run.stages[:MOST_STAGES] if s.duration > 0.0]
+        shaft = {"name": "", "gap": float(run.drive.gap), "T": "T", "theta": "theta", "stages": stages}
+        bodies = [{"name": "J\N{SUBSCRIPT ONE}", "w": "w1"}, {"name": "J\N{SUBSCRIPT TWO}", "w": "w2"}]
+        return {"shafts": [shaft], "bodies": bodies, "motor": 0, "stages": stages, "gap": shaft["gap"]}
+    chain, numbered = run.chain, enumerate(run.chain.masses)
+    each = [chain_stages(run, k) for k in range(len(chain.shafts))]
+    gaps = chain.at_motor_shaft().gap
+    return {
+        "shafts": [
+            {"name": name, "gap": float(gap), "T": f"T[{k}]", "theta": f"theta[{k}]", "stages": stages}
+            for k, (name, gap, stages) in enumerate(zip(chain.shaft_names, gaps, each, strict=True))
+        ],
+        "bodies": [{"name": mass.name, "w": f"w[{k}]"} for k, mass in numbered],
+        "motor": chain.motor_index,
+        "worst": chain.shaft_names[run.worst_shaft],
+        "stages": open_somewhere([stages for stages, gap in zip(each, gaps, strict=True) if gap > 0.0]),
+        "gap": float(gaps.sum()),
+    }
 
 
-@dataclass(frozen=True, eq=False)
-class Traces:
-    """Instants in s and the channels there: torques in N m, speeds in rad/s, twist in rad."""
-
-    t: Vector
-    T: Vector
-    u: Vector
-    w1: Vector
-    w2: Vector
-    theta: Vector
-
-    def packed(self, *names: str) -> str:
-        """Rows of the named channels as single-precision numbers, one after the other, in base 64."""
-        rows = np.stack([getattr(self, name) for name in names]).astype("<f4")
-        return b64encode(rows.tobytes()).decode("ascii")
+def chain_stages(run: ChainRun, shaft: int) -> list[tuple[float, float, int]]:
+    """Contacts and free flights in the gap of one shaft of a chain, the first `MOST_STAGES` of them."""
+    events = [event for event in run.events if event.place == shaft and event.kind in CONTACTS][:MOST_STAGES]
+    times = np.array([0.0, *(event.time for event in events)])
+    twist = run.at(times)["twist"][:, shaft]
+    half = 0.5 * float(run.chain.at_motor_shaft().gap[shaft])
+    closed = [abs(float(twist[0])) >= half, *(CONTACTS[event.kind] for event in events)]
+    sides = [
+        (1 if angle > 0.0 or half == 0.0 else -1) if touch else 0
+        for angle, touch in zip(twist, closed, strict=True)
+    ]
+    return list(zip(times.tolist(), [*times[1:].tolist(), run.end_time], sides, strict=True))
 
 
-def traces_of(run: Run, buckets: int = BUCKETS, window: tuple[float, float] | None = None) -> Traces:
-    """The traces of a run with a few points a bucket, and every instant of `landmarks`.
+def open_somewhere(each: list[list[tuple[float, float, int]]]) -> list[tuple[float, float, int]]:
+    """Stages of several gaps as one: 0 as long as any of them is open, else 1.
 
-    `window`: two instants in s between which the traces are as fine as a screen can show.
+    >>> open_somewhere([[(0.0, 2.0, 0), (2.0, 9.0, 1)], [(0.0, 1.0, -1), (1.0, 3.0, 0), (3.0, 9.0, 1)]])
+    [(0.0, 3.0, 0), (3.0, 9.0, 1)]
+    """
+    spans = sorted((start, end) for stages in each for start, end, side in stages if side == 0)
+    joined: list[list[float]] = []
+    for start, end in spans:
+        if joined and start <= joined[-1][1]:
+            joined[-1][1] = max(joined[-1][1], end)
+        elif end > start:
+            joined.append([start, end])
+    end = max((stages[-1][1] for stages in each), default=0.0)
+    found: list[tuple[float, float, int]] = []
+    for start, stop in joined:
+        if start > (found[-1][1] if found else 0.0):
+            found.append((found[-1][1] if found else 0.0, start, 1))
+        found.append((start, stop, 0))
+    if end > (found[-1][1] if found else 0.0):
+        found.append((found[-1][1] if found else 0.0, end, 1))
+    return found[:MOST_STAGES]
+
+
+def traces_of(
+    run: AnyRun, buckets: int = BUCKETS, window: tuple[float, float] | None = None
+) -> dict[str, Vector]:
+    """Instants `t` of a run, s, and what is there: a few points a bucket, and every instant of `landmarks`.
+
+    Torques in N m, speeds in rad/s and twists in rad: `T`, `u`, `w1`, `w2`, `theta`, of a chain those of the
+    shaft with the largest torque, of motor and load mass, and `T[k]`, `theta[k]`, `w[k]` of each part, all at
+    the motor shaft. `window`: two instants in s between which the traces are as fine as a screen can show.
 
     >>> from softstart import Drive, simulate
     >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
     >>> traces = traces_of(run)
-    >>> run.peak_time in traces.t, round(float(abs(traces.T).max()), 6) == round(run.peak_torque, 6)
+    >>> run.peak_time in traces["t"], round(float(abs(traces["T"]).max()), 6) == round(run.peak_torque, 6)
     (True, True)
     """
     fixed = landmarks(run)
-    periods = run.end_time / float(run.drive.elastic_period)
+    periods = run.end_time / float(run.elastic_period)
     count = int(min(max(COARSEST, PER_PERIOD * periods), FINEST))
     times = np.union1d(np.linspace(0.0, run.end_time, count), fixed)
-    states = run.at(times)
+    states = channels_at(run, times)
     if times.size > 2 * COARSEST:
-        keep = thinned(np.stack([states[name] for name in CHANNELS]), buckets)
+        keep = thinned(np.stack(list(states.values())), buckets)
         keep[np.searchsorted(times, fixed)] = True
         times = times[keep]
         states = {name: values[keep] for name, values in states.items()}
     if window is not None and window[0] < run.end_time:
         seen = np.linspace(window[0], min(window[1], run.end_time), WITHIN)
         times = np.union1d(times[(times < window[0]) | (times > window[1])], np.union1d(seen, fixed))
-        states = run.at(times)
-    return Traces(times, *(states[name] for name in CHANNELS))
+        states = channels_at(run, times)
+    return {"t": times, **states}
 
 
-def landmarks(run: Run) -> Vector:
+def channels_at(run: AnyRun, times: Vector) -> dict[str, Vector]:
+    """What a run has at these instants, by the names of `traces_of`."""
+    states = run.at(times)
+    if isinstance(run, Run):
+        return {name: states[name] for name in CHANNELS}
+    parts = {"T": states["T"].T, "theta": states["twist"].T, "w": states["w"].T}
+    chain, worst = run.chain, run.worst_shaft
+    own = {"T": parts["T"][worst], "u": states["u"], "theta": parts["theta"][worst]}
+    own |= {"w1": parts["w"][chain.motor_index], "w2": parts["w"][chain.load_index]}
+    return own | {f"{name}[{k}]": row for name, rows in parts.items() for k, row in enumerate(rows)}
+
+
+def landmarks(run: AnyRun) -> Vector:
     """Instants that are never thinned away: events and the instants just before, peaks of all stages, the
     peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
     """
-    events = run.event_rows[:, at.E_TIME]
-    joints = run.segments[:, at.S_START]
+    if isinstance(run, Run):
+        events, peaks = run.event_rows[:, at.E_TIME], run.stage_rows[:, at.G_PEAK_TIME]
+        joints = run.segments[:, at.S_START]
+    else:
+        events, peaks = run.recorded.events["time"], run.peak_times
+        joints = run.recorded.spans["start"]
     if joints.size > JUMPS:
         joints = joints[:0]
     sudden = np.concatenate([events, joints])
     others = [run.peak_time, run.start_time, 0.0, run.end_time]
-    peaks = run.stage_rows[:, at.G_PEAK_TIME]
     found = np.concatenate([sudden, np.nextafter(sudden, 0.0), peaks, others])
     return np.unique(found[~np.isnan(found)].clip(0.0, run.end_time))
 
@@ -581,22 +712,3 @@ def thinned(rows: Vector, buckets: int) -> NDArray[np.bool_]:
         keep[whole + rest.argmin(axis=1)] = True
         keep[whole + rest.argmax(axis=1)] = True
     return keep
-
-
-def k_dyn_row(
-    drive: Drive,
-    controller: Controller,
-    gaps: tuple[float, ...],
-    inertia: float,
-    nominal: Drive | None = None,
-) -> Vector:
-    """K_dyn at one load inertia over the gaps; NaN where a start fails or is refused.
-
-    The controller is set up for each drive, or for `nominal`, to whose mean torque K_dyn then refers. These
-    are the figures of `softstart.simulate`, to the bit.
-    """
-    drives = drive.with_gap(list(gaps), load_inertia=inertia)
-    notes = array_starts(drives, controller, fitted_to=nominal, max_events=MAP_EVENTS)
-    base = np.broadcast_to(metrics.base_torque(nominal or drives), (len(gaps),))
-    k: Vector = figures(notes, base)["k_dyn"][0]
-    return k

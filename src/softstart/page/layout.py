@@ -9,11 +9,11 @@ from pathlib import Path
 from types import new_class
 from typing import TYPE_CHECKING, Any
 
-from softstart.drive import Drive
 from softstart.late import late
-from softstart.page.controls import Controls, groups
+from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
+from softstart.page.machines import Machine
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
 
@@ -53,7 +53,7 @@ def style() -> str:
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def build(drive: Drive) -> Session:
+def build(drive: Machine) -> Session:
     """Build the page for the client of the moment, in a session of its own; returns that session."""
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
@@ -63,7 +63,6 @@ def build(drive: Drive) -> Session:
     screen = Screen(session)
     with instrument()() as element:
         _panels(session, client)
-    element.props["groups"] = groups(screen)
 
     def send(number: int, frame: Frame) -> None:
         if not client.is_deleted:
@@ -91,7 +90,7 @@ def build(drive: Drive) -> Session:
     return session
 
 
-def page(drive: Drive) -> None:
+def page(drive: Machine) -> None:
     """The page of one client; what stands in its way is said instead."""
     try:
         build(drive)

@@ -18,30 +18,31 @@ from typing import Any
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_names, make_controller
-from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.page.machines import machine_from, single
 from softstart.page.session import Bench, Reference, Session
 
 MOST_KEPT = 64  # benches of tabs that may be loaded anew
 LONGEST = 16_384  # letters of a link
 LARGEST = 65_536  # bytes that it may hold
 
-_kept: OrderedDict[str, Bench] = OrderedDict()
+_kept: OrderedDict[str, tuple[str, Bench]] = OrderedDict()  # link and bench
 
 
-def keep(session: Session) -> str:
-    """Keep the bench of a session; the name under which `kept` finds it."""
-    name = session.name
-    _kept[name] = session.bench
+def keep(session: Session) -> tuple[str, str]:
+    """Keep the bench of a session: the name under which `kept` finds it, and its link."""
+    name, link = session.name, link_of(session)
+    _kept[name] = link, session.bench
     _kept.move_to_end(name)
     while len(_kept) > MOST_KEPT:
         _kept.popitem(last=False)
-    return name
+    return name, link
 
 
-def kept(name: str) -> Bench | None:
-    """A bench that was kept, if it still is."""
-    return _kept.get(name)
+def kept(name: str, link: str) -> Bench | None:
+    """The bench that is kept under this name, if this is its link: a tab may not know of the latest one."""
+    known, bench = _kept.get(name, ("", None))
+    return bench if known == link else None
 
 
 def link_of(session: Session) -> str:
@@ -86,8 +87,8 @@ def bench_of(link: str, now: Bench) -> Bench:
     """
     try:
         content = _content(link)
-        drive = Drive.from_toml(content["drive"])
-        origin = Drive.from_toml(content["origin"]) if content["origin"] else drive
+        drive = machine_from(content["drive"])
+        origin = machine_from(content["origin"]) if content["origin"] else drive
         parameters = content["parameters"]
         given = {name: dict(parameters[name]) for name in now.controllers if name in parameters}
         selected, drawn = str(content["selected"]), frozenset(map(str, content["drawn"]))
@@ -97,8 +98,11 @@ def bench_of(link: str, now: Bench) -> Bench:
             "the address after #: this is no bench that softstart has written; copy the whole link again, "
             "or delete what follows the #."
         ) from None
-    if any(one.shape != () for one in (drive, origin, *([reference.drive] if reference else []))):
-        raise InputError("the address after #: it holds several drives, and the page starts one.")
+    for one in (drive, origin, *([reference.drive] if reference else [])):
+        try:
+            single(one)
+        except InputError as error:
+            raise InputError([f"the address after #: {sentence}" for sentence in error.sentences]) from None
     made = {name: make_controller(name, values) for name, values in given.items()}
     return Bench(
         drive,
@@ -114,7 +118,7 @@ def _reference(content: Any, now: Bench) -> Reference | None:
     """The reference of a link; like all strategies, only one that the page has can be given parameters."""
     if content is None or (label := str(content["label"])) not in now.controllers:
         return None
-    drive, parameters = Drive.from_toml(content["drive"]), dict(content["parameters"])
+    drive, parameters = machine_from(content["drive"]), dict(content["parameters"])
     return Reference(drive, label, make_controller(label, parameters))
 
 

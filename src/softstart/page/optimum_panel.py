@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, cast
 from nicegui import ui
 
 from softstart.controller.finding import make_controller
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
+from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     TERMINALS,
@@ -48,7 +48,7 @@ class OptimumPanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Drive = session.drive
+        self._drive: Machine = session.machine
         self._found: tasks.Gentlest | None = None
         with box().classes("panel-form"):
             self._time = field(
@@ -83,7 +83,7 @@ class OptimumPanel:
         except InputError as error:
             self._view.refuse(error)
             return
-        self._drive = self._session.drive
+        self._drive = self._session.machine
         terminal = cast("Terminal", self._end.value)
         self._view.begin("optimal start", tasks.gentlest, self._drive, text, terminal)
 

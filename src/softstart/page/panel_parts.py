@@ -13,9 +13,9 @@ from weakref import WeakMethod
 
 from nicegui import app, context, ui
 
-from softstart.drive import Drive
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
+from softstart.page.machines import Machine
 from softstart.page.sentences import changed_since, sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import NOTHING
@@ -231,13 +231,13 @@ class StaleNote:
 
     def __init__(self, session: Session, name: str) -> None:
         self._session = session
-        self._drive: Drive | None = None
+        self._drive: Machine | None = None
         self._seen = -1
         self.stale = False
         self._label = ui.label().classes("stale").props(f'role=status data-testid="{name}-stale"')
         self._label.set_visibility(False)
 
-    def show_for(self, drive: Drive) -> None:
+    def show_for(self, drive: Machine) -> None:
         """The result shown is of this drive."""
         self._drive, self._seen = drive, -1
         self.refresh()
@@ -247,7 +247,7 @@ class StaleNote:
         if self._drive is None or self._session.version == self._seen:
             return False
         self._seen = self._session.version
-        sentence = changed_since(self._drive, self._session.drive)
+        sentence = changed_since(self._drive, self._session.machine)
         self.stale = bool(sentence)
         self._label.set_text(sentence)
         self._label.set_visibility(self.stale)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import Any, NamedTuple
 
-from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
+from softstart.page.machines import Machine, Values, values_of
 from softstart.quantities import shortest
 
 log = logging.getLogger("softstart.page")
@@ -54,7 +54,7 @@ def clipped(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def changed_since(computed: Drive, now: Drive) -> str:
+def changed_since(computed: Machine, now: Machine) -> str:
     """What a result was computed for, where that is not the drive of now; empty where it is.
 
     >>> crane = Drive.load("crane-4amtkf")
@@ -72,28 +72,49 @@ def changed_since(computed: Drive, now: Drive) -> str:
     return f"For {named}; {'another drive is loaded now' if other else 'the drive has changed since'}."
 
 
-def differences(drive: Drive, other: Drive) -> str:
-    """What tells a drive from another one: its name, else its values; empty where both start alike.
+def differences(drive: Machine, other: Machine) -> str:
+    """What tells a drive or chain from another one: its name, else its values; empty where both start alike.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
     'shaft.gap 1 rad, load.inertia 0.2 kg m2'
     """
-    changed = [p for p in changes(drive, other) if p.name not in WORDS]
-    if changed and drive.name != other.name:
+    found = [one for one in changes(drive, other) if one.parameter.name not in WORDS]
+    if found and drive.name != other.name:
         return clipped(drive.name)
-    named = ", ".join(f"{p.path} {_value(p, getattr(drive, p.name))}" for p in changed[:NAMED])
-    return named + (f" and {len(changed) - NAMED} more" if len(changed) > NAMED else "")
+    named = ", ".join(f"{one.path} {_value(one.parameter, one.old)}" for one in found[:NAMED])
+    return named + (f" and {len(found) - NAMED} more" if len(found) > NAMED else "")
 
 
-def changes(old: Drive, new: Drive) -> list[Parameter]:
-    """The parameters in which two drives differ; those that follow another one only where they do not."""
-    differing = [p for p in PARAMETERS.values() if getattr(old, p.name) != getattr(new, p.name)]
-    names = {p.name for p in differing}
-    return [
-        p for p in differing
-        if not (p.follows in names and all(getattr(d, p.name) == getattr(d, p.follows) for d in (old, new)))
-    ]  # fmt: skip
+class Change(NamedTuple):
+    """A parameter in which two machines differ."""
+
+    path: str
+    parameter: Parameter
+    old: Any
+    new: Any
+
+
+def changes(old: Machine, new: Machine) -> list[Change]:
+    """The parameters in which two machines differ; those that follow another one only where they do not."""
+    first, second = values_of(old), values_of(new)
+    found = []
+    for path in dict.fromkeys([*first, *second]):
+        parameter, value = first.get(path) or (second[path][0], None)
+        other = second[path][1] if path in second else None
+        if value != other:
+            found.append(Change(path, parameter, value, other))
+    return [one for one in found if not _follows(one, first, second, {other.path for other in found})]
+
+
+def _follows(one: Change, first: Values, second: Values, changed: set[str]) -> bool:
+    """Whether a parameter is, before and after, as the one that it follows by default."""
+    leader = next((path for path, (other, _) in first.items() if other.name == one.parameter.follows), "")
+    return (
+        leader in changed
+        and leader in second
+        and all(values[leader][1] == values[one.path][1] for values in (first, second))
+    )
 
 
 def _value(parameter: Parameter, value: Any) -> str:

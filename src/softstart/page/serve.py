@@ -27,15 +27,14 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.page.sentences import log
 
 if TYPE_CHECKING:
     import fastapi
     import uvicorn
     from nicegui import ui
 
-    from softstart.drive import Drive
     from softstart.page import layout
+    from softstart.page.machines import Machine
 else:  # of the extra "ui", and only for a server
     fastapi, uvicorn, ui = late("fastapi"), late("uvicorn"), late("nicegui.ui")
     layout = late("softstart.page.layout")
@@ -49,6 +48,8 @@ Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+log = logging.getLogger("softstart.page")
 
 NOISY = ("nicegui", "uvicorn", "uvicorn.error", "engineio.server", "socketio.server", "python_multipart")
 POLICY_VIOLATION = 1008
@@ -172,7 +173,7 @@ def guarded(app: App, address: Address, port: int) -> Guard:
     return Guard(app, names, address.token or "", exposed=not address.is_loopback, cookie=f"softstart-{port}")
 
 
-def application(drive: Drive) -> App:
+def application(drive: Machine) -> App:
     """The ASGI application: NiceGUI with the page at `/`. One a process, since NiceGUI is one a process."""
     # NiceGUI reads and stores things in the folder it is started in; the page stores nothing, and nobody can
     # put anything for it to read where no file can be
@@ -201,7 +202,7 @@ def application(drive: Drive) -> App:
     return app
 
 
-def run(drive: Drive, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
+def run(drive: Machine, address: Address, listener: socket.socket, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
     port = int(listener.getsockname()[1])
     app = guarded(application(drive), address, port)

@@ -13,9 +13,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.model import Chain, load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.page.machines import Machine, changed, machine_from, moved, single
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
@@ -24,6 +26,7 @@ from softstart.start.simulation import simulate
 from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
+    from softstart.chain.run import ChainRun
     from softstart.controller.base import Controller
     from softstart.start.run import Run
 
@@ -41,7 +44,7 @@ class Strategy:
     """
 
     name: str
-    run: Run | None
+    run: Run | ChainRun | None
     trouble: str = ""
     cost: float = 0.0
 
@@ -70,7 +73,7 @@ class Strategy:
 class Reference:
     """A start that stays drawn while drive and strategies change: a controller, its label then, its drive."""
 
-    drive: Drive
+    drive: Machine
     label: str
     controller: Controller
 
@@ -81,16 +84,16 @@ class Bench:
 
     Parameters
     ----------
-    drive : as it is now.
-    origin : the drive as it was loaded; ranges of sliders and maps are about it.
+    drive : the drive or chain as it is now.
+    origin : as it was loaded; ranges of sliders and maps are about it.
     controllers : all strategies of the table, by label, shown or not.
     selected : label of the strategy whose figure is large and whose map is drawn.
     drawn : labels of the strategies that are drawn beside it.
     reference : what all of them are compared with, if something is.
     """
 
-    drive: Drive
-    origin: Drive
+    drive: Machine
+    origin: Machine
     controllers: Mapping[str, Controller]
     selected: str
     drawn: frozenset[str]
@@ -98,7 +101,7 @@ class Bench:
 
 
 class Session:
-    """The drive and the strategies of one user; a refused change raises InputError and changes nothing.
+    """Drive or chain and the strategies of a user; a refused change raises InputError and changes nothing.
 
     Results are computed when they are asked for and kept until the drive changes.
 
@@ -113,8 +116,10 @@ class Session:
     0.5
     """
 
-    def __init__(self, drive: Drive | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None) -> None:
-        drive = _single(Drive.load(drive) if isinstance(drive, str) else drive)
+    def __init__(
+        self, drive: Machine | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
+    ) -> None:
+        drive = single(load_machine(drive) if isinstance(drive, str) else drive)
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = REFERENCE if REFERENCE in names or not names else names[0]
         self._first = {name: make_controller(name) for name in names}
@@ -128,7 +133,7 @@ class Session:
         self._results: dict[str, Strategy] = {}
         self._cases: dict[tuple[str, str], Case] = {}
         self._rows: dict[str, Row] = {}
-        self._direct: list[Run | None] = []  # empty until it is computed
+        self._direct: list[Run | ChainRun | None] = []  # empty until it is computed
         self._reference: tuple[Reference, Strategy] | None = None
 
     # the state -----------------------------------------------------------------------------------------
@@ -139,13 +144,23 @@ class Session:
         return self._bench
 
     @property
-    def drive(self) -> Drive:
-        """The drive as it is now."""
+    def machine(self) -> Machine:
+        """The drive or the chain as it is now."""
         return self._bench.drive
 
     @property
-    def origin(self) -> Drive:
-        """The drive as it was loaded: ranges of sliders and maps are about it."""
+    def drive(self) -> Drive:
+        """The drive as it is now; InputError if it is a chain, for what is done with drives alone."""
+        if isinstance(self.machine, Chain):
+            raise InputError(
+                f"{clipped(self.machine.name)} is a chain, and this takes a drive of two masses; reduce "
+                "it to one (softstart reduce), or load a drive."
+            )
+        return self.machine
+
+    @property
+    def origin(self) -> Machine:
+        """The drive or chain as it was loaded: ranges of sliders and maps are about it."""
         return self._bench.origin
 
     @property
@@ -211,9 +226,13 @@ class Session:
 
     def set_all(self, changes: Mapping[str, str | float], gesture: str = "") -> None:
         """Change several parameters in one step, or none of them; changes of one gesture are one step."""
-        settings = [f"{path}={value if isinstance(value, str) else repr(float(value))}"
-                    for path, value in changes.items()]  # fmt: skip
-        self._put(gesture, drive=_single(self.drive.with_settings(settings)))
+        settings = {path: value if isinstance(value, str) else repr(float(value))
+                    for path, value in changes.items()}  # fmt: skip
+        self._put(gesture, drive=single(changed(self.machine, settings)))
+
+    def move(self, gap: float, load_inertia: float) -> None:
+        """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""
+        self._put(drive=moved(self.machine, gap, load_inertia, self.origin))
 
     def set_parameter(self, name: str, value: str | float | None, gesture: str = "") -> None:
         """Change one parameter of the selected strategy; None gives it back its default.
@@ -228,12 +247,12 @@ class Session:
         self._put(gesture, controllers={**self.controllers, self.selected: controller})
 
     def load(self, text: str, where: str = "") -> None:
-        """Take the drive of a TOML text; `where` is put before each sentence of an InputError."""
-        self.take(Drive.from_toml(text, where=where))
+        """Take the drive or chain of a TOML text; `where` is put before each sentence of an InputError."""
+        self.take(machine_from(text, where))
 
-    def take(self, drive: Drive) -> None:
-        """Go over to another drive."""
-        drive = _single(drive)
+    def take(self, drive: Machine) -> None:
+        """Go over to another drive, or to a chain."""
+        drive = single(drive)
         self._put(drive=drive, origin=drive)
 
     def restore(self, bench: Bench) -> None:
@@ -302,7 +321,7 @@ class Session:
         True
         """
         label = self.selected
-        made = Reference(self.drive, label, self.controllers[label]) if kept else None
+        made = Reference(self.machine, label, self.controllers[label]) if kept else None
         if made is not None and (known := self.ready(label)) is not None:
             self._reference = made, known
         if made is not self._bench.reference:
@@ -335,7 +354,7 @@ class Session:
         if known is not None:
             return known
         self._known(label)
-        found, given_up = _started(label, self.drive, self.controllers[label], max_events)
+        found, given_up = _started(label, self.machine, self.controllers[label], max_events)
         if not given_up or max_events >= MOST_EVENTS:
             self._results[label] = found
         return found
@@ -367,7 +386,7 @@ class Session:
         if key not in self._cases:
             self._known(label)
             try:
-                self._cases[key] = changed_case(self.drive, self.controllers[label], case)
+                self._cases[key] = changed_case(self.machine, self.controllers[label], case)
             except Exception as error:  # a controller is anyone's code; there is no room for the sentence
                 sentence_of(error)  # which is logged
                 self._cases[key] = Case.of(None)
@@ -396,15 +415,15 @@ class Session:
         for label in self.controllers:
             if label not in self._rows:
                 list(self.judged(label))
-        return recommend(self.drive, [self._rows[one] for one in self.controllers if one in self._rows])
+        return recommend(self.machine, [self._rows[one] for one in self.controllers if one in self._rows])
 
-    def direct(self) -> Run | None:
+    def direct(self) -> Run | ChainRun | None:
         """The start that the others are compared with; None where it fails."""
         if not self._direct:
             known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None
             run = known.run if known is not None else None
             try:
-                self._direct = [run or simulate(self.drive, REFERENCE, max_events=MOST_EVENTS)]
+                self._direct = [run or simulate(self.machine, REFERENCE, max_events=MOST_EVENTS)]
             except (InputError, SimulationError):
                 self._direct = [None]
         return self._direct[0]
@@ -440,7 +459,7 @@ class Session:
 
     def _adopted(self, bench: Bench) -> Bench:
         """A bench whose results are not those of the present one where the two differ."""
-        if bench.drive is not self.drive:
+        if bench.drive is not self.machine:
             self._forget(list(self.controllers))
             self._direct.clear()
         for label, controller in self.controllers.items():
@@ -467,7 +486,7 @@ class Session:
             raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
 
 
-def _started(label: str, drive: Drive, controller: Controller, max_events: int) -> tuple[Strategy, bool]:
+def _started(label: str, drive: Machine, controller: Controller, max_events: int) -> tuple[Strategy, bool]:
     """A start, and whether it was given up for its events; what goes wrong in it becomes its sentence."""
     began = time.thread_time()
     try:
@@ -476,13 +495,3 @@ def _started(label: str, drive: Drive, controller: Controller, max_events: int) 
         found = Strategy(label, None, sentence_of(error, FAILED_START), time.thread_time() - began)
         return found, isinstance(error, SimulationError)
     return Strategy(label, run, "", time.thread_time() - began), False
-
-
-def _single(drive: Drive) -> Drive:
-    if drive.shape != ():
-        count = math.prod(drive.shape)
-        raise InputError(
-            f"{drive.name}: lists of values make {count} drives, and the page starts one; "
-            "give one value a key."
-        )
-    return drive

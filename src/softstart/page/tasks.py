@@ -8,22 +8,23 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.model import Chain
+from softstart.controller.finding import ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
+from softstart.page.machines import Machine
 from softstart.processes import Tell
 from softstart.quantities import show
 from softstart.start.simulation import simulate
@@ -43,12 +44,10 @@ if TYPE_CHECKING:
     from softstart.profile import TorqueProfile
     from softstart.tuning.outcome import Tuning
     from softstart.views import identification as shown
-    from softstart.views import starts
-    from softstart.views.numbers import Table
 else:  # they import scipy.optimize; in the server the first page would wait for that
     reporting, front = late("softstart.reporting"), late("softstart.optimal.front")
     logs, fits = late("softstart.identification.logs"), late("softstart.identification.solving")
-    shown, starts = late("softstart.views.identification"), late("softstart.views.starts")
+    shown = late("softstart.views.identification")
     shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
 
 LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
@@ -60,7 +59,6 @@ TUNING_SHARES = {
     "robust": (0.45, 0.8),
     "certified": (0.8, 1.0),
 }
-MOST_SHAFTS = 4  # of a chain, with a column each
 INTERVAL = 0.1  # s between two reports of a task that would report thousands of times
 
 
@@ -72,7 +70,7 @@ class Gentlest:
     files: dict[str, str]
 
 
-def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -> Gentlest:
+def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, tell: Tell) -> Gentlest:
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     tell(None, "looking for the gentlest start")
     with no_solution_as_sentence():
@@ -89,7 +87,7 @@ def gentlest(drive: Drive, start_time: str, terminal: Terminal, *, tell: Tell) -
 
 
 def curve(
-    drive: Drive, start_times: Sequence[float], terminal: Terminal = "reached", *, tell: Tell
+    drive: Machine, start_times: Sequence[float], terminal: Terminal = "reached", *, tell: Tell
 ) -> list[FrontPoint]:
     """The least K_dyn over the start time: the easy long ones first, those of the strategies, the short ones.
 
@@ -119,8 +117,10 @@ def curve(
 
     with no_solution_as_sentence():
         through(long)
-        tell(done / total, "the shortest start time")
-        least = shortest.shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
+        least = math.inf  # of a chain nobody knows it
+        if isinstance(drive, Drive):
+            tell(done / total, "the shortest start time")
+            least = shortest.shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
         done += 1
         if math.isfinite(least):
             first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least
@@ -265,33 +265,18 @@ def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> 
     return text_of(lambda path: profile.to_c(path, about=about), ".c")
 
 
-@dataclass(frozen=True)
-class ChainStarts:
-    """The strategies on a chain, as the page shows them: sentences, a table, and the report."""
-
-    about: str
-    answer: str
-    table: Table
-    report: str
-
-
-def chain(machine: Chain, name: str, *, tell: Tell) -> ChainStarts:
-    """Start a chain, whose file has this name, under each strategy."""
-    tell(0.0, "starting the chain")
-    found = reporting.report_chain(
-        machine,
-        progress=tell,
-        command=shlex.join(["softstart", "report", name, "--out=report.html"]),
-    )
-    rows = sorted(found.comparison.rows, key=lambda row: row.run.k_dyn)
-    shafts = len(found.drive.shaft_names)
-    own = starts.details(found.drive)[:shafts] if 1 < shafts <= MOST_SHAFTS else ()
-    shown = starts.comparison_table(rows, (starts.GENTLE[0], *own, starts.QUICK[0]))
-    about = " ".join(line.strip() for line in starts.machine_lines(found.drive)[1:2])
-    return ChainStarts(about, found.headline, shown, found.to_html())
+def ready(machine: Chain, *, tell: Tell) -> Chain:
+    """The chain, once all strategies have started it: what must be compiled for that is compiled then."""
+    names = ready_controller_names()
+    for done, name in enumerate(names):
+        tell(done / len(names), f"starting it: {name}")
+        with suppress(SimulationError):
+            simulate(machine, name)
+    return machine
 
 
-def report(drive: Drive, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:
+def report(drive: Machine, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:
     """The report for a customer, as one HTML text."""
     tell(0.0, "starting the drive")
-    return reporting.report(drive, controllers=controllers, progress=tell, command=command).to_html()
+    made: Any = reporting.report_chain if isinstance(drive, Chain) else reporting.report
+    return str(made(drive, controllers=controllers, progress=tell, command=command).to_html())

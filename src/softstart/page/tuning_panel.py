@@ -16,6 +16,7 @@ from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
+from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     JobView,
@@ -49,7 +50,7 @@ class TuningPanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Drive = session.drive
+        self._drive: Machine = session.machine
         self._found: tasks.Tuned | None = None
         names = tunable()
         with box().classes("panel-form"):
@@ -93,15 +94,15 @@ class TuningPanel:
     def _begin(self) -> None:
         if self._view.busy:
             return
-        self._drive = self._session.drive
         try:
-            gaps, inertias = grid_of(self._drive, str(self._gaps.value), str(self._inertias.value))
+            self._drive = drive = self._session.drive
+            gaps, inertias = grid_of(drive, str(self._gaps.value), str(self._inertias.value))
         except InputError as error:
             self._view.refuse(error)
             return
         name = str(self._name.value)
         self._view.begin(
-            f"tuning of {name}", tasks.tuning, self._drive, name, gaps, inertias,
+            f"tuning of {name}", tasks.tuning, drive, name, gaps, inertias,
             bool(self._certified.value), int(self._searches.value),
         )  # fmt: skip
 

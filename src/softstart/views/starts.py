@@ -90,7 +90,7 @@ def figure_rows(run: Run) -> list[list[str]]:
     ]
 
 
-def position_notes(runs: Sequence[Run] | Sequence[ChainRun]) -> list[str]:
+def position_notes(runs: Sequence[Run | ChainRun]) -> list[str]:
     """From where each start is the worst, if the position is unknown, and what to do if it is not."""
     worst = [f"{run.controller_name} {run.position}" for run in runs if run.positions]
     if not worst:
@@ -120,7 +120,7 @@ def clipped_torque(run: Any) -> str:
     return f"the demand is {size} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
 
 
-def outcome(run: Run) -> str:
+def outcome(run: Run | ChainRun) -> str:
     """How the start ended, and what was cut off the demand."""
     clipped = clipped_torque(run)
     return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value

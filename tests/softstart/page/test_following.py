@@ -14,7 +14,7 @@ from softstart import simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.drive import PARAMETERS
-from softstart.page.controls import GROUPS, Controls
+from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
 from softstart.page.session import Session
@@ -234,13 +234,24 @@ def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
     assert not [frame for frame in screen.at_rest() if frame and "keep" in frame]  # not twice
 
 
+def test_a_tab_that_has_not_heard_of_the_last_change_gets_what_its_link_says():
+    before = Session(controllers=["direct"])
+    before.set("shaft.gap", 0.3)
+    (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
+    before.set("shaft.gap", 0.7)
+    list(Screen(before).at_rest())  # the server keeps this one; its message is lost
+    session = Session(controllers=["direct"])
+    controls, _ = controls_of(session)
+    controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
+    assert session.drive.gap == 0.3
+
+
 def test_a_slider_sets_exactly_the_value_that_its_field_shows():
     session = Session(controllers=["direct"])
     controls, screen = controls_of(session)
-    for name, scale in screen.scales.items():
-        path = PARAMETERS[name].path
+    for path, scale in screen.scales.items():
         controls.take({"what": "slide", "path": path, "position": 300})
-        assert not screen.mistakes, name
+        assert not screen.mistakes, path
         text, position, _, _ = screen.first()["fields"][path]
         assert float(text) == scale.value(300)
         assert position == pytest.approx(300, abs=1)
@@ -340,14 +351,15 @@ def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
     assert "empty" in screen.mistakes["shaft.gap"]
     session.take(session.drive.replace(gap=0.005))
     assert not screen.first()["mistakes"]
-    assert screen.scales["gap"].high == 0.02
+    assert screen.scales["shaft.gap"].high == 0.02
     assert max(screen.axes.gaps) == 0.02
 
 
 def test_every_parameter_with_a_field_is_one_of_the_drive():
-    shown = [name for rows in GROUPS.values() for name, _ in rows]
+    screen = Screen(Session(controllers=["direct"]))
+    shown = [row["path"] for group in screen.first()["groups"] for row in group["rows"]]
     assert len(set(shown)) == len(shown)
-    assert set(Screen(Session(controllers=["direct"])).scales) <= set(shown)
+    assert set(screen.scales) <= set(shown) <= {parameter.path for parameter in PARAMETERS.values()}
 
 
 KEYS = (

@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 
 from softstart import Drive, simulate
 from softstart.controller import make_controller
-from softstart.page.frames import CHANNELS, Screen, k_dyn_row, landmarks, thinned, traces_of
-from softstart.page.ranges import STEPS, Scale, axes_about, scales_about
+from softstart.page.frames import CHANNELS, Screen, drawn, landmarks, thinned, traces_of
+from softstart.page.machines import STEPS, Scale, axes_about, k_dyn_row, scales_about
 from softstart.page.session import Session
 
 CRANE = Drive.load("crane-4amtkf")
@@ -25,18 +25,18 @@ def test_thinned_traces_keep_every_located_instant(controller, buckets):
     stiff = CRANE.replace(stiffness=40_000.0)  # 80 periods: what is thinned is much
     run = simulate(stiff, controller)
     traces = traces_of(run, buckets)
-    assert traces.t.size < 8000
-    assert set(landmarks(run)) <= set(traces.t)
+    assert traces["t"].size < 8000
+    assert set(landmarks(run)) <= set(traces["t"])
     # the peak is located by the kernel and evaluated again from the record: a few roundings apart
-    assert np.abs(traces.T).max() == pytest.approx(run.peak_torque, rel=1e-13)
-    assert run.peak_time in traces.t
-    exact = run.at(traces.t)
+    assert np.abs(traces["T"]).max() == pytest.approx(run.peak_torque, rel=1e-13)
+    assert run.peak_time in traces["t"]
+    exact = run.at(traces["t"])
     for name in CHANNELS:
-        assert np.array_equal(getattr(traces, name), exact[name])
+        assert np.array_equal(traces[name], exact[name])
     for event in run.events:
-        assert event.time in traces.t
+        assert event.time in traces["t"]
     for stage in run.stages:
-        assert stage.peak_time in traces.t
+        assert stage.peak_time in traces["t"]
 
 
 @settings(max_examples=40, deadline=None)
@@ -59,16 +59,16 @@ def test_each_bucket_keeps_its_least_and_largest(rows, buckets):
 def test_a_window_is_as_fine_as_a_screen(window):
     run = simulate(CRANE, "direct")
     traces = traces_of(run, window=window)
-    assert np.all(np.diff(traces.t) > 0.0)
-    assert traces.t[[0, -1]].tolist() == [0.0, run.end_time]
-    exact = run.at(traces.t)
+    assert np.all(np.diff(traces["t"]) > 0.0)
+    assert traces["t"][[0, -1]].tolist() == [0.0, run.end_time]
+    exact = run.at(traces["t"])
     for name in CHANNELS:
-        assert np.array_equal(getattr(traces, name), exact[name])
+        assert np.array_equal(traces[name], exact[name])
     begin, end = window[0], min(window[1], run.end_time)
-    within = traces.t[(traces.t >= begin) & (traces.t <= end)]
+    within = traces["t"][(traces["t"] >= begin) & (traces["t"] <= end)]
     if begin < run.end_time:
         assert np.diff(within).max() < (end - begin) / 1500
-        assert set(landmarks(run)) <= set(traces.t)
+        assert set(landmarks(run)) <= set(traces["t"])
 
 
 @pytest.mark.parametrize("kept", [False, True])
@@ -84,13 +84,19 @@ def test_the_limit_of_the_map_is_the_permissible_torque_over_the_mean_one(kept):
         run = simulate(drive if kept else one, "direct")
         assert head["limit"][index] == pytest.approx(130.0 / run.peak_torque * run.k_dyn, rel=1e-13)
     assert len({frame["map"]["of"] for frame in rows}) == 1
-    assert Screen(Session(controllers=["direct"]))._map_head()["limit"] is None
+    without = Screen(Session(controllers=["direct"]))
+    assert next(frame for frame in without.at_rest() if frame and "map" in frame)["map"]["limit"] is None
 
 
 def test_packed_traces_come_back_to_single_precision():
-    traces = traces_of(simulate(CRANE, "direct"))
-    rows = np.frombuffer(base64.b64decode(traces.packed("t", "T")), dtype="<f4").reshape(2, -1)
-    assert np.array_equal(rows[1], traces.T.astype("f4"))
+    found = Session(controllers=["direct"]).result("direct")
+    for whole in (True, False):
+        picture = drawn(found, whole)
+        assert (picture["channels"] == ["t", "T"]) is not whole
+        rows = np.frombuffer(base64.b64decode(picture["data"]), dtype="<f4")
+        traces = traces_of(found.run)
+        for name, row in zip(picture["channels"], rows.reshape(len(picture["channels"]), -1), strict=True):
+            assert np.array_equal(row, traces[name].astype("f4"))
 
 
 @pytest.mark.parametrize("controller", ["direct", "shaped", "current-limit-feedback"])

@@ -25,9 +25,8 @@ export default {
     <section class="panels"><slot></slot></section>
   </aside>
 </div>`,
-  props: { groups: Array },
   mounted() {
-    this.instrument = new Instrument(this.$el, this.groups, (message) => this.$emit("act", message));
+    this.instrument = new Instrument(this.$el, (message) => this.$emit("act", message));
     this.instrument.hello();
   },
   unmounted() {

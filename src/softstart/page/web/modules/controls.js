@@ -4,17 +4,23 @@ import { element } from "./numbers.js";
 const STEPS = 600;
 
 export class Controls {
-  constructor(place, own, groups, say) {
+  constructor(place, own, say) {
     this.say = say;
     this.rows = new Map();
     this.own = own;
-    for (const { title, rows } of groups) place.append(this.box(title, rows));
+    this.groups = place.appendChild(element("div"));
   }
 
   box(title, rows) {
     const box = element("fieldset", {}, element("legend", {}, title));
     for (const row of rows) box.append(...this.row(row));
     return box;
+  }
+
+  // the parameters of the drive or chain, in place of those of the one before
+  machine(groups) {
+    for (const path of this.rows.keys()) if (!path.startsWith("strategy.")) this.rows.delete(path);
+    this.groups.replaceChildren(...groups.map(({ title, rows }) => this.box(title, rows)));
   }
 
   // the parameters of the selected strategy, in place of those of the one before
@@ -33,7 +39,7 @@ export class Controls {
   }
 
   row({ path, symbol, label, meaning, unit, slider, choices, words, suggestions }) {
-    const id = `field-${path.replaceAll(".", "-")}`;
+    const id = `field-${path.replaceAll(/[.[]/g, "-").replaceAll("]", "")}`;
     const name = element("label", { for: id, title: meaning }, ...(symbol || !path.startsWith("strategy.") ? [element("i", {}, symbol)] : []), label);
     const mistake = element("p", { class: "mistake", role: "alert", id: `${id}-mistake`, hidden: true });
     const line = element("div", { class: `row${slider ? "" : " plain"}${words ? " words" : ""}${suggestions.length ? " wide" : ""}`, "data-path": path }, name);

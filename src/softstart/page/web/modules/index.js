@@ -13,7 +13,7 @@ import { unpack } from "./trace.js";
 const KEPT = "softstart-bench";
 
 export class Instrument {
-  constructor(root, groups, send) {
+  constructor(root, send) {
     this.send = send;
     this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", stamp: 0 };
     this.pulse = root.querySelector(".pulse");
@@ -23,7 +23,7 @@ export class Instrument {
     const say = (message) => this.say(message);
     this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
     this.scheme = new Scheme(root.querySelector(".controls"));
-    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), groups, say);
+    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), say);
     this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"), say);
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);
@@ -76,9 +76,12 @@ export class Instrument {
       Object.assign(state, { order, shown, added, changed, selected });
       state.stamp = frame.stamp;
       state.here = frame.here;
+      this.map.show(frame.mapped);
+      if (frame.other) this.forget();
       state.reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
       state.fields = frame.fields;
       this.steps.show(frame.steps);
+      if (frame.groups) this.controls.machine(frame.groups);
       if (frame.strategy) this.controls.strategy(frame.strategy);
     }
     for (const row of frame.rows ?? []) state.rows.set(row.name, { ...state.rows.get(row.name), ...row });
@@ -106,6 +109,12 @@ export class Instrument {
     this.number = number;
     if (frame.order) this.plotted = false;
     this.waiting ||= requestAnimationFrame(() => this.draw());
+  }
+
+  // another drive or chain was loaded: what is computed at rest is not known of it
+  forget() {
+    for (const [name, row] of this.state.rows) this.state.rows.set(name, { ...row, worn: null, settled: null, limits: "", flag: "" });
+    this.map.forget();
   }
 
   // what is recommended, for the drive as it was when it was last at rest

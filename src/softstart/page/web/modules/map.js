@@ -53,6 +53,7 @@ export class GapMap {
   constructor(place, theme, say) {
     this.theme = theme;
     this.say = say;
+    this.whole = place;
     this.title = element("h2", {}, "K", element("sub", {}, "dyn"), " over gap and load inertia");
     this.said = element("span", { class: "said" });
     this.keep = element("input", { type: "checkbox", id: "map-keep" });
@@ -74,6 +75,17 @@ export class GapMap {
     for (const way of ["pointerup", "pointercancel"]) this.canvas.addEventListener(way, () => (this.pressed = false));
     this.canvas.addEventListener("pointerleave", () => (this.said.textContent = ""));
     this.canvas.addEventListener("keydown", (event) => this.walk(event));
+  }
+
+  // a chain without gaps has none
+  show(mapped) {
+    if (this.whole.hidden === mapped) this.whole.hidden = !mapped;
+  }
+
+  forget() {
+    Object.assign(this, { head: null, axes: null, picture: null });
+    const sheet = sharp(this.canvas);
+    sheet?.pen.clearRect(0, 0, sheet.width, sheet.height);
   }
 
   // a map comes row by row, and those of an earlier one stay pale until they are replaced
@@ -166,7 +178,7 @@ export class GapMap {
     const k = this.rows[node[1]]?.[node[0]];
     const other = this.pinned ? this.pinned.rows[node[1]]?.[node[0]] : undefined;
     const against = other === undefined || this.pinned.head.strategy === this.head.strategy ? "" : ` (${this.pinned.head.strategy}: ${fixed(other, 3)})`;
-    this.said.textContent = `\u03b4 ${significant(this.head.gaps[node[0]], 4)} rad   J\u2082 ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}${against}`;
+    this.said.textContent = `${this.head.symbols[0]} ${significant(this.head.gaps[node[0]], 4)} rad   ${this.head.symbols[1]} ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}${against}`;
   }
 
   walk(event) {
@@ -305,7 +317,7 @@ export class GapMap {
     for (const mark of marks) {
       pen.fillText(label(mark, marks.digits), this.place(mark, inertias[0])[0], box.y + box.h + 14);
     }
-    pen.fillText("gap \u03b4, rad", box.x + box.w / 2, box.y + box.h + 29);
+    pen.fillText(`${this.head.labels[0]}, rad`, box.x + box.w / 2, box.y + box.h + 29);
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     for (let row = 0; row < inertias.length; row += Math.max(1, Math.round(inertias.length / Math.max(2, box.h / 34)))) {
@@ -315,7 +327,7 @@ export class GapMap {
     pen.translate(10, box.y + box.h / 2);
     pen.rotate(-Math.PI / 2);
     pen.textAlign = "center";
-    pen.fillText("J\u2082, kg m\u00b2", 0, 0);
+    pen.fillText(`${this.head.labels[1]}, kg m\u00b2`, 0, 0);
     pen.restore();
     const x = box.x + box.w + 8;
     const { stops } = scale;

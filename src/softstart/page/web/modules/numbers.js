@@ -78,3 +78,6 @@ export function sharp(canvas) {
   pen.clearRect(0, 0, width, height);
   return { pen, width, height };
 }
+
+// a whole number as a subscript
+export const below = (number) => String(number).replace(/\d/g, (digit) => "\u2080\u2081\u2082\u2083\u2084\u2085\u2086\u2087\u2088\u2089"[digit]);

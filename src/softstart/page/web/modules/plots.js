@@ -1,13 +1,18 @@
 // Torques, speeds and the twist within the gap over time, on one canvas with one time axis. The window on it is
 // moved by wheel, drag and keys; an instant is pointed at by the mouse, or held by a press, the keys and the player.
-import { fixed, label, Range, sharp, significant, ticks } from "./numbers.js";
+import { below, fixed, label, Range, sharp, significant, ticks } from "./numbers.js";
 import { SvgPen } from "./svg.js";
 import { extent, indexAt, valueAt } from "./trace.js";
 
 const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24, LINE = 15;
 const SHARES = [0.5, 0.25, 0.25];
+const BAND = 0.36; // of the height of a gap's band, from its middle to a flank
 const DASH = [7, 4]; // of the reference
 const FINEST = 1e-7; // of the whole start: a shorter window has no digits left in single precision
+
+// whether a start is that of a chain, with several shafts
+const many = (trace) => (trace?.shafts?.length ?? 1) > 1;
+const quoted = (text) => `"${text.replaceAll('"', '""')}"`;
 
 export class Plots {
   // `windowed(window)` is told the window that is seen, or null; `timed(t)` the instant, or null
@@ -198,7 +203,10 @@ export class Plots {
     const kept = this.reference ? [[`reference: ${reference.name}, ${fixed(reference.k_dyn, 3)}`, this.theme.colours.quiet, DASH, 1.4]] : [];
     const entries = others.map((name) => [`T, ${name}${flagged(name)}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
     if (state.traces.get(state.selected).allowed) entries.push(["permissible", this.theme.colours.warn, [], 1]);
-    entries.push(...kept, ["motor u", this.theme.colours.ink, [5, 3], 1.2], [`shaft T${flagged(state.selected)}`, this.own(state), [], 2.4]);
+    const main = state.traces.get(state.selected);
+    if (many(main)) entries.push(["T, its other shafts", this.own(state), [], 0.8]);
+    const worst = many(main) ? `T, ${main.worst}` : "shaft T";
+    entries.push(...kept, ["motor u", this.theme.colours.ink, [5, 3], 1.2], [`${worst}${flagged(state.selected)}`, this.own(state), [], 2.4]);
     const lines = [[]];
     let free = w - 90; // the heading stands in the lowest line
     for (const entry of entries.reverse()) {
@@ -223,11 +231,10 @@ export class Plots {
     pen.globalAlpha = 1;
   }
 
-  frame(panel, range, title, unit) {
+  frame(panel, range, title, unit, marks = ticks(range.low, range.high, Math.max(2, Math.round(panel.h / 34)))) {
     const { pen, x, y, w, h } = panel;
     const { grid, quiet, line, ink } = this.theme.colours;
     Object.assign(panel, { low: range.low, high: range.high });
-    const marks = ticks(range.low, range.high, Math.max(2, Math.round(h / 34)));
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     pen.lineWidth = 1;
@@ -384,6 +391,8 @@ export class Plots {
     let [low, high] = this.reach(main, "T", 0, 0);
     [low, high] = extent(main, "u", this.seen, low, high);
     for (const name of others) [low, high] = extent(state.traces.get(name), "T", this.seen, low, high);
+    const beside = many(main) ? main.shafts.filter(({ name }) => name !== main.worst) : [];
+    for (const { T } of beside) [low, high] = extent(main, T, this.seen, low, high);
     const { quiet, ink, paper } = this.theme.colours;
     const own = this.own(state);
     const { allowed } = main;
@@ -403,6 +412,7 @@ export class Plots {
       }
       this.startLine(panel, state);
       this.compared(panel, "T");
+      for (const { T } of beside) this.curve(panel, main.t, main[T], own, 0.8);
       this.curve(panel, main.t, main.u, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.T, own, 2.2);
       this.peaks(panel, state, main, others);
@@ -455,17 +465,23 @@ export class Plots {
     Object.assign(panel, { low: range.low, high: range.high });
     this.shade(panel, main.stages);
     this.frame(panel, range, "Speed", "rad/s");
-    this.legend(panel, [["motor \u03c9\u2081", ink, [5, 3], 1.2], ["load \u03c9\u2082", own, [], 2.2]]);
+    const between = many(main) && main.bodies.length > 2 ? [["between", quiet, [], 0.7]] : [];
+    this.legend(panel, [...between, ["motor \u03c9\u2081", ink, [5, 3], 1.2], ["load \u03c9\u2082", own, [], 2.2]]);
     this.inside(panel, () => {
       this.level(panel, main.target, quiet, [1, 3]);
       this.startLine(panel, state);
       this.compared(panel, "w2");
+      if (many(main)) for (const { w } of main.bodies) this.curve(panel, main.t, main[w], quiet, 0.7);
       this.curve(panel, main.t, main.w1, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.w2, own, 2);
     });
   }
 
   twist(panel, state, main) {
+    if (many(main) && main.gap > 0) {
+      this.places(panel, state, main);
+      return;
+    }
     const half = main.gap / 2;
     const [low, high] = this.reach(main, "theta", -half, half);
     const { quiet, shade } = this.theme.colours;
@@ -480,6 +496,27 @@ export class Plots {
       this.compared(panel, "theta");
       this.curve(panel, main.t, main.theta, this.own(state), 2);
     });
+  }
+
+  // a band for each gap of a chain: the line lies on a dashed one while that flank is touched
+  places(panel, state, main) {
+    const { pen, x } = panel;
+    const { quiet, shade } = this.theme.colours;
+    const gaps = main.shafts.filter(({ gap }) => gap > 0);
+    this.shade(panel, main.stages);
+    this.frame(panel, { low: 0, high: gaps.length }, "Place in each gap, flanks dashed", "", []);
+    this.legend(panel, [["a gap open", shade, [], 10]]);
+    this.inside(panel, () => gaps.forEach(({ name, gap, theta }, row) => {
+      const middle = gaps.length - row - 0.5;
+      for (const side of [-1, 1]) this.level(panel, middle + side * BAND, quiet);
+      const places = ((main.places ??= {})[theta] ??= main[theta].map((angle) => Math.min(Math.max((2 * angle) / gap, -1), 1)));
+      this.curve(panel, main.t, places.map((share) => middle + share * BAND), this.own(state), 1.6);
+    }));
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    pen.fillStyle = quiet;
+    gaps.forEach(({ T }, row) => pen.fillText(`\u03b4${below(Number(T.slice(2, -1)) + 1)}`, x - 7, this.y(panel, gaps.length - row - 0.5)));
+    pen.textBaseline = "alphabetic";
   }
 
   timeAxis(panel) {
@@ -502,10 +539,14 @@ export class Plots {
     const own = (channel) => valueAt(main, channel, t);
     const among = others.map((name) => [this.theme.strategy(state.order.indexOf(name)), name, valueAt(state.traces.get(name), "T", t), ""]);
     if (this.reference) among.push([quiet, "reference", valueAt(this.reference, "T", t), ""]);
+    if (many(main)) among.unshift(...main.shafts.map(({ name, T }) => [this.own(state), name, own(T), ""]));
+    const twists = many(main)
+      ? main.shafts.filter(({ gap }) => gap > 0).map(({ gap, T, theta }) => ["", `\u03b8${below(Number(T.slice(2, -1)) + 1)}`, own(theta), ""])
+      : [["", "\u03b8", own("theta"), "rad"]];
     const texts = [
       [["", "t", t, "s"], ["", "T", own("T"), "N m"], ["", "u", own("u"), "N m"]],
       [["", "\u03c9\u2081", own("w1"), ""], ["", "\u03c9\u2082", own("w2"), "rad/s"]],
-      [["", "\u03b8", own("theta"), "rad"]],
+      twists,
     ];
     panels.forEach((panel, index) => {
       pen.strokeStyle = quiet;
@@ -553,15 +594,20 @@ export class Plots {
   csv() {
     const { state } = this;
     const [from, to] = this.seen;
-    const channels = ["t", "T", "u", "w1", "w2", "theta"];
-    const lines = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad"];
+    const main = state.traces.get(state.selected);
+    const parts = many(main)
+      ? [...main.shafts.flatMap(({ name, T, theta }) => [[T, `T ${name} [N m]`], [theta, `twist ${name} [rad]`]]), ...main.bodies.map(({ name, w }) => [w, `w ${name} [rad/s]`])]
+      : [];
+    const channels = ["t", "T", "u", "w1", "w2", "theta", ...parts.map(([channel]) => channel)];
+    const heads = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad", ...parts.map(([, head]) => quoted(head))];
+    const lines = [heads.join(",")];
     const drawn = state.order.filter((one) => one === state.selected || state.shown.includes(one));
     const traces = drawn.map((name) => [name, state.traces.get(name)]);
     if (this.reference) traces.push([`reference: ${state.reference.name}`, this.reference]);
     for (const [name, trace] of traces) {
       trace?.t?.forEach((t, i) => {
         if (t < from || t > to) return;
-        lines.push([`"${name.replaceAll('"', '""')}"`, ...channels.map((one) => (trace[one] ? Number(trace[one][i].toPrecision(7)) : ""))].join(","));
+        lines.push([quoted(name), ...channels.map((one) => (trace[one] ? Number(trace[one][i].toPrecision(7)) : ""))].join(","));
       });
     }
     return `${lines.join("\n")}\n`;

@@ -1,92 +1,133 @@
-// The drive in one line: motor, shaft, gap, load; moved as it is at the instant that the plots read.
-import { element } from "./numbers.js";
+// The machine in one line: bodies, shafts and gaps; moved as it is at the instant that the plots read.
+import { below, element } from "./numbers.js";
 import { angleAt, stageAt, valueAt } from "./trace.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-const FLANKS = [138, 202]; // where the pin of the motor's side stands when it touches one of them
-const PIN = 4, BODIES = { motor: [34, 46, 31, 42], load: [236, 50, 31, 50] }; // left, width, middle, height
-const WOUND = 9; // how far the picture of the shaft gives way at the largest torque
+const BEFORE = 34, BEHIND = 42; // room at both ends, for the torques
+const MOST = 6; // bodies that are drawn one by one in any case
+const NARROW = 328, SHAFT = 66; // the picture grows where shafts would be shorter than this
+const MIDDLE = 31, HIGH = 42;
+const SPRING = 0.27, FLANKS = [0.29, 0.67]; // of a shaft: where its spring ends and where the flanks stand
+const PIN = 4;
+const WOUND = 0.05; // of a shaft, how far its picture gives way at the largest torque
 const MARKS = 6; // lines around a body, which tell that it turns
 const FLASH = 0.02; // of the window, how long an impact lights up
+const TWO = { bodies: [{ name: "J\u2081" }, { name: "J\u2082" }], shafts: [{ name: "", gap: 1 }], motor: 0 };
 
 export class Scheme {
   constructor(place) {
     this.place = element("div", { class: "scheme" });
+    place.append(this.place);
+    this.show(null, null, 0);
+  }
+
+  // bodies and shafts of another machine; bodies of a long chain without a gap between them are one block
+  build({ bodies, shafts, motor }) {
+    const joined = bodies.length > MOST && shafts.some(({ gap }) => gap > 0);
+    this.links = shafts.map((_, i) => i).filter((i) => !joined || shafts[i].gap > 0);
+    this.ends = [...this.links, bodies.length - 1]; // the last body of each block
+    const count = this.ends.length;
+    const wide = Math.max(16, Math.min(48, 150 / (count + 1)));
+    const width = Math.max(NARROW, BEFORE + BEHIND + count * wide + this.links.length * SHAFT);
+    const long = (width - BEFORE - BEHIND - count * wide) / Math.max(this.links.length, 1);
+    const lefts = this.ends.map((_, i) => BEFORE + i * (wide + long));
+    const several = bodies.length > 2;
+    const text = (x, y, said) => `<text x="${x.toFixed(1)}" y="${y}" font-style="italic">${said}</text>`;
+    const letter = (i) => `J${i > 0 && this.ends[i] - this.ends[i - 1] === 1 || this.ends[i] === 0 ? "" : `${below((this.ends[i - 1] ?? -1) + 2)}\u208b`}${below(this.ends[i] + 1)}`;
+    this.forks = this.links.map((shaft, i) => {
+      const left = lefts[i] + wide;
+      const [rear, front] = FLANKS.map((share) => left + share * long);
+      return { left, long, gap: shafts[shaft].gap, rear, front, right: lefts[i + 1], number: several ? below(shaft + 1) : "" };
+    });
+    this.bodies = lefts.map((left, i) => ({ left, wide, high: i === count - 1 ? HIGH + 8 : HIGH }));
+    const box = ({ left, high }) => `<rect class="body" x="${left.toFixed(1)}" y="${MIDDLE - high / 2}" width="${wide.toFixed(1)}" height="${high}" rx="2"><title></title></rect>`;
+    const fork = ({ gap, rear, front, right }, i) => (gap > 0
+      ? `<path d="M${right} ${MIDDLE}H${front}V14H${rear}"/><path class="flank rear" data-shaft="${i}" stroke-width="2.4" d="M${rear} 14v10M${rear} 38v10"/><path class="flank front" data-shaft="${i}" stroke-width="2.4" d="M${front} 14v34"/><path d="M${rear} 48H${front}" stroke-dasharray="1 5"/><path class="pin" data-shaft="${i}" stroke-width="3.4"/>`
+      : "") + `<path class="shaft" data-shaft="${i}"/>`;
+    const said = several
+      ? `Chain of ${bodies.length} bodies: ${bodies.map(({ name }) => name).join(", ")}; a gap in ${shafts.filter(({ gap }) => gap > 0).length} of its shafts`
+      : "Motor inertia J1, shaft of stiffness c and damping d, gap, load inertia J2";
+    const turn = lefts[this.ends.findIndex((end) => end >= motor)];
     this.place.innerHTML = `
-<svg viewBox="0 0 328 62" role="img" aria-label="Motor inertia J1, shaft of stiffness c and damping d, gap, load inertia J2">
+<svg viewBox="0 0 ${width.toFixed(0)} 62" role="img">
   <g fill="none" stroke="currentColor" stroke-width="1.4">
-    <rect class="motor" x="34" y="10" width="46" height="42" rx="2"/>
-    <rect class="load" x="236" y="6" width="50" height="50" rx="2"/>
-    <g class="turning" stroke-width="0.8"></g>
-    <path class="shaft"/>
-    <path class="pin" stroke-width="3.4"/>
-    <path d="M236 31h-30v-17h-72"/>
-    <path class="flank rear" stroke-width="2.4" d="M134 14v10M134 38v10"/>
-    <path class="flank front" stroke-width="2.4" d="M206 14v34"/>
-    <path d="M134 48h72" stroke-dasharray="1 5"/>
-    <path class="motor-line" d="M22 45a17 17 0 0 1 0 -28m-6 3l6 -3 2 7"/>
-    <path class="load-line" d="M298 17a17 17 0 0 1 0 28m6 -3l-6 3 -2 -7"/>
+    ${this.bodies.map(box).join("")}<g class="turning" stroke-width="0.8"></g>${this.forks.map(fork).join("")}
+    <path class="motor-line" d="M${turn - 12} 45a17 17 0 0 1 0 -28m-6 3l6 -3 2 7"/>
+    <path class="load-line" d="M${width - 30} 17a17 17 0 0 1 0 28m6 -3l-6 3 -2 -7"/>
   </g>
-  <g fill="currentColor" font-size="11" text-anchor="middle">
-    <text x="57" y="35" font-style="italic">J\u2081</text><text x="261" y="35" font-style="italic">J\u2082</text>
-    <text x="107" y="55" font-style="italic">c, d</text><text x="182" y="58" font-style="italic">\u03b4</text>
-    <text x="8" y="35" font-style="italic">u</text><text x="317" y="35" font-style="italic">Mc</text>
+  <g fill="currentColor" font-size="${count > 4 ? 9 : 11}" text-anchor="middle">
+    ${lefts.map((left, i) => text(left + wide / 2, 35, letter(i))).join("")}
+    ${this.forks.map(({ left, long, gap, rear, front, number }) => text(left + 0.14 * long, 55, several ? `c${number}` : "c, d") + (gap > 0 ? text((rear + front) / 2, 59, `\u03b4${number}`) : "")).join("")}
+    ${turn === BEFORE ? text(8, 35, "u") : ""}${several ? "" : text(width - 11, 35, "Mc")}
   </g>
 </svg>`;
-    place.append(this.place);
-    const find = (name) => this.place.querySelector(name);
-    this.parts = { shaft: find(".shaft"), pin: find(".pin"), rear: find(".rear"), front: find(".front"), torque: find(".motor-line") };
-    this.turning = Object.keys(BODIES).map((body) => {
-      const line = document.createElementNS(SVG, "path");
-      line.dataset.body = body;
-      find(".turning").append(line);
-      return line;
-    });
-    this.show(null, null, 0);
+    this.place.firstElementChild.setAttribute("aria-label", said);
+    const names = this.ends.map((end, i) => bodies.slice(i ? this.ends[i - 1] + 1 : 0, end + 1).map(({ name }) => name).join(", "));
+    this.place.querySelectorAll(".body title").forEach((title, i) => (title.textContent = names[i]));
+    const of = (name) => this.forks.map((_, i) => this.place.querySelector(`.${name}[data-shaft="${i}"]`));
+    this.parts = { shaft: of("shaft"), pin: of("pin"), rear: of("rear"), front: of("front"), torque: this.place.querySelector(".motor-line") };
+    this.turning = this.bodies.map(() => this.place.querySelector(".turning").appendChild(document.createElementNS(SVG, "path")));
   }
 
   // `t` of the start `trace`; null: at rest in mid-gap, as a sign
   show(trace, t, window) {
+    const machine = trace?.bodies ? trace : (this.machine ?? TWO);
+    const key = JSON.stringify([machine.bodies, machine.shafts.map(({ name, gap }) => [name, gap > 0]), machine.motor]);
+    if (key !== this.key) this.build(machine);
+    Object.assign(this, { key, machine: { bodies: machine.bodies, shafts: machine.shafts, motor: machine.motor } });
     const known = trace?.u && t !== null && t <= trace.t.at(-1);
-    const half = known ? trace.gap / 2 : 1;
-    const twist = known ? valueAt(trace, "theta", t) : 0;
-    const torque = known ? valueAt(trace, "T", t) : 0;
-    const share = half > 0 ? Math.min(Math.max(twist / half, -1), 1) : Math.sign(torque);
-    const pin = (FLANKS[0] + FLANKS[1]) / 2 + (share * (FLANKS[1] - FLANKS[0])) / 2;
     const largest = known ? Math.abs(trace.peak[1]) || 1 : 1;
-    const wound = (WOUND * torque) / largest;
-    this.parts.pin.setAttribute("d", `M${pin.toFixed(2)} 19v24`);
-    this.parts.shaft.setAttribute("d", spring(80, 130 - wound, pin - PIN / 2));
-    const [start, , side] = known ? stageAt(trace, t) : [0, 0, 0];
-    const struck = side !== 0 && start > 0 && t - start < FLASH * window;
-    for (const [name, own] of [["front", 1], ["rear", -1]]) {
-      this.parts[name].classList.toggle("touched", side === own);
-      this.parts[name].classList.toggle("struck", struck && side === own);
-    }
+    const states = this.links.map((shaft, i) => this.moved(i, known ? this.shaft(trace, machine.shafts[shaft], t, window, largest) : { share: 0, wound: 0, side: 0, struck: false }));
     const given = known ? Math.abs(valueAt(trace, "u", t)) / (trace.largest_u ??= Math.max(...trace.u.map(Math.abs)) || 1) : 0.5;
     this.parts.torque.style.strokeWidth = 0.6 + 1.8 * given;
-    for (const line of this.turning) {
-      const [x, w, middle, h] = BODIES[line.dataset.body];
-      const angle = known ? angleAt(trace, line.dataset.body === "motor" ? "w1" : "w2", t) : 0;
-      line.setAttribute("d", known ? turned(x, w, middle, h / 2, angle) : "");
+    this.turning.forEach((line, i) => {
+      const angle = known ? angleAt(trace, trace.bodies[this.ends[i]].w, t) : 0;
+      line.setAttribute("d", known ? turned(this.bodies[i], angle) : "");
+    });
+    const all = (name) => states.map((state) => (name === "share" ? state.share.toFixed(4) : state[name])).join(" ");
+    Object.assign(this.place.dataset, { pin: all("share"), side: all("side"), struck: all("struck") });
+  }
+
+  // where the pin of a shaft stands between its flanks, how far the shaft is wound up, and which flank it touches
+  shaft(trace, { gap, T, theta, stages }, t, window, largest) {
+    const torque = valueAt(trace, T, t);
+    const [start, , side] = stageAt(stages, t);
+    const share = gap > 0 ? Math.min(Math.max((2 * valueAt(trace, theta, t)) / gap, -1), 1) : Math.sign(torque);
+    return { share, wound: torque / largest, side, struck: side !== 0 && start > 0 && t - start < FLASH * window };
+  }
+
+  moved(i, state) {
+    const { left, long, gap, rear, front, right } = this.forks[i];
+    const { shaft, pin, rear: back, front: fore } = this.parts;
+    const ends = [rear + PIN, front - PIN];
+    const at = gap > 0 ? (ends[0] + ends[1]) / 2 + (state.share * (ends[1] - ends[0])) / 2 : right;
+    const end = left + (gap > 0 ? SPRING : 0.8) * long - WOUND * state.wound * long;
+    shaft[i].setAttribute("d", spring(left, end, gap > 0 ? at - PIN / 2 : right));
+    if (gap > 0) {
+      pin[i].setAttribute("d", `M${at.toFixed(2)} 19v24`);
+      for (const [flank, own] of [[fore[i], 1], [back[i], -1]]) {
+        flank.classList.toggle("touched", state.side === own);
+        flank.classList.toggle("struck", state.struck && state.side === own);
+      }
     }
-    Object.assign(this.place.dataset, { pin: share.toFixed(4), side, struck });
+    return state;
   }
 }
 
 // lines around a cylinder that is seen from the side: those in front
-function turned(x, w, middle, radius, angle) {
+function turned({ left, wide, high }, angle) {
   let path = "";
   for (let i = 0; i < MARKS; i++) {
     const at = angle + (2 * Math.PI * i) / MARKS;
-    if (Math.cos(at) > 0.05) path += `M${x} ${(middle - radius * Math.sin(at)).toFixed(2)}h${w}`;
+    if (Math.cos(at) > 0.05) path += `M${left.toFixed(1)} ${(MIDDLE - (high / 2) * Math.sin(at)).toFixed(2)}h${wide.toFixed(1)}`;
   }
   return path;
 }
 
 // a shaft as a spring between two places, and the rod from it to the pin
 function spring(from, to, rod) {
-  const step = (to - from - 28) / 4;
+  const lead = 0.2 * (to - from);
+  const step = (to - from - 2 * lead) / 4;
   const zig = [-8, 16, -16, 16, -8].map((dy, i) => `l${(i % 4 ? step : step / 2).toFixed(2)} ${dy}`).join(" ");
-  return `M${from} 31h14 ${zig} L${rod.toFixed(2)} 31`;
+  return `M${from.toFixed(1)} ${MIDDLE}h${lead.toFixed(2)} ${zig} L${rod.toFixed(2)} ${MIDDLE}`;
 }

@@ -1,13 +1,11 @@
 // A start as the browser has it: channels over time, what they are at an instant, and where the bodies stand.
-const CHANNELS = ["t", "T", "u", "w1", "w2", "theta"];
-
 // rows of single-precision numbers in base 64, as the server packs them
 export function unpack(packed) {
   const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
   const all = new Float32Array(bytes.buffer);
-  const size = all.length / packed.rows;
+  const size = all.length / packed.channels.length;
   const found = { ...packed, data: undefined };
-  for (let row = 0; row < packed.rows; row++) found[CHANNELS[row]] = all.subarray(row * size, (row + 1) * size);
+  packed.channels.forEach((name, row) => (found[name] = all.subarray(row * size, (row + 1) * size)));
   return found;
 }
 
@@ -57,6 +55,6 @@ function summed(times, values) {
 }
 
 // the stage of an instant as [start, end, side]: side 0 while the gap is open
-export function stageAt(trace, t) {
-  return trace.stages.findLast(([start]) => start <= t) ?? [0, Infinity, 0];
+export function stageAt(stages, t) {
+  return stages.findLast(([start]) => start <= t) ?? [0, Infinity, 0];
 }

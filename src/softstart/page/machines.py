@@ -1,0 +1,488 @@
+"""What of a machine, a drive or a chain, the page can change: its fields, its sliders, the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from softstart.arrays import Vector
+from softstart.chain.elements import MOTOR, START, TOP, Mass, Shaft
+from softstart.chain.model import Chain, is_chain_text
+from softstart.chain.run import mean_torque_of
+from softstart.chain.simulation import drive_of
+from softstart.controller.base import Controller
+from softstart.drive import PARAMETERS, Drive
+from softstart.errors import InputError, SimulationError
+from softstart.input.parameters import Parameter
+from softstart.start import metrics
+from softstart.start.batch import array_starts, figures
+from softstart.start.simulation import simulate
+from softstart.tuning.ranges import ranges_of, tunable
+
+Machine = Drive | Chain
+Values = dict[str, tuple[Parameter, Any]]  # by path
+
+STEPS = 600
+DIGITS = 4
+SAME = 12  # digits in which two places of a map are one
+GAPS, INERTIAS = 25, 17  # of the map
+MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
+ZETA = "\N{GREEK SMALL LETTER ZETA}"
+MOST_DAMPING = 0.2  # damping ratio of a shaft, by its slider: geared trains have 0.01 to 0.06
+
+# by group: names of the parameters of a drive, and what stands before the field
+GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "Drive": (("name", "name"),),
+    "Motor": (
+        ("starting_torque", "starting torque"),
+        ("motor_inertia", "inertia"),
+        ("torque_lag", "torque lag"),
+        ("maximum_torque", "largest torque"),
+        ("minimum_torque", "braking torque"),
+        ("torque_rate", "torque rate"),
+        ("computing_delay", "dead time"),
+        ("motor_friction", "friction"),
+        ("motor_viscous_friction", "viscous friction"),
+        ("encoder_lines", "encoder lines"),
+        ("torque_noise", "torque noise"),
+    ),
+    "Shaft": (
+        ("gap", "total gap"),
+        ("stiffness", "stiffness"),
+        ("damping", "damping"),
+        ("contact_law", "contact law"),
+    ),
+    "Load": (
+        ("load_inertia", "inertia"),
+        ("load_torque", "torque"),
+        ("load_kind", "kind"),
+        ("load_viscous_friction", "viscous friction"),
+    ),
+    "Start": (
+        ("target_speed", "target speed"),
+        ("start_position", "position"),
+        ("brake", "brake"),
+        ("release", "release"),
+        ("initial_load_speed", "speed before"),
+    ),
+}  # fmt: skip
+SYMBOLS = {
+    "starting_torque": "Ms",
+    "motor_inertia": "J\N{SUBSCRIPT ONE}",
+    "torque_lag": "\N{GREEK SMALL LETTER TAU}",
+    "gap": "\N{GREEK SMALL LETTER DELTA}",
+    "stiffness": "c",
+    "damping": "d",
+    "start_position": "\N{GREEK SMALL LETTER THETA}",
+    "load_inertia": "J\N{SUBSCRIPT TWO}",
+    "load_torque": "Mc",
+    "target_speed": "\N{GREEK SMALL LETTER OMEGA}",
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One field of the page: which parameter of the machine it is, and what stands before it.
+
+    `value(machine)` is what the machine has there; `path` is what `--set` calls it.
+    """
+
+    path: str
+    parameter: Parameter
+    group: str
+    label: str
+    symbol: str
+    value: Callable[[Any], Any]
+
+
+def entries(machine: Machine) -> Mapping[str, Entry]:
+    """The fields of a machine by their paths, in their order on the page.
+
+    >>> list(entries(Drive.load("crane-4amtkf")))[:2]
+    ['name', 'motor.starting_torque']
+    >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].value(Chain.load("crane-4-mass"))
+    0.2
+    """
+    if isinstance(machine, Chain):
+        return MappingProxyType({one.path: one for one in _of_chain(machine)})
+    return _OF_DRIVE
+
+
+def _of_drive() -> Iterator[Entry]:
+    for group, rows in GROUPS.items():
+        for name, label in rows:
+            one = PARAMETERS[name]
+            yield Entry(one.path, one, group, label, SYMBOLS.get(name, ""), _attribute(name))
+
+
+def _of_chain(chain: Chain) -> Iterator[Entry]:
+    motor = {one.name: one for one in MOTOR.parameters}
+    for name, label in GROUPS["Motor"]:
+        if name in motor and chain.motor is not None:
+            yield Entry(
+                f"motor.{name}", motor[name], "Motor", label, SYMBOLS.get(name, ""), _of("motor", name)
+            )
+    for i, mass in enumerate(chain.masses):
+        for name, label, symbol in (("inertia", "inertia", "J"), ("torque", "load torque", "M")):
+            if name == "inertia" or mass.torque or i == chain.load_index:
+                where = f"mass[{i + 1}].{name}"
+                yield Entry(
+                    where, Mass.PARAMETERS[name], mass.name, label, symbol + _below(i), _of("masses", name, i)
+                )
+        if i == len(chain.shafts):
+            continue
+        shaft, group = chain.shafts[i], chain.shaft_names[i]
+        damping, letter = ("damping", "d") if shaft.damping > 0.0 else ("damping_ratio", ZETA)
+        for name, label, symbol in (
+            ("gap", "total gap", "\N{GREEK SMALL LETTER DELTA}"),
+            ("stiffness", "stiffness", "c"),
+            (damping, damping.replace("_", " "), letter),
+            ("permissible_torque", "permissible", ""),
+        ):  # fmt: skip
+            if not shaft.rigid or name not in ("stiffness", damping):
+                where = f"shaft[{i + 1}].{name}"
+                yield Entry(
+                    where,
+                    Shaft.PARAMETERS[name],
+                    group,
+                    label,
+                    symbol and symbol + _below(i),
+                    _of("shafts", name, i),
+                )
+    start = {one.name: one for one in START.parameters}
+    for name, label in (("target_speed", "target speed"), ("position", "position")):
+        symbol = SYMBOLS.get(name, "")
+        yield Entry(f"start.{name}", start[name], "Start", label, symbol, _attribute(name))
+
+
+def _below(index: int) -> str:
+    """The number of a mass or shaft as a subscript."""
+    return "".join(chr(ord("\N{SUBSCRIPT ZERO}") + int(digit)) for digit in str(index + 1))
+
+
+def _attribute(name: str) -> Callable[[Any], Any]:
+    return lambda machine: getattr(machine, name)
+
+
+def _of(part: str, name: str, index: int | None = None) -> Callable[[Any], Any]:
+    """Reads a parameter of a chain's motor, mass or shaft; no damping is a damping ratio of 0."""
+
+    def value(chain: Any) -> Any:
+        owner = getattr(chain, part) if index is None else getattr(chain, part)[index]
+        found = getattr(owner, name)
+        return 0.0 if found is None and name == "damping_ratio" else found
+
+    return value
+
+
+_OF_DRIVE: Mapping[str, Entry] = MappingProxyType({one.path: one for one in _of_drive()})
+
+
+def values_of(machine: Machine) -> Values:
+    """All parameters of a machine by their paths, each with its value."""
+    if not isinstance(machine, Chain):
+        return {one.path: (one, getattr(machine, name)) for name, one in PARAMETERS.items()}
+    found = {one.name: (one, getattr(machine, one.name)) for one in TOP.parameters}
+    parts: list[tuple[str, Any]] = [("motor", machine.motor)] if machine.motor is not None else []
+    parts += [(f"mass[{i}]", mass) for i, mass in enumerate(machine.masses, 1)]
+    parts += [(f"shaft[{i}]", shaft) for i, shaft in enumerate(machine.shafts, 1)]
+    for path, part in parts:
+        given = part.values()
+        found |= {f"{path}.{name}": (one, given[name]) for name, one in part.PARAMETERS.items()}
+    start = {"load": machine.load_mass, "target_speed": machine.target_speed, "position": machine.position}
+    return found | {f"start.{one.name}": (one, start[one.name]) for one in START.parameters}
+
+
+def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
+    """The machine with changes as typed, by the paths of their parameters.
+
+    >>> changed(Chain.load("crane-4-mass"), {"shaft[1].gap": "2 deg"}).shafts[0].gap
+    0.03490...
+    """
+    if isinstance(machine, Chain):
+        return Chain.from_toml(machine.to_toml(), also=settings)
+    return machine.with_settings(f"{path}={text}" for path, text in settings.items())
+
+
+def machine_from(text: str, where: str = "") -> Machine:
+    """The drive or the chain of a TOML text; a chain has tables [[mass]]."""
+    return (Chain if is_chain_text(text) else Drive).from_toml(text, where=where)
+
+
+def single(machine: Machine) -> Machine:
+    """The machine if the page can start it; InputError if it is several, or nothing moves it."""
+    if isinstance(machine, Chain):
+        if machine.motor is None:
+            raise InputError(
+                "[motor] is missing: the page starts the chain by its motor; add it to the file."
+            )
+        if machine.target_speed is None:
+            raise InputError(
+                "[start] target_speed is missing: it ends the start; add it, or the rated_speed of the motor."
+            )
+    elif machine.shape != ():
+        raise InputError(
+            f"{machine.name}: lists of values make {math.prod(machine.shape)} drives, and the page starts "
+            "one; give one value a key."
+        )
+    return machine
+
+
+def told(machine: Machine) -> Drive:
+    """The drive for which strategies are set up; of a chain its modal reduction to two masses."""
+    return drive_of(machine) if isinstance(machine, Chain) else machine.assumed
+
+
+def rounded(value: float, digits: int = DIGITS) -> float:
+    """A value with so many significant digits, so that the field shows what is computed with.
+
+    >>> rounded(0.123456), rounded(0.0)
+    (0.1235, 0.0)
+    """
+    return float(f"{value:.{digits}g}")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A slider from `low` to `high`, even in the value or in its logarithm.
+
+    >>> scale = Scale(0.0, 2.0)
+    >>> scale.value(150), scale.position(0.5)
+    (0.5, 150)
+    """
+
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    def value(self, position: float) -> float:
+        """The value at a position from 0 to STEPS."""
+        share = min(max(position / STEPS, 0.0), 1.0)
+        if share in (0.0, 1.0):
+            return self.high if share else self.low
+        if self.logarithmic:
+            return rounded(self.low * (self.high / self.low) ** share)
+        return rounded(self.low + (self.high - self.low) * share)
+
+    def position(self, value: float) -> int:
+        """The position nearest to a value; beyond the ends it is the end."""
+        if self.logarithmic:
+            share = math.log(value / self.low) / math.log(self.high / self.low) if value > 0.0 else 0.0
+        else:
+            share = (value - self.low) / (self.high - self.low)
+        return round(STEPS * min(max(share, 0.0), 1.0))
+
+
+def scales_about(origin: Machine) -> Mapping[str, Scale]:
+    """The sliders of the main parameters, about the machine as it was loaded; by path of the parameter.
+
+    >>> scales_about(Drive.load("crane-4amtkf"))["shaft.gap"]
+    Scale(low=0.0, high=2.0, logarithmic=False)
+    >>> scales_about(Chain.load("crane-4-mass"))["shaft[1].gap"]
+    Scale(low=0.0, high=0.4, logarithmic=False)
+    """
+    motor: Any = origin.motor if isinstance(origin, Chain) else origin
+    Ms, highest, target = (
+        float(motor.starting_torque),
+        float(motor.maximum_torque),
+        float(origin.target_speed or 1.0),
+    )
+    loads = sum(origin.at_motor_shaft().Mc) if isinstance(origin, Chain) else float(origin.Mc)
+    weakest = rounded(min(max(1.1 * loads, 0.1 * Ms), 0.9 * Ms), 2)
+    found = {
+        "motor.starting_torque": Scale(weakest, max(highest, Ms)),
+        "motor.torque_lag": Scale(0.0, rounded(max(0.02, 4.0 * float(motor.torque_lag)), 2)),
+        "start.target_speed": Scale(rounded(0.2 * target), rounded(2.0 * target)),
+    }
+    if isinstance(origin, Chain):
+        ratios = origin.speed_ratios()
+        for i, mass in enumerate(origin.masses):
+            found[f"mass[{i + 1}].inertia"] = _about(mass.inertia)
+        load = origin.load_index
+        found[f"mass[{load + 1}].torque"] = _torques(origin.masses[load].torque, Ms / ratios[load])
+        for i, shaft in enumerate(origin.shafts, 1):
+            at = ratios[i - 1 if shaft.side == "before" else i]
+            found[f"shaft[{i}].gap"] = _gaps(shaft.gap, 0.1 / at)
+            if not shaft.rigid:
+                found[f"shaft[{i}].stiffness"] = _about(shaft.stiffness)
+                if shaft.damping > 0.0:
+                    found[f"shaft[{i}].damping"] = Scale(0.0, rounded(5.0 * shaft.damping))
+                else:
+                    most = max(MOST_DAMPING, 2.0 * (shaft.damping_ratio or 0.0))
+                    found[f"shaft[{i}].damping_ratio"] = Scale(0.0, most)
+        return MappingProxyType(found)
+    J1, J2, c, d = float(origin.J1), float(origin.J2), float(origin.c), float(origin.d)
+    critical = 2.0 * math.sqrt(c * J1 * J2 / (J1 + J2))
+    return MappingProxyType(
+        found
+        | {
+            "motor.inertia": _about(J1),
+            "shaft.stiffness": _about(c),
+            "shaft.damping": Scale(0.0, rounded(max(0.3 * critical, 2.0 * d), 2)),
+            "shaft.gap": _gaps(float(origin.gap), 0.1),
+            "load.inertia": _about(J2),
+            "load.torque": _torques(float(origin.Mc), Ms),
+        }
+    )
+
+
+def _about(value: float) -> Scale:
+    return Scale(rounded(value / 5.0), rounded(value * 5.0), logarithmic=True)
+
+
+def _gaps(gap: float, otherwise: float) -> Scale:
+    return Scale(0.0, 4.0 * gap if gap > 0.0 else otherwise)
+
+
+def _torques(torque: float, motor: float) -> Scale:
+    """Load torques up to nearly what the motor gives there."""
+    return Scale(min(0.0, 2.0 * torque), rounded(max(0.95 * motor, 0.95 * abs(torque)), 3))
+
+
+def scales_of(controller: Controller, origin: Machine) -> Mapping[str, Scale]:
+    """Sliders of a strategy's parameters, as far as tuning would go, about the drive as it was loaded.
+
+    >>> from softstart.controller import make_controller
+    >>> scales_of(make_controller("s-curve"), Drive.load("crane-4amtkf"))["rounding"]
+    Scale(low=0.0, high=1.0, logarithmic=False)
+    """
+    found = {}
+    default = controller.defaults(told(origin))
+    names = tunable(controller)
+    for one in ranges_of(controller, names) if names else ():
+        low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
+        if low < high:
+            found[one.name] = Scale(low, high, one.logarithmic and low > 0.0)
+    return MappingProxyType(found)
+
+
+@dataclass(frozen=True)
+class Axes:
+    """The gaps (rad) and load inertias (kg m2) of a map, ascending."""
+
+    gaps: tuple[float, ...]
+    inertias: tuple[float, ...]
+
+    def nearest(self, gap: float, inertia: float) -> tuple[int, int]:
+        """Indices of the cell in which a drive lies: the gap's scale is even, the inertia's logarithmic."""
+        column = int(np.argmin(np.abs(np.array(self.gaps) - gap)))
+        row = int(np.argmin(np.abs(np.log(np.array(self.inertias) / inertia))))
+        return column, row
+
+
+def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> Axes | None:
+    """Gaps up to four times that of the machine as loaded, inertias from a fifth to five times its own.
+
+    Of a chain: the sum of its gaps at the motor shaft, all widened alike, and the inertia of its load mass.
+    None for a chain without a gap.
+
+    >>> axes = axes_about(Drive.load("crane-4amtkf"), 5, 3)
+    >>> axes.gaps, axes.inertias
+    ((0.0, 0.5, 1.0, 1.5, 2.0), (0.035, 0.175, 0.875))
+    """
+    gap, inertia = here(origin)
+    if isinstance(origin, Chain) and gap == 0.0:
+        return None
+    widest = 4.0 * gap if gap > 0.0 else 0.1
+    return Axes(
+        tuple(rounded(v, 6) for v in np.linspace(0.0, widest, gaps)),
+        tuple(rounded(v, 6) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
+    )
+
+
+def here(machine: Machine) -> tuple[float, float]:
+    """Where the machine stands in the map: gap and load inertia."""
+    if isinstance(machine, Chain):
+        return float(machine.at_motor_shaft().gap.sum()), machine.masses[machine.load_index].inertia
+    return float(machine.gap), float(machine.load_inertia)
+
+
+def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Symbols and names of the two axes of a map, gap and load inertia.
+
+    >>> map_words(Chain.load("crane-4-mass"))[1]
+    ('all gaps, at the motor shaft', 'inertia of crane')
+    """
+    gap = SYMBOLS["gap"]
+    if isinstance(machine, Chain):
+        symbols = f"\N{N-ARY SUMMATION}{gap}", f"J{_below(machine.load_index)}"
+        return symbols, ("all gaps, at the motor shaft", f"inertia of {machine.load_mass}")
+    return (gap, SYMBOLS["load_inertia"]), (f"gap {gap}", SYMBOLS["load_inertia"])
+
+
+def moved(machine: Machine, gap: float, inertia: float, origin: Machine | None = None) -> Machine:
+    """The machine at another place of its map; a chain whose gaps are all closed has them as its `origin`.
+
+    >>> here(moved(Chain.load("crane-4-mass"), 1.0, 70.0))
+    (1.0, 70.0)
+    """
+    if not isinstance(machine, Chain):
+        return machine.with_gap(gap, load_inertia=inertia)
+    whole, load = here(machine)
+    if whole == 0.0 and isinstance(origin, Chain):
+        shafts = zip(machine.shafts, origin.shafts, strict=True)
+        machine = replace(machine, shafts=tuple(one.replace(gap=first.gap) for one, first in shafts))
+        whole = here(machine)[0]
+    return machine.changed(gaps=gap / whole if whole > 0.0 else 1.0, load_inertia=inertia / load)
+
+
+def placeless(machine: Machine, axes: Axes, origin: Machine) -> Machine:
+    """What a map depends on: the machine at one place of it, wherever in the map it stands.
+
+    >>> chain = Chain.load("crane-4-mass")
+    >>> axes = axes_about(chain)
+    >>> placeless(moved(chain, 0.3, 30.0), axes, chain) == placeless(chain, axes, chain)
+    True
+    """
+    there = moved(machine, axes.gaps[-1], axes.inertias[0], origin)
+    if not isinstance(there, Chain):
+        return there
+    load = there.load_index
+    masses = (
+        one.replace(inertia=rounded(one.inertia, SAME)) if i == load else one
+        for i, one in enumerate(there.masses)
+    )
+    shafts = (one.replace(gap=rounded(one.gap, SAME)) for one in there.shafts)
+    return replace(there, masses=tuple(masses), shafts=tuple(shafts))
+
+
+def k_dyn_row(
+    machine: Machine,
+    controller: Controller,
+    gaps: tuple[float, ...],
+    inertia: float,
+    nominal: Machine | None = None,
+    origin: Machine | None = None,
+) -> Vector:
+    """K_dyn at one load inertia over the gaps; NaN where a start fails or is refused.
+
+    The controller is set up for each machine, or for `nominal`, to whose mean torque K_dyn then refers. These
+    are the figures of `softstart.simulate`, to the bit.
+    """
+    if isinstance(machine, Chain):
+        return np.array([_k_dyn(moved(machine, gap, inertia, origin), controller, nominal) for gap in gaps])
+    of: Any = nominal
+    drives = machine.with_gap(list(gaps), load_inertia=inertia)
+    notes = array_starts(drives, controller, fitted_to=of, max_events=MAP_EVENTS)
+    base = np.broadcast_to(metrics.base_torque(of or drives), (len(gaps),))
+    k: Vector = figures(notes, base)["k_dyn"][0]
+    return k
+
+
+def _k_dyn(chain: Machine, controller: Controller, nominal: Machine | None) -> float:
+    fitted: Any = nominal
+    try:
+        return float(simulate(chain, controller, fitted_to=fitted, max_events=MAP_EVENTS).k_dyn)
+    except (InputError, SimulationError):
+        return math.nan
+
+
+def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
+    """The mean torques to which K_dyn refers along the inertias of a map, N m."""
+    gap = here(machine)[0]
+    return np.array([mean_torque_of(moved(machine, gap, inertia)) for inertia in inertias])

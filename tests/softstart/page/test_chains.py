@@ -1,0 +1,224 @@
+"""A chain on the page: its fields, its figures to the bit, its traces by shaft and body, map and link."""
+
+from __future__ import annotations
+
+import base64
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softstart import Drive, InputError, simulate
+from softstart.chain import Chain
+from softstart.controller import make_controller
+from softstart.page import links
+from softstart.page.controls import Controls
+from softstart.page.downloads import command_text
+from softstart.page.frames import Screen, channels_at, open_somewhere, traces_of
+from softstart.page.machines import axes_about, changed, entries, here, k_dyn_row, moved, scales_about
+from softstart.page.sentences import changed_since, differences
+from softstart.page.session import Session
+
+CHAIN = Chain.load("crane-4-mass")
+DAMPED = changed(CHAIN, {f"shaft[{i}].damping_ratio": "0.04" for i in (1, 2, 3)})
+
+
+def screen_of(chain: Chain, *controllers: str) -> tuple[Session, Screen, Controls]:
+    session = Session(chain, controllers=controllers or ["direct", "ramp"])
+    screen = Screen(session)
+    return session, screen, Controls(session, screen, lambda: None)
+
+
+def test_the_figures_of_a_chain_are_those_of_simulate():
+    session, screen, controls = screen_of(DAMPED, "direct", "ramp", "take-up")
+    assert screen.first()["figure"]["k_dyn"] == simulate(DAMPED, "direct").k_dyn
+    controls.take({"what": "slide", "path": "shaft[2].gap", "position": 100})
+    controls.take({"what": "edit", "path": "mass[4].inertia", "text": "50 kg*m^2"})
+    assert not screen.mistakes
+    now = session.machine
+    assert now.shafts[1].gap == screen.scales["shaft[2].gap"].value(100)
+    assert now.masses[3].inertia == 50.0
+    for name in ("direct", "ramp", "take-up"):
+        assert session.result(name).k_dyn == simulate(now, name).k_dyn
+    rows = [row for frame in screen.at_rest() if frame for row in frame.get("rows", ())]
+    worn = {row["name"]: row["worn"] for row in rows if "worn" in row}
+    wide = simulate(now.changed(gaps=4.0), "ramp", fitted_to=now, base=now).k_dyn
+    assert worn["ramp"] == wide
+    session.undo()
+    session.undo()
+    assert session.machine is DAMPED
+
+
+@pytest.mark.parametrize(
+    "chain", [CHAIN, DAMPED, Chain.load("tractor-like")], ids=["bare", "damped", "tractor"]
+)
+def test_each_field_reads_what_it_writes(chain):
+    """Every slider is set to its middle, every value written back as it is shown: nothing else changes."""
+    for path, one in entries(chain).items():
+        value = one.value(chain)
+        if isinstance(value, float):
+            assert one.value(changed(chain, {path: repr(value)})) == value
+    for path, scale in scales_about(chain).items():
+        there = changed(chain, {path: repr(scale.value(300))})
+        assert entries(chain)[path].value(there) == scale.value(300)
+        other = {key: one.value(there) for key, one in entries(chain).items() if key != path}
+        assert other == {key: one.value(chain) for key, one in entries(chain).items() if key != path}
+
+
+def test_traces_hold_each_shaft_and_body():
+    run = simulate(DAMPED, "direct")
+    traces = traces_of(run)
+    states = run.at(traces["t"])
+    for k in range(3):
+        assert np.array_equal(traces[f"T[{k}]"], states["T"][:, k])
+        assert np.array_equal(traces[f"theta[{k}]"], states["twist"][:, k])
+        assert np.abs(traces[f"T[{k}]"]).max() == pytest.approx(run.peak_torques[k], rel=1e-12)
+    assert np.array_equal(traces["T"], traces[f"T[{run.worst_shaft}]"])
+    assert np.array_equal(traces["w2"], states["w"][:, 3])
+    assert {event.time for event in run.events} <= set(traces["t"])
+
+
+@pytest.mark.parametrize("strategy", ["direct", "take-up"])
+def test_stages_of_a_gap_are_open_where_it_carries_nothing(strategy):
+    """The kernel's events against the states: no torque in an open gap, no twist within a closed one."""
+    session, screen, _ = screen_of(DAMPED, strategy)
+    picture = screen.first()["traces"][strategy]
+    run = session.result(strategy).run
+    halves = 0.5 * DAMPED.at_motor_shaft().gap
+    for k, shaft in enumerate(picture["shafts"]):
+        stages = shaft["stages"]
+        assert stages[0][0] == 0.0
+        assert stages[-1][1] == run.end_time
+        assert all(before[1] == after[0] for before, after in pairwise(stages))
+        for start, end, side in stages:
+            inside = channels_at(run, np.linspace(start, end, 9)[1:-1])
+            if side == 0:
+                assert np.all(inside[f"T[{k}]"] == 0.0)
+            else:
+                assert np.all(side * inside[f"theta[{k}]"] >= halves[k] * (1.0 - 1e-9))
+    data = np.frombuffer(base64.b64decode(picture["data"]), dtype="<f4")
+    assert data.size % len(picture["channels"]) == 0
+    assert json.loads(json.dumps(picture)) is not None
+
+
+@given(
+    st.lists(
+        st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), min_size=1, max_size=8),
+        min_size=1,
+        max_size=4,
+    )
+)
+@settings(max_examples=60, deadline=None)
+def test_several_gaps_are_open_where_one_of_them_is(rows):
+    end = 8.5
+    each = []
+    for row in rows:
+        edges = np.cumsum([0.0, *(length for length, _ in row)])
+        edges[-1] = end
+        each.append([(a, b, int(shut)) for a, b, (_, shut) in zip(edges, edges[1:], row, strict=False)])
+    joined = open_somewhere(each)
+    assert joined[0][0] == 0.0
+    assert joined[-1][1] == end
+    for when in np.linspace(0.003, end - 0.003, 200):
+        wanted = any(a < when < b and not side for stages in each for a, b, side in stages)
+        found = [not side for a, b, side in joined if a < when < b]
+        assert not found or found == [wanted]
+
+
+def test_the_map_of_a_chain_is_made_of_its_starts():
+    axes = axes_about(DAMPED, 3, 3)
+    assert here(DAMPED) == (pytest.approx(0.5), 69.2)
+    controller = make_controller("ramp")
+    row = k_dyn_row(DAMPED, controller, axes.gaps, axes.inertias[2])
+    for gap, k in zip(axes.gaps, row, strict=True):
+        there = moved(DAMPED, gap, axes.inertias[2])
+        assert here(there) == (pytest.approx(gap), pytest.approx(axes.inertias[2]))
+        assert k == simulate(there, "ramp").k_dyn
+
+
+def test_gaps_that_were_closed_on_the_map_open_again_as_they_were():
+    session, _, controls = screen_of(DAMPED)
+    controls.take({"what": "jump", "gap": 0.0, "inertia": 69.2})
+    assert [shaft.gap for shaft in session.machine.shafts] == [0.0, 0.0, 0.0]
+    controls.take({"what": "jump", "gap": 0.5, "inertia": 69.2})
+    assert [shaft.gap for shaft in session.machine.shafts] == pytest.approx([0.1, 0.2, 0.01])
+
+
+def test_a_map_is_not_computed_again_for_another_place_of_it():
+    session, screen, controls = screen_of(DAMPED, "direct")
+    screen.axes = axes_about(DAMPED, 3, 3)
+    assert [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+    controls.take({"what": "jump", "gap": 0.31, "inertia": 44.4})
+    assert not screen.first()["map_is_old"]
+    session.set("shaft[1].stiffness", 5000.0)
+    assert screen.first()["map_is_old"]
+
+
+def test_a_chain_without_gaps_has_no_map():
+    closed = changed(CHAIN, {f"shaft[{i}].gap": "0" for i in (1, 2, 3)})
+    _, screen, _ = screen_of(closed, "direct")
+    assert not screen.first()["mapped"]
+    assert not [frame for frame in screen.at_rest() if frame and "map_row" in frame]
+
+
+def test_a_link_brings_the_chain_back_and_a_drive_replaces_it():
+    session, screen, _ = screen_of(DAMPED)
+    session.set("shaft[3].gap", "0.6 deg")
+    other = links.bench_of(links.link_of(session), Session(controllers=["direct"]).bench)
+    assert other.drive == session.machine
+    assert [group["title"] for group in screen.first()["groups"]][1:3] == ["rotor", "rotor - pinion"]
+    session.take(Drive.load("crane-4amtkf"))
+    assert [group["title"] for group in screen.first()["groups"]] == [
+        "Drive",
+        "Motor",
+        "Shaft",
+        "Load",
+        "Start",
+    ]
+    session.undo()
+    frame = screen.first()
+    assert frame["fields"]["shaft[3].gap"][0] == "0.6 deg"
+    assert frame["figure"]["k_dyn"] == simulate(other.drive, "direct").k_dyn
+
+
+def test_what_takes_two_masses_says_so_of_a_chain():
+    session, _, _ = screen_of(CHAIN)
+    with pytest.raises(InputError, match="is a chain, and this takes a drive of two masses"):
+        _ = session.drive
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "[[mass]]\ninertia = 1.0\n[[mass]]\ninertia = 2.0\n[[shaft]]\nstiffness = 9.0\n",
+            r"\[motor\] is missing",
+        ),
+        (
+            "[[mass]]\ninertia = 1.0\n[[mass]]\ninertia = 2.0\n[[shaft]]\nstiffness = 9.0\n"
+            "[motor]\nstarting_torque = 3.0\n",
+            "target_speed is missing",
+        ),
+    ],
+)
+def test_a_chain_that_cannot_start_is_refused_and_nothing_changes(text, said):
+    session = Session(controllers=["direct"])
+    before = session.machine
+    with pytest.raises(InputError, match=said):
+        session.load(text)
+    assert session.machine is before
+
+
+def test_words_for_a_changed_chain():
+    wider = changed(CHAIN, {"shaft[1].gap": "0.3"})
+    assert differences(CHAIN, wider) == "shaft[1].gap 0.1 rad"
+    assert changed_since(CHAIN, Drive.load("crane-4amtkf")).startswith(
+        "For Crane travel drive as a chain of four"
+    )
+    made = {name: make_controller(name) for name in ("direct", "ramp")}
+    assert command_text(wider, made) == (
+        "softstart compare crane-4-mass --set 'shaft[1].gap=0.3' --controllers direct,ramp"
+    )
