@@ -217,3 +217,37 @@ def test_panels_stay_within_their_column(
         inside, box = panel.evaluate("e => [e.scrollWidth, e.clientWidth]")
         assert inside <= box + 1, name
         assert screenshot(page, f"panel-{name.lower()}-{width}").stat().st_size > 10_000
+
+
+def test_jobs_are_shown_in_every_tab_of_their_user_and_after_a_reload(
+    page: Any, visit: Any, server: Any
+) -> None:
+    second = page.context.new_page()
+    second.goto(server.url)
+    stranger = visit()
+    for one in (page, second, stranger):
+        one.wait_for_selector("#k-dyn[data-value]")
+        one.get_by_role("tab", name="Tuning", exact=True).click()
+    page.get_by_test_id("tuning-go").click()
+    second.get_by_test_id("tuning-state").filter(has_text="Computing").wait_for()
+    second.get_by_test_id("tuning-cancel").click()
+    page.get_by_test_id("tuning-state").filter(has_text="Cancelled").wait_for()
+    assert not stranger.get_by_test_id("tuning-state").is_visible()
+    for one in (page, second):
+        one.get_by_role("tab", name="Optimum", exact=True).click()
+    page.get_by_test_id("optimum-go").click()
+    for one in (page, second):
+        one.get_by_test_id("optimum-figures").wait_for(timeout=60_000)
+    mine, other = (
+        [row.inner_text() for row in one.locator(".strategies tbody tr").all()] for one in (page, second)
+    )
+    assert sum("optimum" in row for row in mine) == 1
+    assert sum("optimum" in row for row in other) == 0
+    assert not page.get_by_test_id("optimum-use").is_visible()
+    second.get_by_test_id("optimum-use").click()
+    second.locator('.strategies tbody tr[data-name^="optimum"]').wait_for()
+    page.reload()
+    page.get_by_role("tab", name="Optimum", exact=True).click()
+    page.get_by_test_id("optimum-figures").wait_for()
+    assert page.locator('.strategies tbody tr[data-name^="optimum"]').count() == 1
+    second.close()

@@ -16,7 +16,6 @@ from nicegui import ui
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
-from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     TERMINALS,
@@ -57,7 +56,6 @@ class CurvePanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Machine | None = None
         self._points: list[FrontPoint] = []
         self._drawn: tuple[object, ...] = ()
         with box().classes("panel-form"):
@@ -70,7 +68,8 @@ class CurvePanel:
             "Points appear as they are computed."
         )
         self._view = JobView(
-            jobs or jobs_of(user), user, "curve", on_part=self._part, on_done=self._done, on_state=self._state
+            jobs or jobs_of(user), user, "curve", on_begin=self._begun, on_part=self._part,
+            on_done=self._done, on_state=self._state,
         )  # fmt: skip
         self._stale = StaleNote(session, "curve")
         self._picture = ui.html("", sanitize=False).classes("curve-box").props('data-testid="curve-picture"')
@@ -85,14 +84,16 @@ class CurvePanel:
     def _begin(self) -> None:
         if self._view.busy:
             return
-        self._drive, self._points, self._drawn = self._session.machine, [], ()
+        drive = self._session.machine
         own = {found.start_time for found in self._session.strategies}
         times = sorted(one for one in own if math.isfinite(one))
+        terminal = cast("Terminal", self._end.value)
+        self._view.begin("least K_dyn over start time", tasks.curve, drive, times, terminal, subject=drive)
+
+    def _begun(self) -> None:
+        self._points, self._drawn = [], ()
         self._picture.set_content("")
-        self._stale.show_for(self._drive)
-        self._view.begin(
-            "least K_dyn over start time", tasks.curve, self._drive, times, cast("Terminal", self._end.value)
-        )
+        self._stale.show_for(self._view.subject)
 
     def _state(self) -> None:
         self._go.set_enabled(not self._view.busy)
@@ -129,8 +130,7 @@ class CurvePanel:
         self._table.set_content(table(COLUMNS, rows, 1, "curve-table") if rows else "")
 
     def _save(self) -> None:
-        assert self._drive is not None
-        save(csv_of(self._points), file_name(self._drive.name, "least k_dyn", suffix=".csv"))
+        save(csv_of(self._points), file_name(self._view.subject.name, "least k_dyn", suffix=".csv"))
 
 
 def colour(index: int) -> str:

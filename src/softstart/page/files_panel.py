@@ -73,9 +73,9 @@ class DriveFiles:
         with box().classes("troubles").props('role=alert data-testid="drive-trouble"') as self._troubles:
             pass
         self._troubles.set_visibility(False)
-        started = WeakMethod(self._started)  # a timer that never ran outlives its tab
+        done = WeakMethod(self._done)  # a timer that never ran outlives its tab
         self._view = JobView(
-            jobs or jobs_of(user), user, "chain", on_done=lambda found: (one := started()) and one(found)
+            jobs or jobs_of(user), user, "chain", on_done=lambda found: (one := done()) and one(found)
         )
 
     def _uploaded(self, content: bytes, name: str) -> None:
@@ -85,22 +85,23 @@ class DriveFiles:
         """Take a drive at once, and a chain as soon as the engine is ready for it."""
         self._troubles.set_visibility(False)
         if not isinstance(machine, Chain):
-            self._started(machine)
+            self._take_over(machine)
         elif self._view.busy:
             raise InputError("A chain is being started; wait for it, or cancel it.")
         else:
             self._view.begin("chain", tasks.ready, single(machine))
 
-    def _started(self, machine: Machine) -> None:
-        self._session.take(machine)
-        self._taken()
+    def _done(self, machine: Machine) -> None:
+        if self._view.mine:
+            self._take_over(machine)
 
     def _take(self, name: str) -> None:
         if name:
             self._shipped.set_value("")
             self._begin(shipped_drives()[name])
 
-    def _taken(self) -> None:
+    def _take_over(self, machine: Machine) -> None:
+        self._session.take(machine)
         notify(f"{clipped(self._session.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
@@ -140,7 +141,7 @@ class Exports:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        self._saved_as = self._text = ""
+        self._text = ""
         self._seen = -1
         with box().classes("panel-actions"):
             self._caption = ui.label().classes("panel-caption").props('data-testid="export-strategy"')
@@ -205,30 +206,33 @@ class Exports:
         if self._view.busy:
             return
         profile = self._needed()
-        self._saved_as, self._text = file_name(self._session.selected, suffix=".c"), ""
+        self._text = ""
         about = {"drive": self._session.machine.name, "strategy": self._session.selected}
-        self._view.begin("C code", tasks.code, profile, about)
+        name = file_name(self._session.selected, suffix=".c")
+        self._view.begin("C code", tasks.code, profile, about, subject=name)
 
     def _begin_report(self) -> None:
         if self._view.busy:
             return
         session = self._session
         strategies = dict(session.controllers)
-        self._saved_as, self._text = self._named("report", suffix=".html"), ""
+        name, self._text = self._named("report", suffix=".html"), ""
         self._view.begin(
             "report",
             tasks.report,
             session.machine,
             list(strategies.values()),
-            command_text(session.machine, strategies, "report", f"--out={self._saved_as}"),
+            command_text(session.machine, strategies, "report", f"--out={name}"),
+            subject=name,
         )
 
     def _done(self, text: str) -> None:
         self._text = text
-        self._save()
+        if self._view.mine:
+            self._save()
 
     def _save(self) -> None:
-        save(self._text, self._saved_as)
+        save(self._text, self._view.subject)
 
 
 class CommandLine:

@@ -49,6 +49,7 @@ class Job:
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
     `parts` what came out so far; `result` what came out at the end; `sentences` why there is no result.
     `changes` counts what happened, so that whoever looks now and then sees whether to look closer.
+    `subject` is for those who show it: what the result is of.
     """
 
     def __init__(self, jobs: Jobs, user: Hashable, title: str, packed: bytes) -> None:
@@ -62,6 +63,7 @@ class Job:
         self.sentences: tuple[str, ...] = ()
         self.changes = 0
         self.pid: int | None = None
+        self.subject: Any = None
         self._jobs = jobs
         self._packed = packed
         self._stop = threading.Event()
@@ -118,6 +120,8 @@ class Jobs:
         self._waiting: list[Job] = []
         self._running: dict[Job, threading.Thread] = {}
         self._served: dict[Hashable, int] = {}
+        self._tabs: dict[Hashable, set[Hashable]] = {}
+        self._shown: dict[tuple[Hashable, str], Job] = {}
         self._turns = itertools.count(1)
         self._ended = False
 
@@ -150,12 +154,36 @@ class Jobs:
             order = self._order()
             return order.index(job) if job in order else 0
 
-    def leave(self, user: Hashable) -> None:
-        """A user has gone: cancel all that is computed for them."""
+    def show(self, user: Hashable, place: str, job: Job | None) -> None:
+        """Let all tabs of a user show this job at this place, or none."""
         with self._lock:
+            if job is None:
+                self._shown.pop((user, place), None)
+            else:
+                self._shown[user, place] = job
+
+    def shown(self, user: Hashable, place: str) -> Job | None:
+        """The job that all tabs of a user show at this place."""
+        return self._shown.get((user, place))
+
+    def enter(self, user: Hashable, tab: Hashable) -> None:
+        """A user has opened a tab."""
+        with self._lock:
+            self._tabs.setdefault(user, set()).add(tab)
+
+    def leave(self, user: Hashable, tab: Hashable = None) -> None:
+        """A tab was closed; with the last one of a user all that is computed for them is cancelled."""
+        with self._lock:
+            tabs = self._tabs.get(user, set())
+            tabs.discard(tab)
+            if tabs:
+                return
             for job in self.of(user):
                 job.cancel()
             self._served.pop(user, None)
+            self._tabs.pop(user, None)
+            for key in [one for one in self._shown if one[0] == user]:
+                del self._shown[key]
 
     def end(self, timeout: float = 5.0) -> None:
         """Cancel everything, and wait until no process is left. Nothing can be begun afterwards."""

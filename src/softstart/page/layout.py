@@ -10,6 +10,7 @@ from types import new_class
 from typing import TYPE_CHECKING, Any
 
 from softstart.late import late
+from softstart.page import USER
 from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
@@ -106,6 +107,10 @@ def _end(task: asyncio.Task[Any], session: Session) -> None:
 
 def _panels(session: Session, client: Client) -> None:
     """The tabs for what is computed in the background, and for files."""
+    try:
+        user = client.request.scope.get(USER, client.id)  # of all tabs of a browser
+    except RuntimeError:  # a page that no request has asked for
+        user = client.id
     with ui.tabs().props("dense no-caps align=left").classes("panel-tabs") as tabs:
         for title, _, _ in PANELS:
             ui.tab(title)
@@ -115,7 +120,7 @@ def _panels(session: Session, client: Client) -> None:
                 try:
                     panel = getattr(import_module(f"softstart.page.{module}"), name)
                     with ui.element("div").classes("panel"):
-                        panel(session, client.id)
+                        panel(session, user)
                 except Exception as error:  # the live part must work without it
                     log.debug("the panel %s cannot be built", title, exc_info=error)
                     ui.label(sentence_of(error))

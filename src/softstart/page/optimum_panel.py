@@ -14,7 +14,6 @@ from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
-from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     TERMINALS,
@@ -48,7 +47,6 @@ class OptimumPanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Machine = session.machine
         self._found: tasks.Gentlest | None = None
         with box().classes("panel-form"):
             self._time = field(
@@ -66,6 +64,7 @@ class OptimumPanel:
             self._figures = ui.html("", sanitize=False).classes("w-full")
             self._sentence = ui.label().classes("panel-sentence").props('data-testid="optimum-sentence"')
             self._why = ui.label().classes("panel-hint")
+            self._use = action("Add to the strategies", guarded(self._add), "optimum-use")
             with box().classes("panel-actions"):
                 ui.label("Torque profile").classes("panel-caption")
                 for suffix in (".csv", ".toml", ".c"):
@@ -83,9 +82,9 @@ class OptimumPanel:
         except InputError as error:
             self._view.refuse(error)
             return
-        self._drive = self._session.machine
+        drive = self._session.machine
         terminal = cast("Terminal", self._end.value)
-        self._view.begin("optimal start", tasks.gentlest, self._drive, text, terminal)
+        self._view.begin("optimal start", tasks.gentlest, drive, text, terminal, subject=drive)
 
     def _state(self) -> None:
         self._view.settle(self._go, self._result)
@@ -100,8 +99,19 @@ class OptimumPanel:
             + "."
         )
         self._result.set_visibility(True)
-        self._stale.show_for(self._drive)
+        self._stale.show_for(self._view.subject)
         self._hint.set_visibility(False)
+        self._use.set_visibility(not self._view.mine)
+        if self._view.mine:
+            self._add()
+        else:
+            self._sentence.set_text("It was computed in another tab, or before this page was loaded anew.")
+
+    def _add(self) -> None:
+        """Let the optimum join the strategies."""
+        found = self._found
+        assert found is not None
+        self._use.set_visibility(False)
         try:
             self._session.add(label_of(found.best), player_of(found.best), select=False)
         except InputError as error:  # the table is full

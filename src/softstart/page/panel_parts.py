@@ -282,10 +282,11 @@ def state_of(job: Job) -> str:
 
 
 class JobView:
-    """The one job of a panel; built in the current slot.
+    """The one job of a panel, the same in all tabs of a user; built in the current slot.
 
     `on_part(value)` is called for each part of the result, `on_done(result)` for the whole; `on_state()`
-    whenever the state has changed. `name` marks the elements for tests.
+    whenever the state has changed, `on_begin()` when a job has begun, here or in another tab. `name` tells it
+    from those of other panels, and marks the elements for tests.
     """
 
     def __init__(
@@ -297,8 +298,11 @@ class JobView:
         on_done: Callable[[Any], None],
         on_part: Callable[[Any], None] = lambda part: None,
         on_state: Callable[[], None] = lambda: None,
+        on_begin: Callable[[], None] = lambda: None,
     ) -> None:
-        self._jobs, self._user = jobs, user
+        self._on_begin = on_begin
+        self._jobs, self._user, self._name = jobs, user, name
+        self._own: Job | None = None  # the one that was begun in this tab
         self._on_done, self._on_part, self._on_state = on_done, on_part, on_state
         self.job: Job | None = None
         self._seen = self._parts = -1
@@ -320,6 +324,16 @@ class JobView:
         ui.timer(POLL, self._refresh)
 
     @property
+    def mine(self) -> bool:
+        """Whether the job was begun in this tab."""
+        return self.job is not None and self.job is self._own
+
+    @property
+    def subject(self) -> Any:
+        """What the result is of."""
+        return None if self.job is None else self.job.subject
+
+    @property
     def failed(self) -> bool:
         """Whether the last job failed."""
         return self.job is not None and self.job.state is State.FAILED
@@ -329,22 +343,25 @@ class JobView:
         """Whether a job waits or runs."""
         return self.job is not None and not self.job.state.over
 
-    def begin(self, title: str, work: Callable[..., Any], *args: Any, **keywords: Any) -> None:
-        """Put a job into the queue; refused input is shown as its sentences."""
+    def begin(self, title: str, work: Callable[..., Any], *args: Any, subject: Any = None) -> None:
+        """Put a job into the queue; refused input is shown as its sentences. `subject` stays with it."""
         if self.busy:
             return
         try:
-            self.job = self._jobs.begin(self._user, title, work, *args, **keywords)
+            self._own = self._jobs.begin(self._user, title, work, *args)
         except InputError as error:
             self.refuse(error)
             return
-        self._seen, self._parts, self._given = -1, 0, False
+        self._own.subject = subject
+        self._jobs.show(self._user, self._name, self._own)
         self._refresh()
 
     def refuse(self, error: InputError) -> None:
         """Show why nothing was begun."""
-        self.job = None
-        self._box.set_visibility(False)
+        if not self.busy:
+            self.job = None
+            self._jobs.show(self._user, self._name, None)
+            self._box.set_visibility(False)
         self._say(error.sentences)
         self._on_state()
 
@@ -361,9 +378,12 @@ class JobView:
             result.set_visibility(False)
 
     def _refresh(self) -> None:
-        job = self.job
+        job = self._jobs.shown(self._user, self._name)
         if job is None:
             return
+        if job is not self.job:  # begun here or in another tab
+            self.job, self._seen, self._parts, self._given = job, -1, 0, False
+            self._on_begin()
         # the job goes on in a thread of its own: each is read once, the count first, since it is raised last
         changes, state = job.changes, job.state
         second = -1 if state.over else int(job.seconds)
@@ -408,10 +428,11 @@ class JobView:
 
 
 def jobs_of(user: Hashable) -> Jobs:
-    """The jobs of the server; those of `user`, the client of the moment, end when the client has gone."""
-    jobs = server_jobs()
+    """The jobs of the server; those of `user` end when the last tab has gone, of which this client is one."""
+    jobs, tab = server_jobs(), context.client.id
     jobs.warm()
-    context.client.on_delete(lambda: jobs.leave(user))
+    jobs.enter(user, tab)
+    context.client.on_delete(lambda: jobs.leave(user, tab))
     return jobs
 
 

@@ -16,6 +16,7 @@ import hmac
 import ipaddress
 import logging
 import os
+import re
 import secrets
 import socket
 from collections.abc import Awaitable, Callable, Collection, Iterable, MutableMapping
@@ -27,6 +28,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.page import USER
 
 if TYPE_CHECKING:
     import fastapi
@@ -50,6 +52,8 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 log = logging.getLogger("softstart.page")
+
+_USER = re.compile(r"[\w-]{32}")
 
 NOISY = ("nicegui", "uvicorn", "uvicorn.error", "engineio.server", "socketio.server", "python_multipart")
 POLICY_VIOLATION = 1008
@@ -279,12 +283,23 @@ class Guard:
             if any(_too_long(text) for text in headers.all("content-length")):
                 await _refuse(scope, receive, send, 413, "This is more than the page takes.")
             else:
-                await self.app(scope, _limited(receive), _with_headers(send))
+                scope[USER], cookie = self._user(headers)
+                news = cookie if scope.get("path") == "/" else []
+                await self.app(scope, _limited(receive), _with_headers(send, news))
         elif scope["type"] == "http" and scope.get("method") == "GET" and self._shows_token(scope):
             await self._admit(scope, send)
         else:
             refusal = "This page needs its token: open the address that softstart serve has printed."
             await _refuse(scope, receive, send, 401, refusal)
+
+    def _user(self, headers: _Headers) -> tuple[str, list[tuple[bytes, bytes]]]:
+        """Whose browser this is, and the header with the cookie for one that has none yet."""
+        name = f"{self._cookie}-user"
+        known = [value for key, value in _cookies(headers) if key == name and _USER.fullmatch(value)]
+        if known:
+            return known[0], []
+        user = secrets.token_urlsafe(24)
+        return user, [(b"set-cookie", f"{name}={user}; Path=/; HttpOnly; SameSite=Strict".encode("ascii"))]
 
     def _refusal(self, headers: _Headers) -> str:
         """Why a request is refused before any token is looked at; empty if it is not."""
@@ -303,9 +318,7 @@ class Guard:
         return name in self._names or (self._exposed and _is_address(name))
 
     def _has_pass(self, headers: _Headers) -> bool:
-        # read by hand: other programs on this host have cookies too, and one that is odd must hide no other
-        pairs = [pair.strip().partition("=") for text in headers.all("cookie") for pair in text.split(";")]
-        return any(_equal(value, self._pass) for name, _, value in pairs if name == self._cookie)
+        return any(_equal(value, self._pass) for name, value in _cookies(headers) if name == self._cookie)
 
     def _shows_token(self, scope: Scope) -> bool:
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
@@ -328,6 +341,12 @@ class _Headers:
 
     def all(self, name: str) -> list[str]:
         return [value for key, value in self._pairs if key == name]
+
+
+def _cookies(headers: _Headers) -> list[tuple[str, str]]:
+    # read by hand: other programs on this host have cookies too, and one that is odd must hide no other
+    pairs = [pair.strip().partition("=") for text in headers.all("cookie") for pair in text.split(";")]
+    return [(name, value) for name, _, value in pairs]
 
 
 def _equal(shown: str, wanted: str) -> bool:
@@ -387,10 +406,10 @@ def _limited(receive: Receive) -> Receive:
     return receiving
 
 
-def _with_headers(send: Send) -> Send:
+def _with_headers(send: Send, more: Iterable[tuple[bytes, bytes]] = ()) -> Send:
     async def sending(message: MutableMapping[str, Any]) -> None:
         if message["type"] == "http.response.start":
-            message["headers"] = [*message.get("headers", ()), *HEADERS]
+            message["headers"] = [*message.get("headers", ()), *HEADERS, *more]
         await send(message)
 
     return sending

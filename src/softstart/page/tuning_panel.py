@@ -16,7 +16,6 @@ from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
-from softstart.page.machines import Machine
 from softstart.page.panel_parts import (
     POLL,
     JobView,
@@ -50,7 +49,6 @@ class TuningPanel:
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self._session = session
-        self._drive: Machine = session.machine
         self._found: tasks.Tuned | None = None
         names = tunable()
         with box().classes("panel-form"):
@@ -95,7 +93,7 @@ class TuningPanel:
         if self._view.busy:
             return
         try:
-            self._drive = drive = self._session.drive
+            drive = self._session.drive
             gaps, inertias = grid_of(drive, str(self._gaps.value), str(self._inertias.value))
         except InputError as error:
             self._view.refuse(error)
@@ -103,7 +101,7 @@ class TuningPanel:
         name = str(self._name.value)
         self._view.begin(
             f"tuning of {name}", tasks.tuning, drive, name, gaps, inertias,
-            bool(self._certified.value), int(self._searches.value),
+            bool(self._certified.value), int(self._searches.value), subject=drive,
         )  # fmt: skip
 
     def _state(self) -> None:
@@ -116,7 +114,7 @@ class TuningPanel:
         self._cells.set_content(cell_table(found))
         self._hint.set_visibility(False)
         self._result.set_visibility(True)
-        self._stale.show_for(self._drive)
+        self._stale.show_for(self._view.subject)
 
     def _add(self, file: str) -> None:
         assert self._found is not None

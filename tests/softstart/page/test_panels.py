@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from softstart import Drive, InputError
-from softstart.page.jobs import State
+from softstart.page.jobs import Jobs, State
 from softstart.page.session import Session
 
 pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
@@ -56,14 +56,12 @@ class Hasty:
 def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks: int) -> None:
     from softstart.page.panel_parts import JobView
 
-    class Queue:
-        def begin(self, *args: Any) -> Hasty:
+    class Queue(Jobs):
+        def begin(self, *args: Any, **keywords: Any) -> Any:
             return job
 
     job, given, states = Hasty(), [], []
-    view = JobView(
-        Queue(), "A", "it", on_done=given.append, on_state=lambda: states.append(view.busy)  # type: ignore[arg-type]
-    )  # fmt: skip
+    view = JobView(Queue(), "A", "it", on_done=given.append, on_state=lambda: states.append(view.busy))
     view.begin("it", print)
     job.looks = looks
     for _ in range(looks + 2):
@@ -72,9 +70,52 @@ def test_a_job_that_ends_under_the_eyes_gives_its_result_once(client: Any, looks
     assert states[-1] is False
 
 
+def test_a_job_is_followed_in_every_tab_of_its_user(client: Any) -> None:
+    """Its parts, its one result, and its cancel; `mine` is the tab in which it was begun."""
+    from softstart.page.panel_parts import JobView
+
+    class Queue(Jobs):
+        def begin(self, *args: Any, **keywords: Any) -> Any:
+            return Hasty()
+
+    jobs = Queue()
+    given: dict[str, list[Any]] = {"first": [], "second": [], "late": [], "other": []}
+    begun: list[str] = []
+
+    def tab(name: str, user: str = "A") -> Any:
+        return JobView(jobs, user, "it", on_done=given[name].append, on_begin=lambda: begun.append(name))
+
+    first, second, other = tab("first"), tab("second"), tab("other", "B")
+    first.begin("it", print, subject="the drive")
+    job = first.job
+    second._refresh()
+    other._refresh()
+    assert (first.mine, second.mine, second.busy, second.subject) == (True, False, True, "the drive")
+    assert (other.job, begun) == (None, ["first", "second"])
+    second.begin("another", print)  # one at a time at one place
+    assert second.job is job
+    job.state, job.result, job.count = State.DONE, "the result", 2
+    late = tab("late")  # the page was loaded anew
+    for view in (first, second, late, other) * 2:
+        view._refresh()
+    assert given == {"first": ["the result"], "second": ["the result"], "late": ["the result"], "other": []}
+    assert not late.mine
+
+
+def test_jobs_end_with_the_last_tab_of_their_user() -> None:
+    jobs = Jobs()
+    job = Hasty()
+    jobs.enter("A", "first")
+    jobs.enter("A", "second")
+    jobs.show("A", "it", job)
+    jobs.leave("A", "first")
+    assert jobs.shown("A", "it") is job
+    jobs.leave("A", "second")
+    assert jobs.shown("A", "it") is None
+
+
 def test_the_enter_key_does_not_lose_a_job_that_runs(client: Any) -> None:
     """The button is out of use then; the key in the field of the start time is not."""
-    from softstart.page.jobs import Jobs
     from softstart.page.optimum_panel import OptimumPanel
 
     class Queue(Jobs):
@@ -110,7 +151,6 @@ def test_the_jobs_end_with_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_closed_tab_keeps_no_bench(client: Any) -> None:
     """The web framework remembers the function of each upload's route."""
     from softstart.page.files_panel import DriveFiles
-    from softstart.page.jobs import Jobs
 
     session = Session(controllers=["direct"])
     DriveFiles(session, "A", Jobs())

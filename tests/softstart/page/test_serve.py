@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import signal
 import socket
 import subprocess
@@ -275,7 +276,8 @@ def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
         url = line.split()[3]
         with urllib.request.urlopen(url, timeout=20) as got:
             text = got.read().decode()
-            assert "set-cookie" not in {key.lower() for key in got.headers}
+            (cookie,) = got.headers.get_all("set-cookie")
+            assert re.fullmatch(r"softstart-\d+-user=[\w-]{32}; Path=/; HttpOnly; SameSite=Strict", cookie)
         assert "softstart: Crane travel drive" in text
         port = int(url.rstrip("/").rpartition(":")[2])
         upgrade = (
