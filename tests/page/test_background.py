@@ -251,3 +251,26 @@ def test_jobs_are_shown_in_every_tab_of_their_user_and_after_a_reload(
     page.get_by_test_id("optimum-figures").wait_for()
     assert page.locator('.strategies tbody tr[data-name^="optimum"]').count() == 1
     second.close()
+
+
+def test_positions_limits_and_life_are_checked(page: Any, screenshot: Any) -> None:
+    for path, text in (("limits.shaft_torque", "70"), ("shaft.damping", "0.3")):
+        field = page.locator(f'[data-path="{path}"] input[type=text]')
+        field.fill(text)
+        field.press("Enter")
+    tab(page, "Checks")
+    page.get_by_test_id("checks-go").click()
+    done(page, "checks")
+    drive = CRANE.with_settings(["limits.shaft_torque=70", "shaft.damping=0.3"])
+    run = simulate(drive.replace(start_position="unknown"), "shaped")
+    row = page.get_by_test_id("checks-positions").locator("tr", has_text="shaped").inner_text().split()
+    assert row[-4:] == [f"{one.k_dyn:.3f}" for one in (*run.positions.values(), run)]
+    assert "exceeded" in page.get_by_test_id("checks-limits").locator("tr", has_text="direct").inner_text()
+    assert page.get_by_test_id("checks-life").locator("tr").count() > 5
+    page.get_by_test_id("checks-use").click()
+    page.locator('.strategies tbody tr[data-name^="quickest"]').wait_for()
+    for width, height in ((1280, 800), (1920, 1080)):
+        page.set_viewport_size({"width": width, "height": height})
+        screenshot(page, f"checks-{width}")
+        panel = page.locator(".instrument .panel").first
+        assert panel.evaluate("one => one.scrollWidth - one.clientWidth") <= 1

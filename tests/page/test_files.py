@@ -164,7 +164,7 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
 
 def test_a_drive_from_its_data_sheet(page: Any) -> None:
     """The sentences of what is missing, then the drive that `DataSheet` makes of the same numbers."""
-    page.get_by_role("tab", name="Data sheet", exact=True).click()
+    page.get_by_role("tab", name="Sheet", exact=True).click()
     before = page.locator(".drive-name").inner_text()
     page.get_by_test_id("sheet-use").click()
     trouble = page.get_by_test_id("sheet-trouble")

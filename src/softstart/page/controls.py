@@ -116,6 +116,8 @@ class Controls:
             self._session.set_parameter(_own(path), words or None)
         elif words:
             self._session.set(path, words)
+        elif self._entry(path).parameter.default is None:
+            self._session.clear(path)
         else:
             raise InputError(f"{path}: the field is empty; write for example {example}.")
 

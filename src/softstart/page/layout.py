@@ -31,8 +31,9 @@ WEB = Path(__file__).with_name("web")
 PANELS = (
     ("Optimum", "optimum_panel", "OptimumPanel"),
     ("Limit", "curve_panel", "CurvePanel"),
+    ("Checks", "checks_panel", "ChecksPanel"),
     ("Tuning", "tuning_panel", "TuningPanel"),
-    ("Data sheet", "data_sheet_panel", "DataSheetPanel"),
+    ("Sheet", "data_sheet_panel", "DataSheetPanel"),
     ("Log", "log_panel", "LogPanel"),
     ("Files", "files_panel", "FilesPanel"),
 )

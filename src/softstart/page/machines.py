@@ -70,6 +70,15 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("release", "release"),
         ("initial_load_speed", "speed before"),
     ),
+    "Limits": (
+        ("permissible_torque", "shaft torque"),
+        ("permissible_start_time", "start time"),
+        ("starts_per_hour", "starts per hour"),
+        ("required_life", "life"),
+        ("fatigue_slope", "slope of S-N"),
+        ("fatigue_torque", "S-N torque"),
+        ("fatigue_cycles", "S-N cycles"),
+    ),
 }  # fmt: skip
 SYMBOLS = {
     "starting_torque": "Ms",
@@ -207,6 +216,24 @@ def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
     if isinstance(machine, Chain):
         return Chain.from_toml(machine.to_toml(), also=settings)
     return machine.with_settings(f"{path}={text}" for path, text in settings.items())
+
+
+def without(machine: Machine, path: str) -> Machine:
+    """The machine without a value that it need not have: a limit, or what follows another parameter then.
+
+    >>> drive = Drive.load("crane-4amtkf").with_settings(["limits.shaft_torque=70"])
+    >>> print(without(drive, "limits.shaft_torque").limits.shaft_torque)
+    None
+    """
+    if not isinstance(machine, Chain):
+        return machine.replace(**{_OF_DRIVE[path].parameter.name: None})
+    table, _, name = path.partition(".")
+    if table == "motor" and machine.motor is not None:
+        return replace(machine, motor=machine.motor.replace(**{name: None}))
+    shafts = list(machine.shafts)
+    index = int(table.removeprefix("shaft[").rstrip("]")) - 1
+    shafts[index] = shafts[index].replace(**{name: None})
+    return replace(machine, shafts=tuple(shafts))
 
 
 def machine_from(text: str, where: str = "") -> Machine:

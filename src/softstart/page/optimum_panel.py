@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, cast
 
 from nicegui import ui
 
-from softstart.controller.finding import make_controller
 from softstart.errors import InputError
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
@@ -35,7 +34,6 @@ from softstart.page.session import Session
 from softstart.start.comparison import REFERENCE
 
 if TYPE_CHECKING:
-    from softstart.controller.base import Controller
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
 
@@ -113,7 +111,7 @@ class OptimumPanel:
         assert found is not None
         self._use.set_visibility(False)
         try:
-            self._session.add(label_of(found.best), player_of(found.best), select=False)
+            self._session.add(tasks.label_of(found.best), tasks.player_of(found.best), select=False)
         except InputError as error:  # the table is full
             self._sentence.set_text(" ".join(error.sentences))
         else:
@@ -121,7 +119,7 @@ class OptimumPanel:
 
     def _beside(self, best: Optimum) -> str:
         """What it is worth, against the constant torque."""
-        text = f"It is among the strategies: {label_of(best)}."
+        text = f"It is among the strategies: {tasks.label_of(best)}."
         if self._stale.stale or REFERENCE not in self._session.controllers:
             return text
         direct = self._session.result(REFERENCE)
@@ -131,21 +129,8 @@ class OptimumPanel:
 
     def _save(self, suffix: str) -> None:
         assert self._found is not None
-        name = file_name(label_of(self._found.best), suffix=suffix)
+        name = file_name(tasks.label_of(self._found.best), suffix=suffix)
         save(self._found.files[suffix], name)
-
-
-def player_of(best: Optimum) -> Controller:
-    """The controller that plays the optimum, under the name that it has among the strategies."""
-    player = make_controller("profile", {"profile": best.profile})
-    object.__setattr__(player, "name", label_of(best))  # as `softstart.controller.tuned` names tuned gains
-    return player
-
-
-def label_of(best: Optimum) -> str:
-    """What the optimum is called among the strategies."""
-    ending = "" if best.problem.terminal == "synchronous" else f", {best.problem.terminal}"
-    return f"optimum {best.end_time:.4g} s{ending}"
 
 
 def figures(best: Optimum) -> list[tuple[str, str]]:

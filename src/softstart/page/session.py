@@ -17,7 +17,7 @@ from softstart.chain.model import Chain, load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import Machine, changed, machine_from, moved, single
+from softstart.page.machines import Machine, changed, machine_from, moved, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
@@ -229,6 +229,10 @@ class Session:
         settings = {path: value if isinstance(value, str) else repr(float(value))
                     for path, value in changes.items()}  # fmt: skip
         self._put(gesture, drive=single(changed(self.machine, settings)))
+
+    def clear(self, path: str) -> None:
+        """Take a value back that the machine need not have, as a limit."""
+        self._put(drive=single(without(self.machine, path)))
 
     def move(self, gap: float, load_inertia: float) -> None:
         """Go to another place of the map: gap in rad, of a chain all gaps together, and inertia in kg m2."""

@@ -16,20 +16,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.model import Chain
-from softstart.controller.finding import ready_controller_names
-from softstart.drive import Drive
+from softstart.controller.finding import make_controller, ready_controller_names
+from softstart.drive import UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
-from softstart.page.machines import Machine
+from softstart.page.machines import Machine, changed
+from softstart.page.sentences import clipped
 from softstart.processes import Tell
 from softstart.quantities import show
+from softstart.start.comparison import compare
+from softstart.start.fatigue import fatigue
+from softstart.start.recommendation import recommend
 from softstart.start.simulation import simulate
 from softstart.tuning.solving import tune
-from softstart.views.printed import unit
+from softstart.views.printed import fixed, unit
 
 if TYPE_CHECKING:
     from softstart import reporting
@@ -42,12 +47,16 @@ if TYPE_CHECKING:
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
     from softstart.profile import TorqueProfile
+    from softstart.start.recommendation import Row
     from softstart.tuning.outcome import Tuning
+    from softstart.views import fatigue as lives
     from softstart.views import identification as shown
+    from softstart.views import optima
 else:  # they import scipy.optimize; in the server the first page would wait for that
     reporting, front = late("softstart.reporting"), late("softstart.optimal.front")
     logs, fits = late("softstart.identification.logs"), late("softstart.identification.solving")
-    shown = late("softstart.views.identification")
+    shown, optima = late("softstart.views.identification"), late("softstart.views.optima")
+    lives = late("softstart.views.fatigue")
     shortest, solving = late("softstart.optimal.shortest"), late("softstart.optimal.solving")
 
 LONG_MULTIPLES = (1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6)  # of the start time of direct: the easy end
@@ -84,6 +93,19 @@ def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, tell: Tell)
         ".c": text_of(lambda path: profile.to_c(path, about=about), ".c"),
     }
     return Gentlest(replace(best, warm=None), files)
+
+
+def player_of(best: Optimum) -> Controller:
+    """The controller that plays the optimum, under the name that it has among the strategies."""
+    player = make_controller("profile", {"profile": best.profile})
+    object.__setattr__(player, "name", label_of(best))  # as `softstart.controller.tuned` names tuned gains
+    return player
+
+
+def label_of(best: Optimum) -> str:
+    """What the optimum is called among the strategies."""
+    ending = "" if best.problem.terminal == "synchronous" else f", {best.problem.terminal}"
+    return f"optimum {best.end_time:.4g} s{ending}"
 
 
 def curve(
@@ -263,6 +285,103 @@ def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> 
     """C code that plays a torque profile."""
     tell(None, "writing C code")
     return text_of(lambda path: profile.to_c(path, about=about), ".c")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a check: a table, and sentences about it or about why there is none."""
+
+    name: str
+    title: str
+    headings: list[str]
+    rows: list[list[str]]
+    sentences: list[str]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What `checked` found: its parts, and the quickest start that keeps the limits if there are any."""
+
+    parts: list[Part]
+    quickest: Optimum | None
+
+
+def checked(machine: Machine, controllers: Mapping[str, Controller], *, tell: Tell) -> Checked:
+    """Strategies from each start position, margins to limits, life under them, and the quickest start."""
+    rows = {}
+    for done, (label, controller) in enumerate(controllers.items()):
+        tell(0.3 * done / len(controllers), f"limits: {label}")
+        with suppress(SimulationError):
+            rows[label] = compare(machine, [controller]).rows[0]
+    parts = [_positions(machine, controllers, tell), _margins(machine, rows), _life(machine, rows, tell)]
+    quickest = None
+    if isinstance(machine, Drive) and machine.limits:
+        tell(0.8, "the quickest start that keeps the limits")
+        name, title = "quickest", "The quickest start within limits"
+        try:
+            with no_solution_as_sentence():
+                best = solving.optimize(machine, limits=True)
+        except (InputError, SimulationError) as error:
+            parts.append(Part(name, title, [], [], [str(error)]))
+        else:
+            quickest = replace(best, warm=None)
+            said = [optima.comparison(best, [row.run for row in rows.values()]), optima.bound_sentence(best)]
+            parts.append(Part(name, title, [], [], said))
+    return Checked(parts, quickest)
+
+
+def _positions(machine: Machine, controllers: Mapping[str, Controller], tell: Tell) -> Part:
+    """K_dyn from each position at which a start may begin."""
+    name, title = "positions", "K_dyn by start position"
+    try:
+        unknown = changed(machine, {"start.position": "unknown"})
+    except InputError as error:
+        return Part(name, title, [], [], [f"It starts from one position alone. {' '.join(error.sentences)}"])
+    cells = []
+    for done, (label, controller) in enumerate(controllers.items()):
+        tell(0.3 + 0.3 * done / len(controllers), f"start positions: {label}")
+        with suppress(SimulationError):
+            run = simulate(unknown, controller)
+            each = [one.k_dyn for one in run.positions.values()]
+            cells.append([label, *(fixed(k, 3) for k in (*each, run.k_dyn))])
+    if not cells or len(cells[0]) < 3:
+        return Part(name, title, [], [], ["There is one position alone: no gap, or one that is wound up."])
+    cells.sort(key=lambda row: float(row[-1]))
+    return Part(
+        name, title, ["strategy", *(one.replace("-", " ") for one in UNKNOWN_POSITIONS), "worst"], cells, []
+    )
+
+
+def _margins(machine: Machine, rows: Mapping[str, Row]) -> Part:
+    """Which strategies keep the limits, with what margin."""
+    name, title = "limits", "Limits"
+    if not machine.limits:
+        lacking = "permissible_torque of its shafts" if isinstance(machine, Chain) else "[limits]"
+        return Part(
+            name, title, [], [], [f"{clipped(machine.name)} has no {lacking}: nothing can be exceeded."]
+        )
+    cells = [[label, row.against_limits] for label, row in rows.items()]
+    return Part(name, title, ["strategy", "limits"], cells, [recommend(machine, rows.values()).text])
+
+
+def _life(machine: Machine, rows: Mapping[str, Row], tell: Tell) -> Part:
+    """The life of the shaft line beside that under direct, of a chain that of each shaft."""
+    name, title = "life", "Life over that under direct"
+    tell(0.65, "life of the shaft line")
+    runs: Any = [row.run for row in rows.values()]
+    try:
+        if isinstance(machine, Chain):
+            shafts = chain_fatigue(runs)
+            shown = lives.chain_tables(shafts)[1]
+            said = [lives.chain_conclusion(shafts), *lives.chain_notes(shafts)]
+        else:
+            found = fatigue(runs)
+            shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
+            said = [lives.conclusion(found), *lives.notes(found)]
+    except InputError as error:
+        return Part(name, title, [], [], list(error.sentences))
+    headings = [column.heading.replace("\n", " ") for column in shown.columns]
+    return Part(name, title, headings, [list(row) for row in shown.rows], said)
 
 
 def ready(machine: Chain, *, tell: Tell) -> Chain:

@@ -355,6 +355,23 @@ def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
     assert max(screen.axes.gaps) == 0.02
 
 
+@pytest.mark.parametrize(
+    ("machine", "path", "text"),
+    [("crane-4amtkf", "limits.shaft_torque", "70"), ("crane-4-mass", "shaft[2].permissible_torque", "90")],
+)
+def test_a_limit_is_given_and_taken_back_by_an_empty_field(machine, path, text):
+    session = Session(machine, controllers=["direct"])
+    controls, screen = controls_of(session)
+    before = session.machine
+    controls.take({"what": "edit", "path": path, "text": text})
+    assert screen.first()["fields"][path][0] == text
+    assert session.machine.limits
+    controls.take({"what": "edit", "path": path, "text": ""})
+    assert not screen.mistakes
+    assert session.machine == before
+    assert not session.machine.limits
+
+
 def test_every_parameter_with_a_field_is_one_of_the_drive():
     screen = Screen(Session(controllers=["direct"]))
     shown = [row["path"] for group in screen.first()["groups"] for row in group["rows"]]

@@ -6,6 +6,7 @@ import csv
 import math
 import shlex
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, SimulationError, identify, optimize, simulate, tune
+from softstart import (
+    Chain,
+    Drive,
+    InputError,
+    SimulationError,
+    compare,
+    fatigue,
+    identify,
+    optimize,
+    simulate,
+    tune,
+)  # fmt: skip
 from softstart.controller import make_controller
 from softstart.identification.planning import made_up_log
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.curve_panel import StrategyPoint, against, csv_of, curve_svg
 from softstart.page.downloads import command_text, file_name
-from softstart.page.optimum_panel import label_of, player_of
 from softstart.page.sentences import changed_since
+from softstart.page.tasks import label_of, player_of
 from softstart.page.tuning_panel import controller_of, tunable
 
 CRANE = Drive.load("crane-4amtkf")
@@ -40,6 +52,46 @@ class Heard:
 
     def part(self, value: Any) -> None:
         self.parts.append(value)
+
+
+def test_checks_are_those_of_compare_fatigue_and_optimize() -> None:
+    """Each figure against the function that a reader can call: positions, margins, life, quickest start."""
+    drive = CRANE.with_settings(["limits.shaft_torque=70", "shaft.damping=0.3"])
+    controllers = {name: make_controller(name) for name in ("direct", "shaped", "ramp")}
+    heard = Heard()
+    found = tasks.checked(drive, controllers, tell=heard)  # type: ignore[arg-type]
+    positions, limits, life, quickest = found.parts
+    for label, *cells in positions.rows:
+        unknown = simulate(drive.replace(start_position="unknown"), label)
+        each = [unknown.positions[name].k_dyn for name in ("driving-flank", "mid-gap", "opposite-flank")]
+        assert cells == [f"{k:.3f}" for k in (*each, unknown.k_dyn)]
+    assert [float(row[-1]) for row in positions.rows] == sorted(float(row[-1]) for row in positions.rows)
+    rows = {row.run.controller_name: row for row in compare(drive, list(controllers)).rows}
+    assert limits.rows == [[name, rows[name].against_limits] for name in controllers]
+    lives = {
+        row.run.controller_name: row.relative for row in fatigue([one.run for one in rows.values()]).rows
+    }
+    assert [row[0] for row in life.rows] == sorted(lives, key=lambda name: -lives[name])
+    best = optimize(drive, limits=True)
+    assert found.quickest is not None
+    assert found.quickest.end_time == best.end_time
+    assert "forbids a quicker start" in quickest.sentences[0]
+    shares = [share for share in heard.shares if share is not None]
+    assert shares == sorted(shares)
+    assert 0.0 <= shares[0] < shares[-1] <= 1.0
+
+
+def test_checks_say_why_a_part_is_missing() -> None:
+    chain = Chain.load("crane-4-mass")
+    controllers = {name: make_controller(name) for name in ("direct", "take-up")}
+    found = tasks.checked(chain, controllers, tell=Heard())  # type: ignore[arg-type]
+    assert found.quickest is None
+    positions, limits, life = found.parts
+    run = simulate(replace(chain, position="unknown"), "take-up")
+    assert positions.rows[0] == ["take-up", *(f"{one.k_dyn:.3f}" for one in (*run.positions.values(), run))]
+    assert (limits.rows, life.rows) == ([], [])
+    assert "permissible_torque" in limits.sentences[0]
+    assert "damping is missing" in life.sentences[0]
 
 
 def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
