@@ -40,14 +40,16 @@ export class Scheme {
       return { left, long, gap: shafts[shaft].gap, rear, front, right: lefts[i + 1], number: several ? below(shaft + 1) : "" };
     });
     this.bodies = lefts.map((left, i) => ({ left, wide, high: i === count - 1 ? HIGH + 8 : HIGH }));
-    const box = ({ left, high }) => `<rect class="body" x="${left.toFixed(1)}" y="${MIDDLE - high / 2}" width="${wide.toFixed(1)}" height="${high}" rx="2"><title></title></rect>`;
+    const driven = this.ends.findIndex((end) => end >= motor);
+    const kind = (i) => (i === driven ? " motor" : i === count - 1 ? " load" : "");
+    const box = ({ left, high }, i) => `<rect class="body${kind(i)}" x="${left.toFixed(1)}" y="${MIDDLE - high / 2}" width="${wide.toFixed(1)}" height="${high}" rx="2"><title></title></rect>`;
     const fork = ({ gap, rear, front, right }, i) => (gap > 0
       ? `<path d="M${right} ${MIDDLE}H${front}V14H${rear}"/><path class="flank rear" data-shaft="${i}" stroke-width="2.4" d="M${rear} 14v10M${rear} 38v10"/><path class="flank front" data-shaft="${i}" stroke-width="2.4" d="M${front} 14v34"/><path d="M${rear} 48H${front}" stroke-dasharray="1 5"/><path class="pin" data-shaft="${i}" stroke-width="3.4"/>`
       : "") + `<path class="shaft" data-shaft="${i}"/>`;
     const said = several
       ? `Chain of ${bodies.length} bodies: ${bodies.map(({ name }) => name).join(", ")}; a gap in ${shafts.filter(({ gap }) => gap > 0).length} of its shafts`
       : "Motor inertia J1, shaft of stiffness c and damping d, gap, load inertia J2";
-    const turn = lefts[this.ends.findIndex((end) => end >= motor)];
+    const turn = lefts[driven];
     this.place.innerHTML = `
 <svg viewBox="0 0 ${width.toFixed(0)} 62" role="img">
   <g fill="none" stroke="currentColor" stroke-width="1.4">
