@@ -88,7 +88,8 @@ BUDGET = {
     "plant": (3171, 16, 2, 0),
     # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed; 370 and a file: the report of a chain
-    "reporting": (3790, 15, 4, 0),
+    # 15: lives of its shafts, parameters with their units
+    "reporting": (3805, 15, 4, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,

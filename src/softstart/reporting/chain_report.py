@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.model import Chain
 from softstart.chain.vibration import natural_vibration
 from softstart.controller import Controller
@@ -23,8 +24,9 @@ from softstart.start.comparison import REFERENCE, Comparison, compared
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 from softstart.views import chain_schemes, chains, starts
+from softstart.views import fatigue as lives
 from softstart.views.numbers import Table
-from softstart.views.printed import digits, fixed, short
+from softstart.views.printed import digits, fixed, short, unit
 
 MOST_SHAFTS = 6  # with a column each in the table of strategies
 
@@ -265,14 +267,9 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
     for row in reversed(_shown(report)):
         key = f"start-{label_of(row.run.controller)}"
         title = f"{row.name}: torques, speeds and twists"
-        values = [
-            f"{name} = {short(value) if isinstance(value, float) else value}"
-            for name, value in row.run.controller.parameters.items()
-            if value is not None
-        ]
         parts += [
             tag("h3", row.name),
-            tag("p", f"Parameters, in SI: {', '.join(values)}.") if values else None,
+            tag("p", f"Parameters: {values}.") if (values := _parameters(row.run.controller)) else None,
             _printed(chains.shaft_table(row.run)),
         ]
         pictures.append(
@@ -283,7 +280,31 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
                 "half its gap (within -1 and 1 the gap is open).",
             )
         )
-    return html(*parts, *pictures)
+    return html(*parts, *pictures, _life(report))
+
+
+def _parameters(controller: Controller) -> str:
+    """What the controller is set up with, each value in its unit."""
+    words = []
+    for one in fields(controller):
+        value = getattr(controller, one.name)
+        if value is not None and "unit" in one.metadata:
+            number = short(value) if isinstance(value, float) else str(value)
+            words.append(f"{one.name.replace('_', ' ')} {number} {unit(one.metadata['unit'])}".strip())
+    return ", ".join(words)
+
+
+def _life(report: ChainReport) -> Html:
+    """The life of each shaft beside that under direct, or why it is not counted."""
+    title = tag("h3", "Life of the shafts")
+    rows = _gentlest_first(report)
+    try:
+        found = chain_fatigue([row.run for row in rows])
+    except InputError as error:
+        return html(title, tag("p", f"Not counted: {' '.join(error.sentences)}"))
+    shown = lives.chain_tables(found)[1] if len(report.drive.shafts) <= MOST_SHAFTS else None
+    notes = [lives.chain_conclusion(found), *lives.chain_notes(found)]
+    return html(title, shown and _printed(shown), tag("p", " ".join(notes)))
 
 
 def _start_picture(row: Row, key: str, title: str) -> Html:
@@ -329,8 +350,7 @@ def _validity(chain: Chain) -> Html:
         "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
         "The equations are solved as Taylor series from event to event; peaks are located, not read off "
         "a grid.",
-        "Not in this report: optima and bounds (softstart optimize and pareto take the chain), lives "
-        "(softstart fatigue), maps over wear and load, and parameter sheets for inverters (for the "
-        "drive that softstart reduce writes).",
+        "Not in this report: optima and bounds (softstart optimize and pareto take the chain), maps over "
+        "wear and load, and parameter sheets for inverters (for the drive that softstart reduce writes).",
     ]
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from softstart import Chain, InputError, simulate_chain
+from softstart.chain import chain_fatigue
 from softstart.reporting import ChainReport, Project, report_chain
 
 CHAIN = Chain.load("crane-4-mass")
@@ -32,6 +33,18 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
     for name in CHAIN.shaft_names:
         assert name in page
     assert page.count("<figure>") == 5
+
+
+def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(made):
+    assert "Not counted: damping is missing in rotor - pinion" in made.to_html()
+    assert "take up speed 2.70452 rad/s, " in made.to_html()
+    damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
+    page = report_chain(damped, controllers=["take-up"]).to_html()
+    found = chain_fatigue([simulate_chain(damped, name) for name in ("take-up", "direct")])
+    last = re.findall(r">take-up</th>(.*?)</tr>", page)[-1]
+    relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
+    assert relative == pytest.approx([life.relative for life in found.rows[0]], rel=5e-3)
+    assert "Longest life: take-up" in page
 
 
 def test_limits_pass_or_fail_by_the_worst_case(made):
