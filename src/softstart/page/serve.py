@@ -32,13 +32,14 @@ from softstart.page import USER
 
 if TYPE_CHECKING:
     import fastapi
+    import nicegui
     import uvicorn
     from nicegui import ui
 
     from softstart.page import layout
     from softstart.page.machines import Machine
 else:  # of the extra "ui", and only for a server
-    fastapi, uvicorn, ui = late("fastapi"), late("uvicorn"), late("nicegui.ui")
+    fastapi, uvicorn, nicegui, ui = late("fastapi"), late("uvicorn"), late("nicegui"), late("nicegui.ui")
     layout = late("softstart.page.layout")
 
 DEFAULT_PORT = 8765
@@ -190,6 +191,8 @@ def application(drive: Machine) -> App:
     def page() -> None:
         layout.page(drive)
 
+    # the bar of Quasar for requests of a page has no name for screen readers, and here nothing waits for one
+    nicegui.app.config.quasar_config["loadingBar"]["skipHijack"] = True
     ui.run_with(
         app,
         dark=None,
