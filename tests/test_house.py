@@ -80,7 +80,7 @@ BUDGET = {
     # 220 and a file: start positions, limits and life are checked; limits are fields
     # 465: a chain in place of the drive: its fields, sliders, traces of all shafts, stages of all gaps, map
     # 111: a start that is kept as a reference, and goes with link and undo; values in their unit
-    "page": (5555, 21, 3, 0),
+    "page": (5565, 21, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart

@@ -254,6 +254,7 @@ def test_jobs_are_shown_in_every_tab_of_their_user_and_after_a_reload(
 
 
 def test_positions_limits_and_life_are_checked(page: Any, screenshot: Any) -> None:
+    page.locator(".controls summary").click()
     for path, text in (("limits.shaft_torque", "70"), ("shaft.damping", "0.3")):
         field = page.locator(f'[data-path="{path}"] input[type=text]')
         field.fill(text)

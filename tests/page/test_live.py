@@ -457,7 +457,7 @@ def test_colours_follow_the_system_and_the_switch(page):
     page.wait_for_function(f"{paper} != 'rgb(255, 255, 255)'")
 
 
-def test_no_request_leaves_the_machine_and_no_cookie_is_set(page, server):
+def test_no_request_leaves_the_machine_and_one_cookie_tells_browsers_apart(page, server):
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.on("websocket", lambda socket: asked.append(socket.url))
@@ -468,7 +468,10 @@ def test_no_request_leaves_the_machine_and_no_cookie_is_set(page, server):
     foreign = [url for url in asked if url.split("//")[-1].split("/")[0] != place]
     assert [url for url in foreign if not url.startswith(("data:", "blob:"))] == []
     assert any(url.startswith("ws://") for url in asked)
-    assert page.context.cookies() == []
+    (cookie,) = page.context.cookies()  # whose jobs are shown in all tabs; it ends with the browser
+    assert re.fullmatch(r"softstart-\d+-user", cookie["name"])
+    assert (cookie["httpOnly"], cookie["sameSite"], cookie["expires"]) == (True, "Strict", -1)
+    assert cookie["domain"] == "127.0.0.1"
 
 
 def test_with_a_token_the_page_opens_by_it_and_by_nothing_else(start_server, visit, browser):
@@ -478,8 +481,9 @@ def test_with_a_token_the_page_opens_by_it_and_by_nothing_else(start_server, vis
     assert "token" not in page.url
     drag(page, "shaft.gap", 0.25, 0.5, 5)  # the socket is let in by the cookie
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] input[type=text]').value > 0.8")
-    (cookie,) = page.context.cookies()
-    assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
+    cookies = page.context.cookies()
+    assert len(cookies) == 2  # the pass, and whose browser it is
+    assert {(one["httpOnly"], one["sameSite"]) for one in cookies} == {(True, "Strict")}
     stranger = browser.new_page()
     assert stranger.goto(bare).status == 401
     assert "needs its token" in stranger.inner_text("body")

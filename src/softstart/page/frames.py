@@ -22,6 +22,7 @@ from softstart.drive import Drive
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.machines import (
+    LIMITS,
     Axes,
     Entry,
     Machine,
@@ -135,8 +136,9 @@ class Screen:
 
     def _groups(self) -> Frame:
         """The fields of the machine in their groups, if the browser has others."""
-        wanted = tuple(
-            (path, one.group, one.label, path in self.scales) for path, one in self.entries.items()
+        wanted = (
+            bool(self._origin.limits),
+            *((path, one.group, one.label, path in self.scales) for path, one in self.entries.items()),
         )
         if self._groups_of == wanted:
             return {}
@@ -144,7 +146,12 @@ class Screen:
         found: dict[str, list[Frame]] = {}
         for path, one in self.entries.items():
             found.setdefault(one.group, []).append(_field(one, path in self.scales))
-        return {"groups": [{"title": title, "rows": rows} for title, rows in found.items()]}
+        folded = "" if self._origin.limits else LIMITS
+        return {
+            "groups": [
+                {"title": title, "rows": rows, "folded": title == folded} for title, rows in found.items()
+            ]
+        }
 
     # parameters of the selected strategy ---------------------------------------------------------------
 

@@ -35,6 +35,8 @@ MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
 ZETA = "\N{GREEK SMALL LETTER ZETA}"
 MOST_DAMPING = 0.2  # damping ratio of a shaft, by its slider: geared trains have 0.01 to 0.06
 
+LIMITS = "Limits"  # the group that is folded where there are none
+
 # by group: names of the parameters of a drive, and what stands before the field
 GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "Drive": (("name", "name"),),
@@ -70,7 +72,7 @@ GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("release", "release"),
         ("initial_load_speed", "speed before"),
     ),
-    "Limits": (
+    LIMITS: (
         ("permissible_torque", "shaft torque"),
         ("permissible_start_time", "start time"),
         ("starts_per_hour", "starts per hour"),

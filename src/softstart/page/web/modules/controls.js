@@ -20,7 +20,12 @@ export class Controls {
   // the parameters of the drive or chain, in place of those of the one before
   machine(groups) {
     for (const path of this.rows.keys()) if (!path.startsWith("strategy.")) this.rows.delete(path);
-    this.groups.replaceChildren(...groups.map(({ title, rows }) => this.box(title, rows)));
+    this.groups.replaceChildren(...groups.map(({ title, rows, folded }) => {
+      const box = this.box(title, rows);
+      if (!folded) return box;
+      box.firstChild.remove();
+      return element("details", {}, element("summary", {}, title), box);
+    }));
   }
 
   // the parameters of the selected strategy, in place of those of the one before
