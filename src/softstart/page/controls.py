@@ -10,7 +10,7 @@ from typing import Any
 from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, STRATEGY, Screen
-from softstart.page.machines import Entry
+from softstart.page.machines import Entry, values_of
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 
@@ -126,7 +126,11 @@ class Controls:
         if path in self._screen.strategy_paths():
             self._session.set_parameter(_own(path), None)
         else:
-            self._session.set(path, self._entry(path).value(self._session.origin))
+            loaded = values_of(self._session.origin)[self._entry(path).path][1]
+            if loaded is None:
+                self._session.clear(path)
+            else:
+                self._session.set(path, loaded)
 
     def _entry(self, path: str) -> Entry:
         if path not in self._screen.entries:

@@ -37,6 +37,7 @@ from softstart.page.machines import (
     scales_about,
     scales_of,
     told,
+    values_of,
 )
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
@@ -442,17 +443,19 @@ def fields(
     A mark is a position on the slider and what it means.
     """
     shown: dict[str, list[Any]] = {}
+    now, before = values_of(machine), values_of(origin)
     for path, one in shown_entries.items():
-        value, si = one.value(machine), one.parameter.unit
+        scale, si = scales.get(path), one.parameter.unit
+        none = None if scale is None else 0.0  # no damping is a damping ratio of 0
+        both: list[Any] = [none if each[path][1] is None else each[path][1] for each in (now, before)]
+        value, first = both
         if value is None:
             continue
         if isinstance(value, tuple):
             shown[path] = ["; ".join(written(part, si) for part in value), None, ""]
             continue
         text = value if isinstance(value, str) else written(float(value), si)
-        scale = scales.get(path)
         position = scale.position(float(value)) if scale else None
-        first = one.value(origin)
         marks = [[scale.position(float(first)), f"as loaded: {written(float(first), si)}"]] if scale else []
         shown[path] = [text, position, otherwise(si, value), marks]
     return shown

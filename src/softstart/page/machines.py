@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.elements import MOTOR, START, TOP, Mass, Shaft
+from softstart.chain.elements import START, TOP, Shaft
 from softstart.chain.model import Chain, is_chain_text
 from softstart.chain.run import mean_torque_of
 from softstart.chain.simulation import drive_of
@@ -98,17 +98,13 @@ SYMBOLS = {
 
 @dataclass(frozen=True)
 class Entry:
-    """One field of the page: which parameter of the machine it is, and what stands before it.
-
-    `value(machine)` is what the machine has there; `path` is what `--set` calls it.
-    """
+    """One field of the page: what `--set` calls it, its parameter, its group, and what stands before it."""
 
     path: str
     parameter: Parameter
     group: str
     label: str
     symbol: str
-    value: Callable[[Any], Any]
 
 
 def entries(machine: Machine) -> Mapping[str, Entry]:
@@ -116,59 +112,46 @@ def entries(machine: Machine) -> Mapping[str, Entry]:
 
     >>> list(entries(Drive.load("crane-4amtkf")))[:2]
     ['name', 'motor.starting_torque']
-    >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].value(Chain.load("crane-4-mass"))
-    0.2
+    >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].group
+    'pinion - wheel shaft'
     """
-    if isinstance(machine, Chain):
-        return MappingProxyType({one.path: one for one in _of_chain(machine)})
-    return _OF_DRIVE
+    known = values_of(machine)
+    rows = _rows_of_chain(machine) if isinstance(machine, Chain) else _rows_of_drive()
+    made = (Entry(path, known[path][0], *words) for path, *words in rows if path in known)
+    return MappingProxyType({one.path: one for one in made})
 
 
-def _of_drive() -> Iterator[Entry]:
+def _rows_of_drive() -> Iterator[tuple[str, str, str, str]]:
+    """Path, group, label and symbol of each field of a drive."""
     for group, rows in GROUPS.items():
         for name, label in rows:
-            one = PARAMETERS[name]
-            yield Entry(one.path, one, group, label, SYMBOLS.get(name, ""), _attribute(name))
+            yield PARAMETERS[name].path, group, label, SYMBOLS.get(name, "")
 
 
-def _of_chain(chain: Chain) -> Iterator[Entry]:
-    motor = {one.name: one for one in MOTOR.parameters}
+def _rows_of_chain(chain: Chain) -> Iterator[tuple[str, str, str, str]]:
+    """The same of a chain: its motor, then masses and shafts in their order."""
     for name, label in GROUPS["Motor"]:
-        if name in motor and chain.motor is not None:
-            yield Entry(
-                f"motor.{name}", motor[name], "Motor", label, SYMBOLS.get(name, ""), _of("motor", name)
-            )
+        yield f"motor.{name}", "Motor", label, SYMBOLS.get(name, "")
     for i, mass in enumerate(chain.masses):
-        for name, label, symbol in (("inertia", "inertia", "J"), ("torque", "load torque", "M")):
-            if name == "inertia" or mass.torque or i == chain.load_index:
-                where = f"mass[{i + 1}].{name}"
-                yield Entry(
-                    where, Mass.PARAMETERS[name], mass.name, label, symbol + _below(i), _of("masses", name, i)
-                )
-        if i == len(chain.shafts):
-            continue
-        shaft, group = chain.shafts[i], chain.shaft_names[i]
-        damping, letter = ("damping", "d") if shaft.damping > 0.0 else ("damping_ratio", ZETA)
-        for name, label, symbol in (
-            ("gap", "total gap", "\N{GREEK SMALL LETTER DELTA}"),
-            ("stiffness", "stiffness", "c"),
-            (damping, damping.replace("_", " "), letter),
-            ("permissible_torque", "permissible", ""),
-        ):  # fmt: skip
-            if not shaft.rigid or name not in ("stiffness", damping):
-                where = f"shaft[{i + 1}].{name}"
-                yield Entry(
-                    where,
-                    Shaft.PARAMETERS[name],
-                    group,
-                    label,
-                    symbol and symbol + _below(i),
-                    _of("shafts", name, i),
-                )
-    start = {one.name: one for one in START.parameters}
+        yield f"mass[{i + 1}].inertia", mass.name, "inertia", f"J{_below(i)}"
+        if mass.torque or i == chain.load_index:
+            yield f"mass[{i + 1}].torque", mass.name, "load torque", f"M{_below(i)}"
+        if i < len(chain.shafts):
+            yield from _rows_of_shaft(chain.shafts[i], i, chain.shaft_names[i])
     for name, label in (("target_speed", "target speed"), ("position", "position")):
-        symbol = SYMBOLS.get(name, "")
-        yield Entry(f"start.{name}", start[name], "Start", label, symbol, _attribute(name))
+        yield f"start.{name}", "Start", label, SYMBOLS.get(name, "")
+
+
+def _rows_of_shaft(shaft: Shaft, index: int, group: str) -> Iterator[tuple[str, str, str, str]]:
+    where = f"shaft[{index + 1}]"
+    yield f"{where}.gap", group, "total gap", f"{SYMBOLS['gap']}{_below(index)}"
+    if not shaft.rigid:
+        yield f"{where}.stiffness", group, "stiffness", f"c{_below(index)}"
+        if shaft.damping > 0.0:
+            yield f"{where}.damping", group, "damping", f"d{_below(index)}"
+        else:
+            yield f"{where}.damping_ratio", group, "damping ratio", f"{ZETA}{_below(index)}"
+    yield f"{where}.permissible_torque", group, "permissible", ""
 
 
 def _below(index: int) -> str:
@@ -176,26 +159,12 @@ def _below(index: int) -> str:
     return "".join(chr(ord("\N{SUBSCRIPT ZERO}") + int(digit)) for digit in str(index + 1))
 
 
-def _attribute(name: str) -> Callable[[Any], Any]:
-    return lambda machine: getattr(machine, name)
-
-
-def _of(part: str, name: str, index: int | None = None) -> Callable[[Any], Any]:
-    """Reads a parameter of a chain's motor, mass or shaft; no damping is a damping ratio of 0."""
-
-    def value(chain: Any) -> Any:
-        owner = getattr(chain, part) if index is None else getattr(chain, part)[index]
-        found = getattr(owner, name)
-        return 0.0 if found is None and name == "damping_ratio" else found
-
-    return value
-
-
-_OF_DRIVE: Mapping[str, Entry] = MappingProxyType({one.path: one for one in _of_drive()})
-
-
 def values_of(machine: Machine) -> Values:
-    """All parameters of a machine by their paths, each with its value."""
+    """All parameters of a machine by their paths, each with its value.
+
+    >>> values_of(Chain.load("crane-4-mass"))["shaft[2].gap"][1]
+    0.2
+    """
     if not isinstance(machine, Chain):
         return {one.path: (one, getattr(machine, name)) for name, one in PARAMETERS.items()}
     found = {one.name: (one, getattr(machine, one.name)) for one in TOP.parameters}
@@ -228,10 +197,12 @@ def without(machine: Machine, path: str) -> Machine:
     None
     """
     if not isinstance(machine, Chain):
-        return machine.replace(**{_OF_DRIVE[path].parameter.name: None})
+        return machine.replace(**{values_of(machine)[path][0].name: None})
     table, _, name = path.partition(".")
     if table == "motor" and machine.motor is not None:
         return replace(machine, motor=machine.motor.replace(**{name: None}))
+    if table == "start":
+        return replace(machine, target_speed=None)  # the rated speed of the motor then
     shafts = list(machine.shafts)
     index = int(table.removeprefix("shaft[").rstrip("]")) - 1
     shafts[index] = shafts[index].replace(**{name: None})

@@ -18,7 +18,17 @@ from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen, channels_at, open_somewhere, traces_of
-from softstart.page.machines import GROUPS, axes_about, changed, entries, here, k_dyn_row, moved, scales_about
+from softstart.page.machines import (
+    GROUPS,
+    axes_about,
+    changed,
+    entries,
+    here,
+    k_dyn_row,
+    moved,
+    scales_about,
+    values_of,
+)  # fmt: skip
 from softstart.page.sentences import changed_since, differences
 from softstart.page.session import Session
 
@@ -52,20 +62,46 @@ def test_the_figures_of_a_chain_are_those_of_simulate():
     assert session.machine is DAMPED
 
 
+@pytest.mark.parametrize("path", ["start.target_speed", "motor.maximum_torque", "motor.minimum_torque"])
+def test_an_empty_field_gives_back_what_follows_another_one(path):
+    """The rated speed is the target then, the starting torque the largest; or it says what it needs."""
+    session, screen, controls = screen_of(CHAIN, "direct")
+    before = session.machine
+    controls.take({"what": "edit", "path": path, "text": ""})
+    if path == "motor.minimum_torque":
+        assert "the field is empty" in screen.mistakes[path]
+        assert session.machine is before
+    else:
+        assert not screen.mistakes
+        assert session.machine.target_speed == CHAIN.motor.rated_speed
+        assert session.machine.motor.maximum_torque >= CHAIN.motor.starting_torque
+
+
+def test_a_damping_ratio_that_was_not_given_is_taken_back():
+    session, screen, controls = screen_of(CHAIN, "direct")
+    controls.take({"what": "slide", "path": "shaft[2].damping_ratio", "position": 60})
+    assert session.machine.shafts[1].damping_ratio == 0.02
+    controls.take({"what": "reset", "path": "shaft[2].damping_ratio"})
+    assert not screen.mistakes
+    assert session.machine == CHAIN
+    assert screen.first()["fields"]["shaft[2].damping_ratio"][:2] == ["0", 0]
+
+
 @pytest.mark.parametrize(
     "chain", [CHAIN, DAMPED, Chain.load("tractor-like")], ids=["bare", "damped", "tractor"]
 )
 def test_each_field_reads_what_it_writes(chain):
     """Every slider is set to its middle, every value written back as it is shown: nothing else changes."""
-    for path, one in entries(chain).items():
-        value = one.value(chain)
+    before = {path: values_of(chain)[path][1] for path in entries(chain)}
+    for path, value in before.items():
         if isinstance(value, float):
-            assert one.value(changed(chain, {path: repr(value)})) == value
+            assert values_of(changed(chain, {path: repr(value)}))[path][1] == value
     for path, scale in scales_about(chain).items():
-        there = changed(chain, {path: repr(scale.value(300))})
-        assert entries(chain)[path].value(there) == scale.value(300)
-        other = {key: one.value(there) for key, one in entries(chain).items() if key != path}
-        assert other == {key: one.value(chain) for key, one in entries(chain).items() if key != path}
+        there = values_of(changed(chain, {path: repr(scale.value(300))}))
+        assert there[path][1] == scale.value(300)
+        assert {key: there[key][1] for key in before if key != path} == {
+            key: value for key, value in before.items() if key != path
+        }
 
 
 def test_traces_hold_each_shaft_and_body():
