@@ -57,6 +57,7 @@ def clipped(name: str) -> str:
 def changed_since(computed: Machine, now: Machine) -> str:
     """What a result was computed for, where that is not the drive of now; empty where it is.
 
+    >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> changed_since(crane, crane)
     ''
@@ -75,6 +76,7 @@ def changed_since(computed: Machine, now: Machine) -> str:
 def differences(drive: Machine, other: Machine) -> str:
     """What tells a drive or chain from another one: its name, else its values; empty where both start alike.
 
+    >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
     'shaft.gap 1 rad, load.inertia 0.2 kg m2'
