@@ -34,6 +34,8 @@ target_sped = 92
 
 
 def put(page: Any, name: str, content: bytes) -> None:
+    # the one before is cleared away by the server: what is chosen meanwhile would go with it
+    page.wait_for_function("document.querySelectorAll('.q-uploader__file').length === 0")
     page.locator('input[type="file"]').set_input_files(
         {"name": name, "mimeType": "application/toml", "buffer": content}
     )
