@@ -198,6 +198,7 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
             page.wait_for_function(
                 "name => document.querySelector('.figure .name').textContent === name", arg=select
             )
+            page.wait_for_selector(".player button[title=Play]:enabled")  # its start is drawn
         return page
 
     visiting.wrong = wrong  # type: ignore[attr-defined]

@@ -195,6 +195,26 @@ def test_what_is_seen_is_saved_as_svg(page):
     assert all(0.0 < x <= float(root.get("width")) and y > 0.0 for x, y in places)
 
 
+def test_a_file_saved_while_figures_arrive_is_whole(page):
+    """What the server sends is drawn with the next picture; a file may be asked for before that."""
+    page.evaluate("""() => {
+      const { instrument } = window.getElement(document.querySelector(".instrument"));
+      const take = instrument.take.bind(instrument);
+      window.files = [];
+      instrument.take = (number, frame) => {
+        take(number, frame);
+        if (frame.traces?.direct) window.files.push([instrument.plots.svg(), instrument.plots.csv()]);
+      };
+    }""")
+    page.locator('[data-path="shaft.gap"] input[type=text]').fill("0.6 rad")
+    page.locator('[data-path="shaft.gap"] input[type=text]').press("Enter")
+    page.wait_for_function("window.files.length > 0")
+    for svg, table in page.evaluate("window.files"):
+        assert "shaft T" in svg
+        assert "No start to draw" not in svg
+        assert len(table.splitlines()) > 100
+
+
 def test_the_gentlest_is_selected_at_first(visit):
     page = visit(select="")
     wait_for_rows(page)

@@ -8,7 +8,6 @@ import { Scheme } from "./scheme.js";
 import { Steps } from "./steps.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
-import { unpack } from "./trace.js";
 
 const KEPT = "softstart-bench";
 
@@ -86,7 +85,7 @@ export class Instrument {
     }
     for (const row of frame.rows ?? []) state.rows.set(row.name, { ...state.rows.get(row.name), ...row });
     for (const [name, packed] of Object.entries(frame.traces ?? {})) {
-      if (packed) state.traces.set(name, packed); // unpacked when drawn: most are overtaken before
+      if (packed) state.traces.set(name, packed);
       else state.traces.delete(name);
       this.plotted = false;
     }
@@ -143,9 +142,6 @@ export class Instrument {
     this.table.show(this.state);
     if (!this.plotted) {
       this.plotted = true;
-      for (const [name, packed] of this.state.traces) if (packed.data) this.state.traces.set(name, unpack(packed));
-      const { reference } = this.state;
-      if (reference?.trace?.data) reference.trace = unpack(reference.trace);
       this.plots.draw(this.state);
     }
     this.map.draw(this.state);

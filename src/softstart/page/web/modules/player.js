@@ -21,10 +21,12 @@ export class Player {
       this.press("\u2212", "Zoom out (\u2212)", () => plots.zoom(2)),
       this.press("+", "Zoom in (+)", () => plots.zoom(0.5)),
       (this.all = this.press("all", "The whole start, all of it (0)", () => plots.show(null))));
-    const files = element("span", { role: "group", "aria-label": "What is seen, as a file" },
+    this.files = [
       this.press("SVG", "The plots as they are seen, as SVG", () => this.save("svg", "image/svg+xml", plots.svg())),
-      this.press("CSV", "The points that are seen, as CSV", () => this.save("csv", "text/csv", plots.csv())));
+      this.press("CSV", "The points that are seen, as CSV", () => this.save("csv", "text/csv", plots.csv()))];
+    const files = element("span", { role: "group", "aria-label": "What is seen, as a file" }, ...this.files);
     place.append(this.button, this.slider, this.said, this.speed, windows, files);
+    this.show(null);
   }
 
   press(text, title, act) {
@@ -48,6 +50,8 @@ export class Player {
     const text = t === null ? "" : `${significant(1000 * t, 4)} ms`;
     if (this.said.textContent !== text) this.said.textContent = text;
     this.all.disabled = this.plots.window === null;
+    this.button.disabled = to <= from;
+    for (const file of this.files) file.disabled = !this.plots.box; // until a start is drawn
   }
 
   toggle() {
@@ -56,7 +60,6 @@ export class Player {
       return;
     }
     const [from, to] = this.span();
-    if (to <= from) return;
     const held = this.plots.held;
     this.plots.hold(held === null || held < from || held >= to ? from : held);
     this.button.textContent = "\u23f8\ufe0e";
@@ -67,10 +70,12 @@ export class Player {
 
   step(now) {
     const to = this.span()[1];
-    const t = Math.min(this.plots.held + Math.max(now - this.last, 0) / 1000 / this.speed.value, to);
+    const passed = Math.max(now - this.last, 0) / 1000 / this.speed.value;
     this.last = now;
-    this.plots.hold(t);
-    if (t >= to) this.stop();
+    const drawn = this.plots.box; // not for a moment, where another strategy was selected
+    const t = Math.min(this.plots.held + passed, to);
+    if (drawn) this.plots.hold(t);
+    if (drawn && t >= to) this.stop();
     else this.playing = requestAnimationFrame((next) => this.step(next));
   }
 

@@ -2,7 +2,7 @@
 // moved by wheel, drag and keys; an instant is pointed at by the mouse, or held by a press, the keys and the player.
 import { below, fixed, label, Range, sharp, significant, ticks } from "./numbers.js";
 import { SvgPen } from "./svg.js";
-import { extent, indexAt, valueAt } from "./trace.js";
+import { extent, indexAt, unpackAll, valueAt } from "./trace.js";
 
 const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24, LINE = 15;
 const SHARES = [0.5, 0.25, 0.25];
@@ -158,6 +158,7 @@ export class Plots {
   draw(state, sheet = sharp(this.canvas)) {
     this.state = state;
     if (!sheet) return;
+    unpackAll(state);
     const { pen, width, height } = sheet;
     const main = state.traces.get(state.selected);
     pen.font = `11px ${this.theme.font}`;
@@ -593,6 +594,7 @@ export class Plots {
   // points of the traces that are drawn, between the ends of the window; a start after the other
   csv() {
     const { state } = this;
+    unpackAll(state);
     const [from, to] = this.seen;
     const main = state.traces.get(state.selected);
     const parts = many(main)

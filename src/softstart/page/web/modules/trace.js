@@ -1,12 +1,18 @@
 // A start as the browser has it: channels over time, what they are at an instant, and where the bodies stand.
 // rows of single-precision numbers in base 64, as the server packs them
-export function unpack(packed) {
+function unpack(packed) {
   const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
   const all = new Float32Array(bytes.buffer);
   const size = all.length / packed.channels.length;
   const found = { ...packed, data: undefined };
   packed.channels.forEach((name, row) => (found[name] = all.subarray(row * size, (row + 1) * size)));
   return found;
+}
+
+// the traces of what the page knows, each unpacked when first looked at: most are overtaken before
+export function unpackAll(state) {
+  for (const [name, trace] of state.traces) if (trace.data) state.traces.set(name, unpack(trace));
+  if (state.reference?.trace?.data) state.reference.trace = unpack(state.reference.trace);
 }
 
 // index of the first instant that is not before t
