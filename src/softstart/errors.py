@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from softstart.language import said
+
 MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
 MOST, LONGEST = 30, 1500  # sentences of one error, and letters of one sentence: more would fill pages
 
@@ -68,4 +70,6 @@ def listed(words: Sequence[str]) -> str:
     >>> listed(["a", "b", "c"]), listed(["a"])
     ('a, b and c', 'a')
     """
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    if len(words) < 2:
+        return "".join(words)
+    return said("{words} and {last}", words=", ".join(words[:-1]), last=words[-1])

@@ -55,7 +55,18 @@ BROWSERS = (
     "C:/Program Files/Google/Chrome/Application/chrome.exe",
     "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
 )
+EXAMPLES = {"--out": "report.html", "--pdf": "report.pdf", "--sentences": "german.toml"}
 PRINTING = 120.0  # s for a browser to print a report
+
+
+def _write_sentences(context: click.Context, _option: click.Parameter, path: str | None) -> None:
+    """Write the file of a translation, and end."""
+    if path is None:
+        return
+    _check_file("--sentences", path)
+    count, missing = reporting.write_sentences(Path(path))
+    click.echo(f"{path}: {count} sentences, {missing} of them not translated yet")
+    context.exit()
 
 
 @click.command(cls=Command)
@@ -95,7 +106,16 @@ PRINTING = 120.0  # s for a browser to print a report
     "--project",
     metavar="FILE",
     help="A TOML file with customer, project, author, logo, revisions, approval, sources of the data, paper "
-    "size and decimal sign (docs/howto/read-a-report.md has one).",
+    "size, decimal sign and language (docs/howto/read-a-report.md has one).",
+)
+@click.option(
+    "--sentences",
+    metavar="FILE",
+    expose_value=False,
+    is_eager=True,
+    callback=_write_sentences,
+    help="Write all sentences of reports to a TOML file, to be translated, and end; what stands in it "
+    "already is kept. A project's file names it: language = FILE.",
 )
 @json_option
 def report(
@@ -199,7 +219,7 @@ def _made(
 
 def _check_file(option: str, out: str) -> None:
     """Whether the file can be written, found before anything is computed."""
-    example = "report.pdf" if option == "--pdf" else "report.html"
+    example = EXAMPLES[option]
     if not out.strip() or "\0" in out:
         raise InputError(f"{option} = {out!r}: this cannot be the name of a file; write one, as {example}.")
     path = Path(out)

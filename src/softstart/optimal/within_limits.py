@@ -45,7 +45,7 @@ def check_limits(drive: Drive) -> None:
     if limits.shaft_torque is None and limits.life is None:
         raise InputError(
             f"limits: {drive.name or 'the drive'} has no permissible shaft torque; give "
-            f'limits.shaft_torque in its file, as "175 N*m".{unchecked_life(drive)}'
+            f'limits.shaft_torque in its file, as "175 N*m". {unchecked_life(drive)}'.rstrip()
         )
 
 
@@ -69,7 +69,7 @@ def quickest(
     return replace(
         found,
         why=f"{found.why}; the first start time whose gentlest start keeps the limits",
-        kept=Kept(margins, at_least, covers, unchecked_life(problem.drive).strip()),
+        kept=Kept(margins, at_least, covers, unchecked_life(problem.drive)),
         seconds=time.perf_counter() - began,
     )
 

@@ -13,11 +13,12 @@ from softstart.chain.model import Chain
 from softstart.chain.vibration import natural_vibration
 from softstart.controller import Controller
 from softstart.controller.base import label_of
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError, SimulationError, listed
 from softstart.input.files import write_whole
+from softstart.language import said, speaking
 from softstart.reporting import document
 from softstart.reporting.first_page import answer, share_saved, tiles, verdicts
-from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.project import Project
 from softstart.reporting.result import Progress, Provenance, controllers_of, provenance
 from softstart.start.comparison import REFERENCE, Comparison, compared
@@ -25,7 +26,6 @@ from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 from softstart.views import chain_schemes, chains, starts
 from softstart.views import fatigue as lives
-from softstart.views.numbers import Table
 from softstart.views.printed import digits, fixed, short, unit
 
 MOST_SHAFTS = 6  # with a column each in the table of strategies
@@ -75,8 +75,9 @@ class ChainReport:
     @property
     def headline(self) -> str:
         """The answer in one sentence or two."""
-        what = "The largest shaft torque, brought to the motor shaft,"
-        return answer(self.comparison.recommendation, self.chosen, self.direct, what)
+        with speaking(self.project.language.table):
+            what = said("The largest shaft torque, brought to the motor shaft,")
+            return answer(self.comparison.recommendation, self.chosen, self.direct, what)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON: as `compare` gives it, what is chosen, and where it is from."""
@@ -158,6 +159,8 @@ def report_chain(
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     comparison = Comparison(chain, tuple(rows), worst_case=rows[0].worst_case)
+    with speaking(about.language.table):  # what is recommended is said once
+        assert comparison.recommendation.text
     return ChainReport(chain, comparison, tuple(failed), provenance(chain, command), about)
 
 
@@ -165,14 +168,14 @@ def _page(report: ChainReport) -> str:
     figures = Figures()
     first = _first_page(report, figures)
     sections = [
-        ("compared", "The strategies compared", _strategies(report)),
-        ("starts", "The starts in detail", _starts(report, figures)),
-        ("chain", "The chain", _chain(report.drive, figures)),
-        ("validity", "What this report assumes, and where it holds", _validity(report.drive)),
+        ("compared", said("The strategies compared"), _strategies(report)),
+        ("starts", said("The starts in detail"), _starts(report, figures)),
+        ("chain", said("The chain"), _chain(report.drive, figures)),
+        ("validity", said("What this report assumes, and where it holds"), _validity(report.drive)),
         (
             "provenance",
-            "About this document",
-            document.provenance_section(report.provenance, report.project, "chain"),
+            said("About this document"),
+            document.provenance_section(report.provenance, report.project, chain=True),
         ),
     ]
     return document.page(report.drive.name, report.project, report.provenance.made, first, sections)
@@ -183,16 +186,16 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
     direct, best = report.direct, report.chosen
     rows = _shown(report)
     limits = report.comparison.recommendation.limits
-    caption = (
-        f"{' and '.join(row.name for row in rows)}: torques of motor and shafts, brought to the motor shaft, "
-        "computed for the chain as it is."
+    caption = said(
+        "{names}: torques of motor and shafts, brought to the motor shaft, computed for the chain as it is.",
+        names=listed([row.name for row in rows]),
     )
     return html(
-        tag("section", tag("p", report.headline), class_="answer", aria_label="The answer"),
+        tag("section", tag("p", report.headline), class_="answer", aria_label=said("The answer")),
         tag("p", " ".join(_sentences(report.drive)[:2]), class_="small"),
         figures.shown(
             "before-after",
-            lambda: inlined(starts.comparison_figure(rows, ""), "before-after", "Before and after."),
+            lambda: inlined(starts.comparison_figure(rows, ""), "before-after", said("Before and after.")),
             caption,
         ),
         _tiles(report, best, direct) if best is not None else None,
@@ -200,25 +203,53 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
         if limits
         else tag(
             "p",
-            "Neither passed nor failed: the chain's file permits no torque. Give the permissible_torque of a "
-            "shaft there, and this page says what passes, with the margin.",
+            said(
+                "Neither passed nor failed: the chain's file permits no torque. Give the permissible_torque "
+                "of a shaft there, and this page says what passes, with the margin."
+            ),
             class_="verdict",
         ),
-        _table(_gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), "Strategies on this chain", best),
+        _table(
+            _gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), said("Strategies on this chain"), best
+        ),
     )
 
 
 def _tiles(report: ChainReport, best: Row, direct: Row) -> Html:
     run, hard = best.run, direct.run
     names = report.drive.shaft_names
-    return tiles([
-        ("largest shaft torque", f"{digits(run.peak_torque)} N m",
-         f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"),
-        ("costs in time", f"{digits(1e3 * best.time_lost, 3)} ms",
-         f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s"),
-        ("is largest in", names[run.worst_shaft], f"direct: {names[hard.worst_shaft]}"),
-        ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start"),
-    ])  # fmt: skip
+    return tiles(
+        [
+            (
+                said("largest shaft torque"),
+                f"{digits(run.peak_torque)} N m",
+                said(
+                    "direct {peak} N m: {saved} less",
+                    peak=digits(hard.peak_torque),
+                    saved=share_saved(best, direct),
+                ),
+            ),
+            (
+                said("costs in time"),
+                f"{digits(1e3 * best.time_lost, 3)} ms",
+                said(
+                    "start time {time} s, direct {direct_time} s",
+                    time=digits(run.start_time),
+                    direct_time=digits(hard.start_time),
+                ),
+            ),
+            (
+                said("is largest in"),
+                names[run.worst_shaft],
+                said("direct: {shaft}", shaft=names[hard.worst_shaft]),
+            ),
+            (
+                "K_dyn",
+                fixed(run.k_dyn, 3),
+                said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
+            ),
+        ]
+    )
 
 
 def _shown(report: ChainReport) -> list[Row]:
@@ -232,14 +263,7 @@ def _gentlest_first(report: ChainReport) -> list[Row]:
 
 def _table(rows: Sequence[Row], columns: Sequence[starts.Figure], title: str, best: Row | None) -> Html:
     strong = [index for index, row in enumerate(rows) if row is best]
-    return _printed(starts.comparison_table(rows, columns, title), strong)
-
-
-def _printed(one: Table, strong: Sequence[int] = ()) -> Html:
-    """A table of the terminal as one of the page."""
-    texts = [index for index, column in enumerate(one.columns) if not column.number]
-    headings = [column.heading.replace("-\n", "- ").replace("\n", " ") for column in one.columns]
-    return table(headings, one.rows, caption=one.title, text_columns=texts, strong=strong)
+    return printed(starts.comparison_table(rows, columns, title), strong)
 
 
 def _strategies(report: ChainReport) -> Html:
@@ -251,12 +275,15 @@ def _strategies(report: ChainReport) -> Html:
         shafts, others = shafts[:-1], (*shafts[-1:], *others)
     notes = [
         *starts.notes(report.comparison),
-        *(f"{n} could not be examined: {why}" for n, why in report.failed),
+        *(
+            said("{name} could not be examined: {reason}", name=name, reason=reason)
+            for name, reason in report.failed
+        ),
     ]
     return html(
         tag("p", report.comparison.recommendation.text),
-        _table(rows, (*starts.QUICK, *others), "How quick, and how often gaps close", best),
-        _table(rows, shafts, "K_dyn of each shaft", best) if 1 < count <= MOST_SHAFTS else None,
+        _table(rows, (*starts.QUICK, *others), said("How quick, and how often gaps close"), best),
+        _table(rows, shafts, said("K_dyn of each shaft"), best) if 1 < count <= MOST_SHAFTS else None,
         tag("ul", joined(tag("li", one) for one in notes), class_="notes"),
     )
 
@@ -266,18 +293,23 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
     parts, pictures = [], []
     for row in reversed(_shown(report)):
         key = f"start-{label_of(row.run.controller)}"
-        title = f"{row.name}: torques, speeds and twists"
+        title = said("{name}: torques, speeds and twists", name=row.name)
         parts += [
             tag("h3", row.name),
-            tag("p", f"Parameters: {values}.") if (values := _parameters(row.run.controller)) else None,
-            _printed(chains.shaft_table(row.run)),
+            tag("p", said("Parameters: {values}.", values=values))
+            if (values := _parameters(row.run.controller))
+            else None,
+            printed(chains.shaft_table(row.run)),
         ]
         pictures.append(
             figures.shown(
                 key,
                 partial(_start_picture, row, key, title),
-                f"{row.name}: torques with their peaks, speeds, and the twist of each shaft with a gap over "
-                "half its gap (within -1 and 1 the gap is open).",
+                said(
+                    "{name}: torques with their peaks, speeds, and the twist of each shaft with a gap over "
+                    "half its gap (within -1 and 1 the gap is open).",
+                    name=row.name,
+                ),
             )
         )
     return html(*parts, *pictures, _life(report))
@@ -296,15 +328,15 @@ def _parameters(controller: Controller) -> str:
 
 def _life(report: ChainReport) -> Html:
     """The life of each shaft beside that under direct, or why it is not counted."""
-    title = tag("h3", "Life of the shafts")
+    title = tag("h3", said("Life of the shafts"))
     rows = _gentlest_first(report)
     try:
         found = chain_fatigue([row.run for row in rows])
     except InputError as error:
-        return html(title, tag("p", f"Not counted: {' '.join(error.sentences)}"))
+        return html(title, tag("p", said("Not counted: {reason}", reason=" ".join(error.sentences))))
     shown = lives.chain_tables(found)[1] if len(report.drive.shafts) <= MOST_SHAFTS else None
     notes = [lives.chain_conclusion(found), *lives.chain_notes(found)]
-    return html(title, shown and _printed(shown), tag("p", " ".join(notes)))
+    return html(title, shown and printed(shown), tag("p", " ".join(notes)))
 
 
 def _start_picture(row: Row, key: str, title: str) -> Html:
@@ -321,13 +353,13 @@ def _chain(chain: Chain, figures: Figures) -> Html:
         figures.shown(
             "scheme",
             lambda: Html(chain_schemes.scheme_svg(chain)),
-            "The chain: masses, shafts, gaps and gears, and below them its first elastic shape.",
+            said("The chain: masses, shafts, gaps and gears, and below them its first elastic shape."),
         ),
-        _printed(chains.frequencies_table(vibration)),
+        printed(chains.frequencies_table(vibration)),
         figures.shown(
             "shapes",
-            lambda: inlined(chains.shapes_figure(vibration), "shapes", "Lowest elastic shapes"),
-            "Lowest elastic shapes with the gaps closed; circles: nodes.",
+            lambda: inlined(chains.shapes_figure(vibration), "shapes", said("Lowest elastic shapes")),
+            said("Lowest elastic shapes with the gaps closed; circles: nodes."),
         ),
     )
 
@@ -341,16 +373,22 @@ def _sentences(chain: Chain) -> list[str]:
 def _validity(chain: Chain) -> Html:
     motor = chain.motor
     assert motor is not None  # or nothing would have started
-    lag = f"with a lag of {short(1e3 * motor.torque_lag)} ms" if motor.torque_lag else "without lag"
     notes = [
         *_sentences(chain),
-        f"The motor is a source of torque from {short(float(motor.minimum_torque))} to "
-        f"{short(float(motor.maximum_torque))} N m that follows its demand {lag}. Currents, fluxes and a "
-        "motor started directly at the mains are not in the model.",
-        "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
-        "The equations are solved as Taylor series from event to event; peaks are located, not read off "
-        "a grid.",
-        "Not in this report: optima and bounds (softstart optimize and pareto take the chain), maps over "
-        "wear and load, and parameter sheets for inverters (for the drive that softstart reduce writes).",
+        document.motor_sentence(
+            float(motor.minimum_torque), float(motor.maximum_torque), float(motor.torque_lag)
+        ),
+        said(
+            "Controllers are set up for the two masses that stand for the chain, and start the chain itself."
+        ),
+        said(
+            "The equations are solved as Taylor series from event to event; peaks are located, not read off "
+            "a grid."
+        ),
+        said(
+            "Not in this report: optima and bounds (softstart optimize and pareto take the chain), maps "
+            "over wear and load, and parameter sheets for inverters (for the drive that softstart reduce "
+            "writes)."
+        ),
     ]
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

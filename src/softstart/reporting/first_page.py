@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from softstart.drive.limits import Limits
 from softstart.errors import listed
+from softstart.language import later, said
 from softstart.reporting.choice import Choice
 from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
 from softstart.reporting.strategies import before_after_figure
@@ -19,6 +20,7 @@ from softstart.views.printed import digits, fixed, percent
 if TYPE_CHECKING:
     from softstart.reporting.result import Report
 
+AS_IT_IS = later("the drive as it is")
 SAME = 0.005  # a peak within this share of that of direct is no saving
 
 
@@ -37,20 +39,32 @@ def answer(
     recommendation: Recommendation,
     best: Row | None,
     direct: Row | None,
-    torque: str = "The shaft torque",
+    torque: str = "",
 ) -> str:
     """What the chosen strategy does to a `torque`, and what it costs; why there is none, else."""
     if best is None or direct is None:
         return recommendation.text
     named = recommendation.recommended is not None
-    what = f"{'Recommended' if named else 'Gentlest start'}: {best.name}."
+    what = (
+        said("Recommended: {name}.", name=best.name)
+        if named
+        else said("Gentlest start: {name}.", name=best.name)
+    )
     run, hard = best.run, direct.run
     if best is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
-        return f"{what} No strategy that was examined is noticeably gentler than direct start."
-    return (
-        f"{what} {torque} peaks at {digits(run.peak_torque)} N m instead of "
-        f"{digits(hard.peak_torque)} N m under direct start, {share_saved(best, direct)} less; the start "
-        f"takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
+        return said(
+            "{what} No strategy that was examined is noticeably gentler than direct start.", what=what
+        )
+    return said(
+        "{what} {torque} peaks at {peak} N m instead of {direct_peak} N m under direct start, {saved} less; "
+        "the start takes {time} s instead of {direct_time} s.",
+        what=what,
+        torque=torque or said("The shaft torque"),
+        peak=digits(run.peak_torque),
+        direct_peak=digits(hard.peak_torque),
+        saved=share_saved(best, direct),
+        time=digits(run.start_time),
+        direct_time=digits(hard.start_time),
     )
 
 
@@ -63,20 +77,24 @@ def share_saved(row: Row, direct: Row | None) -> str:
 def first_page(report: Report, figures: Figures) -> Html:
     """Answer, picture, tiles and the table of limits."""
     rows = before_and_after(report.choice, report.comparison)
-    caption = (
-        f"{' and '.join(row.name for row in rows)}: shaft torque and load speed, computed for the drive as "
-        "it is. Dots: the peaks. Dotted: the target speed."
+    caption = said(
+        "{names}: shaft torque and load speed, computed for the drive as it is. Dots: the peaks. Dotted: "
+        "the target speed.",
+        names=listed([row.name for row in rows]),
     )
     return html(
-        tag("section", tag("p", headline(report)), class_="answer", aria_label="The answer"),
+        tag("section", tag("p", headline(report)), class_="answer", aria_label=said("The answer")),
         figures.shown("before-after", lambda: before_after_picture(rows), caption),
         _tiles(report, rows[-1], rows[0]) if report.choice.chosen else None,
         verdicts(limits, rows)
         if (limits := report.choice.recommendation.limits)
         else tag(
             "p",
-            "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, the "
-            "longest start time or the life in [limits], and this page says what passes, with the margin.",
+            said(
+                "Neither passed nor failed: the drive file has no limits. Give the permissible shaft "
+                "torque, the longest start time or the life in [limits], and this page says what passes, "
+                "with the margin."
+            ),
             class_="verdict",
         ),
         _choices(report),
@@ -96,24 +114,50 @@ def before_and_after(choice: Choice, comparison: Comparison) -> list[Row]:
 
 def before_after_picture(rows: list[Row]) -> Html:
     """The two starts, as an <svg> element."""
-    title = "; ".join(f"{row.name}: peak {digits(row.run.peak_torque)} N m" for row in rows)
-    return inlined(before_after_figure(rows), "before-after", f"Before and after. {title}.")
+    title = "; ".join(
+        said("{name}: peak {peak} N m", name=row.name, peak=digits(row.run.peak_torque)) for row in rows
+    )
+    return inlined(before_after_figure(rows), "before-after", said("Before and after. {title}.", title=title))
 
 
 def _tiles(report: Report, best: Row, direct: Row) -> Html:
     """What it saves, costs and gains."""
     run, hard = best.run, direct.run
     gain = report.life_gain
-    return tiles([
-        ("peak shaft torque", f"{digits(run.peak_torque)} N m",
-         f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"),
-        ("costs in time", f"{digits(1e3 * best.time_lost, 3)} ms",
-         f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s"),
-        ("life of the shaft line", f"× {factor(gain)}" if gain is not None else "not given",
-         f"over that of direct, S-N slope {report.life_slope:g}" if gain is not None
-         else "needs a damping above 0 in the drive file"),
-        ("K_dyn", fixed(run.k_dyn, 3), f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start"),
-    ])  # fmt: skip
+    return tiles(
+        [
+            (
+                said("peak shaft torque"),
+                f"{digits(run.peak_torque)} N m",
+                said(
+                    "direct {peak} N m: {saved} less",
+                    peak=digits(hard.peak_torque),
+                    saved=share_saved(best, direct),
+                ),
+            ),
+            (
+                said("costs in time"),
+                f"{digits(1e3 * best.time_lost, 3)} ms",
+                said(
+                    "start time {time} s, direct {direct_time} s",
+                    time=digits(run.start_time),
+                    direct_time=digits(hard.start_time),
+                ),
+            ),
+            (
+                said("life of the shaft line"),
+                f"× {factor(gain)}" if gain is not None else said("not given"),
+                said("over that of direct, S-N slope {slope:g}", slope=report.life_slope)
+                if gain is not None
+                else said("needs a damping above 0 in the drive file"),
+            ),
+            (
+                "K_dyn",
+                fixed(run.k_dyn, 3),
+                said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
+            ),
+        ]
+    )
 
 
 def tiles(shown: Sequence[tuple[str, str, str]]) -> Html:
@@ -133,16 +177,29 @@ def verdicts(limits: Limits, rows: list[Row]) -> Html:
     cells = []
     for row in rows:
         for margin in row.margins(limits):
-            cells.append([
-                row.name, f"{margin.name}, {margin.unit}", digits(margin.value), digits(margin.limit),
-                percent(margin.share), margin.case or "the drive as it is",
-                tag("b", "pass" if margin.kept else "fail", class_="pass" if margin.kept else "fail"),
-            ])  # fmt: skip
-    cases = ["the drive as it is", *rows[0].worst_case]
+            cells.append(
+                [
+                    row.name,
+                    f"{said(margin.name)}, {margin.unit}",
+                    digits(margin.value),
+                    digits(margin.limit),
+                    percent(margin.share),
+                    said(margin.case or AS_IT_IS),
+                    tag(
+                        "b",
+                        said("pass") if margin.kept else said("fail"),
+                        class_="pass" if margin.kept else "fail",
+                    ),
+                ]
+            )
+    cases = [said(case) for case in (AS_IT_IS, *rows[0].worst_case)]
     return table(
-        ["strategy", "limit", "worst value", "permitted", "margin", "worst with", "verdict"], cells,
-        caption=f"Pass or fail, in the worst of {listed(cases)}", text_columns=(0, 1, 5, 6), class_="names",
-    )  # fmt: skip
+        said("strategy | limit | worst value | permitted | margin | worst with | verdict").split(" | "),
+        cells,
+        caption=said("Pass or fail, in the worst of {cases}", cases=listed(cases)),
+        text_columns=(0, 1, 5, 6),
+        class_="names",
+    )
 
 
 def _choices(report: Report) -> Html:
@@ -152,14 +209,22 @@ def _choices(report: Report) -> Html:
     shown = dict.fromkeys([*([direct] if direct else []), *ordinary, *choice.recommendation.shown])
     rows = sorted(shown, key=lambda row: (row.effort.order, -row.run.k_dyn))
     cells = [
-        [row.name, row.effort.meaning, digits(row.run.peak_torque), share_saved(row, direct),
-         fixed(row.run.k_dyn, 3),
-         digits(row.run.start_time)]
+        [
+            row.name,
+            said(row.effort.meaning),
+            digits(row.run.peak_torque),
+            share_saved(row, direct),
+            fixed(row.run.k_dyn, 3),
+            digits(row.run.start_time),
+        ]
         for row in rows
-    ]  # fmt: skip
+    ]
     best = choice.chosen.row if choice.chosen else None
     return table(
-        ["strategy", "takes", "peak torque, N m", "less than direct", "K_dyn", "start time, s"], cells,
-        caption="What more effort buys", text_columns=(0, 1),
-        strong=[index for index, row in enumerate(rows) if row is best], class_="names",
-    )  # fmt: skip
+        said("strategy | takes | peak torque, N m | less than direct | K_dyn | start time, s").split(" | "),
+        cells,
+        caption=said("What more effort buys"),
+        text_columns=(0, 1),
+        strong=[index for index, row in enumerate(rows) if row is best],
+        class_="names",
+    )

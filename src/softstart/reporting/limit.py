@@ -13,6 +13,7 @@ import numpy as np
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, listed
+from softstart.language import said
 from softstart.late import late
 from softstart.optimal.front import FrontPoint
 from softstart.optimal.lp import ideal, whole_search
@@ -144,7 +145,9 @@ def limit(
     shortest = momentum_shortest_time(Problem(drive, 1.0, TERMINAL))
     least = reference if math.isfinite(reference) else min(own, default=math.nan)
     if not (math.isfinite(least) and math.isfinite(shortest)):
-        return Limit(refusal="No strategy reaches the target speed, so there is no start time to judge by.")
+        return Limit(
+            refusal=said("No strategy reaches the target speed, so there is no start time to judge by.")
+        )
     asked = list(dict.fromkeys([*own, *(share * least for share in SHARES)]))
     longest = max(*asked, 1.05 * shortest)
     soonest = max(1.0005 * shortest, EARLIER * min(asked))
@@ -229,23 +232,37 @@ def optima(drive: Drive, start_times: Sequence[float], *, tell: WorkerTell) -> N
 def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:
     """Figure, table and what can and cannot be said."""
     if limit.refusal:
-        return tag("p", "For this drive there is no limit to compare with. ", limit.refusal)
-    caption = (
-        f"Every strategy (filled: {choice.role}, and best of an ordinary inverter) by its start time and "
-        "K_dyn. Below "
-        "the dashed line (hatched) no start is possible, with whatever motor torque within its limits and "
-        "however it is controlled."
-    )
+        return tag(
+            "p", said("For this drive there is no limit to compare with. {reason}", reason=limit.refusal)
+        )
+    caption = [
+        said(
+            "Every strategy (filled: {role}, and best of an ordinary inverter) by its start time and K_dyn. "
+            "Below the dashed line (hatched) no start is possible, with whatever motor torque within its "
+            "limits and however it is controlled.",
+            role=choice.role,
+        )
+    ]
     if limit.found:
-        caption += " The solid line joins optimal starts, each simulated exactly."
+        caption.append(said("The solid line joins optimal starts, each simulated exactly."))
     if limit.known:
-        caption += " The dash-dotted line joins starts that a quick search found: possible, not proved best."
-    title = "K_dyn against start time: " + "; ".join(
-        f"{one.name} {fixed(one.row.run.k_dyn, 3)} at {digits(one.row.run.start_time)} s"
+        caption.append(
+            said("The dash-dotted line joins starts that a quick search found: possible, not proved best.")
+        )
+    starts = "; ".join(
+        said(
+            "{name} {k_dyn} at {time} s",
+            name=one.name,
+            k_dyn=fixed(one.row.run.k_dyn, 3),
+            time=digits(one.row.run.start_time),
+        )
         for one in choice.candidates
     )
+    title = said("K_dyn against start time: {starts}", starts=starts)
     return html(
-        figures.shown("limit", lambda: inlined(limit_figure(choice, limit), "limit", title), caption)
+        figures.shown(
+            "limit", lambda: inlined(limit_figure(choice, limit), "limit", title), " ".join(caption)
+        )
         if choice.of(REFERENCE)
         else None,
         _how_near(drive, choice, limit),
@@ -256,10 +273,10 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
 def _how_near(drive: Drive, choice: Choice, limit: Limit) -> Html:
     """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
     in_doubt = any(limit.optimum_at(row.run.start_time) is None for row in choice.rows)
-    heads = ["strategy", "start time, s", "K_dyn", "lower bound at that time"]
-    heads += ["optimum at that time", "times the optimum"] if limit.found else []
-    heads += ["gentlest start known in that time"] if in_doubt else []
-    heads.append("times the bound")
+    heads = said("strategy | start time, s | K_dyn | lower bound at that time").split(" | ")
+    heads += [said("optimum at that time"), said("times the optimum")] if limit.found else []
+    heads += [said("gentlest start known in that time")] if in_doubt else []
+    heads.append(said("times the bound"))
     rows = []
     for row in ordered(choice.rows):
         run, bound = row.run, bound_at(drive, row.run.start_time)
@@ -271,15 +288,18 @@ def _how_near(drive: Drive, choice: Choice, limit: Limit) -> Html:
         if in_doubt:
             cells.append(fixed(limit.gentlest_known(run.start_time, choice.rows), 3))
         rows.append([*cells, fixed(run.k_dyn / bound if bound else None, 2)])
-    caption = "How near each strategy comes to the limit in its own start time"
+    caption = said("How near each strategy comes to the limit in its own start time")
     return table(heads, rows, caption=caption, class_="names")
 
 
 def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
     return [
-        "Lower bound: proved from the momentum of the load, for every torque from "
-        f"{short(float(drive.minimum_torque))} to {short(float(min(drive.Ms, drive.maximum_torque)))} N m "
-        "over time and any number of contacts. A dash: no bound at that start time.",
+        said(
+            "Lower bound: proved from the momentum of the load, for every torque from {least} to {most} N m "
+            "over time and any number of contacts. A dash: no bound at that start time.",
+            least=short(float(drive.minimum_torque)),
+            most=short(float(min(drive.Ms, drive.maximum_torque))),
+        ),
         *_on_optima(drive, limit),
         *_on_the_shortest(choice, limit),
         *_on_missing(drive, limit),
@@ -301,21 +321,50 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
     notes = []
     if every:
         notes.append(
-            f"{len(every)} of {len(limit.found)} optima are certified against every other start: none lies "
-            f"more than {digits(max(*every, 0.001), 1)} % above the lower bound."
+            said(
+                "{count} of {all} optima are certified against every other start: none lies more than "
+                "{percent} % above the lower bound.",
+                count=len(every),
+                all=len(limit.found),
+                percent=digits(max(*every, 0.001), 1),
+            )
         )
     if single:
+        times, most = (
+            _times([p.start_time_bound for p in single]),
+            max(*(p.gap_percent or 0.0 for p in single), 0.001),
+        )
         notes.append(
-            f"{'That' if len(single) == 1 else 'Those'} at {_times([p.start_time_bound for p in single])} "
-            f"{'is' if len(single) == 1 else 'are'} certified among starts whose gap closes only once, to "
-            f"{digits(max(*(p.gap_percent or 0.0 for p in single), 0.001), 1)} %. That a start that bounces "
-            "in the gap is gentler, down to the lower bound, is not ruled out."
+            said(
+                "That at {times} is certified among starts whose gap closes only once, to {percent} %. That "
+                "a start that bounces in the gap is gentler, down to the lower bound, is not ruled out.",
+                times=times,
+                percent=digits(most, 1),
+            )
+            if len(single) == 1
+            else said(
+                "Those at {times} are certified among starts whose gap closes only once, to {percent} %. "
+                "That a start that bounces in the gap is gentler, down to the lower bound, is not ruled out.",
+                times=times,
+                percent=digits(most, 1),
+            )
         )
     if loose:
-        far = f", up to {digits(max(loose), 2)} % above their lower bound" if max(loose) < math.inf else ""
+        count, every_one = len(loose), len(limit.found)
         notes.append(
-            f"{len(loose)} of {len(limit.found)} optima are the best starts found{far}: gentler ones may "
-            "exist."
+            said(
+                "{count} of {all} optima are the best starts found, up to {percent} % above their lower "
+                "bound: gentler ones may exist.",
+                count=count,
+                all=every_one,
+                percent=digits(max(loose), 2),
+            )
+            if max(loose) < math.inf
+            else said(
+                "{count} of {all} optima are the best starts found: gentler ones may exist.",
+                count=count,
+                all=every_one,
+            )
         )
     return notes
 
@@ -331,14 +380,20 @@ def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
     notes = []
     if none:
         notes.append(
-            f"In {_times([p.start_time_bound for p in none])} there is no start whose gap closes only once; "
-            f"the shortest such start takes {digits(none[0].shortest_start_time, 5)} s. Quicker starts "
-            "bounce in the gap."
+            said(
+                "In {times} there is no start whose gap closes only once; the shortest such start takes "
+                "{shortest} s. Quicker starts bounce in the gap.",
+                times=_times([p.start_time_bound for p in none]),
+                shortest=digits(none[0].shortest_start_time, 5),
+            )
         )
     if only:
         notes.append(
-            f"In {_times([p.start_time_bound for p in only])} there is no choice: no start whose gap closes "
-            "only once was found that is noticeably quicker, so there is no optimum to tell."
+            said(
+                "In {times} there is no choice: no start whose gap closes only once was found that is "
+                "noticeably quicker, so there is no optimum to tell.",
+                times=_times([p.start_time_bound for p in only]),
+            )
         )
     return notes
 
@@ -348,21 +403,32 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
     notes = []
     if limit.missing:
         ended = (
-            f"none was found within the {short(limit.budget)} s given (more: --budget)"
+            said("none was found within the {budget} s given (more: --budget)", budget=short(limit.budget))
             if limit.budget
-            else "none was looked for (--budget 0)"
+            else said("none was looked for (--budget 0)")
         )
         if gave_up := limit.gave_up:
-            ended += f"; at {_times([p.start_time_bound for p in gave_up])} the search ended without one"
+            ended = said(
+                "{ended}; at {times} the search ended without one",
+                ended=ended,
+                times=_times([p.start_time_bound for p in gave_up]),
+            )
         notes.append(
-            f"For {_times(limit.missing)} no optimum is shown: {_why_hard(drive)}, and {ended}. The lower "
-            "bound holds all the same. A longer search: softstart pareto."
+            said(
+                "For {times} no optimum is shown: {reason}, and {ended}. The lower bound holds all the "
+                "same. A longer search: softstart pareto.",
+                times=_times(limit.missing),
+                reason=_why_hard(drive),
+                ended=ended,
+            )
         )
     if limit.known:
         notes.append(
-            "Starts found: the best of some thousand torques over time that a quick search tried, each "
-            "simulated exactly. They are known to be possible, not known to be the gentlest: the limit lies "
-            "between them and the lower bound."
+            said(
+                "Starts found: the best of some thousand torques over time that a quick search tried, each "
+                "simulated exactly. They are known to be possible, not known to be the gentlest: the limit "
+                "lies between them and the lower bound."
+            )
         )
     return notes
 
@@ -379,34 +445,45 @@ def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]
     optimum = limit.optimum_at(time)
     if optimum is not None and 100.0 * (known / bound - 1.0) <= TIGHT:
         return []
-    text = (
-        f"In the {digits(time)} s of {best.name} the least possible K_dyn thus lies "
-        f"between {fixed(bound, 3)} (proved) and {fixed(known, 3)} "
-    )
-    most = percent(1.0 - bound / own)
-    if known < own:
-        return [
-            f"{text}(found): {best.name} with {fixed(own, 3)} could be undercut by "
-            f"{percent(1.0 - known / own)} for certain, by {most} at most."
-        ]
-    return [f"{text}(that of {best.name} itself, the gentlest start known): {most} less at most."]
+    figures = {
+        "time": digits(time), "name": best.name, "least": fixed(bound, 3), "known": fixed(known, 3),
+        "own": fixed(own, 3), "most": percent(1.0 - bound / own), "certain": percent(1.0 - known / own),
+    }  # fmt: skip
+    return [
+        said(
+            "In the {time} s of {name} the least possible K_dyn thus lies between {least} (proved) and "
+            "{known} (found): {name} with {own} could be undercut by {certain} for certain, by {most} at "
+            "most.",
+            **figures,
+        )
+        if known < own
+        else said(
+            "In the {time} s of {name} the least possible K_dyn thus lies between {least} (proved) and "
+            "{known} (that of {name} itself, the gentlest start known): {most} less at most.",
+            **figures,
+        )
+    ]
 
 
 def _times(times: Sequence[float]) -> str:
     """Start times in words, each once, or how many there are."""
     words = list(dict.fromkeys(f"{digits(t)} s" for t in times))
-    return f"{len(times)} start times" if len(words) > 4 else listed(words)
+    return said("{count} start times", count=len(times)) if len(words) > 4 else listed(words)
 
 
 def _why_hard(drive: Drive) -> str:
     if len(drive.positions) > 1:
-        return "the start position is unknown, and one torque for every position has a search of its own"
+        return said(
+            "the start position is unknown, and one torque for every position has a search of its own"
+        )
     problem = Problem(drive, 1.0, "reached")
     if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
-        return f"they need a numerical search (direct collocation), because {reason}"
+        return said("they need a numerical search (direct collocation), because {reason}", reason=reason)
     if reason := applies(problem):
-        return f"there is no formula ({reason}), only a search by linear programs"
-    return "so near the shortest start time there is no formula, and a linear program has to be certified"
+        return said("there is no formula ({reason}), only a search by linear programs", reason=reason)
+    return said(
+        "so near the shortest start time there is no formula, and a linear program has to be certified"
+    )
 
 
 def limit_figure(choice: Choice, limit: Limit) -> Any:
@@ -425,17 +502,19 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
         if limit.times:
             t, k = _within(limit, left, right, 2.0 * max(values))
             axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
-            axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound: no torque goes below")
+            axes.plot(
+                t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label=said("lower bound: no torque goes below")
+            )
             values.append(float(k.min()))
         if optima:
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], "-", color=COLOURS[0],
-                lw=1.2, marker=".", ms=7, label="optimum found", zorder=3,
+                lw=1.2, marker=".", ms=7, label=said("optimum found"), zorder=3,
             )  # fmt: skip
         if limit.known:
             axes.plot(
                 [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], ls=DASHES[2],
-                color="black", lw=1.0, marker="+", ms=6, label="start found: possible, not proved best",
+                color="black", lw=1.0, marker="+", ms=6, label=said("start found: possible, not proved best"),
                 zorder=3,
             )  # fmt: skip
         for index, one in enumerate(placed):
@@ -451,7 +530,7 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
         else:
             axes.set_ylim(0.0, 1.1 * high)
         axes.set_xlim(left, right)
-        axes.set_xlabel("start time, s")
+        axes.set_xlabel(said("start time, s"))
         axes.set_ylabel("K_dyn")
         handles = axes.get_legend_handles_labels()[0]
         if handles:

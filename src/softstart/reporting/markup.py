@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from softstart.language import said
 from softstart.late import late
 from softstart.views.drawing import drawing
+from softstart.views.numbers import Table
 
 if TYPE_CHECKING:
     import matplotlib as mpl
@@ -84,6 +86,13 @@ def table(
     return tag("div", whole, class_="wide")
 
 
+def printed(one: Table, strong: Sequence[int] = (), caption: str = "") -> Html:
+    """A table of the terminal as one of the page; its headings are said in the language of the page."""
+    texts = [index for index, column in enumerate(one.columns) if not column.number]
+    headings = [said(column.heading).replace("-\n", "- ").replace("\n", " ") for column in one.columns]
+    return table(headings, one.rows, caption=caption or one.title, text_columns=texts, strong=strong)
+
+
 def css_string(text: str) -> str:
     """Any text as a string of CSS that ends nowhere but at its end.
 
@@ -109,7 +118,7 @@ class Figures:
         self.count += 1
         if key not in self.ready:
             self.ready[key] = picture()
-        number = tag("b", f"Figure {self.count}. ")
+        number = tag("b", said("Figure {number}.", number=self.count), " ")
         return tag("figure", self.ready[key], tag("figcaption", number, caption))
 
 

@@ -9,6 +9,7 @@ from typing import Self
 
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.language import later, said
 from softstart.quantities import nearest, to_si
 from softstart.views.printed import RPM, decimals_of, digits, short
 
@@ -95,22 +96,27 @@ class Resolution:
             return 2.0 * math.pi * self.frequency if "frequency" in name else self.speed
         return {"s": self.time, "1": self.share}.get(unit)
 
-    def described(self, drive: Drive) -> list[tuple[str, str]]:
+    def described(self, drive: Drive) -> list[str]:
         """What is rounded to what, in words."""
         rated, basis = rated_torque(drive)
         if self.torque is not None:
-            torque = f"{short(self.torque)} N m"
+            torques = said("torques to {step} N m", step=short(self.torque))
         else:
-            share = f"{short(100.0 * self.torque_share)} %"
-            step = short(float(f"{self.torque_share * rated:.4g}"))
-            torque = f"{share} of the {basis} of {digits(rated)} N m, that is {step} N m"
+            torques = said(
+                "torques to {percent} % of the {basis} of {rated} N m, that is {step} N m",
+                percent=short(100.0 * self.torque_share), basis=said(basis), rated=digits(rated),
+                step=short(float(f"{self.torque_share * rated:.4g}")),
+            )  # fmt: skip
         return [
-            ("torques", torque),
-            ("times", f"{short(1e3 * self.time)} ms"),
-            ("speeds", f"{short(self.speed * RPM)} rpm"),
-            ("frequencies", f"{short(self.frequency)} Hz"),
-            ("shares and gains", short(self.share)),
+            torques,
+            said("times to {step} ms", step=short(1e3 * self.time)),
+            said("speeds to {step} rpm", step=short(self.speed * RPM)),
+            said("frequencies to {step} Hz", step=short(self.frequency)),
+            said("shares and gains to {step}", step=short(self.share)),
         ]
+
+
+RATED = later("rated torque")
 
 
 def rated_torque(drive: Drive) -> tuple[float, str]:
@@ -120,10 +126,10 @@ def rated_torque(drive: Drive) -> tuple[float, str]:
     23.87
     """
     if drive.rated_torque is not None:
-        return float(drive.rated_torque), "rated torque"
+        return float(drive.rated_torque), RATED
     if drive.rated_power is not None and drive.rated_speed is not None:
-        return float(drive.rated_power / drive.rated_speed), "rated torque"
-    return float(drive.Ms), "starting torque"
+        return float(drive.rated_power / drive.rated_speed), RATED
+    return float(drive.Ms), later("starting torque")
 
 
 def nearest_step(value: float, step: float, most: float = math.inf) -> float:

@@ -12,8 +12,9 @@ import numpy as np
 from softstart.arrays import Matrix
 from softstart.controller import Controller
 from softstart.drive import Drive
+from softstart.language import said
 from softstart.late import late
-from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, printed, tag
 from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -112,15 +113,20 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
 def robustness_section(drive: Drive, shown: Sequence[Mapped], figures: Figures) -> Html:
     """The maps of strategies, in one scale of colours."""
     first = shown[0].map
-    gaps = f"gaps from {digits(first.gaps[0], 3)} to {digits(first.gaps[-1], 3)} rad"
-    if drive.gap == 0.0:
-        gaps = "no gap (the drive has none, so the maps have one row and say nothing about play)"
-    text = (
-        f"Gears wear and loads change. Each strategy was set up once, for the drive as it is, and then "
-        f"started at {gaps} and load inertias from {short(first.inertias[0])} to {short(first.inertias[-1])} "
-        "kg m². K_dyn refers to the drive as it is everywhere, so the numbers compare shaft torques."
+    gaps = said(
+        "gaps from {least} to {most} rad", least=digits(first.gaps[0], 3), most=digits(first.gaps[-1], 3)
     )
-    caption = (
+    if drive.gap == 0.0:
+        gaps = said("no gap (the drive has none, so the maps have one row and say nothing about play)")
+    text = said(
+        "Gears wear and loads change. Each strategy was set up once, for the drive as it is, and then "
+        "started at {gaps} and load inertias from {least} to {most} kg m². K_dyn refers to the drive as it "
+        "is everywhere, so the numbers compare shaft torques.",
+        gaps=gaps,
+        least=short(first.inertias[0]),
+        most=short(first.inertias[-1]),
+    )
+    caption = said(
         "K_dyn over gap and load inertia, all maps in one scale of colours, dark is gentle. Framed: the "
         "drive as it is. Grey: the load does not reach its target speed."
     )
@@ -134,11 +140,17 @@ def maps_picture(drive: Drive, shown: Sequence[Mapped]) -> Html:
         min(first.gaps, key=lambda v: abs(v - float(drive.gap))),
         min(first.inertias, key=lambda v: abs(v - float(drive.J2))),
     )
-    title = "K_dyn over gap and load inertia: " + "; ".join(
-        f"{one.name}, worst {fixed(one.map.worst, 3)} at gap {short(one.map.worst_at[0])} rad and J2 "
-        f"{short(one.map.worst_at[1])} kg m²"
+    worst = "; ".join(
+        said(
+            "{name}, worst {k_dyn} at gap {gap} rad and J2 {inertia} kg m²",
+            name=one.name,
+            k_dyn=fixed(one.map.worst, 3),
+            gap=short(one.map.worst_at[0]),
+            inertia=short(one.map.worst_at[1]),
+        )
         for one in shown
     )
+    title = said("K_dyn over gap and load inertia: {worst}", worst=worst)
     return inlined(maps_figure([(one.name, one.map) for one in shown], nominal), "maps", title)
 
 
@@ -147,22 +159,21 @@ def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[st
     if found is None:
         return []
     if isinstance(found, str):
-        content = tag("p", f"Lives cannot be given. {found}")
+        content = tag("p", said("Lives cannot be given. {reason}", reason=found))
     else:
         shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
-        headings = [column.heading.replace("\n", " ") for column in shown.columns]
-        title = "Cycles of one start, and life over that of direct"
+        title = said("Cycles of one start, and life over that of direct")
         content = html(
             tag("p", lives.conclusion(found)),
-            table(headings, shown.rows, caption="Life of the shaft line under each strategy"),
+            printed(shown, caption=said("Life of the shaft line under each strategy")),
             figures.shown(
                 "life",
                 lambda: inlined(lives.fatigue_figure(found), "life", title),
-                f"{title}. Rainflow cycles of the shaft torque.",
+                said("{title}. Rainflow cycles of the shaft torque.", title=title),
             ),
             *(tag("p", one) for one in lives.notes(found)),
         )
-    return [("life", "How long the shaft line lasts", content)]
+    return [("life", said("How long the shaft line lasts"), content)]
 
 
 def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float, float]) -> Any:
@@ -189,7 +200,7 @@ def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float
             )
             for (i, j), value in np.ndenumerate(one.k_dyn):
                 dark = math.isnan(value) or float(scale(value)) > 0.55
-                text = f"{value:.2f}" if math.isfinite(value) else "none"
+                text = f"{value:.2f}" if math.isfinite(value) else said("none")
                 panel.text(j, i, text, ha="center", va="center", fontsize=SMALL - 1.0,
                            color="black" if dark else "white")  # fmt: skip
             _frame(panel, first.gaps.index(nominal[0]), first.inertias.index(nominal[1]))
@@ -202,9 +213,9 @@ def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
         for panel in axes[:, 0]:
-            panel.set_ylabel(f"gap, {_powers(gap)}rad", fontsize=SMALL)
+            panel.set_ylabel(said("gap, {unit}", unit=f"{_powers(gap)}rad"), fontsize=SMALL)
         for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
-            panel.set_xlabel(f"load inertia J2, {_powers(inertia)}kg m²", fontsize=SMALL)
+            panel.set_xlabel(said("load inertia J2, {unit}", unit=f"{_powers(inertia)}kg m²"), fontsize=SMALL)
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
         bar.set_label("K_dyn", fontsize=SMALL)
         bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
@@ -226,7 +237,7 @@ def _powers(unit: float) -> str:
 
 
 def _worst(one: RobustnessMap) -> str:
-    return f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
+    return said("worst {k_dyn:.3f}", k_dyn=one.worst) if math.isfinite(one.worst) else said("grey: no start")
 
 
 def _plain_ticks(bar: Any, low: float, high: float) -> None:

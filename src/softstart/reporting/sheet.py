@@ -16,8 +16,9 @@ from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError, listed
+from softstart.language import later, said
 from softstart.reporting.markup import Html, Part, html, joined, table, tag
-from softstart.reporting.resolution import Resolution, nearest_step, rated_torque
+from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, kind_of
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -40,13 +41,13 @@ _DATA = {
     "load_inertia": "J2",
     "stiffness": "c",
     "damping": "d",
-    "gap": "the gap",
+    "gap": later("the gap"),
     "starting_torque": "Ms",
     "load_torque": "Mc",
-    "torque_lag": "the torque lag",
-    "torque_rate": "the torque rate",
-    "torque_noise": "the noise of the torque",
-    "computing_delay": "the dead time",
+    "torque_lag": later("the torque lag"),
+    "torque_rate": later("the torque rate"),
+    "torque_noise": later("the noise of the torque"),
+    "computing_delay": later("the dead time"),
 }
 _LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
 _PROBE = 1e-3  # relative
@@ -299,15 +300,17 @@ def sheet_section(
 ) -> Html:
     """One sheet for each strategy; `chosen` is the name of that one with this `role`."""
     if not sheets:
-        return tag("p", "There is no sheet, because no strategy is recommended.")
-    steps = "; ".join(f"{what} to {step}" for what, step in resolution.described(drive))
+        return tag("p", said("There is no sheet, because no strategy is recommended."))
+    steps = "; ".join(resolution.described(drive))
     return html(
         tag(
             "p",
-            f"Every value is rounded to what the inverter can be set to: {steps}. The drive was then "
-            f"started again with "
-            "the rounded values, and once more with every value half a step off, as a display that rounds "
-            "may hide.",
+            said(
+                "Every value is rounded to what the inverter can be set to: {steps}. The drive was then "
+                "started again with the rounded values, and once more with every value half a step off, as "
+                "a display that rounds may hide.",
+                steps=steps,
+            ),
         ),
         joined(_sheet(sheet, role if sheet.name == chosen else "", drive) for sheet in sheets),
         _families(sheets, drive),
@@ -315,10 +318,10 @@ def sheet_section(
 
 
 FUNCTIONS = {
-    "limit": "torque limit",
-    "braking": "torque limit, generating",
-    "reference": "torque reference",
-    "preload": "torque before the brake opens, and its ramp",
+    "limit": later("torque limit"),
+    "braking": later("torque limit, generating"),
+    "reference": later("torque reference"),
+    "preload": later("torque before the brake opens, and its ramp"),
 }
 
 
@@ -331,40 +334,52 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
     rows, sources = list[list[Part]](), list[Part]()
     for number, family in enumerate(tomllib.loads(text)["family"], start=1):
         rows += [
-            [f"{family['name']} [{number}]", FUNCTIONS[key], tag("code", family[key])]
+            [f"{family['name']} [{number}]", said(FUNCTIONS[key]), tag("code", family[key])]
             for key in asked
             if key in family
         ]
         sources.append(tag("code", f"[{number}] {family['source']}."))
     return tag(
         "section",
-        tag("h3", "Where to set it"),
-        table(["inverter", "function", "name in its manual"], rows, caption="Names of these functions",
-              text_columns=(0, 1, 2), class_="words"),
+        tag("h3", said("Where to set it")),
+        table(
+            said("inverter | function | name in its manual").split(" | "),
+            rows,
+            caption=said("Names of these functions"),
+            text_columns=(0, 1, 2),
+            class_="words",
+        ),
         tag(
             "p",
-            "Only names that a public manual prints; what is missing was not found there. The ramps of the "
-            "sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves of speed) "
-            "are ramps of the speed reference and do not replace them. Check the names against the manual of "
-            "your firmware. ",
+            said(
+                "Only names that a public manual prints; what is missing was not found there. The ramps of "
+                "the sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves "
+                "of speed) are ramps of the speed reference and do not replace them. Check the names "
+                "against the manual of your firmware."
+            ),
+            " ",
             joined(sources, " "),
             class_="small",
         ),
-    )  # fmt: skip
+    )
 
 
 def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
     rows = [_setting(one, drive) for one in sheet.settings]
-    role = role or "for an ordinary inverter"
-    heads = ["parameter", "meaning", "set to", "unit", "that is", "exact"]
+    role = role or said("for an ordinary inverter")
+    heads = said("parameter | meaning | set to | unit | that is | exact").split(" | ")
     return tag(
         "section",
         tag("h3", f"{sheet.name} ({role})"),
         table(
-            heads, rows, caption=f"Parameter sheet: {sheet.name}", text_columns=(0, 1, 3, 4), class_="sheet"
+            heads,
+            rows,
+            caption=said("Parameter sheet: {name}", name=sheet.name),
+            text_columns=(0, 1, 3, 4),
+            class_="sheet",
         )
         if rows
-        else tag("p", "This strategy has no parameters."),
+        else tag("p", said("This strategy has no parameters.")),
         _outcome(sheet),
         tag("ul", joined(tag("li", one) for one in _notes(sheet, drive)), class_="notes"),
         class_="sheet",
@@ -374,7 +389,7 @@ def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
 def _setting(one: Setting, drive: Drive) -> list[str]:
     name = one.name.replace("_", " ")
     if isinstance(one.exact, str) or isinstance(one.rounded, str):
-        return [name, one.meaning, str(one.rounded), "", "", str(one.exact)]
+        return [name, said(one.meaning), str(one.rounded), "", "", str(one.exact)]
     value, exact, step, shown = one.rounded, one.exact, one.step, unit(one.unit)
     other = ""
     if one.unit == "s":
@@ -386,12 +401,17 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
     elif one.unit == "N*m":
         rated, basis = rated_torque(drive)
         share = step and 100.0 * step / rated
-        other = f"{_multiple(100.0 * value / rated, share)} % of the {basis}"
+        other = said(
+            "{percent} % of the {basis}", percent=_multiple(100.0 * value / rated, share), basis=said(basis)
+        )
     text = _multiple(value, step)
-    kept = "" if one.step is not None else " (not rounded)" if one.name != "period" else "at most"
+    meaning = said(one.meaning)
     if one.name == "period":
-        return [name, one.meaning + " of the control code", f"≤ {short(value)}", shown, "", short(value)]
-    return [name, one.meaning + kept, text, shown, other, short(float(f"{exact:.5g}"))]
+        meaning = said("{meaning} of the control code", meaning=meaning)
+        return [name, meaning, f"≤ {short(value)}", shown, "", short(value)]
+    if one.step is None:
+        meaning = said("{meaning} (not rounded)", meaning=meaning)
+    return [name, meaning, text, shown, other, short(float(f"{exact:.5g}"))]
 
 
 def _multiple(value: float | None, step: float | None) -> str:
@@ -415,22 +435,24 @@ def _multiple(value: float | None, step: float | None) -> str:
 
 def _outcome(sheet: Sheet) -> Html:
     if sheet.rounded is None:
-        return tag("p", "The start with the rounded values could not be made: ", sheet.failure)
+        return tag(
+            "p", said("The start with the rounded values could not be made: {reason}", reason=sheet.failure)
+        )
     exact, rounded = sheet.exact, sheet.rounded
     rows = [
-        ["exact values", fixed(exact.k_dyn, 4), digits(exact.peak_torque), digits(exact.start_time, 5)],
-        ["rounded values, as in the sheet", fixed(rounded.k_dyn, 4), digits(rounded.peak_torque),
+        [said("exact values"), fixed(exact.k_dyn, 4), digits(exact.peak_torque), digits(exact.start_time, 5)],
+        [said("rounded values, as in the sheet"), fixed(rounded.k_dyn, 4), digits(rounded.peak_torque),
          digits(rounded.start_time, 5)],
     ]  # fmt: skip
     if sheet.variants:
         peak = sheet.worst_k_dyn * exact.peak_torque / exact.k_dyn if exact.k_dyn > 0.0 else math.nan
         rows.append(
-            ["worst with the values half a step off", fixed(sheet.worst_k_dyn, 4), digits(peak),
+            [said("worst with the values half a step off"), fixed(sheet.worst_k_dyn, 4), digits(peak),
              digits(sheet.slowest, 5)]
         )  # fmt: skip
     return table(
-        ["start with", "K_dyn", "peak torque, N m", "start time, s"], rows,
-        caption=f"{sheet.name}: started again after rounding",
+        said("start with | K_dyn | peak torque, N m | start time, s").split(" | "), rows,
+        caption=said("{name}: started again after rounding", name=sheet.name),
     )  # fmt: skip
 
 
@@ -445,25 +467,49 @@ def _limits(sheet: Sheet, drive: Drive) -> str:
         if torque:
             limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
             share = _multiple(100.0 * limit / rated, 100.0 * step / rated)
-            text.append(f"{_multiple(limit, step)} N m ({share} % of the {basis})")
-    current = " A limit of the torque-producing current: the same percentages." if basis[0] == "r" else ""
-    return (
-        f"Torque limits of the inverter, not tighter than what this start takes: {' and '.join(text)}."
-        f"{current}"
+            text.append(
+                said(
+                    "{torque} N m ({share} % of the {basis})",
+                    torque=_multiple(limit, step),
+                    share=share,
+                    basis=said(basis),
+                )
+            )
+    limits = said(
+        "Torque limits of the inverter, not tighter than what this start takes: {limits}.",
+        limits=listed(text),
     )
+    if basis is not RATED:
+        return limits
+    current = said("A limit of the torque-producing current: the same percentages.")
+    return f"{limits} {current}"
 
 
 def _notes(sheet: Sheet, drive: Drive) -> list[str]:
     notes = []
     if sheet.variants:
-        which = "all combinations of" if sheet.corners else "each value alone, and all together,"
-        notes.append(f"Half a step off: {sheet.variants} starts, {which} half a step down or up.")
+        notes.append(
+            said(
+                "Half a step off: {count} starts, all combinations of half a step down or up.",
+                count=sheet.variants,
+            )
+            if sheet.corners
+            else said(
+                "Half a step off: {count} starts, each value alone, and all together, half a step down or "
+                "up.",
+                count=sheet.variants,
+            )
+        )
         if math.isnan(sheet.worst_k_dyn):
-            notes.append("In at least one of them the load does not reach its target speed: set finer steps.")
+            notes.append(
+                said("In at least one of them the load does not reach its target speed: set finer steps.")
+            )
     notes.append(_limits(sheet, drive))
     coarse = [one.name.replace("_", " ") for one in sheet.settings if one.coarse]
     if coarse:
-        notes.append(f"The steps are coarse against {', '.join(coarse)}: look for a finer setting.")
+        notes.append(
+            said("The steps are coarse against {coarse}: look for a finer setting.", coarse=", ".join(coarse))
+        )
     if sheet.kind in ORDINARY:
         return notes + _on_ramps(sheet, drive)
     if sheet.kind != "direct":
@@ -477,28 +523,47 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
     if rise := sheet.full_rise:
         rated, basis = rated_torque(drive)
         notes.append(
-            f"Some inverters ask for the time of a ramp from 0 to 100 % of torque "
-            f"({short(float(f'{rated:.4g}'))} N m, the {basis}): that is {digits(1e3 * rise.exact)} ms, a "
-            f"mean rise of {digits(rated / rise.exact)} N m/s. Set to {short(1e3 * rise.rounded)} ms the "
-            f"rise takes {digits(1e3 * rise.rise)} ms, K_dyn is {fixed(rise.run.k_dyn, 4)} and the start "
-            f"time {digits(rise.run.start_time, 5)} s."
+            said(
+                "Some inverters ask for the time of a ramp from 0 to 100 % of torque ({rated} N m, the "
+                "{basis}): that is {exact} ms, a mean rise of {rise} N m/s. Set to {rounded} ms the rise "
+                "takes {takes} ms, K_dyn is {k_dyn} and the start time {time} s.",
+                rated=short(float(f"{rated:.4g}")),
+                basis=said(basis),
+                exact=digits(1e3 * rise.exact),
+                rise=digits(rated / rise.exact),
+                rounded=short(1e3 * rise.rounded),
+                takes=digits(1e3 * rise.rise),
+                k_dyn=fixed(rise.run.k_dyn, 4),
+                time=digits(rise.run.start_time, 5),
+            )
         )
     if sheet.kind == "s-curve":
         values = {one.name: one.rounded for one in sheet.settings}
         share, time = float(values["rounding"]), float(values["time"])
         notes.append(
-            f"S-curve share {short(100.0 * share)} %: rounded ends of {digits(500.0 * share * time)} ms each "
-            "at the beginning and at the end of the rise."
+            said(
+                "S-curve share {share} %: rounded ends of {time} ms each at the beginning and at the end of "
+                "the rise.",
+                share=short(100.0 * share),
+                time=digits(500.0 * share * time),
+            )
         )
     return notes
 
 
 def _on_code(sheet: Sheet, drive: Drive) -> str:
     """What an inverter must run and know for a strategy that is a program."""
-    text = "The strategy is code of its own"
-    if sheet.kind in DOCUMENTED:
-        text += " (equations: docs/controllers.md of softstart)"
-    if sheet.computes_with:
-        whose = "the drive" if sheet.own == drive else "the drive that its gains were tuned for"
-        text += f"; beside the sheet it computes with {listed(list(sheet.computes_with))} of {whose}"
-    return text + "."
+    found = (
+        said("The strategy is code of its own (equations: docs/controllers.md of softstart)")
+        if sheet.kind in DOCUMENTED
+        else said("The strategy is code of its own")
+    )
+    if not sheet.computes_with:
+        return f"{found}."
+    values = {"code": found, "data": listed([said(one) for one in sheet.computes_with])}
+    if sheet.own == drive:
+        return said("{code}; beside the sheet it computes with {data} of the drive.", **values)
+    return said(
+        "{code}; beside the sheet it computes with {data} of the drive that its gains were tuned for.",
+        **values,
+    )
