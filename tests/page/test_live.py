@@ -112,8 +112,8 @@ def test_sixty_steps_of_a_drag_give_at_least_55_updates(page, strategy, machine,
     lags = sorted(page.evaluate("window.lags"))
     print(
         f"\n{strategy}, {STEPS} steps: {updates} updates of K_dyn, {len(lags)} pictures; hand to picture "
-        f"{lags[len(lags) // 2]:.0f} ms (median), {lags[-1]:.0f} ms (worst), last {page.inner_text('.pulse')}; "
-        f"first paint {painted:.0f} ms after the address"
+        f"{lags[len(lags) // 2]:.0f} ms (median), {lags[-1]:.0f} ms (worst), "
+        f"last {page.inner_text('.pulse')}; first paint {painted:.0f} ms"
     )
     assert updates >= 55
 

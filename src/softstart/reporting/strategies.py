@@ -228,7 +228,7 @@ def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: f
     """
     down = -(-len(rows) // ACROSS)
     with drawing():
-        size = (WIDE, 0.75 + 1.1 * down)
+        size = (WIDE, 0.75 + 1.0 * down)  # four rows stand below the table of strategies on a page
         figure, axes = new_figure(down, ACROSS, size, sharex=True, sharey=True, squeeze=False)
         for row, panel in zip(rows, axes.flat, strict=False):
             run = row.run
