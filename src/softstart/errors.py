@@ -1,9 +1,10 @@
-"""The two errors that softstart raises, its one warning, and what sentences are made of."""
+"""The two errors that softstart raises, the collector of their sentences, and one warning."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 from softstart.language import said
 
@@ -35,6 +36,34 @@ class InputError(ValueError):
             found[MOST:] = [f"{len(found) - MOST} more things are wrong."]
         self.sentences: tuple[str, ...] = tuple(map(_readable, found))
         super().__init__("\n".join(self.sentences))
+
+
+class Mistakes:
+    """Collects what is wrong with an input, to raise it as one InputError.
+
+    >>> mistakes = Mistakes()
+    >>> with mistakes.noted():
+    ...     raise InputError("gap = -1: a gap is 0 or more.")
+    >>> mistakes.settle()
+    Traceback (most recent call last):
+    softstart.errors.InputError: gap = -1: a gap is 0 or more.
+    """
+
+    def __init__(self) -> None:
+        self.sentences: list[str] = []
+
+    @contextmanager
+    def noted(self, before: str = "") -> Iterator[None]:
+        """Keep the sentences of an InputError raised inside, each with `before` in front of it."""
+        try:
+            yield
+        except InputError as error:
+            self.sentences.extend(before + sentence for sentence in error.sentences)
+
+    def settle(self) -> None:
+        """Raise what was noted, if anything was."""
+        if self.sentences:
+            raise InputError(self.sentences)
 
 
 def _readable(sentence: str) -> str:

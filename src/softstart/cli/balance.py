@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from softstart.balancing import Balance, Engine, MeasuredCycle
 from softstart.balancing import balance as compute
 from softstart.balancing.engine import INDICATOR_FILE, LIBRARY, TABLES
-from softstart.cli.commands import Command
-from softstart.cli.completion import names_or_files, table_keys
+from softstart.cli.commands import Command, Reading
+from softstart.cli.completion import table_keys
 from softstart.cli.options import (
-    Mistakes,
     changes_option,
     command_line,
+    drive_argument,
     json_option,
     out_option,
     read_changes,
 )
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.quantities import to_si
 from softstart.views import balances as views
 from softstart.views.drawing import save_figure
@@ -34,26 +34,43 @@ from softstart.views.markdown import (
     write_table,
     write_text,
 )
-from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
+from softstart.views.terminal import present, print_conclusion, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-DEFAULT_ENGINE = "vaz-11113"
+
+def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
+    """The speeds in rad/s; None if none was given.
+
+    >>> [round(speed, 3) for speed in _read_speeds(["4500rpm", "100"], "--speed")]
+    [471.239, 100.0]
+    """
+    found = []
+    mistakes = Mistakes()
+    for text in texts:
+        with mistakes.noted():
+            speed = float(to_si(text, "rad/s", name=option))
+            if not speed > 0.0:
+                raise InputError(f'{option} = "{text}": a speed above 0, as 4500rpm.')
+            found.append(speed)
+    mistakes.settle()
+    return found or None
 
 
 @click.command(cls=Command)
-@click.argument(
-    "engine",
-    metavar="[ENGINE]",
-    default=DEFAULT_ENGINE,
-    shell_complete=names_or_files(LIBRARY.names, ".toml"),
+@drive_argument(
+    lambda name, settings: Engine.load(name, also=read_changes(settings)),
+    name="engine",
+    default="vaz-11113",
+    names=LIBRARY.names,
 )
 @click.option(
     "--speed",
     "speeds",
     metavar="SPEED",
     multiple=True,
+    type=Reading(_read_speeds),
     help="A speed to show, as 4500rpm. May be repeated; by default round ones over the range.",
 )
 @changes_option(
@@ -62,63 +79,23 @@ DEFAULT_ENGINE = "vaz-11113"
 )
 @json_option
 @out_option("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")
-def balance(
-    *, engine: str, speeds: tuple[str, ...], settings: tuple[str, ...], as_json: bool, out: str | None
-) -> None:
+def balance(*, engine: Engine, speeds: list[float] | None, as_json: bool, out: str | None) -> None:
     """Find the forces and moments of a piston engine by order, and design a two-shaft balancer.
 
     ENGINE is a TOML file or the name of a shipped engine; without it, the two-cylinder engine VAZ-11113 of
     the literature is taken, with values that are partly assumed. The balancer is tuned at one speed:
     balancer.tuning_speed.
     """
-    mistakes = Mistakes()
-    one: Engine | None = None
-    asked: list[float] | None = None
-    with mistakes.noted():
-        one = read_engine(engine, settings)
-    with mistakes.noted():
-        asked = read_speeds(speeds)
-    mistakes.settle()
-    assert one is not None
-
     with output_folder(out) as folder:
-        found = compute(one, asked)
+        found = compute(engine, speeds)
         if folder is not None:
             _write(found, folder, command_line())
-    if as_json:
-        print_json(found.summary())
-        return
-    _show(console(), found)
-    if out is not None:
-        print(f"\nWritten to {out}: report.md, the figures and the tables.")
-
-
-def read_engine(name: str, settings: Sequence[str]) -> Engine:
-    """The engine asked for, with its changes."""
-    mistakes = Mistakes()
-    changes: dict[str, Any] = {}
-    with mistakes.noted():
-        changes = read_changes(settings)
-    mistakes.settle()
-    return Engine.load(name, also=changes)
-
-
-def read_speeds(texts: Sequence[str]) -> list[float] | None:
-    """The speeds in rad/s; None if none was given.
-
-    >>> [round(speed, 3) for speed in read_speeds(["4500rpm", "100"])]
-    [471.239, 100.0]
-    """
-    found = []
-    mistakes = Mistakes()
-    for text in texts:
-        with mistakes.noted():
-            speed = float(to_si(text, "rad/s", name="--speed"))
-            if not speed > 0.0:
-                raise InputError(f'--speed = "{text}": a speed above 0, as 4500rpm.')
-            found.append(speed)
-    mistakes.settle()
-    return found or None
+    present(
+        found.summary,
+        lambda to: _show(to, found),
+        as_json,
+        out and f"{out}: report.md, the figures and the tables",
+    )
 
 
 def _show(to: Console, found: Balance) -> None:

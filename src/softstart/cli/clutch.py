@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.commands import Command, did_you_mean
+from softstart.cli.commands import Command, Reading, did_you_mean, typed
 from softstart.cli.completion import names_or_files, table_keys
 from softstart.cli.options import (
-    Mistakes,
     changes_option,
     command_line,
+    count,
     json_option,
     out_option,
+    quantity,
     read_changes,
 )
 from softstart.cli.running import working
@@ -29,8 +30,7 @@ from softstart.clutch import (
 )
 from softstart.clutch.laws import read_law
 from softstart.clutch.model import LIBRARY
-from softstart.errors import InputError
-from softstart.quantities import to_si, whole_number
+from softstart.errors import InputError, Mistakes
 from softstart.views import clutches as views
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
@@ -42,12 +42,11 @@ from softstart.views.markdown import (
     write_table,
     write_text,
 )
-from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
+from softstart.views.terminal import present, print_conclusion, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-DEFAULT_CLUTCH = "paper-c"
 DEFAULT_POINTS = 8
 
 
@@ -57,88 +56,7 @@ LAW = ("t [s]", "M [N*m]")
 PHASES = ("phase", "start [s]", "end [s]", "peak torque [N*m]", "at [s]", "friction work [J]")
 
 
-@click.command(cls=Command)
-@click.argument(
-    "clutch",
-    metavar="[CLUTCH]",
-    default=DEFAULT_CLUTCH,
-    shell_complete=names_or_files(LIBRARY.names, ".toml"),
-)
-@click.option(
-    "--law",
-    metavar="NAME|FILE",
-    shell_complete=names_or_files(lambda: LAWS, ".csv"),
-    help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
-    "and friction torque. By default that of the clutch file.",
-)
-@changes_option(
-    lambda: table_keys(Clutch.TABLES),
-    "Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
-)
-@click.option(
-    "--until", metavar="TIME", help="End of the run, as 5 (s). By default a period after the lock-up."
-)
-@click.option(
-    "--optimal",
-    is_flag=True,
-    help="Find the laws with the least friction work for a given peak of the shaft torque, with bounds.",
-)
-@click.option("--points", metavar="N", help=f"With --optimal: number of peaks. By default {DEFAULT_POINTS}.")
-@click.option(
-    "--nondecreasing", is_flag=True, help="With --optimal: only laws whose friction torque never falls."
-)
-@json_option
-@out_option("Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.")
-def clutch(
-    *,
-    clutch: str,
-    law: str | None,
-    settings: tuple[str, ...],
-    until: str | None,
-    optimal: bool,
-    points: str | None,
-    nondecreasing: bool,
-    as_json: bool,
-    out: str | None,
-) -> None:
-    """Engage a slipping clutch: peak of the shaft torque, friction work, slip time.
-
-    CLUTCH is a TOML file or the name of a shipped clutch; without it, the clutch of the literature is taken.
-    Its driving side turns at constant speed. With --optimal, the best engagement laws for its engagement time
-    are found.
-    """
-    mistakes = Mistakes()
-    one: Clutch | None = None
-    count = DEFAULT_POINTS
-    with mistakes.noted():
-        one = read_clutch(clutch, settings, law)
-    with mistakes.noted():
-        end = read_end(until)
-    with mistakes.noted():
-        count = _points(points, optimal, nondecreasing, until)
-    mistakes.settle()
-    assert one is not None
-
-    found: Engagement | EngagementFront
-    with output_folder(out) as folder:
-        found = _optimize(one, count, nondecreasing) if optimal else engage(one, until=end)
-        if folder is not None:
-            _write(found, folder, command_line())
-    if as_json:
-        print_json(found.summary())
-        return
-    _show(console(), found)
-    if out is not None:
-        print(f"\nWritten to {out}: report.md, the figure, the tables and the laws.")
-
-
-def _optimize(one: Clutch, points: int, nondecreasing: bool) -> EngagementFront:
-    with working("looking for the best laws ...") as progress:
-        law_class = "nondecreasing" if nondecreasing else "any"
-        return optimize_engagement(one, points, law_class=law_class, progress=progress)
-
-
-def read_clutch(name: str, settings: Sequence[str], law: str | None) -> Clutch:
+def _read_clutch(name: str, option: str, settings: Sequence[str], law: str | None) -> Clutch:
     """The clutch asked for, with its changes and its law; all mistakes at once."""
     mistakes = Mistakes()
     changes: dict[str, Any] = {}
@@ -158,31 +76,95 @@ def read_clutch(name: str, settings: Sequence[str], law: str | None) -> Clutch:
     return Clutch.load(name, also=changes)
 
 
-def read_end(text: str | None) -> float | None:
-    """The end of the run in s.
-
-    >>> read_end("500 ms")
-    0.5
-    """
-    if text is None:
-        return None
-    value = float(to_si(text, "s", name="--until"))
-    if not value > 0.0:
-        raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 5 or "500 ms".')
-    return value
-
-
-def _points(text: str | None, optimal: bool, nondecreasing: bool, until: str | None) -> int:
-    if optimal and until is not None:
+def _check_optimal(given: Mapping[str, Any]) -> None:
+    if given["optimal"] and typed("until") is not None:
         raise InputError(
-            f'--until = "{until}": optimal laws are followed to the lock-up; leave it out with --optimal.'
+            f'--until = "{typed("until")}": optimal laws are followed to the lock-up; leave it out with '
+            "--optimal."
         )
-    if not optimal and (text is not None or nondecreasing):
-        what = f'--points = "{text}"' if text is not None else "--nondecreasing"
+    if not given["optimal"] and (given["points"] is not None or given["nondecreasing"]):
+        what = "--nondecreasing" if given["points"] is None else f'--points = "{typed("points")}"'
         raise InputError(f"{what}: this is for the optimal laws; add --optimal.")
-    if text is None:
-        return DEFAULT_POINTS
-    return whole_number(text, "--points", 1, 200)
+
+
+@click.command(cls=Command, checks=[_check_optimal])
+@click.argument(
+    "clutch",
+    metavar="[CLUTCH]",
+    default="paper-c",
+    type=Reading(_read_clutch, "settings", "law"),
+    shell_complete=names_or_files(LIBRARY.names, ".toml"),
+)
+@click.option(
+    "--law",
+    metavar="NAME|FILE",
+    shell_complete=names_or_files(lambda: LAWS, ".csv"),
+    help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
+    "and friction torque. By default that of the clutch file.",
+)
+@changes_option(
+    lambda: table_keys(Clutch.TABLES),
+    "Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
+)
+@click.option(
+    "--until",
+    metavar="TIME",
+    type=quantity("s", 'the end of the run is a time above 0 s, as 5 or "500 ms"', above=0.0),
+    help="End of the run, as 5 (s). By default a period after the lock-up.",
+)
+@click.option(
+    "--optimal",
+    is_flag=True,
+    help="Find the laws with the least friction work for a given peak of the shaft torque, with bounds.",
+)
+@click.option(
+    "--points",
+    metavar="N",
+    type=count(1, 200),
+    help=f"With --optimal: number of peaks. By default {DEFAULT_POINTS}.",
+)
+@click.option(
+    "--nondecreasing", is_flag=True, help="With --optimal: only laws whose friction torque never falls."
+)
+@json_option
+@out_option("Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.")
+def clutch(
+    *,
+    clutch: Clutch,
+    until: float | None,
+    optimal: bool,
+    points: int | None,
+    nondecreasing: bool,
+    as_json: bool,
+    out: str | None,
+) -> None:
+    """Engage a slipping clutch: peak of the shaft torque, friction work, slip time.
+
+    CLUTCH is a TOML file or the name of a shipped clutch; without it, the clutch of the literature is taken.
+    Its driving side turns at constant speed. With --optimal, the best engagement laws for its engagement time
+    are found.
+    """
+    found: Engagement | EngagementFront
+    with output_folder(out) as folder:
+        found = (
+            _optimize(clutch, points or DEFAULT_POINTS, nondecreasing)
+            if optimal
+            else engage(clutch, until=until)
+        )
+        if folder is not None:
+            _write(found, folder, command_line())
+    present(
+        found.summary,
+        lambda to: _show(to, found),
+        as_json,
+        out and f"{out}: report.md, the figure, the tables and the laws",
+    )
+
+
+def _optimize(one: Clutch, points: int, nondecreasing: bool) -> EngagementFront:
+    with working("looking for the best laws ...") as progress:
+        law_class = "nondecreasing" if nondecreasing else "any"
+        return optimize_engagement(one, points, law_class=law_class, progress=progress)
 
 
 def _show(to: Console, found: Engagement | EngagementFront) -> None:

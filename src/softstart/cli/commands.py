@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from softstart import __version__
-from softstart.errors import listed
+from softstart.errors import Mistakes, listed
 from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
@@ -94,6 +94,19 @@ For completion with the Tab key: eval "$(softstart completion bash)", or zsh, or
 """
 
 
+TYPED = "softstart.typed"
+
+
+def typed(name: str) -> Any:
+    """The text of this option or argument of the command that runs; None where it is not given."""
+    return click.get_current_context().meta[TYPED][name]
+
+
+def all_read(given: Mapping[str, Any]) -> bool:
+    """Whether every option that is given could be read, as a check of several of them together needs."""
+    return all(value is not None or typed(name) is None for name, value in given.items())
+
+
 class Words(click.types.StringParamType):
     """Text with the choices of the option's metavar, `a|b|c`; a choice in capitals is a placeholder.
 
@@ -111,14 +124,68 @@ class Words(click.types.StringParamType):
         return [CompletionItem(word) for word in found] if len(words) > 1 else []
 
 
-class Command(click.Command):
-    """A command that names itself in its usage errors, and whose options complete their words."""
+class Reading(Words):
+    """The type of an option whose command is given what `read(text, option, *others)` returns.
 
-    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+    `option` is the option's name, and `others` are what the options `needs` have; one of them without a
+    reading, as --set, is text for this one alone, which the command does not see.
+    """
+
+    def __init__(self, read: Callable[..., Any], *needs: str) -> None:
+        self.read, self.needs = read, needs
+
+
+class Command(click.Command):
+    """A command that reads its options, names itself in its usage errors, and completes words of options.
+
+    What is wrong with any option is reported together with what the `checks` find, which are called with all
+    values by name; a value that could not be read is None there.
+    """
+
+    def __init__(
+        self, *arguments: Any, checks: Sequence[Callable[[Mapping[str, Any]], None]] = (), **keywords: Any
+    ) -> None:
         super().__init__(*arguments, **keywords)
+        self.checks = checks
         for parameter in self.params:
             if parameter.type is click.STRING:
                 parameter.type = Words()
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Read all options, report all mistakes at once, and run the command with the values."""
+        mistakes = Mistakes()
+        ctx.meta[TYPED] = ctx.params
+        ctx.params = self._read(ctx.params, mistakes)
+        for check in self.checks:
+            with mistakes.noted():
+                check(ctx.params)
+        mistakes.settle()
+        return super().invoke(ctx)
+
+    def _read(self, given: Mapping[str, Any], mistakes: Mistakes) -> dict[str, Any]:
+        options = {str(one.name): one for one in self.params if one.name in given}
+        found: dict[str, Any] = {}
+
+        def value(name: str) -> Any:
+            if name not in found:
+                option, text = options[name], given[name]
+                if text is None or not isinstance(option.type, Reading):
+                    found[name] = text
+                else:
+                    found[name] = None  # if it cannot be read
+                    others = [value(other) for other in option.type.needs]
+                    with mistakes.noted():
+                        found[name] = option.type.read(text, option.opts[0], *others)
+            return found[name]
+
+        texts = {
+            other
+            for one in options.values()
+            if isinstance(one.type, Reading)
+            for other in one.type.needs
+            if not isinstance(options[other].type, Reading)
+        }
+        return {name: value(name) for name in options if name not in texts}
 
     def get_help_option_names(self, ctx: click.Context) -> list[str]:
         """Both names, whichever context asks first: click keeps the option that it has made for that one."""

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 import softstart
-from softstart.cli.commands import Command
+from softstart.cli.commands import Command, Reading, typed
 from softstart.cli.completion import names_or_files
 from softstart.cli.options import (
-    Mistakes,
+    choice,
     command_line,
+    count,
     drive_names,
     json_option,
     named_as_options,
     out_option,
-    read_count,
+    quantity,
     read_drive,
+    read_list,
     read_machine,
     read_names,
     read_params,
@@ -29,7 +31,6 @@ from softstart.cli.options import (
 from softstart.cli.running import working
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.quantities import to_si
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
     markdown,
@@ -39,12 +40,13 @@ from softstart.views.markdown import (
     write_drive_report,
     write_table,
 )
-from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
+from softstart.views.terminal import present, print_conclusion, print_lines, print_tables
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from softstart.drive import Drive
     from softstart.identification import planning
-    from softstart.identification.logs import TorqueIs
     from softstart.identification.planning import Plan
     from softstart.identification.result import Identification
     from softstart.views import identification as views
@@ -58,39 +60,68 @@ SIMULATED = (
 STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse-coast-hold")
 
 
-@click.command(cls=Command)
+def _check_question(given: Mapping[str, Any]) -> None:
+    logs, plan, drive, wear = given["logs"], typed("plan"), typed("drive"), given["wear"]
+    if plan is None and not logs:
+        raise InputError(
+            "LOG is missing: name the CSV file of a log, or plan an experiment with --plan DRIVE."
+        )
+    if plan is not None and logs:
+        raise InputError(f'--plan = "{plan}": it reads no log; leave out {logs[0]}, or --plan.')
+    if not wear and (typed("dates") or typed("limit")):
+        raise InputError(
+            f"{'--dates' if typed('dates') else '--limit'}: it goes with --wear; leave it out, or add --wear."
+        )
+    if wear and (plan is not None or drive is not None or typed("settings")):
+        option = "--plan" if plan is not None else "--drive" if drive is not None else "--set"
+        raise InputError(f"{option}: --wear reads folders of identifications alone; leave it out.")
+    if plan is None and drive is None and not wear:
+        raise InputError("--drive is missing: the search begins from a guess; softstart init writes one.")
+
+
+@click.command(cls=Command, checks=[_check_question])
 @click.argument("logs", metavar="[LOG]...", nargs=-1)
 @click.option(
-    "--drive", metavar="GUESS", shell_complete=names_or_files(drive_names, ".toml"),
+    "--drive", metavar="GUESS",
+    type=Reading(lambda name, _, settings: read_machine(name, settings), "settings"),
+    shell_complete=names_or_files(drive_names, ".toml"),
     help="The drive, or chain with one dominant gap, as it is thought to be, by a factor of 3 if need be: a "
     "file or shipped name.",
 )  # fmt: skip
 @set_option
 @click.option(
     "--columns", metavar="SIGNAL=NAME,...",
+    type=Reading(lambda text, option: read_params(text.split(","), option, "speed=n_act")),
     help="What the log calls them, as time=t,torque=-M_act,speed=n_act[rpm]; a minus turns the sign, a unit "
     "in brackets takes the place of that of the log.",
 )  # fmt: skip
 @click.option(
-    "--torque-is", metavar="measured|demand", default="measured", help="What the torque of the log is."
-)
+    "--torque-is", metavar="measured|demand", type=choice("measured", "demand"), default="measured",
+    help="What the torque of the log is.",
+)  # fmt: skip
 @click.option(
-    "--torque-constant", metavar="CONSTANT",
+    "--torque-constant", metavar="CONSTANT", type=quantity("N*m/A"),
     help="The log has a current in place of the torque, of which this is the torque, as '1.2 N*m/A'.",
 )  # fmt: skip
 @click.option(
     "--free",
     metavar="NAME,...",
+    type=Reading(read_list),
     help="What to find, as gap,stiffness,position. By default all that is usual; +motor.friction adds one.",
 )
-@click.option("--searches", metavar="N", help="At most so many searches for the best fit; 12 by default.")
+@click.option(
+    "--searches", metavar="N", type=count(), default="12",
+    help="At most so many searches for the best fit; 12 by default.",
+)  # fmt: skip
 @click.option(
     "--controllers",
     metavar="NAME,...",
+    type=Reading(read_names),
     help=f"Strategies whose K_dyn is shown; {','.join(STRATEGIES)} by default.",
 )
 @click.option(
-    "--plan", metavar="DRIVE", shell_complete=names_or_files(drive_names, ".toml"),
+    "--plan", metavar="DRIVE", type=Reading(lambda name, _, settings: read_drive(name, settings), "settings"),
+    shell_complete=names_or_files(drive_names, ".toml"),
     help="No log yet: show what experiments with this drive would tell, and look for a better one.",
 )  # fmt: skip
 @click.option(
@@ -101,7 +132,11 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 )
 @click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
 @click.option(
-    "--tell", "wanted", metavar="NAME,...", help="Parameters that a plan is to tell best; all by default."
+    "--tell",
+    "wanted",
+    metavar="NAME,...",
+    type=Reading(read_list),
+    help="Parameters that a plan is to tell best; all by default.",
 )
 @click.option(
     "--most-torque", metavar="TORQUE", help="Largest shaft torque that a planned experiment may have."
@@ -114,11 +149,14 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
     help="LOG are folders of identifications of one drive: how its gap grows, and when it reaches --limit.",
 )  # fmt: skip
 @click.option(
-    "--dates", metavar="DATE,...",
+    "--dates", metavar="DATE,...", type=Reading(read_list),
     help="With --wear: when the logs were taken, as 2025-05-31,2026-05. By default by the folders' names.",
 )  # fmt: skip
 @click.option(
-    "--limit", metavar="GAP", help="With --wear: the gap of a worn drive, as '0.2 rad'; strategies then."
+    "--limit",
+    metavar="GAP",
+    type=quantity("rad"),
+    help="With --wear: the gap of a worn drive, as '0.2 rad'; strategies then.",
 )
 @json_option
 @out_option(
@@ -127,26 +165,12 @@ STRATEGIES = ("direct", "ramp", "s-curve", "reduced-two-stage", "shaped", "pulse
 def identify(
     *,
     logs: tuple[str, ...],
-    drive: str | None,
-    settings: tuple[str, ...],
-    columns: str | None,
-    torque_is: str,
-    torque_constant: str | None,
-    free: str | None,
-    searches: str | None,
-    controllers: str | None,
-    plan: str | None,
-    standard: bool,
-    log_period: str | None,
-    ripple: str | None,
-    wanted: str | None,
-    most_torque: str | None,
-    most_travel: str | None,
+    plan: Drive | None,
+    controllers: list[str] | None,
     wear: bool,
-    dates: str | None,
-    limit: str | None,
     as_json: bool,
     out: str | None,
+    **given: Any,
 ) -> None:
     """Find the parameters of a drive, with intervals, from what an inverter logged of its starts.
 
@@ -155,116 +179,76 @@ def identify(
     logs are of one drive. With --plan DRIVE no log is read: it shows what each experiment would tell before
     it is run. With --wear the folders of identifications are compared over the years.
     """
-    mistakes = Mistakes()
-    with mistakes.noted():
-        if plan is None and not logs:
-            raise InputError(
-                "LOG is missing: name the CSV file of a log, or plan an experiment with --plan DRIVE."
-            )
-        if plan is not None and logs:
-            raise InputError(f'--plan = "{plan}": it reads no log; leave out {logs[0]}, or --plan.')
-        if not wear and (dates or limit):
-            raise InputError(
-                f"{'--dates' if dates else '--limit'}: it goes with --wear; leave it out, or add --wear."
-            )
-        if wear and (plan is not None or drive is not None or settings):
-            option = "--plan" if plan is not None else "--drive" if drive is not None else "--set"
-            raise InputError(f"{option}: --wear reads folders of identifications alone; leave it out.")
-        if plan is None and drive is None and not wear:
-            raise InputError("--drive is missing: the search begins from a guess; softstart init writes one.")
-    mistakes.settle()
     if wear:
-        show_wear(logs, dates, limit, controllers, as_json, out)
-        return
-    with mistakes.noted():
-        guess = read_drive(plan, settings) if plan is not None else read_machine(str(drive), settings)
-    with mistakes.noted():
-        if torque_is not in ("measured", "demand"):
-            raise InputError(f'--torque-is = "{torque_is}": write measured or demand.')
-    with mistakes.noted():
-        constant = (
-            None
-            if torque_constant is None
-            else float(to_si(torque_constant, "N*m/A", name="--torque-constant"))
-        )
-    with mistakes.noted():
-        names = [name.strip() for name in free.split(",")] if free else None
-    with mistakes.noted():
-        most = read_count(searches, "--searches")
-    with mistakes.noted():
-        strategies = read_names(controllers)
-    with mistakes.noted():
-        texts = tuple(columns.split(",")) if columns else ()
-        called = read_params(texts, "--columns", "speed=n_act")
-    mistakes.settle()
+        show_wear(logs, given["dates"], given["limit"], controllers, as_json, out)
+    elif plan is not None:
+        show_plan(plan, given, as_json, out)
+    else:
+        show_fit(logs, controllers or STRATEGIES, given, as_json, out)
 
-    with output_folder(out) as folder:
-        if plan is not None:
-            with working("planning experiments ...") as tell, named_as_options():
-                made = softstart.plan_experiments(
-                    cast("Drive", guess), log_period=log_period or "4 ms", ripple=ripple, free=names,
-                    most_torque=most_torque, most_travel=most_travel, optimise=not standard, tell=tell,
-                    wanted=[name.strip() for name in wanted.split(",")] if wanted else (),
-                )  # fmt: skip
-                if folder is not None:
-                    write_plan(made, folder, command_line())
-            if as_json:
-                print_json(made.summary())
-            else:
-                to = console()
-                print_lines(to, views.plan_headline(made))
-                print_tables(to, [views.plan_table(made)])
-                print_conclusion(to, [views.plan_conclusion(made)], [])
-        else:
-            with working("fitting the drive to the logs ...") as tell, named_as_options():
-                found = softstart.identify(
-                    list(logs),
-                    guess,
-                    free=names,
-                    torque_is=cast("TorqueIs", torque_is),
-                    columns=called,
-                    torque_constant=constant,
-                    searches=most or 12,
-                    tell=tell,
-                )
-                each = found.k_dyn(strategies or STRATEGIES)
-                if folder is not None:
-                    write_identification(found, each, folder, command_line())
-            if as_json:
-                print_json(
-                    found.summary()
-                    | {
-                        "k_dyn": {
-                            name: dict(zip(("value", "lower", "upper"), three, strict=True))
-                            for name, three in each.items()
-                        }
-                    }
-                )
-            else:
-                to = console()
-                print_lines(to, views.headline(found))
-                print_tables(to, [views.estimates_table(found), views.k_dyn_table(each)])
-                print_conclusion(to, [], found.notes)
-    if out is not None and not as_json:
-        what = "torques and simulated logs, figure" if plan is not None else "drive.toml, residuals, figure"
-        print(f"\nWritten to {out}: report.md, {what}.")
+
+def show_plan(drive: Drive, given: Mapping[str, Any], as_json: bool, out: str | None) -> None:
+    """`--plan`: what standard experiments and a planned one tell."""
+    with output_folder(out) as folder, working("planning experiments ...") as progress, named_as_options():
+        made = softstart.plan_experiments(
+            drive, log_period=given["log_period"] or "4 ms", ripple=given["ripple"], free=given["free"],
+            most_torque=given["most_torque"], most_travel=given["most_travel"],
+            optimise=not given["standard"], tell=progress, wanted=given["wanted"] or (),
+        )  # fmt: skip
+        if folder is not None:
+            write_plan(made, folder, command_line())
+
+    def show(to: Console) -> None:
+        print_lines(to, views.plan_headline(made))
+        print_tables(to, [views.plan_table(made)])
+        print_conclusion(to, [views.plan_conclusion(made)], [])
+
+    present(made.summary, show, as_json, out and f"{out}: report.md, torques and simulated logs, figure")
+
+
+def show_fit(
+    logs: Sequence[str], strategies: Sequence[str], given: Mapping[str, Any], as_json: bool, out: str | None
+) -> None:
+    """The drive that the logs are of."""
+    with (
+        output_folder(out) as folder,
+        working("fitting the drive to the logs ...") as progress,
+        named_as_options(),
+    ):
+        found = softstart.identify(
+            list(logs), given["drive"], free=given["free"], torque_is=given["torque_is"],
+            columns=given["columns"] or {}, torque_constant=given["torque_constant"],
+            searches=given["searches"], tell=progress,
+        )  # fmt: skip
+        each = found.k_dyn(strategies)
+        if folder is not None:
+            write_identification(found, each, folder, command_line())
+
+    def show(to: Console) -> None:
+        print_lines(to, views.headline(found))
+        print_tables(to, [views.estimates_table(found), views.k_dyn_table(each)])
+        print_conclusion(to, [], found.notes)
+
+    names = ("value", "lower", "upper")
+    present(
+        lambda: (
+            found.summary()
+            | {"k_dyn": {name: dict(zip(names, three, strict=True)) for name, three in each.items()}}
+        ),
+        show,
+        as_json,
+        out and f"{out}: report.md, drive.toml, residuals, figure",
+    )
 
 
 def show_wear(
-    folders: Sequence[str], dates: str | None, limit: str | None, controllers: str | None, as_json: bool,
-    out: str | None,
+    folders: Sequence[str], days: list[str] | None, worn: float | None, controllers: list[str] | None,
+    as_json: bool, out: str | None,
 ) -> None:  # fmt: skip
     """`--wear`: growth of the gap, when it is worn, and strategies then."""
-    mistakes = Mistakes()
-    with mistakes.noted():
-        names = read_names(controllers)
-    with mistakes.noted():
-        worn = None if limit is None else float(to_si(limit, "rad", name="--limit"))
-    mistakes.settle()
-    days = None if dates is None else [one.strip() for one in dates.split(",")]
     with output_folder(out) as folder:
         with working("starting the worn drive ..."):
-            found = softstart.follow_wear(folders, days, worn, controllers=names or list(STRATEGIES))
+            found = softstart.follow_wear(folders, days, worn, controllers=controllers or list(STRATEGIES))
         said = views.wear_conclusion(found)
         tables = [views.wear_table(found), *([views.wear_strategies(found)] if found.then else [])]
         if folder is not None:
@@ -279,15 +263,13 @@ def show_wear(
                 *map(markdown, found.notes),
             ]
             write_drive_report(folder, parts, found.found[-1].drive, command_line())
-    if as_json:
-        print_json(found.summary())
-        return
-    to = console()
-    print_lines(to, [f"{found.found[-1].drive.name}: wear from {found.dates[0]} to {found.dates[-1]}"])
-    print_tables(to, tables)
-    print_conclusion(to, said, found.notes)
-    if out is not None:
-        print(f"\nWritten to {out}: report.md, wear.csv, figure.")
+
+    def show(to: Console) -> None:
+        print_lines(to, [f"{found.found[-1].drive.name}: wear from {found.dates[0]} to {found.dates[-1]}"])
+        print_tables(to, tables)
+        print_conclusion(to, said, found.notes)
+
+    present(found.summary, show, as_json, out and f"{out}: report.md, wear.csv, figure")
 
 
 def write_identification(

@@ -10,9 +10,6 @@ import click
 import softstart
 from softstart.cli.commands import Command
 from softstart.cli.options import (
-    DEFAULT_DRIVE,
-    Mistakes,
-    check_name,
     command_line,
     controller_option,
     drive_argument,
@@ -20,7 +17,6 @@ from softstart.cli.options import (
     out_option,
     param_option,
     read_drive,
-    read_params,
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
@@ -36,10 +32,9 @@ from softstart.views.markdown import (
     write_table,
 )
 from softstart.views.terminal import (
-    console,
+    present,
     print_conclusion,
     print_figures,
-    print_json,
     print_lines,
     print_tables,
     sentence,
@@ -48,17 +43,18 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from softstart.drive import Drive
     from softstart.views import linear as views
 else:  # no numba for a help, a wrong option or the Tab key
     views = late("softstart.views.linear")
 
 
 @click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
+@drive_argument(read_drive)
 @controller_option(
     "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
 )
-@param_option("KEY=VALUE", "Set a parameter of the controller, as period='0.5 ms'. May be repeated.")
+@param_option("Set a parameter of the controller, as period='0.5 ms'. May be repeated.")
 @set_option
 @json_option
 @out_option(
@@ -66,10 +62,9 @@ else:  # no numba for a help, a wrong option or the Tab key
 )
 def linear(
     *,
-    drive: str,
+    drive: Drive,
     controller: str,
-    params: tuple[str, ...],
-    settings: tuple[str, ...],
+    params: dict[str, str],
     as_json: bool,
     out: str | None,
 ) -> None:
@@ -80,30 +75,17 @@ def linear(
     the gap is closed; the loop is broken at the torque demand. Limit cycles through the gap are predicted
     by the describing function and tried on the exact plant.
     """
-    mistakes = Mistakes()
-    with mistakes.noted():
-        one = read_drive(drive, settings)
-    with mistakes.noted():
-        check_name(controller, "--controller")
-    with mistakes.noted():
-        given = read_params(params)
-    mistakes.settle()
-
     with output_folder(out) as folder:
         with working("running and linearising the start ..."):
-            (made,) = make_controllers([controller], {controller: given}, prefix=False)
+            (made,) = make_controllers([controller], {controller: params}, prefix=False)
             with Attributed():
-                view = softstart.linear_view(one, made)
+                view = softstart.linear_view(drive, made)
         if folder is not None:
             with working("drawing the figure ..."):
                 write_linear(view, folder, command_line())
 
-    if as_json:
-        print_json(view.summary())
-    else:
-        _show(console(), view)
-        if out is not None:
-            print(f"\nWritten to {out}: {'report.md, figure and response' if view.margins else 'report.md'}.")
+    files = "report.md, figure and response" if view.margins else "report.md"
+    present(view.summary, lambda to: _show(to, view), as_json, out and f"{out}: {files}")
 
 
 def _show(to: Console, view: softstart.LinearView) -> None:

@@ -10,10 +10,10 @@ import click
 from softstart.cli.commands import Command, did_you_mean
 from softstart.cli.completion import controllers as controllers_known
 from softstart.cli.completion import names_or_files
-from softstart.cli.options import Mistakes, check_name, controller_names, drive_names, json_option
+from softstart.cli.options import check_name, controller_names, drive_names, json_option
 from softstart.cli.running import Attributed, working
 from softstart.drive import PARAMETERS, Drive, library
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.late import late
 from softstart.views.numbers import Table, printable
 from softstart.views.terminal import console, print_json, print_table, sentence

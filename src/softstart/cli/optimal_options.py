@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from softstart.cli.commands import did_you_mean
-from softstart.cli.options import Decorator, Mistakes, as_option
-from softstart.errors import InputError, SimulationError
+from softstart.cli.commands import Reading
+from softstart.cli.options import Decorator, as_option, choice, quantity
+from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import StartTime
+from softstart.optimal.problem import TERMINALS, StartTime
 from softstart.quantities import to_si, values_in, whole_number
 from softstart.views.terminal import print_json
 
@@ -24,60 +24,10 @@ else:  # no numba for a help, a wrong option or the Tab key
 METHODS = ("auto", "closed-form", "collocation", "lp")
 
 
-# the options ---------------------------------------------------------------------------------------------
-
-
-def terminal_option(default: str) -> Decorator:
-    """--terminal."""
-    return click.option(
-        "--terminal",
-        metavar="synchronous|steady|reached",
-        help="How the start ends: motor and load at the target speed; also with the shaft torque at that of "
-        f"the load; or only the load at the target speed. By default {default}.",
-    )
-
-
-method_option = click.option(
-    "--method",
-    metavar="|".join(METHODS),
-    help="By default auto: the cheapest one that is valid.",
-)
-torque_speed_option = click.option(
-    "--torque-speed",
-    metavar="SPEED:TORQUE,...",
-    help="Limit of the motor's torque over its speed by its corners, as '0 rad/s:62 N*m,90 rad/s:40 N*m'.",
-)
-smoothness_option = click.option(
-    "--smoothness",
-    metavar="TIME",
-    help="Weight of a smooth torque against a low K_dyn, as 0.001 (s). By default 0.",
-)
-
-
 # reading them --------------------------------------------------------------------------------------------
 
 
-def read_choice(text: str, option: str, choices: Sequence[str]) -> Any:
-    """One of the words.
-
-    >>> read_choice("steedy", "--terminal", ("synchronous", "steady", "reached"))
-    Traceback (most recent call last):
-    softstart.errors.InputError: --terminal = "steedy": there is no such choice; did you mean steady?
-    """
-    if text not in choices:
-        raise InputError(f'{option} = "{text}": there is no such choice; {did_you_mean(text, choices)}')
-    return text
-
-
-def read_positive(text: str, option: str, unit: str, meaning: str) -> float:
-    """A finite quantity above 0."""
-    value = float(to_si(text, unit, name=option))
-    if not value > 0.0:
-        raise InputError(f'{option} = "{text}": give {meaning}.')
-    return value
-
-
-def read_start_times(text: str) -> list[StartTime]:
+def read_start_times(text: str, option: str = "--start-times") -> list[StartTime]:
     """Start times with commas between, or as from:to:count.
 
     >>> read_start_times("0.25, 1.2x")
@@ -85,7 +35,6 @@ def read_start_times(text: str) -> list[StartTime]:
     >>> [round(one.value, 3) for one in read_start_times("0.25:0.5:3")]
     [0.25, 0.375, 0.5]
     """
-    option = "--start-times"
     if ":" not in text:
         return _each(text, option, lambda part: StartTime.of(part, option))
     parts = [part.strip() for part in text.split(":")]
@@ -109,34 +58,31 @@ def read_start_times(text: str) -> list[StartTime]:
     return [StartTime(first.value + index * step, first.multiple) for index in range(count)]
 
 
-def read_quantities(text: str | None, option: str, unit: str) -> list[float]:
-    """Numbers or quantities with commas between; none if nothing was given.
+def quantities(unit: str) -> Reading:
+    """The type of an option that is numbers or quantities with commas between.
 
-    >>> read_quantities("0.25, 500 mrad", "--gaps", "rad")
+    >>> quantities("rad").read("0.25, 500 mrad", "--gaps")
     [0.25, 0.5]
     """
-    if text is None:
-        return []
-    return _each(text, option, lambda part: float(to_si(part, unit, name=option)))
+    return Reading(
+        lambda text, option: _each(text, option, lambda part: float(to_si(part, unit, name=option)))
+    )
 
 
-def read_corners(text: str | None) -> tuple[tuple[float, float], ...]:
+def _read_corners(text: str, option: str) -> tuple[tuple[float, float], ...]:
     """Corners of a torque-speed curve, rad/s and N m.
 
-    >>> read_corners("0:62, 900 rpm: 40 N*m")[1][1]
+    >>> _read_corners("0:62, 900 rpm: 40 N*m", "--torque-speed")[1][1]
     40.0
     """
-    if text is None:
-        return ()
 
     def corner(part: str) -> tuple[float, float]:
         speed, colon, torque = part.partition(":")
         if not (colon and speed.strip() and torque.strip()):
-            raise InputError(f'--torque-speed = "{part}": write each corner as speed:torque, as 90:40.')
-        option = "--torque-speed"
+            raise InputError(f'{option} = "{part}": write each corner as speed:torque, as 90:40.')
         return float(to_si(speed, "rad/s", name=option)), float(to_si(torque, "N*m", name=option))
 
-    return tuple(_each(text, "--torque-speed", corner))
+    return tuple(_each(text, option, corner))
 
 
 def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
@@ -148,6 +94,41 @@ def _each(text: str, option: str, read: Callable[[str], Any]) -> list[Any]:
             found.append(read(part))
     mistakes.settle()
     return found
+
+
+# the options ---------------------------------------------------------------------------------------------
+
+
+def terminal_option(usual: str, default: str | None = None) -> Decorator:
+    """--terminal; `default` where it is not the drive that decides."""
+    return click.option(
+        "--terminal",
+        metavar="|".join(TERMINALS),
+        type=choice(*TERMINALS),
+        default=default,
+        help="How the start ends: motor and load at the target speed; also with the shaft torque at that of "
+        f"the load; or only the load at the target speed. By default {usual}.",
+    )
+
+
+method_option = click.option(
+    "--method",
+    metavar="|".join(METHODS),
+    type=choice(*METHODS),
+    help="By default auto: the cheapest one that is valid.",
+)
+torque_speed_option = click.option(
+    "--torque-speed",
+    metavar="SPEED:TORQUE,...",
+    type=Reading(_read_corners),
+    help="Limit of the motor's torque over its speed by its corners, as '0 rad/s:62 N*m,90 rad/s:40 N*m'.",
+)
+smoothness_option = click.option(
+    "--smoothness",
+    metavar="TIME",
+    type=quantity("s", "a weight in s, 0 or more", least=0.0),
+    help="Weight of a smooth torque against a low K_dyn, as 0.001 (s). By default 0.",
+)
 
 
 # what comes of them --------------------------------------------------------------------------------------

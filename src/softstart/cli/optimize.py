@@ -5,7 +5,7 @@ With --gaps, --inertias or --load-torques: one profile for several drives, and w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -13,28 +13,24 @@ import click
 
 import softstart
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command
+from softstart.cli.commands import Command, Reading, all_read, typed
 from softstart.cli.optimal_options import (
-    METHODS,
     method_option,
     no_solution_reported,
-    read_choice,
-    read_corners,
-    read_positive,
-    read_quantities,
+    quantities,
     smoothness_option,
     terminal_option,
     torque_speed_option,
 )
 from softstart.cli.options import (
-    DEFAULT_DRIVE,
-    Mistakes,
     as_option,
+    choice,
     command_line,
     drive_argument,
     json_option,
     named_as_options,
     out_option,
+    quantity,
     read_machine,
     read_names,
     set_option,
@@ -43,14 +39,12 @@ from softstart.cli.running import Attributed, working
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import OBJECTIVES, TERMINALS, USUAL, Problem, StartTime, usual_terminal
-from softstart.quantities import to_si
+from softstart.optimal.problem import OBJECTIVES, USUAL, Problem, StartTime, usual_terminal
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
-    console,
+    present,
     print_conclusion,
     print_figures,
-    print_json,
     print_lines,
     print_table,
     sentence,
@@ -76,121 +70,44 @@ else:  # no numba for a help, a wrong option or the Tab key
 
 
 SEARCH = ("method", "tolerance", "time_limit", "confirm", "limits", "seeds")  # how, not what
+SEVERAL = ("gaps", "inertias", "load_torques")
 
 
-@click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
-@click.option(
-    "--start-time",
-    metavar="TIME",
-    help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct. By default 1.2x.",
-)
-@click.option(
-    "--limits", is_flag=True, help="Find the least start time that keeps the [limits] of the drive instead."
-)
-@terminal_option("synchronous")
-@method_option
-@click.option("--minimise", metavar="|".join(OBJECTIVES), help="By default k_dyn.")
-@click.option("--max-k-dyn", metavar="NUMBER", help="Largest K_dyn allowed, if another figure is minimised.")
-@click.option("--max-heat", metavar="TIME", help="Largest I2t heat allowed, in s of starting torque.")
-@torque_speed_option
-@smoothness_option
-@click.option(
-    "--tolerance", metavar="SHARE", help="Gap to the lower bound at which the search ends. By default 0.5 %."
-)
-@click.option(
-    "--time-limit", metavar="TIME", help="No further search after this, as 20 (s); 0: the first answer."
-)
-@click.option(
-    "--confirm", is_flag=True, help="Solve the CasADi problem too, from its own guess, and show both."
-)
-@click.option(
-    "--seeds",
-    metavar="A,B,...",
-    help="Of a chain: strategies whose torque the search starts from; cma (cma2, cma3 ...) for a global "
-    "search (package cma). By default all strategies that need no parameter.",
-)
-@click.option(
-    "--gaps", metavar="GAP,...", help="One profile for these gaps, with a contact sensor and without."
-)
-@click.option("--inertias", metavar="INERTIA,...", help="... for these load inertias.")
-@click.option("--load-torques", metavar="TORQUE,...", help="... for these load torques.")
-@set_option
-@json_option
-@out_option("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
-def optimize(
-    *,
-    drive: str,
-    start_time: str | None,
-    gaps: str | None,
-    inertias: str | None,
-    load_torques: str | None,
-    settings: tuple[str, ...],
-    confirm: bool,
-    limits: bool,
-    seeds: str | None,
-    as_json: bool,
-    out: str | None,
-    **texts: str | None,
-) -> None:
-    """Find the torque profile with the least K_dyn for a start time, and prove how good it is.
-
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
-    Of a chain (crane-4-mass) the largest torque of all its shafts is minimised.
-    """
-    mistakes = Mistakes()
-    one: Drive | Chain | None = None
-    asked: StartTime | None = None
-    varied: dict[str, list[float]] = {}
-    with mistakes.noted():
-        one = read_machine(drive, settings)
-    if start_time is not None:
-        with mistakes.noted():
-            asked = StartTime.of(start_time, "--start-time")
-    flags = {"confirm": confirm, "limits": limits}
-    bounds = bounds_of(texts, mistakes) | {name: True for name, given in flags.items() if given}
-    lists = (("gaps", gaps, "rad"), ("inertias", inertias, "kg*m^2"), ("load_torques", load_torques, "N*m"))
-    for name, text, unit in lists:
-        with mistakes.noted():
-            varied[name] = read_quantities(text, f"--{name.replace('_', '-')}", unit)
-    if seeds is not None:
-        with mistakes.noted():
-            bounds["seeds"] = _read_seeds(seeds)
-    several = any(text is not None for _, text, _ in lists)
-    if several:
-        mistakes.sentences += not_for_several(bounds)
-    if isinstance(one, Chain):
-        with mistakes.noted(), named_as_options():
-            _check_chain(one, several, bounds)
-    elif one is not None and not mistakes.sentences:
-        with mistakes.noted(), named_as_options():
-            Problem(
-                one,
-                None if bounds.get("minimise") == "start_time" and asked is None else 1.0,  # any above 0
-                **{
-                    "terminal": usual_terminal(one),
-                    **{name: value for name, value in bounds.items() if name not in SEARCH},
-                },
-            )
-    mistakes.settle()
-    assert one is not None
-    if several and isinstance(one, Drive):
-        _optimize_for_all(one, asked or USUAL, varied, as_json, out)
-    else:
-        _optimize_one(one, start_time, bounds, as_json, out)
-
-
-def _read_seeds(text: str) -> list[str]:
+def _read_seeds(text: str, option: str) -> list[str]:
     """Names of controllers, and cma for the global search, which is none."""
     names = [name.strip() for name in text.split(",")]
     controllers = ",".join(name for name in names if not chain_search.is_global(name))
     globally = [name for name in names if chain_search.is_global(name)]
-    return [*(read_names(controllers or None, "--seeds") or ()), *globally]
+    return [*(read_names(controllers, option) if controllers else ()), *globally]
+
+
+def _bounds(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The keywords of `softstart.optimize` that were given, but for the start time."""
+    others = ("drive", "start_time", "as_json", "out", *SEVERAL)
+    return {
+        name: value
+        for name, value in given.items()
+        if name not in others and value is not None and value is not False
+    }
+
+
+def _check_bounds(given: Mapping[str, Any]) -> None:
+    """What an optimum of this drive or chain, or of several drives, does not take."""
+    one, bounds = given["drive"], _bounds(given)
+    several = any(given[name] is not None for name in SEVERAL)
+    if isinstance(one, Chain):
+        with named_as_options():
+            _check_chain(one, several, bounds)
+    elif several and (refused := not_for_several(bounds)):
+        raise InputError(refused)
+    elif all_read(given):
+        free = bounds.get("minimise") == "start_time" and given["start_time"] is None
+        bounds = {name: value for name, value in bounds.items() if name not in SEARCH}
+        with named_as_options():
+            Problem(one, None if free else 1.0, **{"terminal": usual_terminal(one), **bounds})  # any above 0
 
 
 def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None:
-    """What an optimum of a chain does not take."""
     if several:
         raise InputError(
             "--gaps, --inertias and --load-torques are for drives: on a chain one profile for several is not "
@@ -199,28 +116,6 @@ def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None
     given = {"method": "auto", "confirm": False, "limits": False, **bounds}
     solving.refuse_for_chain(given["method"], given["confirm"], given["limits"])
     chains.ChainProblem(chain, 1.0, **{name: value for name, value in bounds.items() if name not in SEARCH})
-
-
-def bounds_of(texts: Mapping[str, str | None], mistakes: Mistakes) -> dict[str, Any]:
-    """The options that were given, read, under the names of the keywords of `softstart.optimize`."""
-    readers: dict[str, tuple[str, Callable[[str], Any]]] = {
-        "terminal": ("terminal", lambda text: read_choice(text, "--terminal", TERMINALS)),
-        "method": ("method", lambda text: read_choice(text, "--method", METHODS)),
-        "minimise": ("minimise", lambda text: read_choice(text, "--minimise", OBJECTIVES)),
-        "max_k_dyn": ("k_dyn", lambda text: read_positive(text, "--max-k-dyn", "1", "a number above 0")),
-        "max_heat": ("heat", lambda text: read_positive(text, "--max-heat", "s", "a time above 0 s")),
-        "torque_speed": ("torque_speed", read_corners),
-        "smoothness": ("smoothness", _weight),
-        "tolerance": ("tolerance", lambda text: _from_zero(text, "--tolerance", "1", "a share, as 0.5 %")),
-        "time_limit": ("time_limit", lambda text: _from_zero(text, "--time-limit", "s", "a time in s")),
-    }
-    found: dict[str, Any] = {}
-    for name, text in texts.items():
-        if text is not None:
-            key, read = readers[name]
-            with mistakes.noted():
-                found[key] = read(text)
-    return found
 
 
 def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
@@ -234,15 +129,75 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _weight(text: str) -> float:
-    return _from_zero(text, "--smoothness", "s", "a weight in s")
+@click.command(cls=Command, checks=[_check_bounds])
+@drive_argument(read_machine)
+@click.option(
+    "--start-time",
+    metavar="TIME",
+    type=Reading(StartTime.of),
+    help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct. By default 1.2x.",
+)
+@click.option(
+    "--limits", is_flag=True, help="Find the least start time that keeps the [limits] of the drive instead."
+)
+@terminal_option("synchronous")
+@method_option
+@click.option("--minimise", metavar="|".join(OBJECTIVES), type=choice(*OBJECTIVES), help="By default k_dyn.")
+@click.option(
+    "--max-k-dyn", "k_dyn", metavar="NUMBER", type=quantity("1", "give a number above 0", above=0.0),
+    help="Largest K_dyn allowed, if another figure is minimised.",
+)  # fmt: skip
+@click.option(
+    "--max-heat", "heat", metavar="TIME", type=quantity("s", "give a time above 0 s", above=0.0),
+    help="Largest I2t heat allowed, in s of starting torque.",
+)  # fmt: skip
+@torque_speed_option
+@smoothness_option
+@click.option(
+    "--tolerance", metavar="SHARE", type=quantity("1", "a share, as 0.5 %, 0 or more", least=0.0),
+    help="Gap to the lower bound at which the search ends. By default 0.5 %.",
+)  # fmt: skip
+@click.option(
+    "--time-limit", metavar="TIME", type=quantity("s", "a time in s, 0 or more", least=0.0),
+    help="No further search after this, as 20 (s); 0: the first answer.",
+)  # fmt: skip
+@click.option(
+    "--confirm", is_flag=True, help="Solve the CasADi problem too, from its own guess, and show both."
+)
+@click.option(
+    "--seeds",
+    metavar="A,B,...",
+    type=Reading(_read_seeds),
+    help="Of a chain: strategies whose torque the search starts from; cma (cma2, cma3 ...) for a global "
+    "search (package cma). By default all strategies that need no parameter.",
+)
+@click.option(
+    "--gaps", metavar="GAP,...", type=quantities("rad"),
+    help="One profile for these gaps, with a contact sensor and without.",
+)  # fmt: skip
+@click.option(
+    "--inertias", metavar="INERTIA,...", type=quantities("kg*m^2"), help="... for these load inertias."
+)
+@click.option(
+    "--load-torques", metavar="TORQUE,...", type=quantities("N*m"), help="... for these load torques."
+)
+@set_option
+@json_option
+@out_option("Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.")
+def optimize(
+    *, drive: Drive | Chain, start_time: StartTime | None, as_json: bool, out: str | None, **given: Any
+) -> None:
+    """Find the torque profile with the least K_dyn for a start time, and prove how good it is.
 
-
-def _from_zero(text: str, option: str, unit: str, what: str) -> float:
-    value = float(to_si(text, unit, name=option))
-    if not value >= 0.0:
-        raise InputError(f'{option} = "{text}": {what}, 0 or more.')
-    return value
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
+    of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
+    Of a chain (crane-4-mass) the largest torque of all its shafts is minimised.
+    """
+    varied = {name: given[name] or [] for name in SEVERAL}
+    if any(given[name] is not None for name in SEVERAL) and isinstance(drive, Drive):
+        _optimize_for_all(drive, start_time or USUAL, varied, as_json, out)
+    else:
+        _optimize_one(drive, typed("start_time"), _bounds(given), as_json, out)
 
 
 def _optimize_one(
@@ -257,12 +212,12 @@ def _optimize_one(
             with working("drawing the figure ..."):
                 views.write_optimum(best, others, folder, command_line())
 
-    if as_json:
-        print_json({**best.summary(), "controllers": [views.controller_summary(run) for run in others]})
-    else:
-        _show(console(), best, others)
-        if out is not None:
-            print(f"\nWritten to {out}: report.md, the profile (CSV, TOML, C), figure and traces.")
+    present(
+        lambda: {**best.summary(), "controllers": [views.controller_summary(run) for run in others]},
+        lambda to: _show(to, best, others),
+        as_json,
+        out and f"{out}: report.md, the profile (CSV, TOML, C), figure and traces",
+    )
 
 
 def runs_beside(best: Optimum) -> list[Run]:
@@ -301,12 +256,12 @@ def _optimize_for_all(
             with working("drawing the figure ..."):
                 views.write_worth(worth, folder, command_line())
 
-    if as_json:
-        print_json(worth.summary())
-    else:
-        _show_worth(console(), worth)
-        if out is not None:
-            print(f"\nWritten to {out}: report.md, both profiles, the figure and traces.")
+    present(
+        worth.summary,
+        lambda to: _show_worth(to, worth),
+        as_json,
+        out and f"{out}: report.md, both profiles, the figure and traces",
+    )
 
 
 def _show_worth(to: Console, worth: SensorWorth) -> None:

@@ -8,7 +8,7 @@ import re
 import shlex
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.chain.model import Chain, is_chain, load_machine
-from softstart.cli.commands import did_you_mean
+from softstart.cli.commands import Reading, did_you_mean
 from softstart.cli.completion import Keys, controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.input.files import refusal_of
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
@@ -45,37 +45,6 @@ KEYWORDS = {"k_dyn": "--max-k-dyn", "heat": "--max-heat", "start_time": "--start
             "tolerances": "--tolerance", "to": "--out"}  # fmt: skip
 
 
-class Mistakes:
-    """Collects what is wrong with the input, to raise it as one InputError.
-
-    >>> mistakes = Mistakes()
-    >>> with mistakes.noted():
-    ...     raise InputError("gap = -1: a gap is 0 or more.")
-    >>> mistakes.settle()
-    Traceback (most recent call last):
-    softstart.errors.InputError: gap = -1: a gap is 0 or more.
-    """
-
-    def __init__(self) -> None:
-        self.sentences: list[str] = []
-
-    @contextmanager
-    def noted(self, before: str = "") -> Iterator[None]:
-        """Keep the sentences of an InputError raised inside, each with `before` in front of it."""
-        try:
-            yield
-        except InputError as error:
-            self.sentences.extend(before + sentence for sentence in error.sentences)
-
-    def settle(self) -> None:
-        """Raise what was noted, if anything was."""
-        if self.sentences:
-            raise InputError(self.sentences)
-
-
-# the options ---------------------------------------------------------------------------------------------
-
-
 def drive_names() -> tuple[str, ...]:
     """Names of the shipped drives."""
     return tuple(library.names())
@@ -87,85 +56,10 @@ def controller_names() -> tuple[str, ...]:
     return tuple(registered(CONTROLLERS))
 
 
-def drive_argument(default: str | None = None) -> Decorator:
-    """DRIVE: a TOML file or the name of a shipped drive."""
-    complete = names_or_files(drive_names, ".toml")
-    if default is None:
-        return click.argument("drive", metavar="DRIVE", shell_complete=complete)
-    return click.argument("drive", metavar="[DRIVE]", default=default, shell_complete=complete)
-
-
-def controller_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
-    """An option that takes one or more controllers, and --allow-code for files of tuned gains among them."""
-    given = click.option(name, metavar=metavar, required=required, help=text, shell_complete=controllers)
-    return lambda command: given(_allow_code_option(command))
-
-
-_allow_code_option = click.option(
-    "--allow-code",
-    is_flag=True,
-    expose_value=False,
-    callback=lambda context, _, given: context.meta.update({CODE: given}),
-    help="Let a file of tuned gains name a Python file, which then runs.",
-)
-
-
 def code_allowed() -> bool:
     """Whether the command that runs now has --allow-code."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(CODE))
-
-
-def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
-    """--set, for a file with these keys."""
-    return click.option(
-        "--set",
-        "settings",
-        metavar="KEY=VALUE",
-        multiple=True,
-        shell_complete=settings_of(keys),
-        help=f"{text} May be repeated.",
-    )
-
-
-set_option = changes_option(
-    drive_keys, "Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'."
-)
-until_option = click.option(
-    "--until",
-    metavar="TIME",
-    help="End of the run, as 0.5 (s) or '500 ms'. By default one elastic period after the start time.",
-)
-fitted_to_option = click.option(
-    "--fitted-to",
-    metavar="DRIVE",
-    shell_complete=names_or_files(drive_names, ".toml"),
-    help="The drive for which the controllers are set up, a file or shipped name, if not the one they run: "
-    "how robust are they? --set changes the drive that runs, not this one.",
-)
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object on standard output and nothing else."
-)
-
-
-workers_option = click.option(
-    "--workers", metavar="N", help="How much is computed at once. By default one for each processor."
-)
-scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead."
-)
-
-
-def param_option(metavar: str, text: str) -> Decorator:
-    """--param, which differs between one controller and several."""
-    return click.option(
-        "--param", "params", metavar=metavar, multiple=True, help=text, shell_complete=parameters
-    )
-
-
-def out_option(text: str) -> Decorator:
-    """--out DIR."""
-    return click.option("--out", metavar="DIR", help=text, shell_complete=files_only())
 
 
 def command_line() -> str:
@@ -203,7 +97,7 @@ def two_masses(chain: Chain, name: str) -> Drive:
     return found.drive
 
 
-def read_identified(name: str, settings: Sequence[str]) -> Identification | None:
+def _identified(name: str, settings: Sequence[str]) -> Identification | None:
     """The identification in the folder of this name; None where there is none, as for a drive."""
     if name in drive_names() or not os.path.isfile(os.path.join(name, "identification.json")):
         return None
@@ -221,28 +115,40 @@ def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
         raise
 
 
-def read_fitted_to(name: str | None) -> Drive | None:
-    """The drive of --fitted-to, None without it."""
-    if name is None:
-        return None
-    try:
-        return read_drive(name, ())
-    except InputError as error:
-        raise InputError([f"--fitted-to: {sentence}" for sentence in error.sentences]) from error
+def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Chain | Identification:
+    """The one drive, the chain, or the identification in a folder, with its changes."""
+    return _identified(name, settings) or read_machine(name, settings)
 
 
-def read_until(text: str | None) -> float | None:
-    """The end of the run in s.
+def read_drive_or_identified(name: str, settings: Sequence[str]) -> Drive | Identification:
+    """The one drive, or the identification in a folder, with its changes."""
+    return _identified(name, settings) or read_drive(name, settings)
 
-    >>> read_until("500 ms")
-    0.5
+
+def _read_fitted_to(name: str, option: str) -> Drive:
+    """The drive of --fitted-to."""
+    mistakes = Mistakes()
+    with mistakes.noted(f"{option}: "):
+        found = read_drive(name, ())
+    mistakes.settle()
+    return found
+
+
+def quantity(unit: str, meaning: str = "", least: float | None = None, above: float | None = None) -> Reading:
+    """The type of an option that is a quantity in this unit, of `least` or more, or above `above`.
+
+    >>> quantity("s", "give a time above 0 s", above=0.0).read("-1 ms", "--until")
+    Traceback (most recent call last):
+    softstart.errors.InputError: --until = "-1 ms": give a time above 0 s.
     """
-    if text is None:
-        return None
-    value = float(to_si(text, "s", name="--until"))
-    if not value > 0.0:
-        raise InputError(f'--until = "{text}": the end of the run is a time above 0 s, as 0.5 or "500 ms".')
-    return value
+
+    def read(text: str, option: str) -> float:
+        value = float(to_si(text, unit, name=option))
+        if not ((above is None or value > above) and (least is None or value >= least)):
+            raise InputError(f'{option} = "{text}": {meaning}.')
+        return value
+
+    return Reading(read)
 
 
 @contextmanager
@@ -281,19 +187,42 @@ def _options() -> dict[str, str]:
     return {**others, **{str(one.name): one.opts[0] for one in given}, **named}
 
 
-def read_count(text: str | None, option: str) -> int | None:
-    """A whole number of 1 or more; None where the option was left out.
+def count(least: int = 1, most: int = 10**15) -> Reading:
+    """The type of an option that is a whole number.
 
-    >>> read_count("12", "--workers")
+    >>> count().read("12", "--workers")
     12
     """
-    return None if text is None else whole_number(text, option)
+    return Reading(lambda text, option: whole_number(text, option, least, most))
 
 
-def read_names(text: str | None, option: str = "--controllers") -> list[str] | None:
-    """The controllers of a comma-separated list, each known and named once; None if none was given."""
-    if text is None:
-        return None
+def choice(*words: str) -> Reading:
+    """The type of an option that is one of these words.
+
+    >>> choice("synchronous", "steady", "reached").read("steedy", "--terminal")
+    Traceback (most recent call last):
+    softstart.errors.InputError: --terminal = "steedy": there is no such choice; did you mean steady?
+    """
+
+    def read(text: str, option: str) -> str:
+        if text not in words:
+            raise InputError(f'{option} = "{text}": there is no such choice; {did_you_mean(text, words)}')
+        return text
+
+    return Reading(read)
+
+
+def read_list(text: str, option: str) -> list[str]:
+    """Words with commas between.
+
+    >>> read_list("gap, stiffness", "--free")
+    ['gap', 'stiffness']
+    """
+    return [word.strip() for word in text.split(",")]
+
+
+def read_names(text: str, option: str = "--controllers") -> list[str]:
+    """The controllers of a comma-separated list, each known and named once."""
     names = [name.strip() for name in text.split(",")]
     if not all(names):
         raise InputError(
@@ -344,12 +273,15 @@ def read_params(
     return _pairs(texts, option, f"a key, an equals sign and a value, as {example}")
 
 
-def read_params_of(texts: Sequence[str], names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """The `controller.key=value` texts of --param, by controller.
+def read_params_of(
+    texts: Sequence[str], option: str = "--param", names: Sequence[str] | None = None
+) -> dict[str, dict[str, str]]:
+    """The `controller.key=value` texts of --param, by controller; `names`: by default all that are installed.
 
-    >>> read_params_of(["ramp.time=0.2"], ["direct", "ramp"])
+    >>> read_params_of(["ramp.time=0.2"], names=["direct", "ramp"])
     {'ramp': {'time': '0.2'}}
     """
+    names = controller_names() if names is None else names
     form = "CONTROLLER.key=value, as ramp.time=0.2"
 
     def check(whole: str) -> None:
@@ -360,7 +292,7 @@ def read_params_of(texts: Sequence[str], names: Sequence[str]) -> dict[str, dict
             raise InputError(f"{name} is not compared here; {did_you_mean(name, names)}")
 
     found: dict[str, dict[str, str]] = {}
-    for whole, value in _pairs(texts, "--param", form, check).items():
+    for whole, value in _pairs(texts, option, form, check).items():
         name, _, key = whole.rpartition(".")
         found.setdefault(name, {})[key] = value
     return found
@@ -399,3 +331,103 @@ def _pairs(
             found[key] = value
     mistakes.settle()
     return found
+
+
+# the options -----------------------------------------------------------------------------------------
+
+
+def drive_argument(
+    read: Callable[[str, Sequence[str]], Any], needed: bool = False, name: str = "drive",
+    default: str = DEFAULT_DRIVE, names: Callable[[], Iterable[str]] = drive_names,
+) -> Decorator:  # fmt: skip
+    """DRIVE, a TOML file or the name of a shipped one; the command gets `read(name, changes of --set)`."""
+    usual: dict[str, Any] = {} if needed else {"default": default}
+    return click.argument(
+        name,
+        metavar=name.upper() if needed else f"[{name.upper()}]",
+        **usual,
+        type=Reading(lambda given, _, settings: read(given, settings), "settings"),
+        shell_complete=names_or_files(names, ".toml"),
+    )
+
+
+def controller_option(
+    name: str, metavar: str, text: str, required: bool = False, read: Callable[..., Any] | None = None
+) -> Decorator:
+    """An option that takes one or more controllers, and --allow-code for files of tuned gains among them.
+
+    The command gets a name, or a list of names where the option is in the plural, if `read` is left out.
+    """
+    given = click.option(
+        name, metavar=metavar, required=required, help=text, shell_complete=controllers,
+        type=Reading(read or (read_names if metavar.endswith("...") else check_name)),
+    )  # fmt: skip
+    return lambda command: given(_allow_code_option(command))
+
+
+_allow_code_option = click.option(
+    "--allow-code",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, given: context.meta.update({CODE: given}),
+    help="Let a file of tuned gains name a Python file, which then runs.",
+)
+
+
+def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
+    """--set, for a file with these keys."""
+    return click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        shell_complete=settings_of(keys),
+        help=f"{text} May be repeated.",
+    )
+
+
+set_option = changes_option(
+    drive_keys, "Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'."
+)
+until_option = click.option(
+    "--until",
+    metavar="TIME",
+    type=quantity("s", 'the end of the run is a time above 0 s, as 0.5 or "500 ms"', above=0.0),
+    help="End of the run, as 0.5 (s) or '500 ms'. By default one elastic period after the start time.",
+)
+fitted_to_option = click.option(
+    "--fitted-to",
+    metavar="DRIVE",
+    type=Reading(_read_fitted_to),
+    shell_complete=names_or_files(drive_names, ".toml"),
+    help="The drive for which the controllers are set up, a file or shipped name, if not the one they run: "
+    "how robust are they? --set changes the drive that runs, not this one.",
+)
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object on standard output and nothing else."
+)
+
+
+workers_option = click.option(
+    "--workers",
+    metavar="N",
+    type=count(),
+    help="How much is computed at once. By default one for each processor.",
+)
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead."
+)
+
+
+def param_option(text: str, names: str | None = None) -> Decorator:
+    """--param: of one controller, or of several, which the option `names` has."""
+    kind = Reading(read_params) if names is None else Reading(read_params_of, names)
+    metavar = "KEY=VALUE" if names is None else "CONTROLLER.KEY=VALUE"
+    return click.option(
+        "--param", "params", metavar=metavar, multiple=True, type=kind, help=text, shell_complete=parameters
+    )
+
+
+def out_option(text: str) -> Decorator:
+    """--out DIR."""
+    return click.option("--out", metavar="DIR", help=text, shell_complete=files_only())

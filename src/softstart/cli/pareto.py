@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,30 +11,24 @@ import click
 
 import softstart
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command
+from softstart.cli.commands import Command, Reading, all_read
 from softstart.cli.optimal_options import (
-    METHODS,
     method_option,
     no_solution_reported,
-    read_choice,
-    read_corners,
     read_start_times,
     terminal_option,
     torque_speed_option,
 )
 from softstart.cli.options import (
-    DEFAULT_DRIVE,
-    Mistakes,
     as_option,
     command_line,
     controller_option,
+    count,
     drive_argument,
     json_option,
     named_as_options,
     out_option,
-    read_count,
     read_machine,
-    read_names,
     scheduler_option,
     set_option,
 )
@@ -42,9 +36,9 @@ from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.late import late
-from softstart.optimal.problem import TERMINALS, Problem, StartTime
+from softstart.optimal.problem import Problem, StartTime
 from softstart.views.markdown import kept_state, output_folder
-from softstart.views.terminal import console, print_conclusion, print_json, print_lines, print_tables
+from softstart.views.terminal import present, print_conclusion, print_json, print_lines, print_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,21 +54,32 @@ else:  # no numba for a help, a wrong option or the Tab key
 STATE = "pareto.jsonl"
 
 
-@click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
+def _check(given: Mapping[str, Any]) -> None:
+    """What the front of this drive or chain does not take."""
+    if all_read(given):
+        about: Any = chains.ChainProblem if isinstance(given["drive"], Chain) else Problem
+        with named_as_options():
+            about(given["drive"], 1.0, given["terminal"], torque_speed=given["torque_speed"] or ())
+
+
+@click.command(cls=Command, checks=[_check])
+@drive_argument(read_machine)
 @click.option(
     "--start-times",
     metavar="TIME,...",
+    type=Reading(read_start_times),
     help="Bounds on the start time, as 0.25,0.3 (s) or from:to:count, as 0.25:0.5:12; also as multiples of "
     "that of direct, 1.02x:1.6x:12. By default 12 from the shortest feasible one on.",
 )
-@terminal_option("reached")
+@terminal_option("reached", "reached")
 @method_option
 @torque_speed_option
 @controller_option(
     "--controllers", "A,B,...", "Controllers to show beside the curve. By default all that need no parameter."
 )
-@click.option("--workers", metavar="N", help="Optima computed at once. By default 1.")
+@click.option(
+    "--workers", metavar="N", type=count(), default="1", help="Optima computed at once. By default 1."
+)
 @scheduler_option
 @set_option
 @json_option
@@ -84,17 +89,12 @@ STATE = "pareto.jsonl"
 )
 def pareto(
     *,
-    drive: str,
-    start_times: str | None,
-    terminal: str | None,
-    method: str | None,
-    torque_speed: str | None,
-    controllers: str | None,
-    workers: str | None,
-    scheduler: str | None,
-    settings: tuple[str, ...],
+    drive: Drive | Chain,
+    start_times: list[StartTime] | None,
+    controllers: list[str] | None,
     as_json: bool,
     out: str | None,
+    **bounds: Any,
 ) -> None:
     """Find the least K_dyn for many start times, and show how near the controllers come to it.
 
@@ -102,53 +102,26 @@ def pareto(
     of the literature is taken; or that of a chain (crane-4-mass). Each controller is judged by the optimum at
     its own start time.
     """
-    mistakes = Mistakes()
-    one: Drive | Chain | None = None
-    names: Sequence[str] | None = None
-    asked: list[StartTime] | None = None
-    bounds: dict[str, Any] = {"scheduler": scheduler}
-    with mistakes.noted():
-        one = read_machine(drive, settings)
-    with mistakes.noted():
-        names = read_names(controllers)
-    if start_times is not None:
-        with mistakes.noted():
-            asked = read_start_times(start_times)
-    for name, text, option, choices in (
-        ("terminal", terminal or "reached", "--terminal", TERMINALS),
-        ("method", method or "auto", "--method", METHODS),
-    ):
-        with mistakes.noted():
-            bounds[name] = read_choice(text, option, choices)
-    with mistakes.noted():
-        bounds["torque_speed"] = read_corners(torque_speed)
-    with mistakes.noted():
-        bounds["workers"] = read_count(workers, "--workers") or 1
-    if one is not None and not mistakes.sentences:
-        with mistakes.noted(), named_as_options():
-            about: Any = chains.ChainProblem if isinstance(one, Chain) else Problem
-            about(one, 1.0, bounds["terminal"], torque_speed=bounds["torque_speed"])
-    mistakes.settle()
-    assert one is not None
-
     with (
         no_solution_reported(as_json),
         output_folder(out) as folder,
         kept_state(out, STATE, "finished points") as state,
     ):
-        found = _computed(one, asked, names, bounds, state)
+        found = _computed(drive, start_times, controllers, bounds, state)
         if folder is not None and any(point.found for point in found.points):
             with working("drawing the figure ..."):
                 views.write_front(found, folder, command_line())
 
-    if as_json:
-        print_json(found.summary())
     if not any(point.found for point in found.points):
+        if as_json:
+            print_json(found.summary())
         raise SimulationError(as_option(found.points[-1].status_text))
-    if not as_json:
-        _show(console(), found)
-        if out is not None:
-            print(f"\nWritten to {out}: report.md, the figure, the table and the finished points.")
+    present(
+        found.summary,
+        lambda to: _show(to, found),
+        as_json,
+        out and f"{out}: report.md, the figure, the table and the finished points",
+    )
 
 
 def _computed(
@@ -158,17 +131,15 @@ def _computed(
     bounds: dict[str, Any],
     state: Path | None,
 ) -> softstart.Front:
+    given = {name: value for name, value in bounds.items() if value is not None}
     with working("starting the drive ...") as progress:
         made = make_controllers(names, {}, prefix=True)
-
         times = None
         if asked is not None:
             direct = cache(lambda: shortest.start_time_of_direct(drive))
             times = [one.seconds(direct) for one in asked]
         with Attributed(), named_as_options():
-            return softstart.pareto(
-                drive, times, controllers=made, save_to=state, progress=progress, **bounds
-            )
+            return softstart.pareto(drive, times, controllers=made, save_to=state, progress=progress, **given)
 
 
 def _show(to: Console, found: softstart.Front) -> None:

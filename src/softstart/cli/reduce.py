@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,26 +10,25 @@ import click
 
 from softstart.chain.elements import LIBRARY, TABLES
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command
-from softstart.cli.completion import Keys, names_or_files, table_keys
-from softstart.cli.completion import settings as settings_of
-from softstart.cli.optimal_options import read_choice, read_positive
+from softstart.cli.commands import Command, typed
+from softstart.cli.completion import table_keys
 from softstart.cli.options import (
-    Mistakes,
+    changes_option,
+    choice,
     command_line,
     controller_option,
+    count,
+    drive_argument,
     json_option,
     named_as_options,
     out_option,
     param_option,
+    quantity,
     read_changes,
-    read_names,
-    read_params_of,
 )
 from softstart.cli.running import Attributed, make_controllers, working
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.late import late
-from softstart.quantities import whole_number
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
     markdown,
@@ -40,15 +39,16 @@ from softstart.views.markdown import (
     write_text,
 )
 from softstart.views.terminal import (
-    console,
+    present,
     print_conclusion,
-    print_json,
     print_lines,
     print_tables,
     sentence,
 )
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from softstart.chain import reduction, simulation
     from softstart.chain.reduction import Reduction
     from softstart.chain.simulation import TwoMassError
@@ -58,49 +58,51 @@ else:  # no numba for a help, a wrong option or the Tab key; the kernel of start
     reduction, simulation = late("softstart.chain.reduction"), late("softstart.chain.simulation")
     chain_schemes, views = late("softstart.views.chain_schemes"), late("softstart.views.chains")
 
-DEFAULT_CHAIN = "crane-4-mass"
 METHODS = ("lever", "modal")
 
 
-def _chains() -> Iterable[str]:
-    return LIBRARY.names()
+def _check_verify(given: Mapping[str, Any]) -> None:
+    if given["no_starts"] and given["verify"] is not None:
+        raise InputError("--no-starts: it leaves out the starts of --verify; give one of the two.")
+    if typed("params") and typed("verify") is None:
+        raise InputError("--param: it sets up a controller of --verify; name that, as --verify ramp.")
 
 
-def _keys() -> Keys:
-    return table_keys(TABLES)
-
-
-@click.command(cls=Command)
-@click.argument(
-    "chain", metavar="[CHAIN]", default=DEFAULT_CHAIN, shell_complete=names_or_files(_chains, ".toml")
+@click.command(cls=Command, checks=[_check_verify])
+@drive_argument(
+    lambda name, settings: Chain.load(name, also=read_changes(settings)),
+    name="chain",
+    default="crane-4-mass",
+    names=LIBRARY.names,
 )
-@click.option("--to", metavar="N", help="Number of masses to reduce to. By default 2, a drive.")
+@click.option(
+    "--to", metavar="N", type=count(2), help="Number of masses to reduce to. By default 2, a drive."
+)
 @click.option(
     "--up-to",
     metavar="SPEED",
+    type=quantity("rad/s", "give a frequency above 0, as 70 (rad/s) or '11 turn/s'", above=0.0),
     help="Keep all frequencies up to this one, as 70 (rad/s), with as few masses as that takes.",
 )
 @click.option(
     "--method",
     metavar="|".join(METHODS),
+    type=choice(*METHODS),
+    default="lever",
     help="lever: partial systems merged one by one, as in the literature; modal: two masses with the first "
     "frequency and the node of the chain. By default lever.",
 )
 @click.option(
     "--factor",
     metavar="NUMBER",
+    type=quantity("1", "give a number of 1 or more, as 10", above=0.0),
     help="How many times the square of the highest wanted frequency those of partial systems must be. By "
     "default 10.",
 )
 @click.option("--force", is_flag=True, help="Go on where a partial frequency is too low.")
-@click.option(
-    "--set",
-    "settings",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=settings_of(_keys),
-    help="Change a value of the chain, as mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2. May be "
-    "repeated.",
+@changes_option(
+    lambda: table_keys(TABLES),
+    "Change a value of the chain, as mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.",
 )
 @controller_option(
     "--verify",
@@ -111,28 +113,20 @@ def _keys() -> Keys:
 @click.option(
     "--no-starts", is_flag=True, help="Leave out the starts that tell whether two masses are enough."
 )
-@param_option(
-    "CONTROLLER.KEY=VALUE",
-    "Set a parameter of a controller to verify, as ramp.time='0.2 s'. May be repeated.",
-)
+@param_option("Set a parameter of a controller to verify, as ramp.time='0.2 s'. May be repeated.", "verify")
 @json_option
 @out_option(
     "Write scheme and figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder."
 )
 def reduce(
     *,
-    chain: str,
-    to: str | None,
-    up_to: str | None,
-    method: str | None,
-    factor: str | None,
-    force: bool,
-    settings: tuple[str, ...],
-    verify: str | None,
+    chain: Chain,
+    verify: list[str] | None,
     no_starts: bool,
-    params: tuple[str, ...],
+    params: dict[str, dict[str, str]],
     as_json: bool,
     out: str | None,
+    **asked: Any,
 ) -> None:
     """Find the natural frequencies of a chain of masses, and reduce it to the drive that stands for it.
 
@@ -140,62 +134,30 @@ def reduce(
     drive as a chain of four masses is taken. The drive that comes out goes into compare, optimize and tune.
     Whether two masses are enough is told by starts of both, under --verify's controllers and 128 torques.
     """
-    mistakes = Mistakes()
-    one: Chain | None = None
-    asked: dict[str, Any] = {"force": force}
-    with mistakes.noted():
-        one = read_chain(chain, settings)
-    with mistakes.noted():
-        asked["method"] = read_choice(method or "lever", "--method", METHODS)
-    if to is not None:
-        with mistakes.noted():
-            asked["to"] = read_count(to)
-    for option, text, unit, meaning in (
-        ("up_to", up_to, "rad/s", "a frequency above 0, as 70 (rad/s) or '11 turn/s'"),
-        ("factor", factor, "1", "a number of 1 or more, as 10"),
-    ):
-        if text is not None:
-            with mistakes.noted():
-                asked[option] = read_positive(text, f"--{option.replace('_', '-')}", unit, meaning)
-    names: Sequence[str] | None = None
-    with mistakes.noted():
-        names = read_names(verify, "--verify")
-    given: dict[str, dict[str, Any]] = {}
-    with mistakes.noted():
-        if no_starts and names is not None:
-            raise InputError("--no-starts: it leaves out the starts of --verify; give one of the two.")
-        if params and names is None:
-            raise InputError("--param: it sets up a controller of --verify; name that, as --verify ramp.")
-        given = read_params_of(params, names or ())
-    mistakes.settle()
-    assert one is not None
-
+    asked = {name: value for name, value in asked.items() if value is not None}
     with output_folder(out) as folder:
         with working("reducing the chain ..."), named_as_options():
-            found = reduction.reduce_chain(one, **asked)
+            found = reduction.reduce_chain(chain, **asked)
             beside = beside_it(found)
-        check(found, names)
+        check(found, verify)
         off: TwoMassError | None = None
         if makes_drive(found) and not no_starts:
             with working("starting the drive and the chain ..."):
-                off = error_of(found, names, given)
+                off = error_of(found, verify, params)
         if folder is not None:
             with working("drawing the figures ..."):
                 _write(found, beside, off, folder, command_line())
 
-    if as_json:
-        print_json({**summary(found, beside), **views.verdict(off)})
-        return
-    _show(found, beside, off)
-    if out is not None:
-        print(
-            f"\nWritten to {out}: report.md, the scheme, the figures, the tables and what it was reduced to."
-        )
+    present(
+        lambda: {**summary(found, beside), **views.verdict(off)},
+        lambda to: _show(to, found, beside, off),
+        as_json,
+        out and f"{out}: report.md, the scheme, the figures, the tables and what it was reduced to",
+    )
 
 
-def _show(found: Reduction, beside: Reduction | None, off: TwoMassError | None) -> None:
+def _show(to: Console, found: Reduction, beside: Reduction | None, off: TwoMassError | None) -> None:
     """The chain, its frequencies, the steps and what came out."""
-    to = console()
     print_lines(to, views.chain_lines(found.chain))
     print_tables(to, views.tables(found, beside, off))
     if off is not None:
@@ -304,23 +266,3 @@ def makes_drive(found: Reduction) -> bool:
     """Whether a drive comes out: two masses, with a motor and a target speed."""
     chain = found.reduced
     return len(chain.masses) == 2 and chain.motor is not None and chain.target_speed is not None
-
-
-def read_chain(name: str, settings: Sequence[str]) -> Chain:
-    """The chain asked for, with its changes."""
-    mistakes = Mistakes()
-    changes: dict[str, Any] = {}
-    with mistakes.noted():
-        changes = read_changes(settings)
-    mistakes.settle()
-    return Chain.load(name, also=changes)
-
-
-def read_count(text: str) -> int:
-    """A whole number of masses.
-
-    >>> read_count("two")
-    Traceback (most recent call last):
-    softstart.errors.InputError: --to = "two": give a whole number of 2 or more.
-    """
-    return whole_number(text, "--to", 2)

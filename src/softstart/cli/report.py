@@ -6,36 +6,30 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command
+from softstart.cli.commands import Command, Reading, typed
 from softstart.cli.options import (
-    DEFAULT_DRIVE,
-    Mistakes,
     command_line,
-    controller_names,
     controller_option,
     drive_argument,
     json_option,
     param_option,
-    read_identified,
-    read_machine,
-    read_names,
-    read_params_of,
+    quantity,
+    read_machine_or_identified,
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.input.files import write_whole
 from softstart.late import late
-from softstart.quantities import to_si
-from softstart.views.terminal import console, print_json, print_lines, sentence
+from softstart.views.terminal import present, print_lines, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,8 +63,34 @@ def _write_sentences(context: click.Context, _option: click.Parameter, path: str
     context.exit()
 
 
-@click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
+def _read_resolution(text: str, option: str) -> reporting.Resolution:
+    return reporting.Resolution.read(text, option)
+
+
+def _check_files(given: Mapping[str, Any]) -> None:
+    if given["out"] is None and given["pdf"] is None and not given["as_json"]:
+        raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
+    for option in ("out", "pdf"):
+        if given[option] is not None:
+            _check_file(f"--{option}", given[option])
+    if given["pdf"] is not None:
+        _browser()
+
+
+def _check_chain(given: Mapping[str, Any]) -> None:
+    """What the report of a chain has not."""
+    mistakes = Mistakes()
+    for option in ("resolution", "budget"):
+        if isinstance(given["drive"], Chain) and typed(option) is not None:
+            mistakes.sentences.append(
+                f'--{option}: "{typed("drive")}" is a chain, whose report has no optima and no parameter '
+                "sheets; leave it out."
+            )
+    mistakes.settle()
+
+
+@click.command(cls=Command, checks=[_check_files, _check_chain])
+@drive_argument(read_machine_or_identified)
 @click.option(
     "--out",
     metavar="FILE",
@@ -87,12 +107,11 @@ def _write_sentences(context: click.Context, _option: click.Parameter, path: str
     "Strategies to examine, files of tuned gains among them. By default all that need no parameter.",
 )
 @set_option
-@param_option(
-    "CONTROLLER.KEY=VALUE", "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated."
-)
+@param_option("Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated.", "controllers")
 @click.option(
     "--resolution",
     metavar="KEY=STEP,...",
+    type=Reading(_read_resolution),
     help="Steps in which the inverter can be set, as torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,"
     "share=1%. "
     "Torque in % of the rated torque or in N*m. By default 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.",
@@ -100,11 +119,13 @@ def _write_sentences(context: click.Context, _option: click.Parameter, path: str
 @click.option(
     "--budget",
     metavar="TIME",
+    type=quantity("s", 'give a time, as 20 or "60 s", or 0 for no search', least=0.0),
     help="Time for the search of optima where there is no formula, as 60 (s). By default 20 s; 0 for none.",
 )
 @click.option(
     "--project",
     metavar="FILE",
+    type=Reading(lambda path, option: reporting.Project.load(path)),
     help="A TOML file with customer, project, author, logo, revisions, approval, sources of the data, paper "
     "size, decimal sign and language (docs/howto/read-a-report.md has one).",
 )
@@ -120,16 +141,13 @@ def _write_sentences(context: click.Context, _option: click.Parameter, path: str
 @json_option
 def report(
     *,
-    drive: str,
+    drive: Drive | Chain | Identification,
     out: str | None,
     pdf: str | None,
-    controllers: str | None,
-    settings: tuple[str, ...],
-    params: tuple[str, ...],
-    resolution: str | None,
-    budget: str | None,
-    project: str | None,
+    controllers: list[str] | None,
+    params: dict[str, dict[str, str]],
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
 
@@ -139,57 +157,17 @@ def report(
     what the inverter can be set to and started again after rounding. The report of a chain has its strategies
     and starts, without optima and parameter sheets.
     """
-    mistakes = Mistakes()
-    one: Drive | Chain | Identification | None = None
-    names: Sequence[str] | None = None
-    given: dict[str, dict[str, str]] = {}
-    asked: dict[str, Any] = {}
-    browser = ""
-    with mistakes.noted():
-        if out is None and pdf is None and not as_json:
-            raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
-        for option, path in (("--out", out), ("--pdf", pdf)):
-            if path is not None:
-                _check_file(option, path)
-    if pdf is not None:
-        with mistakes.noted():
-            browser = _browser()
-    with mistakes.noted():
-        one = read_identified(drive, settings) or read_machine(drive, settings)
-    with mistakes.noted():
-        names = read_names(controllers)
-    with mistakes.noted():
-        given = read_params_of(params, names or controller_names())
-    if resolution is not None:
-        with mistakes.noted():
-            asked["resolution"] = reporting.Resolution.read(resolution, "--resolution")
-    if budget is not None:
-        with mistakes.noted():
-            asked["budget"] = _seconds(budget)
-    for option in asked if isinstance(one, Chain) else ():
-        with mistakes.noted():
-            raise InputError(
-                f'--{option}: "{drive}" is a chain, whose report has no optima and no parameter sheets; '
-                "leave it out."
-            )
-    if project is not None:
-        with mistakes.noted():
-            asked["project"] = reporting.Project.load(project)
-    mistakes.settle()
-    assert one is not None
-
-    made, page = _made(one, names, given, asked, out is not None or pdf is not None)
+    asked = {name: value for name, value in asked.items() if value is not None}
+    browser = None if pdf is None else _browser()
+    made, page = _made(drive, controllers, params, asked, out is not None or pdf is not None)
     if out is not None:
         write_whole(Path(out), lambda stream: stream.write(page))
-    if pdf is not None:
+    if pdf is not None and browser is not None:
         with working("printing ..."):
             printed = _printed(page, browser)
         write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
-
-    if as_json:
-        print_json(made.summary())
-    else:
-        _show(console(), made, " and ".join(path for path in (out, pdf) if path is not None))
+    written = " and ".join(path for path in (out, pdf) if path is not None)
+    present(made.summary, lambda to: _show(to, made), as_json, written or None)
 
 
 def _made(
@@ -277,15 +255,7 @@ def _printed(page: str, browser: str) -> bytes:
         return target.read_bytes()
 
 
-def _seconds(text: str) -> float:
-    """A time in s, 0 or more."""
-    value = float(to_si(text, "s", name="--budget"))
-    if value < 0.0:
-        raise InputError(f'--budget = "{text}": give a time, as 20 or "60 s", or 0 for no search.')
-    return value
-
-
-def _show(to: Console, made: reporting.Report | reporting.ChainReport, out: str) -> None:
+def _show(to: Console, made: reporting.Report | reporting.ChainReport) -> None:
     print_lines(to, starts.machine_lines(made.drive))
     to.print()
     if isinstance(made, reporting.ChainReport):
@@ -306,5 +276,3 @@ def _show(to: Console, made: reporting.Report | reporting.ChainReport, out: str)
         )
     for name, reason in made.failed:
         sentence(to, f"{name} was left out: {reason}", "dim")
-    to.print()
-    sentence(to, f"Written to {out}.")

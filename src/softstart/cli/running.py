@@ -9,8 +9,8 @@ from contextlib import contextmanager, redirect_stdout
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from softstart.cli.options import Mistakes, code_allowed
-from softstart.errors import InputError, SimulationError
+from softstart.cli.options import code_allowed
+from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import threading
 import webbrowser
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,8 +17,9 @@ os.environ.setdefault("MKL_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from softstart.cli.commands import Command
-from softstart.cli.options import DEFAULT_DRIVE, Mistakes, drive_argument, read_machine, set_option
+from softstart.cli.options import drive_argument, read_machine, set_option
 from softstart.cli.running import working
+from softstart.errors import Mistakes
 from softstart.late import late
 from softstart.page.serve import Address, check_installed, listening, run
 
@@ -30,8 +32,20 @@ else:
     sessions = late("softstart.page.session")
 
 
-@click.command(cls=Command)
-@drive_argument(DEFAULT_DRIVE)
+def _check_address(given: Mapping[str, Any]) -> None:
+    mistakes = Mistakes()
+    for check in (_address(given).check, check_installed):
+        with mistakes.noted():
+            check()
+    mistakes.settle()
+
+
+def _address(given: Mapping[str, Any]) -> Address:
+    return Address(given["host"], given["port"], given["token"], given["expose"])
+
+
+@click.command(cls=Command, checks=[_check_address])
+@drive_argument(lambda name, settings: machines.single(read_machine(name, settings)))
 @set_option
 @click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 takes a free one.")
 @click.option(
@@ -42,31 +56,16 @@ else:
 )
 @click.option("--expose", is_flag=True, help="Let other machines reach the page; needs --host and --token.")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
-def serve(
-    drive: str,
-    settings: tuple[str, ...],
-    port: int,
-    host: str,
-    token: str | None,
-    expose: bool,
-    no_browser: bool,
-) -> None:
+def serve(*, drive: Machine, no_browser: bool, **given: Any) -> None:
     """Design a soft start in the browser: sliders, traces that follow, strategies side by side.
 
     The page is served to this machine alone, unless it is told otherwise. Without DRIVE it begins with the
     crane drive of the literature. Ctrl-C ends it. Needs NiceGUI: pip install 'softstart[ui]'.
     """
-    address = Address(host, port, token, expose)
-    mistakes = Mistakes()
-    for check in (address.check, check_installed):
-        with mistakes.noted():
-            check()
-    with mistakes.noted():
-        loaded = machines.single(read_machine(drive, settings))
-    mistakes.settle()
+    address = _address(given)
     listener = listening(address)
     with listener:
-        _warm_up(loaded)
+        _warm_up(drive)
 
         def ready(url: str) -> None:
             print(f"softstart is at {url}  (Ctrl-C ends it)", flush=True)
@@ -74,7 +73,7 @@ def serve(
                 # some browsers take the terminal until they are closed; the page must not wait for that
                 threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
-        run(loaded, address, listener, ready)
+        run(drive, address, listener, ready)
 
 
 def _warm_up(machine: Machine) -> None:

@@ -12,9 +12,9 @@ import click
 
 from softstart.cli.commands import Command
 from softstart.cli.completion import studies
-from softstart.cli.options import Mistakes, json_option, out_option
+from softstart.cli.options import json_option, out_option
 from softstart.cli.running import working
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.late import late
 from softstart.study import Claim, Study, StudyResult, Table, Verdict, find_study, study_names
 from softstart.views import numbers

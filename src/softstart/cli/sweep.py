@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,27 +13,23 @@ import click
 import numpy as np
 
 import softstart
-from softstart.cli.commands import Command
+from softstart.cli.commands import Command, Reading, typed
 from softstart.cli.completion import axes as axes_known
 from softstart.cli.completion import files_only
 from softstart.cli.options import (
-    DEFAULT_DRIVE,
-    Mistakes,
     check_name,
     code_allowed,
     command_line,
     controller_option,
+    count,
     drive_argument,
     fitted_to_option,
     json_option,
     named_as_options,
     out_option,
     param_option,
-    read_count,
     read_drive,
-    read_fitted_to,
-    read_params,
-    read_until,
+    read_list,
     scheduler_option,
     set_option,
     until_option,
@@ -41,11 +37,11 @@ from softstart.cli.options import (
 )
 from softstart.cli.running import Attributed, working
 from softstart.drive import PARAMETERS
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.late import late
 from softstart.quantities import values_in, whole_number
 from softstart.views.markdown import output_folder
-from softstart.views.terminal import console, print_json
+from softstart.views.terminal import present
 
 if TYPE_CHECKING:
     import xarray
@@ -64,10 +60,21 @@ RESULTS = "sweep.zarr"
 AT_MOST = 4.0  # times a second, that the line of progress changes
 
 
-@click.command(cls=Command)
-@drive_argument(default=DEFAULT_DRIVE)
+def _check_controller(given: Mapping[str, Any]) -> None:
+    named = any(text.partition("=")[0].strip() == "controller" for text in given["axes"])
+    if not named and typed("controller") is None:
+        raise InputError(
+            "--controller is missing: name one, or make an axis of several, as controller=direct,ramp."
+        )
+
+
+@click.command(cls=Command, checks=[_check_controller])
+@drive_argument(read_drive)
 @controller_option(
-    "--controller", "NAME", "The controller, unless several are an axis: --axis controller=direct,ramp."
+    "--controller",
+    "NAME",
+    "The controller, unless several are an axis: --axis controller=direct,ramp.",
+    read=lambda name, option: check_name(name, option, "several are an axis: --axis controller="),
 )
 @click.option(
     "--axis",
@@ -80,16 +87,21 @@ AT_MOST = 4.0  # times a second, that the line of progress changes
     "behind in equal ratios) or load.kind=active,reactive, or of the controller, as controller.torque='10 "
     "N*m,20 N*m'. To be repeated.",
 )
-@param_option("KEY=VALUE", "A parameter of the controller, the same for all starts. May be repeated.")
+@param_option("A parameter of the controller, the same for all starts. May be repeated.")
 @set_option
 @fitted_to_option
 @until_option
 @click.option(
-    "--figures", metavar="A,B,...", help="Figures to keep, as k_dyn,start_time; the status always is."
+    "--figures",
+    metavar="A,B,...",
+    type=Reading(read_list),
+    help="Figures to keep, as k_dyn,start_time; the status always is.",
 )
 @workers_option
 @scheduler_option
-@click.option("--chunk", metavar="N", help="Most starts that are computed and written at a time.")
+@click.option(
+    "--chunk", metavar="N", type=count(), help="Most starts that are computed and written at a time."
+)
 @click.option(
     "--netcdf",
     metavar="FILE",
@@ -103,80 +115,50 @@ AT_MOST = 4.0  # times a second, that the line of progress changes
 )
 def sweep(
     *,
-    drive: str,
+    drive: Drive,
     controller: str | None,
     axes: tuple[str, ...],
-    params: tuple[str, ...],
-    settings: tuple[str, ...],
-    fitted_to: str | None,
-    until: str | None,
-    figures: str | None,
-    workers: str | None,
-    scheduler: str | None,
-    chunk: str | None,
-    netcdf: str | None,
+    params: dict[str, str],
+    fitted_to: Drive | None,
+    figures: list[str] | None,
     as_json: bool,
     out: str | None,
+    **asked: Any,
 ) -> None:
     """Simulate every start of a grid of drives and controllers, of any size.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
     of the literature is taken. The results are a Zarr folder that xarray opens.
     """
-    mistakes = Mistakes()
-    one: Drive | None = None
-    values: dict[str, str] = {}
-    asked: dict[str, Any] = {"scheduler": scheduler, "netcdf": netcdf}
-    with mistakes.noted():
-        one = read_drive(drive, settings)
-    with mistakes.noted():
-        if controller is not None:
-            check_name(controller, "--controller", "several are an axis: --axis controller=")
-        elif not any(text.partition("=")[0].strip() == "controller" for text in axes):
-            raise InputError(
-                "--controller is missing: name one, or make an axis of several, as controller=direct,ramp."
-            )
-    with mistakes.noted():
-        values = read_params(params)
-    with mistakes.noted():
-        asked["fitted_to"] = read_fitted_to(fitted_to)
-    with mistakes.noted():
-        asked["until"] = read_until(until)
-    for option, text in (("workers", workers), ("chunk", chunk)):
-        with mistakes.noted():
-            asked[option] = read_count(text, f"--{option}")
-    if figures is not None:
-        asked["figures"] = [name.strip() for name in figures.split(",")]
-    mistakes.settle()
-    assert one is not None
-
+    asked |= {"fitted_to": fitted_to, **({} if figures is None else {"figures": figures})}
     begin = time.monotonic()
     with output_folder(out) as folder, _kept(out) as to, named_as_options():
-        results, last = _computed(one, controller, values, axes, asked, to)
+        results, last = _computed(drive, controller, params, axes, asked, to)
 
         with working("summing up ..."):
             summary = summaries.summarise(results)
             if folder is not None:
-                views.write_sweep(results, summary, one, folder, command_line(), asked["fitted_to"])
+                views.write_sweep(results, summary, drive, folder, command_line(), fitted_to)
 
-    if as_json:
-        print_json(
-            {
-                "drive": one.name,
-                "fitted_to": asked["fitted_to"].name if asked["fitted_to"] else None,
-                "controller": controller,
-                "axes": views.axis_summary(results),
-                **summary.summary(),
-                "cells": list(views.cell_rows(results)) if summary.starts <= views.MOST_SHOWN else None,
-                "seconds": time.monotonic() - begin,
-                "computed": last.done - last.before if last else 0,
-                "results": None if to is None else str(to),
-            }
-        )
-        return
-    views.show(console(), one, asked["fitted_to"], results, summary, last)
-    if out is not None:
-        print(f"\nWritten to {out}: {RESULTS}, report.md, the figure and the tables.")
+    def data() -> dict[str, Any]:
+        return {
+            "drive": drive.name,
+            "fitted_to": fitted_to.name if fitted_to else None,
+            "controller": controller,
+            "axes": views.axis_summary(results),
+            **summary.summary(),
+            "cells": list(views.cell_rows(results)) if summary.starts <= views.MOST_SHOWN else None,
+            "seconds": time.monotonic() - begin,
+            "computed": last.done - last.before if last else 0,
+            "results": None if to is None else str(to),
+        }
+
+    present(
+        data,
+        lambda screen: views.show(screen, drive, fitted_to, results, summary, last),
+        as_json,
+        out and f"{out}: {RESULTS}, report.md, the figure and the tables",
+    )
 
 
 def _computed(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +44,18 @@ def console() -> rich_console.Console:
 def print_json(data: Any) -> None:
     """One JSON object on standard output."""
     print(json.dumps(plain(data), indent=2, allow_nan=False))
+
+
+def present(
+    data: Callable[[], Any], show: Callable[[rich_console.Console], None], as_json: bool, written: str | None
+) -> None:
+    """A command's answer: the JSON object of `data`, or what `show` prints and which files are `written`."""
+    if as_json:
+        print_json(data())
+        return
+    show(console())
+    if written is not None:
+        print(f"\nWritten to {written}.")
 
 
 def print_table(

@@ -55,7 +55,7 @@ def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> N
         (["identify", "nowhere.csv", "--drive", "crane-4amtkf"], "there is no such file"),
         (
             ["identify", "a.csv", "--drive", "crane-4amtkf", "--torque-is", "guess"],
-            "write measured or demand",
+            '--torque-is = "guess": there is no such choice; there are measured and demand.',
         ),
         (
             ["identify", "--plan", "crane-4amtkf", "--tell", "gpa"],
