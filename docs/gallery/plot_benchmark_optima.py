@@ -1,14 +1,14 @@
 """The same optimum by three methods
 =================================
 
-The gentlest start within a given time, by softstart's three methods: the closed form, a linear program
-searched over the instant of contact, and collocation with CasADi. Whatever a method claims, its torque is
-replayed on the exact plant.
+The start with the lowest peak shaft torque within a given time, computed by the three methods of softstart:
+closed form, linear programs searched over the instant of contact, and collocation with CasADi. The torque
+of each method is replayed on the exact plant.
 """
 
 # %%
-# Crane drive of [G], gap 0.5 rad, to 60 rad/s within 0.2883 s. The study lays rockit, dymos and GEKKO
-# beside them, where they are installed, and asks for a quicker start, too.
+# Crane drive of [G], gap 0.5 rad, to 60 rad/s within 0.2883 s. The study also includes rockit, dymos and
+# GEKKO, if installed, and a shorter start time.
 from softstart_studies.benchmarks.optima.study import BenchmarkOptima
 
 methods = ("closed-form", "lp", "collocation")
@@ -25,4 +25,4 @@ for row in table.rows:
     print(" | ".join(str(cell) for cell in row))
 
 # %%
-# All contenders: ``make benchmark``; what is compared with what is on :doc:`/benchmarks`.
+# All packages: ``make benchmark``; for the method see :doc:`/benchmarks`.

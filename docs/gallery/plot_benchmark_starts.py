@@ -1,26 +1,26 @@
-"""Starts a second, beside LSODA
-=============================
+"""Starts per second, compared with LSODA
+======================================
 
-softstart writes down the motion between two events and the instant of the next one; a general integrator
-finds the same curve by hundreds of steps. The same starts to the same end, each contender in a process of
-its own, rates by processor time.
+softstart evaluates the motion between two events and the instant of the next event in closed form; a
+general integrator needs hundreds of steps for the same curve. Both simulate the same starts to the same
+end, each in its own process, with rates by processor time.
 """
 
 # %%
-# Constant and staged torque against ``solve_ivp(method="LSODA")`` with located events, one pass while these
-# pages were built; the study makes seven, with python-control and diffrax beside it.
+# Constant and staged torque, compared with ``solve_ivp(method="LSODA")`` with located events, in one pass.
+# The study makes seven passes and also includes python-control and diffrax.
 from softstart_studies.benchmarks.starts import DUELS, BenchmarkStarts
 
 result = BenchmarkStarts(DUELS[:3], passes=1).run(None, lambda doing: None)
 figure = result.figures["benchmark-starts-ratios"]
-figure.set_label("How many starts softstart makes in the time of one of LSODA's.")
+figure.set_label("Number of starts by softstart in the time of one start by LSODA.")
 
 # %%
 # The largest difference in K_dyn between the two:
 table = result.tables[0]
 for row in table.rows:
-    told = dict(zip(table.columns, row, strict=True))
-    print(told["strategy"], told["peer"], told["K_dyn diff."])
+    cells = dict(zip(table.columns, row, strict=True))
+    print(cells["strategy"], cells["peer"], cells["K_dyn diff."])
 
 # %%
-# All contenders: ``make benchmark``; what is compared with what is on :doc:`/benchmarks`.
+# All packages: ``make benchmark``; for the method see :doc:`/benchmarks`.

@@ -1,14 +1,14 @@
-"""Over gaps and load inertias
-===========================
+"""Variation of backlash and load inertia
+======================================
 
-Which strategy should a machine have whose gap grows and whose load changes? Every controller is tuned
-alike, for each cell of a grid of gaps and inertias and once for all of them, and laid beside the optimum of
-the cell.
+Which strategy is suitable for a machine whose backlash grows and whose load changes? Every controller is
+tuned in the same way, for each cell of a grid of gaps and inertias and once for all cells, and compared
+with the optimum of the cell.
 """
 
 # %%
-# Crane drive of [G], torque lag 2 ms (assumed), to 60 rad/s. Two cells, two controllers and a short search
-# here; the study has 5 by 4 cells and all controllers.
+# Crane drive of [G], torque lag 2 ms (assumed), to 60 rad/s. This page uses two cells, two controllers and
+# a short search; the study has 5 by 4 cells and all controllers.
 from softstart_studies.gaps_and_inertias import Extent, grids, present
 
 extent = Extent(
@@ -22,7 +22,7 @@ extent = Extent(
 result = present(grids(extent, lambda doing: None), lambda doing: None)
 figure = result.figures["gaps-and-inertias-active-cells"]
 figure.set_label(
-    "K_dyn over the optimum in the same time, gains tuned for each cell; a dash: too quick for an optimum."
+    "Ratio of K_dyn to the optimum for the same time, gains tuned for each cell; a dash: no optimum exists."
 )
 
 # %%

@@ -1,10 +1,9 @@
-"""The gentlest starts of the crane drive
-======================================
+"""Optimal starts of the crane drive
+=================================
 
-How gently can a drive with a gap start if it has to be at speed by a given time? The answer is a torque
-over time with a proof that no other torque loads the shaft less: pulse, coast, hold. Full torque brings the
-motor into the gap, none lets it meet the load without a blow, and from then on the torque holds the shaft
-at its peak.
+What is the lowest peak shaft torque of a drive with backlash that has to reach its speed within a given
+time? The optimal torque profile, with a proof of optimality, is pulse, coast, hold: full torque accelerates
+the motor in the gap, zero torque limits the impact, and then the torque holds the shaft torque at its peak.
 """
 
 # %%
@@ -20,8 +19,8 @@ figure.set_label(
 )
 
 # %%
-# The quickest of them leaves no time for a shaft at rest: it swings, and K_dyn is above 1. In figures, with
-# the bound that no torque can go below:
+# For the shortest start time the shaft torque oscillates, and K_dyn is above 1. Values of K_dyn and the
+# proved lower bound for any torque:
 for start in found:
     point = start.point
     print(f"{start.multiple:.2f} x direct: K_dyn {point.k_dyn:.6f}, bound {point.k_dyn_lower_bound:.6f}")

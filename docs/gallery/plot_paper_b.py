@@ -1,10 +1,10 @@
 """The balancer of a two-cylinder engine
 =====================================
 
-The engine VAZ-11113 has two cylinders that fire evenly; gas and masses shake its mounts with every turn.
-[B] designs a balancer of two shafts against the reaction torque and finds its imbalance and arm. Here its
-formulas stand beside an engine model with all orders. The paper prints neither masses nor pressures: they
-are assumed, and named so in every output.
+The engine VAZ-11113 has two cylinders that fire evenly; gas and inertia forces excite its mounts in every
+turn. [B] designs a two-shaft balancer against the reaction torque, with its imbalance and arm. This page
+compares the formulas of [B] with an engine model that includes all orders. The paper gives neither masses
+nor pressures; they are assumed and marked as such in every output.
 """
 
 # %%
@@ -18,19 +18,19 @@ figure = over_speed.figure_2(curves)
 figure.set_label("Figure 2 of [B]: first order of the reaction torque over the speed of the crank.")
 
 # %%
-# Gas and inertia apart:
+# Gas and inertia separately:
 second = over_speed.figure_3(curves)
 second.set_label("Figure 3 of [B]: first order of the torque of gas, of inertia, and of both.")
 
 # %%
-# The torque over the crank angle and its orders, and what several designs of a balancer leave of the first
-# one:
+# The torque over the crank angle and its orders, and the residual of the first order for several balancer
+# designs:
 drawn = found.figures()
 torque = drawn["torque"]
 torque.set_label("Reaction torque at 4500 rpm over two turns of the crank, and its orders.")
 left = drawn["residual"]
 left.set_label(
-    "What balancers leave: first order of the moment, height of their shafts, force on the housing."
+    "Residuals with balancers: first order of the moment, height of the shafts, force on the housing."
 )
 
 # %%

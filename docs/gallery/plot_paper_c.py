@@ -1,14 +1,13 @@
-"""Engagement laws of a friction clutch, and the best there is
-===========================================================
+"""Engagement laws of a friction clutch, and optimal laws
+======================================================
 
 How should the torque of a friction clutch rise while it slips? [C] compares four laws of the same duration
-by the peak torque of the shaft behind and the work lost in slip. An optimal law shows how much better any
-of them could be: the least slip work for each peak, for laws that rise only and for laws that may do as
-they like.
+by the peak shaft torque and the friction work. Optimal laws give the minimum friction work for each peak,
+for nondecreasing laws and for arbitrary laws.
 """
 
 # %%
-# The clutch, shaft and load of [C] (its units: kgf m), and the four laws on the exact plant with re-slip:
+# The clutch, shaft and load of [C] (in kgf m), and the four laws on the exact plant with renewed slip:
 from softstart.views.clutches import engagement_figure, front_figure
 from softstart_studies.paper_c import IN_KGF, fronts, printed
 
@@ -17,17 +16,17 @@ figure = engagement_figure(list(runs.values()), "The laws of [C]", list(runs), I
 figure.set_label("Clutch torque, shaft torque and speeds under the laws of [C].")
 
 # %%
-# The least slip work for each peak, with fewer points than the study takes:
+# The minimum friction work for each peak, with fewer points than in the study:
 found = fronts.fronts(lambda doing: None, points=4)
 front = front_figure(found, IN_KGF)
-front.set_label("Slip work over peak shaft torque: the optimal laws, and those of [C].")
+front.set_label("Friction work over peak shaft torque: the optimal laws, and those of [C].")
 
 # %%
-# What an optimal law looks like beside the linear one:
+# Optimal laws compared with the linear law:
 best = [one.points[0].run for one in found]
 names = ["linear", *(f"optimal, {one.law_class}" for one in found)]
 laws = engagement_figure([runs["linear"], *best], "The linear law, and two optimal ones", names, IN_KGF)
-laws.set_label("The linear law beside the laws of the least peak.")
+laws.set_label("The linear law and the laws with the lowest peak.")
 
 # %%
 # All tables and verdicts: ``softstart study paper-c --out results`` (10 s); the model is on

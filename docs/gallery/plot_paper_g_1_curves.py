@@ -1,11 +1,11 @@
 """Methods 1 and 2 of [G], closed form and exact plant
 ===================================================
 
-A drive with a gap starts under a reduced torque M1 until the gap is closed and under the full one
-afterwards (method 1), or under M1 until the end of the first contact (method 2). How much does a smaller M1
-take off the shaft? Gerasymiak and Subbotin [G] answer with closed forms, figures 2 to 4 of their paper.
-Here are their curves with the exact plant on top: lines are the closed forms, marks are starts simulated
-from event to event. What became of their conclusions is on :doc:`/paper-g`.
+A drive with backlash starts with a reduced torque M1 until the gap is closed and with full torque
+afterwards (method 1), or with M1 until the end of the first contact (method 2). How much does M1 reduce the
+shaft torque? Gerasymiak and Subbotin [G] give closed forms, figures 2 to 4 of their paper. This page shows
+their curves together with the exact plant: lines are the closed forms, marks are starts simulated from
+event to event. Their conclusions are checked on :doc:`/paper-g`.
 """
 
 # %%
@@ -21,12 +21,12 @@ figure.set_label(
 )
 
 # %%
-# The gap four times as wide, as after wear:
+# With the gap worn to four times its width:
 worn = pictures.curves_figure(curves.figure_3(), 2, "Fig. 3 of [G]: $J_2'' = 5\\,J_1$", pictures.K_DYN, 5.2)
 worn.set_label("The same for a new and a worn gap, J2 = 5 J1.")
 
 # %%
-# And what it costs in time:
+# Durations of the stages:
 times = pictures.curves_figure(curves.figure_4(), 3, "Fig. 4 of [G]: $J_2'' = 5\\,J_1$", "time, ms", 250.0)
 times.set_label("Durations of the stages over M1/Ms.")
 

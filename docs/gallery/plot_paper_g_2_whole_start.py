@@ -1,10 +1,10 @@
 """Method 2 of [G] over the whole start
 ====================================
 
-Method 2 looks much gentler than method 1 as long as only its first contact is looked at. [G] raises the
-torque when that contact ends, by its equation (15); the gap is open then, the motor runs ahead, and the
-*second* contact comes under full torque. Raised at the peak of the first contact instead, by (14), the gap
-never opens again.
+Method 2 has a much lower peak than method 1 if only the first contact is considered. [G] raises the torque
+when that contact ends, by equation (15). The gap is then open, the motor accelerates, and the *second*
+contact occurs under full torque. If the torque is raised at the peak of the first contact instead, by (14),
+the gap stays closed.
 """
 
 # %%
@@ -22,10 +22,10 @@ traces = [
     ("raised at the peak of stage 2, (14)", whole_start.at_peak(GAP_1, SHARE)),
 ]
 in_time = pictures.traces_figure(traces, 0.26)
-in_time.set_label("Shaft torque of the two starts; grey where the gap is open.")
+in_time.set_label("Shaft torque of the two starts; grey: gap open.")
 
 # %%
-# In figures:
+# Numerical values:
 for name, run in traces:
     print(f"{name}: K_dyn {run.k_dyn:.4f}, {run.contacts} contacts, start time {run.start_time:.4f} s")
 

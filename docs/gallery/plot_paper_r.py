@@ -1,30 +1,30 @@
-"""Four masses as two, and how a chain with gaps swings
-====================================================
+"""Reduction of four masses to two, and vibration of a chain with gaps
+===================================================================
 
-A crane or a tractor is no two-mass drive but a chain of masses, gears and gaps. [R] merges masses until two
-are left. How far off is the lowest frequency then? The first picture maps the error over what was merged.
-The second shows how gaps lower the frequency of the free vibration of a chain and change its shape.
+The driveline of a crane or a tractor is a chain of masses, gears and gaps. [R] merges masses until two
+remain. The first figure shows the error of the lowest frequency as a function of the merged masses. The
+second shows how gaps lower the frequency of the free vibration of a chain and change its shape.
 """
 
 # %%
-# Four masses, the middle ones light: their share of the inertia, and the stiffness of the ends vary.
+# Four masses with light middle masses; their share of the inertia and the stiffness of the ends are varied.
 from softstart_studies.paper_r import four_to_two, pictures
 
 figure = pictures.map_figure(four_to_two.error_map())
 figure.set_label(
-    "How low the lever rule puts the lowest frequency, over the share merged and the stiffness of the ends."
+    "Error of the lowest frequency by the lever rule, over the merged share and the stiffness of the ends."
 )
 
 # %%
-# A chain like that of the tractor T-4. The paper prints its speed ratios and gaps; inertias and stiffnesses
-# are assumed, and named so in every output; see :doc:`/paper-r`.
+# A chain similar to the tractor T-4. The paper gives speed ratios and gaps; inertias and stiffnesses are
+# assumed and marked as such in every output; see :doc:`/paper-r`.
 shapes = pictures.shapes_figure()
 shapes.set_label(
     "First free vibration of the tractor-like chain, without gaps and with gaps of several widths."
 )
 
 # %%
-# All tables and findings, two pictures more: ``softstart study paper-r --out results`` (50 s).
+# All tables and findings, and two more figures: ``softstart study paper-r --out results`` (50 s).
 #
 # **References.** [R] V. S. Popovich, R. E. Pestretsov, on reducing torsional systems of machine units with
 # gaps.

@@ -1,15 +1,14 @@
-"""The optimum as feedback
-=======================
+"""The optimum as a feedback controller
+====================================
 
-Pulse, coast, hold as a profile is only good for the gap and the load that it was computed for. The
-controller ``pulse-coast-hold`` makes the same start from what an inverter measures, motor angle and motor
-torque, with gap, load inertia and load speed unknown. How near does it come to the optimum that knows
-everything?
+As a torque profile, pulse, coast, hold is valid only for the gap and load for which it was computed. The
+controller ``pulse-coast-hold`` realises the same start from the measured motor angle and motor torque, with
+unknown gap, load inertia and load speed. This page compares it with the optimum for known data.
 """
 
 # %%
-# Crane drive of [G] with a torque lag of 2 ms, encoder of 4096 lines, 1 kHz; told a gap of 0.5 rad,
-# whatever it is.
+# Crane drive of [G] with a torque lag of 2 ms, encoder of 4096 lines, 1 kHz; always set up for a gap of 0.5
+# rad.
 from softstart_studies.pulse_coast_hold import cells, pictures
 from softstart_studies.pulse_coast_hold.crane import Extent
 
@@ -18,15 +17,15 @@ figure = pictures.starts_figure(extent)
 figure.set_label("Starts at the corners of gap and load inertia, with one set of parameters.")
 
 # %%
-# K_dyn over that of the optimum in the same time, at the corners (the study has four gaps and four
-# inertias, 16 places of the encoder, and both kinds of load):
+# Ratio of K_dyn to the optimum for the same time, at the corners (the study has four gaps and four
+# inertias, 16 encoder phases, and both kinds of load):
 grids = {kind: cells.grid(kind, extent, lambda doing: None) for kind in extent.kinds}
 ratios = pictures.ratios_figure(grids)
-ratios.set_label("K_dyn over the optimum in the same time, by gap and load inertia.")
+ratios.set_label("Ratio of K_dyn to the optimum for the same time, by gap and load inertia.")
 
 # %%
-# The whole grid, tolerances and rivals: ``softstart study pulse-coast-hold --out results`` (4 min); the
-# theory is on :doc:`/pulse-coast-hold`.
+# The whole grid, tolerances and other strategies: ``softstart study pulse-coast-hold --out results`` (4
+# min); the theory is on :doc:`/pulse-coast-hold`.
 #
 # **References.** [G] R. P. Gerasymiak, V. V. Subbotin, *Dual-mass mechanical part electromechanical system
 # behavior analysis*.

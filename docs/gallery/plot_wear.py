@@ -1,13 +1,14 @@
-"""A drive from new to worn
-========================
+"""Effect of wear over the service life
+====================================
 
-One drive, its gap from 0.5 rad on: which strategy keeps its promise over that life, and what is it worth to
-tune it for the new drive, for all of its life with one set of gains, or with a schedule over the gap?
+The gap of a drive grows from 0.5 rad on. Which strategy keeps its K_dyn over the service life, and what is
+the benefit of tuning for the new drive, of one set of gains for the whole life, or of a schedule over the
+gap?
 """
 
 # %%
-# Crane drive of [G], torque lag 2 ms (assumed), to 60 rad/s. Two controllers, a short search and gaps up to
-# 2 rad here; the study tunes all of them with more effort and goes on to 4 rad.
+# Crane drive of [G], torque lag 2 ms (assumed), to 60 rad/s. This page uses two controllers, a short search
+# and gaps up to 2 rad; the study tunes all controllers with more effort and gaps up to 4 rad.
 from softstart_studies.wear import Extent, live, present
 
 extent = Extent(
@@ -20,13 +21,13 @@ extent = Extent(
 )
 result = present(live(extent, lambda doing: None), lambda doing: None)
 figure = result.figures["wear-life"]
-figure.set_label("K_dyn over the life, by how the gains were chosen.")
+figure.set_label("K_dyn over the service life, for each choice of gains.")
 
 # %%
-# A start that takes longer can be gentler, so K_dyn alone does not say who is good; beside the optimum in
-# the same time it does:
+# A longer start can have a lower K_dyn, so strategies are compared by the ratio to the optimum for the same
+# start time:
 ratio = result.figures["wear-over-optimum"]
-ratio.set_label("The same over the least K_dyn of any start in the same time.")
+ratio.set_label("Ratio to the lowest K_dyn of any start in the same time.")
 
 # %%
 # All controllers: ``softstart study wear --out results`` (3 min); the findings are on
