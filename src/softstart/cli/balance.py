@@ -71,19 +71,19 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     metavar="SPEED",
     multiple=True,
     type=Reading(_read_speeds),
-    help="A speed to show, as 4500rpm. May be repeated; by default round ones over the range.",
+    help="Speed to show, for example 4500rpm. May be repeated. Default: round values over the speed range.",
 )
 @changes_option(
     lambda: table_keys(TABLES),
-    "Change a value of the engine, as masses.reciprocating='0.6 kg' or operation.load=0.5.",
+    "Change a parameter of the engine, for example masses.reciprocating='0.6 kg' or operation.load=0.5.",
 )
 @json_option
 @out_option("Write figures (SVG, PNG), tables (CSV) and report.md into this folder.")
 def balance(*, engine: Engine, speeds: list[float] | None, as_json: bool, out: str | None) -> None:
-    """Find the forces and moments of a piston engine by order, and design a two-shaft balancer.
+    """Compute forces and moments of a piston engine by order, and design a balancer.
 
-    ENGINE is a TOML file or the name of a shipped engine; without it, the two-cylinder engine VAZ-11113 of
-    the literature is taken, with values that are partly assumed. The balancer is tuned at one speed:
+    ENGINE is a TOML file or the name of a shipped engine; by default the two-cylinder engine VAZ-11113 of the
+    literature, some of whose parameters are assumed. The two-shaft balancer is tuned at one speed,
     balancer.tuning_speed.
     """
     with output_folder(out) as folder:

@@ -100,31 +100,31 @@ def _check_optimal(given: Mapping[str, Any]) -> None:
     metavar="NAME|FILE",
     shell_complete=names_or_files(lambda: LAWS, ".csv"),
     help="Engagement law: linear, quadratic-concave, quadratic-convex, exponential, or a CSV file of time "
-    "and friction torque. By default that of the clutch file.",
+    "and friction torque. Default: that of the clutch file.",
 )
 @changes_option(
     lambda: table_keys(Clutch.TABLES),
-    "Change a value of the clutch, as clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
+    "Change a parameter of the clutch, for example clutch.engagement_time='0.5 s' or shaft.gap='1 deg'.",
 )
 @click.option(
     "--until",
     metavar="TIME",
     type=quantity("s", 'the end of the run is a time above 0 s, as 5 or "500 ms"', above=0.0),
-    help="End of the run, as 5 (s). By default a period after the lock-up.",
+    help="End of the simulation, for example 5 (s). Default: one period after the lock-up.",
 )
 @click.option(
     "--optimal",
     is_flag=True,
-    help="Find the laws with the least friction work for a given peak of the shaft torque, with bounds.",
+    help="Compute the laws with the lowest friction work for a given peak shaft torque, with bounds.",
 )
 @click.option(
     "--points",
     metavar="N",
     type=count(1, 200),
-    help=f"With --optimal: number of peaks. By default {DEFAULT_POINTS}.",
+    help=f"With --optimal: number of peak torques. Default: {DEFAULT_POINTS}.",
 )
 @click.option(
-    "--nondecreasing", is_flag=True, help="With --optimal: only laws whose friction torque never falls."
+    "--nondecreasing", is_flag=True, help="With --optimal: only laws whose friction torque never decreases."
 )
 @json_option
 @out_option("Write figures (SVG, PNG), tables and traces (CSV) and report.md into this folder.")
@@ -138,11 +138,10 @@ def clutch(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Engage a slipping clutch: peak of the shaft torque, friction work, slip time.
+    """Simulate a clutch engagement: peak shaft torque, friction work, slip time.
 
-    CLUTCH is a TOML file or the name of a shipped clutch; without it, the clutch of the literature is taken.
-    Its driving side turns at constant speed. With --optimal, the best engagement laws for its engagement time
-    are found.
+    CLUTCH is a TOML file or the name of a shipped clutch; by default that of the literature. The driving side
+    turns at constant speed. With --optimal, the optimal engagement laws for its engagement time are computed.
     """
     found: Engagement | EngagementFront
     with output_folder(out) as folder:

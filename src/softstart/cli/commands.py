@@ -17,74 +17,74 @@ from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
-    "compare": ("starts", "Start a drive or a chain under several controllers and compare them."),
-    "simulate": ("starts", "Start a drive or a chain once under one controller."),
+    "compare": ("starts", "Compare controllers on a drive or a chain."),
+    "simulate": ("starts", "Simulate one start of a drive or a chain."),
     "fatigue": (
         "starts",
-        "Find how long the shaft line lasts under each controller: rainflow cycles, life, impacts.",
+        "Estimate the fatigue life of the shaft line under each controller.",
     ),
     "optimize": (
         "optimize",
-        "Find the torque profile with the least K_dyn for a start time, and prove how good it is.",
+        "Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.",
     ),
     "pareto": (
         "pareto",
-        "Find the least K_dyn for many start times, and show how near the controllers come to it.",
+        "Compute the lowest K_dyn over the start time, and compare the controllers with it.",
     ),
     "tune": (
         "tune",
-        "Find the gains of a controller for each gap and load inertia, and one set of gains for all.",
+        "Tune a controller for each gap and load inertia, and one robust set of gains.",
     ),
-    "sweep": ("sweep", "Simulate every start of a grid of drives and controllers, of any size."),
-    "linear": ("linear", "Linearise a controller as it runs, and show margins, modes and limit cycles."),
+    "sweep": ("sweep", "Simulate a grid of drives and controllers of any size."),
+    "linear": ("linear", "Linearise the control loop: stability margins, modes, limit cycles."),
     "reduce": (
         "reduce",
-        "Find the natural frequencies of a chain of masses, and reduce it to the drive that stands for it.",
+        "Compute the natural frequencies of a chain, and reduce it to two masses.",
     ),
-    "clutch": ("clutch", "Engage a slipping clutch: peak of the shaft torque, friction work, slip time."),
+    "clutch": ("clutch", "Simulate a clutch engagement: peak shaft torque, friction work, slip time."),
     "balance": (
         "balance",
-        "Find the forces and moments of a piston engine by order, and design a two-shaft balancer.",
+        "Compute forces and moments of a piston engine by order, and design a balancer.",
     ),
     "report": (
         "report",
-        "Write a report on the start of a drive: one HTML file that opens offline and prints to A4.",
+        "Write a report on the start of a drive or a chain as one HTML file.",
     ),
     "serve": (
         "serve",
-        "Design a soft start in the browser: sliders, traces that follow, strategies side by side.",
+        "Open the interactive page in the browser.",
     ),
-    "init": ("init", "Make a drive file from plates, catalogues and drawings."),
+    "init": ("init", "Create a drive file from data sheet values."),
     "identify": (
         "identify",
-        "Find the parameters of a drive, with intervals, from what an inverter logged of its starts.",
+        "Identify the parameters of a drive, with confidence intervals, from inverter logs.",
     ),
     "drives": ("lists", "List the shipped drives, or print one as TOML."),
     "controllers": ("lists", "List the controllers, or show the parameters of one."),
     "study": ("study", "List the studies, or run one."),
     "completion": (
         "completion",
-        "Print the script that completes commands, drives, controllers, keys and studies with the Tab key.",
+        "Print the script for completion with the Tab key.",
     ),
 }
 
 PURPOSES = {
-    "A drive of your own": ("init", "identify", "drives", "reduce"),
+    "Your own drive": ("init", "identify", "drives", "reduce"),
     "Strategies": ("compare", "simulate", "fatigue", "controllers", "linear"),
-    "The gentlest start": ("optimize", "pareto", "tune", "sweep"),
-    "Show it": ("serve", "report"),
-    "Other machines, and softstart itself": ("clutch", "balance", "study", "completion"),
+    "Design": ("optimize", "pareto", "tune", "sweep"),
+    "Results": ("serve", "report"),
+    "Other machines and tools": ("clutch", "balance", "study", "completion"),
 }
 
 GREETING = f"""\
-softstart {__version__}: start a drive with a gap in its transmission gently and fast.
+softstart {__version__}: soft-start torque strategies for drives with backlash.
 
-  softstart compare                      strategies side by side: K_dyn and time
-  softstart optimize --start-time 1.2x   the gentlest start there can be
-  softstart serve                        see it and try it in the browser
+  softstart compare                      compare strategies: K_dyn, start time
+  softstart optimize --start-time 1.2x   compute the lowest possible K_dyn
+  softstart serve                        open the interactive page
 
-For a drive of your own, give its file to any of them:
-softstart init --out mine.toml         makes one from data sheets: it asks
+Pass the file of your own drive to any of them;
+softstart init --out mine.toml         asks for data sheet values and writes one.
 softstart --help lists all commands."""
 
 EPILOG = """\
@@ -249,7 +249,7 @@ class Commands(Command, click.Group):
 @click.version_option(__version__, prog_name="softstart", message="%(prog)s %(version)s")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Which soft-start strategy loads the shaft of a drive with a gap least, and what it costs in time."""
+    """Compare and design soft-start torque strategies for drives with backlash."""
     if context.invoked_subcommand is None:
         print(GREETING)
 

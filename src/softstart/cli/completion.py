@@ -306,7 +306,7 @@ def register_shells() -> None:
 @click.command(cls=Command)
 @click.argument("shell", metavar="[bash|zsh|fish]", required=False)
 def completion(shell: str | None) -> None:
-    """Print the script that completes commands, drives, controllers, keys and studies with the Tab key.
+    """Print the script for completion with the Tab key.
 
     By default it is for the shell that runs. Its first line names the file to put it in; to try it at once:
 

@@ -85,82 +85,84 @@ def _check_question(given: Mapping[str, Any]) -> None:
     "--drive", metavar="GUESS",
     type=Reading(lambda name, _, settings: read_machine(name, settings), "settings"),
     shell_complete=names_or_files(drive_names, ".toml"),
-    help="The drive, or chain with one dominant gap, as it is thought to be, by a factor of 3 if need be: a "
-    "file or shipped name.",
+    help="Initial guess: a drive, or a chain with one dominant gap, as a file or shipped name. Factors of "
+    "3 are tolerated.",
 )  # fmt: skip
 @set_option
 @click.option(
     "--columns", metavar="SIGNAL=NAME,...",
     type=Reading(lambda text, option: read_params(text.split(","), option, "speed=n_act")),
-    help="What the log calls them, as time=t,torque=-M_act,speed=n_act[rpm]; a minus turns the sign, a unit "
-    "in brackets takes the place of that of the log.",
+    help="Names of the columns in the log, for example time=t,torque=-M_act,speed=n_act[rpm]; a minus "
+    "inverts the sign, a unit in brackets replaces that of the log.",
 )  # fmt: skip
 @click.option(
     "--torque-is", metavar="measured|demand", type=choice("measured", "demand"), default="measured",
-    help="What the torque of the log is.",
+    help="Meaning of the torque in the log. Default: measured.",
 )  # fmt: skip
 @click.option(
     "--torque-constant", metavar="CONSTANT", type=quantity("N*m/A"),
-    help="The log has a current in place of the torque, of which this is the torque, as '1.2 N*m/A'.",
+    help="Torque constant, for example '1.2 N*m/A', if the log has the current instead of the torque.",
 )  # fmt: skip
 @click.option(
     "--free",
     metavar="NAME,...",
     type=Reading(read_list),
-    help="What to find, as gap,stiffness,position. By default all that is usual; +motor.friction adds one.",
+    help="Parameters to identify, for example gap,stiffness,position; +motor.friction adds one to the "
+    "default set.",
 )
 @click.option(
     "--searches", metavar="N", type=count(), default="12",
-    help="At most so many searches for the best fit; 12 by default.",
+    help="Largest number of searches for the best fit. Default: 12.",
 )  # fmt: skip
 @click.option(
     "--controllers",
     metavar="NAME,...",
     type=Reading(read_names),
-    help=f"Strategies whose K_dyn is shown; {','.join(STRATEGIES)} by default.",
+    help=f"Strategies whose K_dyn is shown. Default: {','.join(STRATEGIES)}.",
 )
 @click.option(
     "--plan", metavar="DRIVE", type=Reading(lambda name, _, settings: read_drive(name, settings), "settings"),
     shell_complete=names_or_files(drive_names, ".toml"),
-    help="No log yet: show what experiments with this drive would tell, and look for a better one.",
+    help="Compute the expected accuracy of experiments with this drive, and design a better one; no log is "
+    "needed.",
 )  # fmt: skip
+@click.option("--standard", is_flag=True, help="With --plan: evaluate the standard experiments only.")
+@click.option("--log-period", metavar="TIME", help="With --plan: sample period of the log. Default: 4 ms.")
 @click.option(
-    "--standard", is_flag=True, help="With --plan: the standard experiments only, no search for a better one."
+    "--ripple", metavar="TORQUE", help="With --plan: standard deviation of the torque error in each sample."
 )
-@click.option(
-    "--log-period", metavar="TIME", help="Sample period of the log for --plan, as '4 ms' (the default)."
-)
-@click.option("--ripple", metavar="TORQUE", help="Torque error in each sample for --plan.")
 @click.option(
     "--tell",
     "wanted",
     metavar="NAME,...",
     type=Reading(read_list),
-    help="Parameters that a plan is to tell best; all by default.",
+    help="With --plan: parameters whose accuracy is optimised. Default: all.",
 )
+@click.option("--most-torque", metavar="TORQUE", help="With --plan: upper bound of the shaft torque.")
 @click.option(
-    "--most-torque", metavar="TORQUE", help="Largest shaft torque that a planned experiment may have."
-)
-@click.option(
-    "--most-travel", metavar="ANGLE", help="How far a planned experiment may move the load, at the motor."
+    "--most-travel",
+    metavar="ANGLE",
+    help="With --plan: upper bound of the travel of the load, referred to the motor.",
 )
 @click.option(
     "--wear", is_flag=True,
-    help="LOG are folders of identifications of one drive: how its gap grows, and when it reaches --limit.",
+    help="LOG are folders of identifications of one drive: compute the growth of its gap, and when it "
+    "reaches --limit.",
 )  # fmt: skip
 @click.option(
     "--dates", metavar="DATE,...", type=Reading(read_list),
-    help="With --wear: when the logs were taken, as 2025-05-31,2026-05. By default by the folders' names.",
+    help="With --wear: dates of the logs, for example 2025-05-31,2026-05. Default: from the folder names.",
 )  # fmt: skip
 @click.option(
     "--limit",
     metavar="GAP",
     type=quantity("rad"),
-    help="With --wear: the gap of a worn drive, as '0.2 rad'; strategies then.",
+    help="With --wear: gap of a worn drive, for example '0.2 rad', at which the strategies are evaluated.",
 )
 @json_option
 @out_option(
-    "Write the drive found (drive.toml), figures and report.md, or the planned torques, into this folder."
+    "Write the identified drive (drive.toml), figures and report.md, or the planned torque profiles, into "
+    "this folder."
 )
 def identify(
     *,
@@ -172,12 +174,12 @@ def identify(
     out: str | None,
     **given: Any,
 ) -> None:
-    """Find the parameters of a drive, with intervals, from what an inverter logged of its starts.
+    """Identify the parameters of a drive, with confidence intervals, from inverter logs.
 
-    LOG is a CSV file with the columns time, torque, and angle or speed of the motor, units in its first line
-    as in "time [ms];torque [N*m];speed [rpm]", or a measurement file (MDF). It begins at standstill. Several
-    logs are of one drive. With --plan DRIVE no log is read: it shows what each experiment would tell before
-    it is run. With --wear the folders of identifications are compared over the years.
+    LOG is a CSV file with the columns time, torque, and angle or speed of the motor, with units in the first
+    line, "time [ms];torque [N*m];speed [rpm]", or a measurement file (MDF). It begins at standstill. Several
+    logs of the same drive are fitted together. With --plan DRIVE no log is read: the expected accuracy of
+    each experiment is computed beforehand. With --wear identifications of several years are compared.
     """
     if wear:
         show_wear(logs, given["dates"], given["limit"], controllers, as_json, out)

@@ -31,25 +31,25 @@ FIRST = ("name", "source", "machine")
 @click.argument("sheet", required=False, metavar="[SHEET]", shell_complete=files_only(".toml"))
 @changes_option(
     lambda: table_keys(DataSheet.TABLES),
-    "Give a value of the data sheet, as motor.power='3 kW' or gear.ratio=31.5.",
+    "Set a value of the data sheet, for example motor.power='3 kW' or gear.ratio=31.5.",
 )
 @click.option(
     "--out",
     metavar="FILE",
     shell_complete=files_only(".toml"),
-    help="The drive file to write, as mine.toml; without it, the drive is printed.",
+    help="Drive file to write, for example mine.toml. Default: print it.",
 )
-@click.option("--ask", is_flag=True, help="Ask for what is not given; on a terminal without SHEET it does.")
-@click.option("--template", is_flag=True, help="Print an empty data sheet to fill in, and nothing else.")
+@click.option("--ask", is_flag=True, help="Ask for missing values; the default on a terminal without SHEET.")
+@click.option("--template", is_flag=True, help="Print an empty data sheet to fill in.")
 @json_option
 def init(
     *, sheet: str | None, settings: tuple[str, ...], out: str | None, ask: bool, template: bool, as_json: bool
 ) -> None:
-    """Make a drive file from plates, catalogues and drawings.
+    """Create a drive file from data sheet values.
 
-    Asks for rating plate, gearbox, shaft and load, each number at the part it belongs to, and refers all to
-    the motor shaft; comments in the file say what each number is from. SHEET is a TOML file with the
-    answers; --template prints one to fill in.
+    Asks for the values of rating plate, gearbox, shaft and load, and refers them to the motor shaft; comments
+    in the file state the origin of each value. SHEET is a TOML file with the values; --template prints one
+    to fill in.
     """
     if template:
         click.echo(template_text(), nl=False)

@@ -54,7 +54,7 @@ else:  # no numba for a help, a wrong option or the Tab key
 @controller_option(
     "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
 )
-@param_option("Set a parameter of the controller, as period='0.5 ms'. May be repeated.")
+@param_option("Set a parameter of the controller, for example period='0.5 ms'. May be repeated.")
 @set_option
 @json_option
 @out_option(
@@ -68,12 +68,12 @@ def linear(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Linearise a controller as it runs, and show margins, modes and limit cycles.
+    """Linearise the control loop: stability margins, modes, limit cycles.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. The controller's own step is linearised at an instant of its start at which
-    the gap is closed; the loop is broken at the torque demand. Limit cycles through the gap are predicted
-    by the describing function and tried on the exact plant.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); by default the crane drive of
+    the literature. The controller's step function is linearised at an instant of its start at which the gap
+    is closed; the loop is broken at the torque demand. Limit cycles through the gap are predicted by the
+    describing function and checked on the exact plant.
     """
     with output_folder(out) as folder:
         with working("running and linearising the start ..."):

@@ -31,7 +31,7 @@ else:
 def drives(name: str | None, as_json: bool) -> None:
     """List the shipped drives, or print one as TOML.
 
-    For a drive of your own: softstart drives crane-4amtkf > mine.toml
+    To begin a file of your own: softstart drives crane-4amtkf > mine.toml
     """
     if name is not None and name not in drive_names():
         raise InputError(

@@ -106,8 +106,9 @@ def terminal_option(usual: str, default: str | None = None) -> Decorator:
         metavar="|".join(TERMINALS),
         type=choice(*TERMINALS),
         default=default,
-        help="How the start ends: motor and load at the target speed; also with the shaft torque at that of "
-        f"the load; or only the load at the target speed. By default {usual}.",
+        help="Terminal condition: motor and load at the target speed (synchronous), with the shaft torque "
+        "equal to the load torque as well (steady), or the load alone at the target speed (reached). "
+        "Default: {usual}.",
     )
 
 
@@ -115,19 +116,20 @@ method_option = click.option(
     "--method",
     metavar="|".join(METHODS),
     type=choice(*METHODS),
-    help="By default auto: the cheapest one that is valid.",
+    help="Solution method. Default: auto, the fastest one that is valid.",
 )
 torque_speed_option = click.option(
     "--torque-speed",
     metavar="SPEED:TORQUE,...",
     type=Reading(_read_corners),
-    help="Limit of the motor's torque over its speed by its corners, as '0 rad/s:62 N*m,90 rad/s:40 N*m'.",
+    help="Corners of the torque-speed curve that limits the motor, for example '0 rad/s:62 N*m,90 rad/s:40 "
+    "N*m'.",
 )
 smoothness_option = click.option(
     "--smoothness",
     metavar="TIME",
     type=quantity("s", "a weight in s, 0 or more", least=0.0),
-    help="Weight of a smooth torque against a low K_dyn, as 0.001 (s). By default 0.",
+    help="Weight of torque smoothness, for example 0.001 (s). Default: 0.",
 )
 
 

@@ -135,51 +135,57 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
     "--start-time",
     metavar="TIME",
     type=Reading(StartTime.of),
-    help="Longest start time, as 0.3 (s), '300 ms', or 1.2x that of direct. By default 1.2x.",
+    help="Upper bound of the start time: 0.3 (s), '300 ms', or 1.2x that of direct. Default: 1.2x.",
 )
 @click.option(
-    "--limits", is_flag=True, help="Find the least start time that keeps the [limits] of the drive instead."
+    "--limits",
+    is_flag=True,
+    help="Find the shortest start time that meets the [limits] of the drive instead.",
 )
 @terminal_option("synchronous")
 @method_option
-@click.option("--minimise", metavar="|".join(OBJECTIVES), type=choice(*OBJECTIVES), help="By default k_dyn.")
+@click.option(
+    "--minimise", metavar="|".join(OBJECTIVES), type=choice(*OBJECTIVES), help="Objective. Default: k_dyn."
+)
 @click.option(
     "--max-k-dyn", "k_dyn", metavar="NUMBER", type=quantity("1", "give a number above 0", above=0.0),
-    help="Largest K_dyn allowed, if another figure is minimised.",
+    help="Upper bound of K_dyn if another objective is minimised.",
 )  # fmt: skip
 @click.option(
     "--max-heat", "heat", metavar="TIME", type=quantity("s", "give a time above 0 s", above=0.0),
-    help="Largest I2t heat allowed, in s of starting torque.",
+    help="Upper bound of the I2t heat, in s of starting torque.",
 )  # fmt: skip
 @torque_speed_option
 @smoothness_option
 @click.option(
     "--tolerance", metavar="SHARE", type=quantity("1", "a share, as 0.5 %, 0 or more", least=0.0),
-    help="Gap to the lower bound at which the search ends. By default 0.5 %.",
+    help="Relative gap to the lower bound at which the search ends. Default: 0.5 %.",
 )  # fmt: skip
 @click.option(
     "--time-limit", metavar="TIME", type=quantity("s", "a time in s, 0 or more", least=0.0),
-    help="No further search after this, as 20 (s); 0: the first answer.",
+    help="Time after which no further search starts, for example 20 (s); 0: return the first solution.",
 )  # fmt: skip
 @click.option(
-    "--confirm", is_flag=True, help="Solve the CasADi problem too, from its own guess, and show both."
+    "--confirm",
+    is_flag=True,
+    help="Also solve the CasADi problem from its own initial guess, and show both results.",
 )
 @click.option(
     "--seeds",
     metavar="A,B,...",
     type=Reading(_read_seeds),
-    help="Of a chain: strategies whose torque the search starts from; cma (cma2, cma3 ...) for a global "
-    "search (package cma). By default all strategies that need no parameter.",
+    help="For a chain: strategies whose torque initialises the search; cma (cma2, cma3 ...) for a global "
+    "search (package cma). Default: all strategies that need no parameter.",
 )
 @click.option(
     "--gaps", metavar="GAP,...", type=quantities("rad"),
-    help="One profile for these gaps, with a contact sensor and without.",
+    help="Compute one profile for these gaps, with and without a contact sensor.",
 )  # fmt: skip
 @click.option(
-    "--inertias", metavar="INERTIA,...", type=quantities("kg*m^2"), help="... for these load inertias."
+    "--inertias", metavar="INERTIA,...", type=quantities("kg*m^2"), help="Likewise for these load inertias."
 )
 @click.option(
-    "--load-torques", metavar="TORQUE,...", type=quantities("N*m"), help="... for these load torques."
+    "--load-torques", metavar="TORQUE,...", type=quantities("N*m"), help="Likewise for these load torques."
 )
 @set_option
 @json_option
@@ -187,11 +193,11 @@ def not_for_several(bounds: Mapping[str, Any]) -> list[str]:
 def optimize(
     *, drive: Drive | Chain, start_time: StartTime | None, as_json: bool, out: str | None, **given: Any
 ) -> None:
-    """Find the torque profile with the least K_dyn for a start time, and prove how good it is.
+    """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. With --gaps, --inertias or --load-torques, one profile serves all of them.
-    Of a chain (crane-4-mass) the largest torque of all its shafts is minimised.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
+    default the crane drive of the literature. With --gaps, --inertias or --load-torques, one profile is
+    computed for all combinations. For a chain, the largest torque of all its shafts is minimised.
     """
     varied = {name: given[name] or [] for name in SEVERAL}
     if any(given[name] is not None for name in SEVERAL) and isinstance(drive, Drive):

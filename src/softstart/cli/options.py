@@ -370,7 +370,7 @@ _allow_code_option = click.option(
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, given: context.meta.update({CODE: given}),
-    help="Let a file of tuned gains name a Python file, which then runs.",
+    help="Allow a file of tuned gains to name a Python file, which is then executed.",
 )
 
 
@@ -387,35 +387,34 @@ def changes_option(keys: Callable[[], Keys], text: str) -> Decorator:
 
 
 set_option = changes_option(
-    drive_keys, "Change a parameter of the drive, as load.inertia=0.07 or shaft.gap='2 rad'."
+    drive_keys, "Change a parameter of the drive, for example load.inertia=0.07 or shaft.gap='2 rad'."
 )
 until_option = click.option(
     "--until",
     metavar="TIME",
     type=quantity("s", 'the end of the run is a time above 0 s, as 0.5 or "500 ms"', above=0.0),
-    help="End of the run, as 0.5 (s) or '500 ms'. By default one elastic period after the start time.",
+    help="End of the simulation, for example 0.5 (s) or '500 ms'. Default: one elastic period after the "
+    "start time.",
 )
 fitted_to_option = click.option(
     "--fitted-to",
     metavar="DRIVE",
     type=Reading(_read_fitted_to),
     shell_complete=names_or_files(drive_names, ".toml"),
-    help="The drive for which the controllers are set up, a file or shipped name, if not the one they run: "
-    "how robust are they? --set changes the drive that runs, not this one.",
+    help="Set the controllers up for this drive (a file or shipped name) and run them on DRIVE, to check "
+    "their robustness. --set changes DRIVE only.",
 )
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object on standard output and nothing else."
-)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 
 
 workers_option = click.option(
     "--workers",
     metavar="N",
     type=count(),
-    help="How much is computed at once. By default one for each processor.",
+    help="Number of parallel workers. Default: one per processor.",
 )
 scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler instead."
+    "--scheduler", metavar="ADDRESS", help="Compute on the dask cluster of this scheduler."
 )
 
 

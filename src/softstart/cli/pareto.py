@@ -68,24 +68,28 @@ def _check(given: Mapping[str, Any]) -> None:
     "--start-times",
     metavar="TIME,...",
     type=Reading(read_start_times),
-    help="Bounds on the start time, as 0.25,0.3 (s) or from:to:count, as 0.25:0.5:12; also as multiples of "
-    "that of direct, 1.02x:1.6x:12. By default 12 from the shortest feasible one on.",
+    help="Bounds of the start time: 0.25,0.3 (s), a range from:to:count such as 0.25:0.5:12, or multiples "
+    "of that of direct, 1.02x:1.6x:12. Default: 12 bounds from the shortest feasible one on.",
 )
 @terminal_option("reached", "reached")
 @method_option
 @torque_speed_option
 @controller_option(
-    "--controllers", "A,B,...", "Controllers to show beside the curve. By default all that need no parameter."
+    "--controllers", "A,B,...", "Controllers to compare with the curve. Default: all that need no parameter."
 )
 @click.option(
-    "--workers", metavar="N", type=count(), default="1", help="Optima computed at once. By default 1."
+    "--workers",
+    metavar="N",
+    type=count(),
+    default="1",
+    help="Number of optima computed in parallel. Default: 1.",
 )
 @scheduler_option
 @set_option
 @json_option
 @out_option(
-    "Write figure (SVG, PNG), table (CSV) and report.md into this folder, and each finished point at once: "
-    "an interrupted command goes on from there."
+    "Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at "
+    "once, so that an interrupted command resumes."
 )
 def pareto(
     *,
@@ -96,11 +100,11 @@ def pareto(
     out: str | None,
     **bounds: Any,
 ) -> None:
-    """Find the least K_dyn for many start times, and show how near the controllers come to it.
+    """Compute the lowest K_dyn over the start time, and compare the controllers with it.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken; or that of a chain (crane-4-mass). Each controller is judged by the optimum at
-    its own start time.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
+    default the crane drive of the literature. Each controller is compared with the optimum at its own start
+    time.
     """
     with (
         no_solution_reported(as_json),

@@ -75,45 +75,46 @@ def _check_verify(given: Mapping[str, Any]) -> None:
     default="crane-4-mass",
     names=LIBRARY.names,
 )
-@click.option(
-    "--to", metavar="N", type=count(2), help="Number of masses to reduce to. By default 2, a drive."
-)
+@click.option("--to", metavar="N", type=count(2), help="Number of masses to reduce to. Default: 2, a drive.")
 @click.option(
     "--up-to",
     metavar="SPEED",
     type=quantity("rad/s", "give a frequency above 0, as 70 (rad/s) or '11 turn/s'", above=0.0),
-    help="Keep all frequencies up to this one, as 70 (rad/s), with as few masses as that takes.",
+    help="Keep all natural frequencies up to this one, for example 70 (rad/s), with as few masses as "
+    "possible.",
 )
 @click.option(
     "--method",
     metavar="|".join(METHODS),
     type=choice(*METHODS),
     default="lever",
-    help="lever: partial systems merged one by one, as in the literature; modal: two masses with the first "
-    "frequency and the node of the chain. By default lever.",
+    help="lever: merge partial systems one by one, as in the literature; modal: two masses with the first "
+    "frequency and the node of the chain. Default: lever.",
 )
 @click.option(
     "--factor",
     metavar="NUMBER",
     type=quantity("1", "give a number of 1 or more, as 10", above=0.0),
-    help="How many times the square of the highest wanted frequency those of partial systems must be. By "
-    "default 10.",
+    help="Smallest ratio of the squared partial frequencies to that of the highest frequency to keep. "
+    "Default: 10.",
 )
-@click.option("--force", is_flag=True, help="Go on where a partial frequency is too low.")
+@click.option("--force", is_flag=True, help="Continue where a partial frequency is too low.")
 @changes_option(
     lambda: table_keys(TABLES),
-    "Change a value of the chain, as mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.",
+    "Change a parameter of the chain, for example mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.",
 )
 @controller_option(
     "--verify",
     "A,B,...",
-    "Controllers to set up for the drive and to start on the drive and on the whole chain. By default all "
-    "that need no parameter.",
+    "Controllers to set up for the drive and to run on the drive and on the chain. Default: all that need "
+    "no parameter.",
 )
 @click.option(
-    "--no-starts", is_flag=True, help="Leave out the starts that tell whether two masses are enough."
+    "--no-starts", is_flag=True, help="Skip the starts that determine whether two masses are sufficient."
 )
-@param_option("Set a parameter of a controller to verify, as ramp.time='0.2 s'. May be repeated.", "verify")
+@param_option(
+    "Set a parameter of a controller of --verify, for example ramp.time='0.2 s'. May be repeated.", "verify"
+)
 @json_option
 @out_option(
     "Write scheme and figures (SVG, PNG), tables (CSV), the drive (TOML) and report.md into this folder."
@@ -128,11 +129,12 @@ def reduce(
     out: str | None,
     **asked: Any,
 ) -> None:
-    """Find the natural frequencies of a chain of masses, and reduce it to the drive that stands for it.
+    """Compute the natural frequencies of a chain, and reduce it to two masses.
 
-    CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); without it, the crane
-    drive as a chain of four masses is taken. The drive that comes out goes into compare, optimize and tune.
-    Whether two masses are enough is told by starts of both, under --verify's controllers and 128 torques.
+    CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); by default the crane
+    drive as a chain of four masses. The reduced drive is an input of compare, optimize and tune. The error of
+    the reduction in K_dyn is computed from starts of both under the controllers of --verify and 128 torque
+    profiles.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     with output_folder(out) as folder:

@@ -94,40 +94,42 @@ def _check_chain(given: Mapping[str, Any]) -> None:
 @click.option(
     "--out",
     metavar="FILE",
-    help="The HTML file to write, as report.html. Without it (then give --json) only the numbers are made.",
+    help="HTML file to write, for example report.html.",
 )
 @click.option(
     "--pdf",
     metavar="FILE",
-    help="The PDF file to write, as report.pdf; Chromium, Chrome or Edge prints it.",
+    help="PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.",
 )
 @controller_option(
     "--controllers",
     "A,B,...",
-    "Strategies to examine, files of tuned gains among them. By default all that need no parameter.",
+    "Strategies to compare, including files of tuned gains. Default: all that need no parameter.",
 )
 @set_option
-@param_option("Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated.", "controllers")
+@param_option(
+    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "controllers"
+)
 @click.option(
     "--resolution",
     metavar="KEY=STEP,...",
     type=Reading(_read_resolution),
-    help="Steps in which the inverter can be set, as torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,"
-    "share=1%. "
-    "Torque in % of the rated torque or in N*m. By default 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.",
+    help="Resolution of the inverter parameters, for example torque=0.5%,time=10ms,speed=1rpm,"
+    "frequency=0.1Hz,share=1%. Torque in % of the rated torque or in N*m. Default: 0.1 %, 1 ms, 1 rpm, "
+    "0.1 Hz and 0.01.",
 )
 @click.option(
     "--budget",
     metavar="TIME",
     type=quantity("s", 'give a time, as 20 or "60 s", or 0 for no search', least=0.0),
-    help="Time for the search of optima where there is no formula, as 60 (s). By default 20 s; 0 for none.",
+    help="Time limit of numerical optimisation, for example 60 (s). Default: 20 s; 0 disables it.",
 )
 @click.option(
     "--project",
     metavar="FILE",
     type=Reading(lambda path, option: reporting.Project.load(path)),
-    help="A TOML file with customer, project, author, logo, revisions, approval, sources of the data, paper "
-    "size, decimal sign and language (docs/howto/read-a-report.md has one).",
+    help="TOML file with customer, project, author, logo, revisions, approval, data sources, paper size, "
+    "decimal sign and language (example in docs/howto/read-a-report.md).",
 )
 @click.option(
     "--sentences",
@@ -135,8 +137,8 @@ def _check_chain(given: Mapping[str, Any]) -> None:
     expose_value=False,
     is_eager=True,
     callback=_write_sentences,
-    help="Write all sentences of reports to a TOML file, to be translated, and end; what stands in it "
-    "already is kept. A project's file names it: language = FILE.",
+    help="Write all texts of the report to a TOML file for translation, and exit; existing translations "
+    "are kept. The project file refers to it: language = FILE.",
 )
 @json_option
 def report(
@@ -149,13 +151,13 @@ def report(
     as_json: bool,
     **asked: Any,
 ) -> None:
-    """Write a report on the start of a drive: one HTML file that opens offline and prints to A4.
+    """Write a report on the start of a drive or a chain as one HTML file.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like), or the folder of an identification, whose figures have intervals; without it, the crane
-    drive of the literature is taken. The report recommends a strategy and gives its parameters, rounded to
-    what the inverter can be set to and started again after rounding. The report of a chain has its strategies
-    and starts, without optima and parameter sheets.
+    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
+    tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
+    drive of the literature. The file opens offline and prints to A4. The report recommends a strategy and
+    states its parameters, rounded to the resolution of the inverter and simulated again after rounding. The
+    report of a chain has its strategies and starts, without optima and parameter sheets.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     browser = None if pdf is None else _browser()

@@ -47,20 +47,26 @@ def _address(given: Mapping[str, Any]) -> Address:
 @click.command(cls=Command, checks=[_check_address])
 @drive_argument(lambda name, settings: machines.single(read_machine(name, settings)))
 @set_option
-@click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 takes a free one.")
+@click.option("--port", type=int, default=8765, show_default=True, help="Port; 0 selects a free one.")
 @click.option(
-    "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen at."
+    "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen on."
 )
 @click.option(
-    "--token", default=None, metavar="TOKEN", help="Ask everyone for this token; needed with --expose."
+    "--token",
+    default=None,
+    metavar="TOKEN",
+    help="Token that every client must present; required with --expose.",
 )
-@click.option("--expose", is_flag=True, help="Let other machines reach the page; needs --host and --token.")
+@click.option(
+    "--expose", is_flag=True, help="Accept connections from other machines; requires --host and --token."
+)
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 def serve(*, drive: Machine, no_browser: bool, **given: Any) -> None:
-    """Design a soft start in the browser: sliders, traces that follow, strategies side by side.
+    """Open the interactive page in the browser.
 
-    The page is served to this machine alone, unless it is told otherwise. Without DRIVE it begins with the
-    crane drive of the literature. Ctrl-C ends it. Needs NiceGUI: pip install 'softstart[ui]'.
+    DRIVE is a TOML file or the name of a shipped drive or chain; by default the crane drive of the
+    literature. The server accepts connections from this machine only, unless --expose is given; Ctrl-C stops
+    it. Needs NiceGUI: pip install 'softstart[ui]'.
     """
     address = _address(given)
     listener = listening(address)

@@ -64,10 +64,10 @@ SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 
 strategies_option = controller_option(
     "--controllers", "A,B,...",
-    "Controllers, with commas between. By default all installed ones that need no parameter.",
+    "Controllers, separated by commas. Default: all installed ones that need no parameter.",
 )  # fmt: skip
 params_option = param_option(
-    "Set a parameter of a controller, as ramp.time='0.2 s'. May be repeated.", "controllers"
+    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "controllers"
 )
 
 
@@ -96,8 +96,8 @@ def _cases(text: str, option: str) -> tuple[str, ...]:
     "--worst-case",
     metavar="A,B,...",
     type=Reading(_cases),
-    help="Changes under which the drive must keep its [limits] as well: gap x4, J2 x0.4, or none. By default "
-    "both.",
+    help="Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. "
+    "Default: both.",
 )
 @json_option
 @out_option("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
@@ -112,12 +112,12 @@ def compare(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Start a drive or a chain under several controllers and compare them.
+    """Compare controllers on a drive or a chain.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like), or the folder of an identification, whose figures have intervals; without it, the crane
-    drive of the literature is taken. A controller is a name (see: softstart controllers),
-    path/to/file.py:Class, or a file of tuned gains.
+    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
+    tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
+    drive of the literature. A controller is a name (see: softstart controllers), path/to/file.py:Class, or a
+    file of tuned gains.
     """
     with output_folder(out) as folder:
         with working("starting the drive ..."):
@@ -173,7 +173,7 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
         name, option, "several are compared: softstart compare --controllers "
     ),
 )
-@param_option("Set a parameter of the controller, as time='200 ms'. May be repeated.")
+@param_option("Set a parameter of the controller, for example time='200 ms'. May be repeated.")
 @set_option
 @fitted_to_option
 @until_option
@@ -189,7 +189,7 @@ def simulate(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Start a drive or a chain once under one controller.
+    """Simulate one start of a drive or a chain.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like).
@@ -276,18 +276,21 @@ def _check_chain(given: Mapping[str, Any]) -> None:
     "--slope",
     metavar="M",
     type=quantity("1"),
-    help="Slope of the S-N curve instead of limits.fatigue.slope. By default 6.6: pitting of hardened gears.",
+    help="Slope of the S-N curve, instead of limits.fatigue.slope. Default: 6.6, pitting of case-hardened "
+    "gears.",
 )
 @click.option(
     "--worn-gap",
     metavar="GAP",
-    help="Gap at the end of limits.life, as '2 rad': it grows in proportion to time, and damage adds up.",
+    help="Gap at the end of limits.life, for example '2 rad'; it grows in proportion to time, and damage "
+    "accumulates.",
 )
 @click.option(
     "--estimate-damping",
     metavar="gears=N,couplings=N",
     type=Reading(_gears_and_couplings),
-    help="For a drive without damping: a ratio of 1 % a pair of gears and 0.5 % a coupling, at most 6 %.",
+    help="For a drive without damping: a damping ratio of 1 % per pair of gears and 0.5 % per coupling, at "
+    "most 6 %.",
 )
 @json_option
 @out_option("Write the figure (SVG, PNG), cycles and turning points (CSV) and report.md into this folder.")
@@ -303,12 +306,13 @@ def fatigue(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Find how long the shaft line lasts under each controller: rainflow cycles, life, impacts.
+    """Estimate the fatigue life of the shaft line under each controller.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. Its tables [limits] and [limits.fatigue] give the S-N curve, the starts per
-    hour and the life asked for; without them lives are compared with that of direct. A drive needs damping.
-    Of a chain, whose shafts all need damping, each shaft is counted by itself.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
+    drive of the literature. Cycles are counted by the rainflow method. The tables [limits] and
+    [limits.fatigue] of the file give the S-N curve, the starts per hour and the required life; without them
+    lives are relative to that of direct. A drive needs damping; a chain needs it in every shaft, and each
+    shaft is evaluated separately.
     """
     if isinstance(drive, Chain):
         _fatigue_of_chain(

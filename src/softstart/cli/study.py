@@ -35,7 +35,7 @@ MARKS = {Verdict.CONFIRMED: "green", Verdict.REFUTED: "red", Verdict.PARTLY: "ye
 
 @click.command(cls=Command)
 @click.argument("name", required=False, shell_complete=studies)
-@click.option("--list", "only_list", is_flag=True, help="List the studies, as without NAME.")
+@click.option("--list", "only_list", is_flag=True, help="List the studies.")
 @json_option
 @out_option("Write pictures (SVG, PNG) and tables (CSV) into this folder.")
 def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> None:

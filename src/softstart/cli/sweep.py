@@ -83,11 +83,11 @@ def _check_controller(given: Mapping[str, Any]) -> None:
     multiple=True,
     required=True,
     shell_complete=axes_known,
-    help="An axis of the grid: a parameter of the drive, as shaft.gap=0.25:4:100 (from:to:count, with :log "
-    "behind in equal ratios) or load.kind=active,reactive, or of the controller, as controller.torque='10 "
-    "N*m,20 N*m'. To be repeated.",
+    help="Axis of the grid: a parameter of the drive, shaft.gap=0.25:4:100 (from:to:count, with :log for "
+    "geometric spacing) or load.kind=active,reactive, or of the controller, controller.torque='10 N*m,20 "
+    "N*m'. May be repeated.",
 )
-@param_option("A parameter of the controller, the same for all starts. May be repeated.")
+@param_option("Set a parameter of the controller for all starts. May be repeated.")
 @set_option
 @fitted_to_option
 @until_option
@@ -95,23 +95,26 @@ def _check_controller(given: Mapping[str, Any]) -> None:
     "--figures",
     metavar="A,B,...",
     type=Reading(read_list),
-    help="Figures to keep, as k_dyn,start_time; the status always is.",
+    help="Figures to save, for example k_dyn,start_time; the status is always saved.",
 )
 @workers_option
 @scheduler_option
 @click.option(
-    "--chunk", metavar="N", type=count(), help="Most starts that are computed and written at a time."
+    "--chunk",
+    metavar="N",
+    type=count(),
+    help="Largest number of starts that are computed and written at once.",
 )
 @click.option(
     "--netcdf",
     metavar="FILE",
     shell_complete=files_only(".nc"),
-    help="Also write the finished results as netCDF.",
+    help="Also write the results as netCDF.",
 )
 @json_option
 @out_option(
-    f"Write the results chunk by chunk into DIR/{RESULTS}, and figure, table and report.md beside it: the "
-    "same command goes on where an earlier one ended. Without it the results are only summed up."
+    f"Write the results chunk by chunk into DIR/{RESULTS}, with figure, table and report.md; an "
+    "interrupted command resumes. Without it only a summary is printed."
 )
 def sweep(
     *,
@@ -125,10 +128,10 @@ def sweep(
     out: str | None,
     **asked: Any,
 ) -> None:
-    """Simulate every start of a grid of drives and controllers, of any size.
+    """Simulate a grid of drives and controllers of any size.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); without it, the crane drive
-    of the literature is taken. The results are a Zarr folder that xarray opens.
+    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); by default the crane drive of
+    the literature. The results are a Zarr store that xarray opens.
     """
     asked |= {"fitted_to": fitted_to, **({} if figures is None else {"figures": figures})}
     begin = time.monotonic()

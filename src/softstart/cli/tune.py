@@ -140,34 +140,34 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     "--gaps",
     metavar="GAP,...",
     type=Reading(lambda text, option: read_grid(text, option, "rad")),
-    help="Gaps, as 0.5,1 (rad), '30 deg', 2x (of the drive's own), or from:to:count, as 0.5:2:7. "
-    "By default 0.5x,1x,2x,4x.",
+    help="Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as "
+    "0.5:2:7. Default: 0.5x,1x,2x,4x.",
 )
 @click.option(
     "--inertias",
     metavar="INERTIA,...",
     type=Reading(lambda text, option: read_grid(text, option, "kg*m^2")),
-    help="Load inertias, likewise; also multiples of the motor's, as 2J1:5J1:4. By default 0.4x,1x,2x.",
+    help="Load inertias, likewise; also multiples of the motor's, 2J1:5J1:4. Default: 0.4x,1x,2x.",
 )
 @click.option(
     "--free",
     metavar="NAME[=LOW:HIGH],...",
     type=Reading(read_free),
-    help="Parameters to tune, and within what, as torque,delay='5 ms:20 ms',rise=0.5x:2x (of the default). "
-    "By default all that the controller offers.",
+    help="Parameters to tune, with or without a range: torque,delay='5 ms:20 ms',rise=0.5x:2x (multiples "
+    "of the default). Default: all that the controller declares tunable.",
 )
-@param_option("Set a parameter of the controller; it is not tuned then. May be repeated.")
+@param_option("Fix a parameter of the controller, which is then not tuned. May be repeated.")
 @click.option(
     "--metric",
     metavar="NAME",
     default="k_dyn",
-    help="What is made small, by default k_dyn; margin: what is left of the [limits], made large.",
+    help="Figure to minimise. Default: k_dyn; margin maximises the margin to the [limits].",
 )
 @click.option(
     "--start-time",
     metavar="TIME",
-    help="Bound on the start time, as 0.3 (s) or 1.2x (of direct in the same cell). By default that of the "
-    "controller's own defaults.",
+    help="Upper bound of the start time: 0.3 (s), or 1.2x that of direct in the same cell. Default: that "
+    "of the controller with its default gains.",
 )
 @click.option(
     "--tolerance",
@@ -175,28 +175,33 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     metavar="KEY=SPREAD",
     multiple=True,
     type=Reading(read_tolerances),
-    help="What drives may be off by, as stiffness=10%, load_torque=2, or values to be met, as "
+    help="Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover, "
     "encoder_phase=0,0.5. May be repeated.",
 )
 @click.option(
-    "--quantile", metavar="SHARE", type=quantity("1"), default="1", help="Share of the starts judged by. By "
-    "default 1, the worst case.",
+    "--quantile", metavar="SHARE", type=quantity("1"), default="1", help="Quantile of the starts that is "
+    "minimised. Default: 1, the worst case.",
 )  # fmt: skip
 @click.option(
-    "--only", metavar="|".join(QUESTIONS), type=choice(*QUESTIONS), help="Answer one of the two questions."
+    "--only",
+    metavar="|".join(QUESTIONS),
+    type=choice(*QUESTIONS),
+    help="Compute the gain schedule or the robust set only.",
 )
-@click.option("--no-optimum", is_flag=True, help="Leave out the certified optima, which may take a while.")
-@click.option("--seed", metavar="N", type=count(0), default="0", help="Of the random search. By default 0.")
+@click.option("--no-optimum", is_flag=True, help="Skip the certified optima, which take longest.")
 @click.option(
-    "--restarts", metavar="N", type=count(0), default="3", help="Independent searches. By default 3."
+    "--seed", metavar="N", type=count(0), default="0", help="Seed of the random search. Default: 0."
+)
+@click.option(
+    "--restarts", metavar="N", type=count(0), default="3", help="Number of independent searches. Default: 3."
 )
 @workers_option
 @scheduler_option
 @set_option
 @json_option
 @out_option(
-    "Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder, and each "
-    "finished part at once: an interrupted command goes on from there."
+    "Write the gains (TOML, CSV), figures (SVG, PNG), tables and report.md into this folder. Finished "
+    "parts are saved at once, so that an interrupted command resumes."
 )
 def tune(
     *,
@@ -209,12 +214,12 @@ def tune(
     out: str | None,
     **asked: Any,
 ) -> None:
-    """Find the gains of a controller for each gap and load inertia, and one set of gains for all.
+    """Tune a controller for each gap and load inertia, and one robust set of gains.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives), or the folder of an
-    identification: the gains are then robust over the drives that its logs leave possible. Without it, the
-    crane drive of the literature is taken. The gains are written as files that stand for a controller
-    everywhere: softstart simulate DRIVE --controller DIR/robust.toml
+    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives), or the folder of an
+    identification: the gains are then robust over its confidence region. By default the crane drive of the
+    literature. The gains are written as files that every command accepts as a controller: softstart simulate
+    DRIVE --controller DIR/robust.toml
     """
     asked |= {
         "parameters": params, "certified": not no_optimum,
