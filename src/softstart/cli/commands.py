@@ -84,7 +84,7 @@ softstart {__version__}: soft-start torque strategies for drives with backlash.
   softstart serve                        open the interactive page
 
 Pass the file of your own drive to any of them;
-softstart init --out mine.toml         asks for data sheet values and writes one.
+softstart init --out mine.toml         asks for data sheet values.
 softstart --help lists all commands."""
 
 EPILOG = """\
