@@ -27,9 +27,9 @@ def drive_file() -> str:
         lines += [_heading(table, False), "", "| key | symbol | unit | default | range | meaning | example |"]
         lines += ["|---|---|---|---|---|---|---|"]
         for p in (p for p in PARAMETERS.values() if p.table == table):
-            default = "**needed**" if p.required else _default(p.default, p.unit, p.follows)
+            default = "**required**" if p.required else _default(p.default, p.unit, p.follows)
             if p.name == "target_speed":
-                default = "`rated_speed`, else **needed**"
+                default = "`rated_speed`, else **required**"
             limit = _choices(p.choices) or _limit(p.limit, p.unit)
             lines.append(
                 f"| `{p.key}` | {p.symbol and f'`{p.symbol}`'} | {_unit(p.unit)} | {default} | {limit} "
@@ -59,12 +59,12 @@ def _tables(tables: Iterable[Table]) -> str:
     for table in tables:
         lines += [_heading(table.name, table.many), ""]
         if table.many:
-            lines += [f"As often as needed, at least {table.least}.", ""]
+            lines += [f"At least {table.least} of these tables.", ""]
         elif table.name and not table.required:
-            lines += ["May be left out as a whole.", ""]
+            lines += ["Optional table.", ""]
         lines += ["| key | unit | default | range | meaning | example |", "|---|---|---|---|---|---|"]
         for f in table.parameters:
-            default = "**needed**" if f.default is REQUIRED else _default(f.default, f.unit)
+            default = "**required**" if f.default is REQUIRED else _default(f.default, f.unit)
             limit = _choices(f.choices) or _limit(f.limit, f.unit)
             many = " (a list)" if f.many else ""
             lines.append(
@@ -77,7 +77,7 @@ def _tables(tables: Iterable[Table]) -> str:
 
 def _heading(name: str, many: bool) -> str:
     if not name:
-        return "## Above the first table"
+        return "## Top-level keys"
     return f"## `[[{name}]]`" if many else f"## `[{name}]`"
 
 
@@ -108,48 +108,46 @@ def _default(value: Any, unit: str, follows: str = "") -> str:
 
 
 def controllers() -> str:
-    """Every installed controller: what it does and sees, its parameters."""
+    """Every installed controller: summary, measured quantities, parameters."""
     lines: list[str] = []
     for name in controller_names():
         cls = controller_class(name)
         lines += [f"## {name}", "", f"{prose(cls.summary[:1].upper() + cls.summary[1:])}.", ""]
-        lines += [f"Sees {', '.join(_seen(cls))}. Source: {prose(cls.source) or 'own design'}.", ""]
+        lines += [f"Measures {', '.join(_measured(cls))}. Source: {prose(cls.source) or 'own design'}.", ""]
         if not fields(cls):
             lines += ["It has no parameters.", ""]
             continue
-        lines += ["| parameter | unit | meaning | default | searched by `tune` |", "|---|---|---|---|---|"]
+        lines += ["| parameter | unit | meaning | default | range for `tune` |", "|---|---|---|---|---|"]
         for field in fields(cls):
-            told = field.metadata
+            meta = field.metadata
             lines.append(
-                f"| `{field.name}` | {_unit(told['unit']) if told['kind'] == 'quantity' else told['kind']} "
-                f"| {prose(told['meaning'])} | {prose(told['default']) or '-'} | {_searched(told)} |"
+                f"| `{field.name}` | {_unit(meta['unit']) if meta['kind'] == 'quantity' else meta['kind']} "
+                f"| {prose(meta['meaning'])} | {prose(meta['default']) or '-'} | {_searched(meta)} |"
             )
         lines.append("")
     return "\n".join(lines)
 
 
-def _seen(cls: Any) -> Iterator[str]:
+def _measured(cls: Any) -> Iterator[str]:
     yield from ("time", "encoder", "motor torque")
     yield from (str(s.name).lower().replace("_", " ") for s in Sensor if s and s in cls.sensors)
 
 
-def _searched(told: Any) -> str:
+def _searched(meta: Any) -> str:
     parts = []
-    if told["multiples"]:
-        parts.append("{:g} to {:g} times the default".format(*told["multiples"]))
-    if told["between"]:
-        parts.append("{:g} to {:g}".format(*told["between"]))
+    if meta["multiples"]:
+        parts.append("{:g} to {:g} times the default".format(*meta["multiples"]))
+    if meta["between"]:
+        parts.append("{:g} to {:g}".format(*meta["between"]))
     return ", within ".join(parts) or "-"
 
 
 def shipped() -> str:
-    """The drives that come with it."""
+    """The shipped drives."""
     from softstart import Drive
     from softstart.drive import library
 
-    lines = [
-        "| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | starts from | source |"
-    ]
+    lines = ["| name | J1, kg m² | J2, kg m² | c, N m/rad | gap, rad | Ms, N m | load | position | source |"]
     lines += ["|---|--:|--:|--:|--:|--:|---|---|---|"]
     for name in library.names():
         d = Drive.load(name)
@@ -163,8 +161,8 @@ def shipped() -> str:
 
 
 def studies() -> str:
-    """The studies and their pictures."""
-    lines = ["| study | question | pictures |", "|---|---|---|"]
+    """The studies and their figures."""
+    lines = ["| study | title | figures |", "|---|---|---|"]
     for name in study_names():
         study = find_study(name)
         pictures = ", ".join(f"`{stem}`" for stem in study.pictures) or "-"
