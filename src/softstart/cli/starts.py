@@ -146,13 +146,13 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
     print_lines(to, starts.machine_lines(comparison.drive, comparison.fitted_to))
     to.print()
     gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.details(comparison.drive)
-    what = "What happens at the gap" if at_the_gap == starts.AT_THE_GAP else "What happens in the shafts"
+    what = "Events at the gap" if at_the_gap == starts.AT_THE_GAP else "Shafts"
     uncertain = starts.INTERVALS if rows[0].intervals else ()
     parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *uncertain, *quick, *at_the_gap))]
     if not fits(to, starts.comparison_table(rows)):
-        parts = [("How gentle, how quick", (*gentle, *quick)), (what, at_the_gap)]
+        parts = [("K_dyn and start times", (*gentle, *quick)), (what, at_the_gap)]
         if not fits(to, starts.comparison_table(rows, parts[0][1])):
-            parts[:1] = [("How gentle", gentle), ("How quick", quick)]
+            parts[:1] = [("K_dyn", gentle), ("Start times", quick)]
         if uncertain:
             parts.insert(1, ("Intervals of 95 %", uncertain))
     for index, (title, figures) in enumerate(parts):

@@ -89,8 +89,8 @@ def strategies_section(
             inertia=short(LIGHT_INERTIA),
         ),
         said(
-            "Settled: from then on the load speed is never more than {percent} % below the target. Time "
-            "lost: start time beyond that of direct start.",
+            "Settled: from then on the load speed is never more than {percent} % below the target. "
+            "Later: start time beyond that of direct start.",
             percent=short(100.0 * SETTLED_BAND),
         ),
         *([_limits_note(rows[0])] if limited else []),
@@ -129,7 +129,7 @@ def strategies_section(
             said("peak torque, N m"),
             said("start time, s"),
             said("settled, s"),
-            said("time lost, s"),
+            said("later, s"),
             said("contacts"),
             *([said("limits, least margin")] if limited else []),
             said("flag"),

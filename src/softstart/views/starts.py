@@ -295,9 +295,9 @@ INTERVALS = (
 QUICK = (
     Figure(later("start\ntime s"), lambda row: row.run.start_time),
     Figure(later("settled\ns"), lambda row: row.run.settled_time),
-    Figure(later("start\nlost s"), lambda row: row.time_lost, digits=3),
-    Figure(later("settled\nlost s"), lambda row: row.settled_lost, digits=3),
-    Figure(later("settled\nlost %"), share_lost, 1),
+    Figure(later("start\nlater s"), lambda row: row.time_lost, digits=3),
+    Figure(later("settled\nlater s"), lambda row: row.settled_lost, digits=3),
+    Figure(later("settled\nlater %"), share_lost, 1),
 )
 AT_THE_GAP = (
     Figure(later("first\ncontact\ns"), lambda row: row.run.first_contact, digits=3),
@@ -377,7 +377,7 @@ def notes(comparison: Comparison) -> list[str]:
         ),
         said(
             "settled: from then on the load speed is never more than {percent:g} % below the target, for "
-            "{periods:g} elastic periods after the start time. lost: later than with direct start.",
+            "{periods:g} elastic periods after the start time. later: compared with direct start.",
             percent=100.0 * SETTLED_BAND,
             periods=SETTLING_PERIODS,
         ),
