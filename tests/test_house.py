@@ -20,7 +20,8 @@ BUDGET = {
     # 110 lines: lists and whole numbers as people type them, in one place; 180: checksums of what is kept,
     # folders of killed processes, the end of a process that does not stop
     # 40 and a file: the language of what is shown; 30: the collector of sentences, which cli had
-    "(top)": (2665, 12, 0, 0),
+    # 75: the units in which people see angles and speeds
+    "(top)": (2741, 12, 0, 0),
     "balancing": (2020, 7, 0, 0),
     # 150 lines: damping ratios, mean torque and K_dyn of a chain, permissible torques; 180: where its start
     # begins, settled times, starts from an unknown position, as a drive has them; 370 and a file that
@@ -28,7 +29,8 @@ BUDGET = {
     # 285 and a file: sensitivities of starts, for the optimum
     # 250 and a file: lives of its shafts; 15: spans and records that compile once
     # 170: how far two masses are off in K_dyn; 9: chains told from drives by their text, which the page has
-    "chain": (6069, 17, 4, 0),
+    # 9: units of what is shown, as a drive has them
+    "chain": (6078, 17, 4, 0),
     # 140 and a file: `init`; 30: `fatigue` of a chain
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains
@@ -43,7 +45,8 @@ BUDGET = {
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
     # 3: names of the frictions
     # 1: names of limits are sentences too
-    "drive": (1610, 6, 1, 0),  # 5: a reactive load may be anywhere; 55: friction of motor and load
+    # 10: units of what is shown
+    "drive": (1620, 6, 1, 0),  # 5: a reactive load may be anywhere; 55: friction of motor and load
     # the drive from logs of its starts, and experiments that tell it
     # 165: measurement files, whose channels have instants of their own; currents; units given by the user
     # 100: identifications kept on disk, drawn by the intervals that are shown
@@ -82,7 +85,8 @@ BUDGET = {
     # 220 and a file: start positions, limits and life are checked; limits are fields
     # 465: a chain in place of the drive: its fields, sliders, traces of all shafts, stages of all gaps, map
     # 111: a start that is kept as a reference, and goes with link and undo; values in their unit
-    "page": (5565, 21, 3, 0),
+    # 65: angles and speeds in the units of the user; a log of a chain
+    "page": (5630, 21, 3, 0),
     # a motor held by its brake; `terms`: rates decades apart; 60: demands cut off at the limits;
     # 50: turning points; 10: the longest start; 260: lags far longer than a span, torques far faster than
     # the spring; 60: functions compiled apart
@@ -92,7 +96,9 @@ BUDGET = {
     # names of functions of inverters, what is assumed; 370 and a file: the report of a chain
     # 15: lives of its shafts, parameters with their units
     # 630 and a file: sentences are templates, a value a line; translations of them
-    "reporting": (4435, 16, 4, 0),
+    # 165: limit, optimum and parameter sheet of a chain; 110: sheets that keep the rule; 30: the ramp of a gear
+    # backlash function; 120: units of the user, indices and spaces as printers set them
+    "reporting": (4860, 16, 4, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,
@@ -120,7 +126,8 @@ BUDGET = {
     # 6: friction
     # 15: whether two masses are enough
     # 130: what a report shows of a view is said by templates; 10: how a command answers, which each had
-    "views": (5405, 19, 6, 0),
+    # 16: units in which a machine is seen; colours of shafts
+    "views": (5421, 19, 6, 0),
 }
 
 

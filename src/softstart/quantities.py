@@ -34,6 +34,7 @@ __all__ = [
     "OTHER_NOUNS",
     "QUANTITIES",
     "RefusedError",
+    "Units",
     "Value",
     "nearest",
     "parse",
@@ -327,6 +328,86 @@ def shortest(value: float, unit: str) -> str:
         return plain
     texts = [f"{value / ORDINARY[one, unit]:.{MOST_DIGITS}g} {one}" for one in TYPED.get(unit, ())]
     return min((one for one in texts if parse(one, unit) == value), key=len, default=plain)
+
+
+class Units(NamedTuple):
+    """The units in which a person sees angles and speeds; everything else stays in SI.
+
+    An angle in `mm` is the arc on a circle of this `diameter`, m: half of it is the lever, as for the
+    backlash of gears on their pitch circle.
+
+    >>> units = Units.read("deg, rpm")
+    >>> units.of("rad"), round(units.shown(0.5, "rad"), 3), units.typed("4", "rad")
+    ('deg', 28.648, '4 deg')
+    >>> Units.read("mm on 80 mm").typed("0.3", "rad"), Units.read("").of("rad/s")
+    ('0.0075', 'rad/s')
+    """
+
+    angle: str = "rad"
+    speed: str = "rad/s"
+    diameter: float = 0.0
+
+    @classmethod
+    def read(cls, text: str, angles: Iterable[float] = (), speeds: Iterable[float] = ()) -> Units:
+        """The units of a text as `deg, rpm` or `mm on 80 mm`; those that it leaves out as values are written.
+
+        The values are in SI: an angle that `shortest` writes in deg is one that somebody gave in deg; if
+        they all are, that is the unit. Raises `RefusedError` for a text that names no such units.
+
+        >>> Units.read("", [0.06981317007977318], [92.1533845053006])
+        Units(angle='deg', speed='rpm', diameter=0.0)
+        """
+        found: dict[str, Any] = {}
+        for part in filter(None, (one.strip() for one in text.split(","))):
+            arc = re.fullmatch(r"mm\s+on\s+(.+)", part)
+            if arc:
+                diameter = parse(arc[1], "m")
+                if not isinstance(diameter, float) or not diameter > 0.0:
+                    raise RefusedError("the diameter of the pitch circle must be above 0")
+                found |= {"angle": "mm", "diameter": diameter}
+            elif part == "rad" or (part, "rad") in ORDINARY:
+                found["angle"] = part
+            elif part == "rad/s" or (part, "rad/s") in ORDINARY:
+                found["speed"] = part
+            else:
+                raise RefusedError(f"{show(part)} is no unit of an angle or a speed; {UNITS_ARE}")
+        for key, si, values in (("angle", "rad", angles), ("speed", "rad/s", speeds)):
+            written = {shortest(value, si).partition(" ")[2] for value in values if value}
+            found.setdefault(key, written.pop() or si if len(written) == 1 else si)
+        return cls(**found)
+
+    def of(self, si: str) -> str:
+        """The unit in which a quantity of this SI unit is seen."""
+        return {"rad": self.angle, "rad/s": self.speed}.get(si, si)
+
+    def size(self, si: str) -> float:
+        """How much of the SI unit one of these is."""
+        unit = self.of(si)
+        return 2e-3 / self.diameter if unit == "mm" and si == "rad" else ORDINARY.get((unit, si), 1.0)
+
+    def shown(self, value: Any, si: str) -> Any:
+        """A value or an array in SI as it is seen."""
+        size = self.size(si)
+        return value if size == 1.0 else value / size
+
+    def rounded(self, value: float, si: str, digits: int) -> float:
+        """The value in SI whose number in these units has so many digits.
+
+        >>> Units.read("deg").rounded(0.0698, "rad", 3) == parse("4 deg", "rad")
+        True
+        """
+        return cast("float", parse(self.typed(f"{self.shown(value, si):.{digits}g}", si), si))
+
+    def typed(self, text: str, si: str) -> str:
+        """What a bare number in such a field means, as `parse` reads it; any other text stays as it is."""
+        if self.of(si) == si or not _NUMBER.fullmatch(text.strip()):
+            return text
+        if self.of(si) == "mm":  # a length is no angle
+            return f"{float(text) * self.size(si):.{MOST_DIGITS}g}"
+        return f"{text.strip()} {self.of(si)}"
+
+
+UNITS_ARE = 'write for example "deg, rpm", or "mm on 80 mm" for the backlash on a pitch circle'
 
 
 def _cells(value: list[Any] | tuple[Any, ...] | NDArray[Any]) -> NDArray[np.object_]:

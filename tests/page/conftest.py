@@ -109,6 +109,41 @@ def wait_for_rows(page: Any) -> None:
     }""")
 
 
+INSTRUMENT = 'window.getElement(document.querySelector(".instrument")).instrument'
+
+
+def at_rest(page: Any) -> None:
+    """Wait until the server has sent all that it computes at rest, the map included, and it is drawn."""
+    page.wait_for_function(f"""() => {{
+      const {{ map, advice, waiting }} = {INSTRUMENT};
+      const mapped = map.whole.hidden || (map.rows?.every(Boolean) && map.fresh.size === map.rows.length);
+      return mapped && !waiting && advice.textContent && !advice.classList.contains("old");
+    }}""")
+
+
+def answered(page: Any) -> None:
+    """Wait until the server has answered everything that was sent to it before."""
+    page.evaluate(f"""async () => {{
+      const instrument = {INSTRUMENT};
+      const stamp = instrument.say({{ what: "leave", path: "shaft.gap" }});
+      while (instrument.state.stamp < stamp) await new Promise(requestAnimationFrame);
+    }}""")
+
+
+def drawn(page: Any) -> None:
+    """Wait for the second picture from now on: what was to be drawn is."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def choose(page: Any, strategy: str) -> None:
+    """Select a strategy, and wait until its start is drawn."""
+    page.locator(f'tr[data-name="{strategy}"] input[type=radio]').check()
+    shown = "document.querySelector('.figure .name').textContent"
+    page.wait_for_function(f"name => {shown} === name", arg=strategy)
+    page.wait_for_selector(".player button[title=Play]:enabled")
+    drawn(page)
+
+
 def marked(mark: str) -> dict[int, str]:
     """Living processes with the mark in their environment."""
     found = {}
@@ -194,11 +229,7 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
         page.goto(url or server.url)
         page.wait_for_selector(".instrument .k-dyn:not(:empty)")
         if select:  # else the gentlest is
-            page.locator(f'tr[data-name="{select}"] input[type=radio]').check()
-            page.wait_for_function(
-                "name => document.querySelector('.figure .name').textContent === name", arg=select
-            )
-            page.wait_for_selector(".player button[title=Play]:enabled")  # its start is drawn
+            choose(page, select)
         return page
 
     visiting.wrong = wrong  # type: ignore[attr-defined]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.page.conftest import drawn
 from tests.patience import patient
 
 from softstart import Drive, optimize, simulate, tune
@@ -212,8 +213,9 @@ def test_panels_stay_within_their_column(
         if name == "Optimum":
             page.get_by_test_id("optimum-go").click()
             done(page, "optimum")
-        page.wait_for_timeout(150)
         panel = page.locator(".instrument .panel").first
+        panel.wait_for()
+        drawn(page)
         inside, box = panel.evaluate("e => [e.scrollWidth, e.clientWidth]")
         assert inside <= box + 1, name
         assert screenshot(page, f"panel-{name.lower()}-{width}").stat().st_size > 10_000

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tests.page.conftest import at_rest
+
 TABS = 10
 MINUTES = float(os.environ.get("SOFTSTART_MINUTES", "0.1"))
 ROOM = 24.0  # MB by which memory may still grow: some lists have not reached their lengths yet
@@ -45,7 +47,7 @@ def test_ten_tabs_that_are_dragged(visit: Any, start_server: Callable[..., Any])
     server = start_server()
     pid = server.process.pid
     alone = visit(url=server.url)
-    alone.wait_for_timeout(1000)
+    at_rest(alone)
     before = sockets(pid)
     pages = [visit(url=server.url) for _ in range(TABS)]
     boxes = []

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from PIL import Image
-from tests.page.conftest import SOFTSTART
+from tests.page.conftest import SOFTSTART, at_rest
 
 LARGEST = 90_000  # bytes: they are part of every clone
 COLOURS = 128
@@ -24,7 +24,7 @@ def test_the_page_for_the_readme(visit: Any, screenshot: Any) -> None:
     page.locator('tr[data-name="direct"] input[type=checkbox]').check()
     page.locator('tr[data-name="pulse-coast-hold"] input[type=radio]').check()
     page.wait_for_function("document.querySelector('#k-dyn').dataset.value < 1")
-    page.wait_for_timeout(3000)  # the map and the worn gap are computed when nothing changes any more
+    at_rest(page)
     path = screenshot(page, "page")
     assert small(path) < LARGEST
 

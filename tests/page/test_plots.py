@@ -259,3 +259,26 @@ def test_maps_of_two_strategies_are_compared(page):
     drive = CRANE.replace(gap=gap, load_inertia=inertia)
     assert own == pytest.approx(simulate(drive, "ramp").k_dyn, abs=2e-3)
     assert other == pytest.approx(simulate(drive, "direct").k_dyn, abs=2e-3)
+
+
+def test_plots_fields_and_map_are_in_the_units_of_the_user(page):
+    """Those in the head of the page: CSV of the plots, a field with its unit, facts; the scheme stays."""
+    field = page.locator('[data-path="units"] input')
+    assert field.input_value() == "rad, rpm"
+    field.fill("deg, rpm")
+    field.press("Enter")
+    page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] .unit').textContent === 'deg'")
+    assert float(page.locator('[data-path="shaft.gap"] input[type=text]').input_value()) == pytest.approx(
+        math.degrees(CRANE.gap), rel=1e-5
+    )
+    seen_now = seen(page, lambda found: "direct twist_deg" in found)
+    exact = DIRECT.at(seen_now["direct time_s"])
+    assert seen_now["direct twist_deg"] == pytest.approx(np.degrees(exact["theta"]), abs=1e-3)
+    assert seen_now["direct load_speed_rpm"] == pytest.approx(exact["w2"] * 30.0 / math.pi, abs=1e-2)
+    instant = hold(page, 0.5)
+    theta = float(DIRECT.at(instant)["theta"])
+    assert float(scheme(page)["pin"]) == pytest.approx(np.clip(theta / HALF, -1.0, 1.0), abs=0.02)
+    assert page.locator(".figure dl").inner_text().count("rpm") == 1
+    field.fill("furlongs")
+    field.press("Enter")
+    page.get_by_text("is no unit of an angle or a speed").wait_for()

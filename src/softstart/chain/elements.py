@@ -242,6 +242,7 @@ TOP = Table(
         Parameter("name", "", "name of the chain", '"my chain"', default="unnamed chain"),
         Parameter("source", "", "source of the numbers", '"data sheet"', default=""),
         Parameter("assumed", "", "list of the values that are assumed", '"all stiffnesses"', default=""),
+        Drive.PARAMETERS["units"],
     ),
 )
 START = Table(

@@ -34,9 +34,11 @@ from softstart.chain.elements import (
     Shaft,
 )
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
+from softstart.drive.checks import wrong_units
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document, read_table
 from softstart.input.files import ABSENT, read_text, refusal_of
+from softstart.input.parameters import Wording
 from softstart.late import late
 from softstart.quantities import RefusedError, nearest, show
 
@@ -71,6 +73,8 @@ class Chain:
         Name of the chain, and source of its numbers.
     assumed : str, optional
         Which values are assumed; it is printed with every output.
+    units : str, optional
+        Units in which page and report show angles and speeds, as "deg, rpm"; by default as they were given.
 
     Raises
     ------
@@ -97,6 +101,7 @@ class Chain:
     name: str
     source: str
     assumed: str
+    units: str
 
     def __init__(
         self,
@@ -110,6 +115,7 @@ class Chain:
         name: str = "unnamed chain",
         source: str = "",
         assumed: str = "",
+        units: str = "",
     ) -> None:
         numbered = enumerate(masses, start=1)
         masses = tuple(mass if mass.name else mass.replace(name=f"mass {i}") for i, mass in numbered)
@@ -123,6 +129,7 @@ class Chain:
             if motor is not None and not motor.mass:
                 motor = motor.replace(mass=masses[0].name)
         wrong = _mistakes(masses, shafts, motor, load_mass)
+        wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
             raise InputError(wrong)
         put = object.__setattr__
@@ -135,6 +142,7 @@ class Chain:
         put(self, "name", name)
         put(self, "source", source)
         put(self, "assumed", assumed)
+        put(self, "units", units)
 
     # ---- where chains come from --------------------------------------------------------------------------
 
@@ -198,7 +206,7 @@ class Chain:
         motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key != "mass"})
         return cls(
             (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source,
-            position="unknown" if unknown else "mid-gap",
+            position="unknown" if unknown else "mid-gap", units=of.units,
         )  # fmt: skip
 
     def to_toml(self) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from softstart.chain.model import Chain
-from softstart.cli.commands import Command, Reading, typed
+from softstart.cli.commands import Command, Reading
 from softstart.cli.options import (
     command_line,
     controller_option,
@@ -26,7 +26,7 @@ from softstart.cli.options import (
 )
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.drive import Drive
-from softstart.errors import InputError, Mistakes
+from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.late import late
 from softstart.views.terminal import present, print_lines, sentence
@@ -77,19 +77,7 @@ def _check_files(given: Mapping[str, Any]) -> None:
         _browser()
 
 
-def _check_chain(given: Mapping[str, Any]) -> None:
-    """What the report of a chain has not."""
-    mistakes = Mistakes()
-    for option in ("resolution", "budget"):
-        if isinstance(given["drive"], Chain) and typed(option) is not None:
-            mistakes.sentences.append(
-                f'--{option}: "{typed("drive")}" is a chain, whose report has no optima and no parameter '
-                "sheets; leave it out."
-            )
-    mistakes.settle()
-
-
-@click.command(cls=Command, checks=[_check_files, _check_chain])
+@click.command(cls=Command, checks=[_check_files])
 @drive_argument(read_machine_or_identified)
 @click.option(
     "--out",
@@ -157,7 +145,7 @@ def report(
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
     drive of the literature. The file opens offline and prints to A4. The report recommends a strategy and
     states its parameters, rounded to the resolution of the inverter and simulated again after rounding. The
-    report of a chain has its strategies and starts, without optima and parameter sheets.
+    report of a chain has no maps.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     browser = None if pdf is None else _browser()

@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 
 from softstart.input.parameters import Parameter, Wording
-from softstart.quantities import Value, show
+from softstart.quantities import RefusedError, Units, Value, show
 
-__all__ = ["FRICTIONS", "contradictions", "elastic_frequency"]
+__all__ = ["FRICTIONS", "contradictions", "elastic_frequency", "wrong_units"]
 
 FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_friction")
 
@@ -29,6 +29,14 @@ def elastic_frequency(J1: Value, J2: Value, c: Value) -> Value:
     with np.errstate(over="ignore"):
         Omega = np.sqrt(np.divide(c, J1) + np.divide(c, J2))
     return float(Omega) if np.ndim(Omega) == 0 else Omega
+
+
+def wrong_units(values: Values, parameter: Parameter, wording: Wording) -> Iterator[str]:
+    """A sentence if the units in which a machine is to be shown cannot be read."""
+    try:
+        Units.read(values.get(parameter.name, ""))
+    except RefusedError as refusal:
+        yield wording.refused(parameter, values[parameter.name], refusal)
 
 
 def contradictions(values: Values, parameters: Mapping[str, Parameter], wording: Wording) -> Iterator[str]:

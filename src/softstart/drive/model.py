@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args,
 
 import numpy as np
 
-from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency
+from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
@@ -90,6 +90,9 @@ class Drive(ParameterSet):
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
+    units: str = parameter(
+        "units", "", "units in which page and report show angles and speeds", '"deg, rpm"', default=""
+    )
     motor_inertia: Numbers = parameter(
         "motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"', "above 0", symbol="J1"
     )
@@ -258,6 +261,7 @@ class Drive(ParameterSet):
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterable[str]:
         yield from contradictions({**values, **self._derived(values)}, self.PARAMETERS, wording)
         yield from contradicting_limits(values, self.PARAMETERS, wording)
+        yield from wrong_units(values, self.PARAMETERS["units"], wording)
 
     # ---- where drives come from --------------------------------------------------------------------------
 

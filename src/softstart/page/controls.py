@@ -10,7 +10,7 @@ from typing import Any
 from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, STRATEGY, Screen
-from softstart.page.machines import Entry, values_of
+from softstart.page.machines import DIGITS, NODE_DIGITS, Entry, values_of
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 
@@ -101,17 +101,20 @@ class Controls:
         scale = (self._screen.strategy_scales if own else self._screen.scales).get(name)
         if scale is None:
             raise InputError(f"{path}: there is no such slider.")
+        value, units, si = scale.value(position), self._screen.units, self._screen.si(path)
+        if units.of(si) != si:
+            value = units.rounded(value, si, DIGITS)
         if own:
-            self._session.set_parameter(name, scale.value(position), gesture=path)
+            self._session.set_parameter(name, value, gesture=path)
         else:
-            self._session.set_all({path: scale.value(position)}, gesture=path)
+            self._session.set_all({path: value}, gesture=path)
 
     def _edit(self, path: str, text: str) -> None:
         own = path in self._screen.strategy_paths()
         example = "a value, or nothing for the default" if own else self._entry(path).parameter.example
         if len(text) > LONGEST_TEXT:
             raise InputError(f"{path}: the text has more than {LONGEST_TEXT} letters; write {example}.")
-        words = " ".join(text.split())
+        words = self._screen.units.typed(" ".join(text.split()), self._screen.si(path))
         if own:
             self._session.set_parameter(_own(path), words or None)
         elif words:
@@ -141,7 +144,8 @@ class Controls:
         """What was written in a field is undone: nothing changes, and its error message disappears."""
 
     def _jump(self, gap: float, inertia: float) -> None:
-        self._session.move(gap, inertia)
+        units = self._screen.units
+        self._session.move(units.rounded(units.size("rad") * gap, "rad", NODE_DIGITS), inertia)
         self._screen.mistakes.clear()
 
     def _hello(self, kept: object, link: object) -> None:

@@ -59,9 +59,7 @@ class CurvePanel:
         self._points: list[FrontPoint] = []
         self._drawn: tuple[object, ...] = ()
         with box().classes("panel-form"):
-            self._end = choice("Start ends with", TERMINALS, "reached", "curve-terminal").classes(
-                "panel-wide"
-            )
+            self._end = choice("Start ends with", TERMINALS, "reached", "curve-terminal")
             self._go = action("Compute", self._begin, "curve-go", main=True)
         self._hint = hint(
             "The least K_dyn for each start time; the shaded part is proved to be out of reach. "

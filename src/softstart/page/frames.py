@@ -22,6 +22,7 @@ from softstart.drive import Drive
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.machines import (
+    HEAD,
     LIMITS,
     Axes,
     Entry,
@@ -42,8 +43,9 @@ from softstart.page.machines import (
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
 from softstart.plant import layout as at
+from softstart.quantities import Units
 from softstart.start.run import Run
-from softstart.views.printed import unit
+from softstart.views.printed import unit, units_of
 from softstart.views.starts import position_notes
 
 QUICK_EVENTS = 8_000  # of a start that follows the hand; longer ones are computed when the drive is at rest
@@ -94,6 +96,15 @@ class Screen:
         self._reference_of: tuple[object, ...] = ()  # the reference that the browser has, and its window
 
     @property
+    def units(self) -> Units:
+        """The units of the machine, else those in which it was loaded: a gap of 0 has none of its own."""
+        own, loaded = units_of(self.session.machine), units_of(self.session.origin)
+        speed = own.speed if own.speed != Units().speed else loaded.speed
+        if self.session.machine.units or own.angle != Units().angle:
+            return own._replace(speed=own.speed if self.session.machine.units else speed)
+        return loaded._replace(speed=speed)
+
+    @property
     def version(self) -> int:
         """That of the session."""
         return self.session.version
@@ -128,7 +139,8 @@ class Screen:
         if self._origin is not session.origin or min(self._costs.get(session.selected, LONG)) > QUICK:
             return None
         found = self._result(session.selected)
-        return {"stamp": self.stamp, "version": session.version, "figure": figure(session, found)}
+        figures = figure(session, found, self.units)
+        return {"stamp": self.stamp, "version": session.version, "figure": figures}
 
     def _result(self, label: str) -> Strategy:
         found = self.session.result(label, QUICK_EVENTS)
@@ -139,6 +151,7 @@ class Screen:
         """The fields of the machine in their groups, if the browser has others."""
         wanted = (
             bool(self._origin.limits),
+            self.units,
             *((path, one.group, one.label, path in self.scales) for path, one in self.entries.items()),
         )
         if self._groups_of == wanted:
@@ -146,11 +159,12 @@ class Screen:
         self._groups_of = wanted
         found: dict[str, list[Frame]] = {}
         for path, one in self.entries.items():
-            found.setdefault(one.group, []).append(_field(one, path in self.scales))
+            found.setdefault(one.group, []).append(_field(one, path in self.scales, self.units))
         folded = "" if self._origin.limits else LIMITS
         return {
             "groups": [
-                {"title": title, "rows": rows, "folded": title == folded} for title, rows in found.items()
+                {"title": title, "rows": rows, "folded": title == folded, "head": title == HEAD}
+                for title, rows in found.items()
             ]
         }
 
@@ -161,11 +175,18 @@ class Screen:
         controller = self.session.controllers[self.session.selected]
         return frozenset(STRATEGY + one.name for one in parameters_of(controller))
 
+    def si(self, path: str) -> str:
+        """The SI unit of a field; empty where it has none."""
+        if path in self.entries:
+            return self.entries[path].parameter.unit
+        own = parameters_of(self.session.controllers[self.session.selected])
+        return next((str(one.metadata["unit"]) for one in own if STRATEGY + one.name == path), "")
+
     def _strategy_rows(self) -> Frame:
         """The fields of the selected strategy, if the browser has others."""
         session = self.session
         controller = session.controllers[session.selected]
-        wanted = (session.selected, type(controller), self._origin)
+        wanted = (session.selected, type(controller), self._origin, self.units)
         if self._strategy_of == wanted:
             return {}
         self._strategy_of = wanted
@@ -183,7 +204,7 @@ class Screen:
             "symbol": "",
             "label": one.name.replace("_", " "),
             "meaning": f"{about['meaning']}; default: {about['default'] or 'fixed'}",
-            "unit": unit(about["unit"]),
+            "unit": unit(self.units.of(about["unit"])),
             "slider": one.name in self.strategy_scales,
             "choices": list(about["choices"]),
             "words": False,
@@ -196,7 +217,7 @@ class Screen:
         controller = session.controllers[session.selected]
         units = {one.name: one.metadata["unit"] for one in parameters_of(controller)}
         try:
-            if self._strategy_of != (session.selected, type(controller), self._origin):
+            if self._strategy_of[:3] != (session.selected, type(controller), self._origin):
                 self.strategy_scales = scales_of(controller, self._origin)
             default = controller.defaults(_told(session, found))
         except Exception as error:  # a controller is anyone's code; its start has said what is wrong
@@ -219,12 +240,14 @@ class Screen:
             scale = self.strategy_scales.get(name)
             marks = []
             if scale is not None:
-                marks = [[scale.position(float(default[name])), f"default: {float(default[name]):.4g}"]] + [
-                    [scale.position(float(at)), f"{label}: {at:.4g}"]
-                    for label, other in tuned
-                    if (at := getattr(other, name, None)) is not None
+                values = [("default", float(default[name]))]
+                values += [(label, float(at)) for label, other in tuned
+                           if (at := getattr(other, name, None)) is not None]  # fmt: skip
+                marks = [
+                    [scale.position(value), f"{of}: {self.units.shown(value, si):.4g}"]
+                    for of, value in values
                 ]
-            text = f"{number:.4g}" if given is None else written(number, si)
+            text = f"{self.units.shown(number, si):.4g}" if given is None else written(number, si, self.units)
             text = "" if math.isnan(number) else text
             position = scale.position(number) if scale is not None else None
             shown[STRATEGY + name] = [text, position, "" if given is None else "changed", marks]
@@ -242,7 +265,7 @@ class Screen:
             "stamp": self.stamp,
             "version": session.version,
             "mistakes": dict(self.mistakes),
-            "fields": fields(session.machine, session.origin, self.entries, self.scales)
+            "fields": fields(session.machine, session.origin, self.entries, self.scales, self.units)
             | self._strategy_fields(found),
             **self._groups(),
             **self._strategy_rows(),
@@ -253,12 +276,12 @@ class Screen:
             "added": list(session.added),
             "changed": list(session.changed),
             "selected": session.selected,
-            "figure": figure(session, found),
-            "traces": {session.selected: drawn(found, window=self.window)},
+            "figure": figure(session, found, self.units),
+            "traces": {session.selected: drawn(found, self.units, window=self.window)},
             "rows": [row(session, found)],
             "reference": self._reference(),
             "mapped": self.axes is not None,
-            "here": here(session.machine),
+            "here": self._here(),
             "map_is_old": self._map_seen and not self._map_is_right(),
         }
 
@@ -268,10 +291,14 @@ class Screen:
         if kept is None or found is None:
             return None
         line = outcomes(found) | {"name": ", ".join(filter(None, reference_words(kept, self.session)))}
-        if self._reference_of != (kept, self.window):
-            self._reference_of = kept, self.window
-            line["trace"] = drawn(found, window=self.window)
+        if self._reference_of != (kept, self.window, self.units):
+            self._reference_of = kept, self.window, self.units
+            line["trace"] = drawn(found, self.units, window=self.window)
         return line
+
+    def _here(self) -> tuple[float, float]:
+        gap, inertia = here(self.session.machine)
+        return self.units.shown(gap, "rad"), inertia
 
     def others(self) -> Iterator[Frame | None]:
         """Rows of the other strategies and the traces of those that are shown, a few ms at a time.
@@ -288,7 +315,7 @@ class Screen:
             found = self._result(label)
             frame["rows"].append(row(session, found))
             if label in session.shown:
-                frame["traces"][label] = drawn(found, False, self.window)
+                frame["traces"][label] = drawn(found, self.units, False, self.window)
             if perf_counter() - begun > SLICE:
                 yield frame
                 begun, frame = perf_counter(), {"rows": [], "traces": {}}
@@ -311,7 +338,7 @@ class Screen:
                 if label == session.selected:
                     frame |= self.first() | {"at_rest": True}
                 elif label in session.shown:
-                    frame["traces"] = {label: drawn(found, False, self.window)}
+                    frame["traces"] = {label: drawn(found, self.units, False, self.window)}
                 yield frame
             yield from (None for _ in session.judged(label))
         rows = [row(session, found) for found in session.strategies]
@@ -366,7 +393,8 @@ class Screen:
         inertias = (here(machine)[1],) * len(axes.inertias) if self.kept else axes.inertias
         symbols, labels = map_words(machine)
         return {
-            "gaps": list(axes.gaps),
+            "gaps": [self.units.shown(gap, "rad") for gap in axes.gaps],
+            "unit": self.units.of("rad"),
             "inertias": list(axes.inertias),
             "strategy": session.selected,
             "kept": self.kept,
@@ -418,16 +446,16 @@ def numbers(values: Any) -> list[float | None]:
     return [number(value) for value in values.tolist()]
 
 
-def _field(one: Entry, slider: bool) -> dict[str, Any]:
+def _field(one: Entry, slider: bool, units: Units) -> dict[str, Any]:
     """A field as the browser builds it."""
     parameter = one.parameter
-    words = parameter.choices if parameter.unit else ()
+    words = one.suggestions or (parameter.choices if parameter.unit else ())
     return {
         "path": one.path,
         "symbol": one.symbol,
         "label": one.label,
         "meaning": f"{parameter.meaning}; write for example {', '.join([*words, parameter.example])}",
-        "unit": unit(parameter.unit),
+        "unit": unit(units.of(parameter.unit)),
         "slider": slider,
         "choices": [] if parameter.unit else list(parameter.choices),
         "suggestions": list(words),
@@ -436,7 +464,11 @@ def _field(one: Entry, slider: bool) -> dict[str, Any]:
 
 
 def fields(
-    machine: Machine, origin: Machine, shown_entries: Mapping[str, Entry], scales: Mapping[str, Scale]
+    machine: Machine,
+    origin: Machine,
+    shown_entries: Mapping[str, Entry],
+    scales: Mapping[str, Scale],
+    units: Units,
 ) -> dict[str, list[Any]]:
     """By path: text of the field, position of the slider or None, the value in another unit, and marks.
 
@@ -452,24 +484,27 @@ def fields(
         if value is None:
             continue
         if isinstance(value, tuple):
-            shown[path] = ["; ".join(written(part, si) for part in value), None, ""]
+            shown[path] = ["; ".join(written(part, si, units) for part in value), None, ""]
             continue
-        text = value if isinstance(value, str) else written(float(value), si)
+        if path == "units" and not value:
+            value = f"{units.angle}, {units.speed}"  # as the machine was given
+        text = value if isinstance(value, str) else written(float(value), si, units)
         position = scale.position(float(value)) if scale else None
-        marks = [[scale.position(float(first)), f"as loaded: {written(float(first), si)}"]] if scale else []
-        shown[path] = [text, position, otherwise(si, value), marks]
+        loaded = scale and f"as loaded: {written(float(first), si, units)}"
+        marks = [[scale.position(float(first)), loaded]] if scale else []
+        shown[path] = [text, position, otherwise(si, value, units), marks]
     return shown
 
 
-def otherwise(si: str, value: Any) -> str:
-    """An angle in degrees, a speed in revolutions a minute; in SI what was written in another unit.
+def otherwise(si: str, value: Any, units: Units) -> str:
+    """An angle in degrees, a speed in revolutions a minute; in SI what is shown in another unit.
 
-    >>> otherwise("rad", 0.5), otherwise("rad/s", 92.15), otherwise("rad", 0.06981317007977318)
-    ('28.6\N{DEGREE SIGN}', '880 rpm', '0.06981 rad')
+    >>> [otherwise("rad", 0.5, one) for one in (Units(), Units("deg"))], otherwise("rad/s", 92.15, Units())
+    (['28.6\N{DEGREE SIGN}', '0.5 rad'], '880 rpm')
     """
     if isinstance(value, str):
         return ""
-    if " " in written(value, si):
+    if units.of(si) != si or " " in written(value, si, units):
         return f"{value:.4g} {unit(si)}"
     if si == "rad":
         return f"{math.degrees(value):.3g}\N{DEGREE SIGN}"
@@ -480,7 +515,7 @@ def otherwise(si: str, value: Any) -> str:
     return ""
 
 
-def figure(session: Session, found: Strategy) -> dict[str, Any]:
+def figure(session: Session, found: Strategy, units: Units) -> dict[str, Any]:
     """The large figure and the numbers around it."""
     run = found.run
     facts = judged(session, found) | {
@@ -492,7 +527,8 @@ def figure(session: Session, found: Strategy) -> dict[str, Any]:
             "reached": math.isfinite(run.start_time),
             "peak_time": number(run.peak_time),
             "contacts": run.contacts,
-            "impact_speed": number(getattr(run, "impact_speed", math.nan)),
+            "impact_speed": number(units.shown(getattr(run, "impact_speed", math.nan), "rad/s")),
+            "speed_unit": units.of("rad/s"),
             "end_time": number(run.end_time),
             "position": "".join(position_notes([run])),
         }
@@ -552,15 +588,21 @@ def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
 
 
 def drawn(
-    found: Strategy, whole: bool = True, window: tuple[float, float] | None = None
+    found: Strategy, units: Units, whole: bool = True, window: tuple[float, float] | None = None
 ) -> dict[str, Any] | None:
-    """Traces as the browser draws them: packed channels, the peak; if `whole` all channels and the parts."""
+    """Traces as the browser draws them: packed channels, the peak; if `whole` all channels and the parts.
+
+    Speeds and angles are in these units; `turn` is how much of a rad/s one of the speeds is.
+    """
     run = found.run
     if run is None:
         return None
     traces = traces_of(run, window=window)
     channels = list(traces) if whole else ["t", "T"]
-    rows = np.stack([traces[name] for name in channels]).astype("<f4")
+    of = {"w": "rad/s", "theta": "rad"}  # by the letters of a channel
+    rows = np.stack(
+        [units.shown(traces[name], of.get(name.rstrip("0123456789[]"), "")) for name in channels]
+    ).astype("<f4")
     peak = min(int(np.searchsorted(traces["t"], run.peak_time)), traces["t"].size - 1)
     picture: dict[str, Any] = {
         "channels": channels,
@@ -569,9 +611,13 @@ def drawn(
     }
     if whole:
         machine = run.drive
-        picture |= parts_of(run) | {
-            "target": machine.target_speed,
+        parts = parts_of(run)
+        for one in (parts, *parts["shafts"]):
+            one["gap"] = units.shown(one["gap"], "rad")
+        picture |= parts | {
+            "target": units.shown(machine.target_speed, "rad/s"),
             "allowed": machine.limits.shaft_torque,
+            "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "turn": units.size("rad/s")},
         }
     return picture
 

@@ -37,9 +37,10 @@ class LogPanel:
         self._session = session
         self._found: tasks.Identified | None = None
         hint(
-            "A CSV file with time, torque, and angle or speed of the motor, units in its first line, from "
-            "standstill. The drive of this page is the guess, by a factor of 3 if need be; it stays as it is "
-            "until you use the drive found."
+            "A CSV file of a start from standstill: time, torque, and angle or speed of the motor, with "
+            "units in its first line. The drive on this page is the first guess and may be off by a factor "
+            "of 3; of a chain with one dominant gap, two masses are found. Nothing changes until you use the "
+            "drive found."
         )
         with box().classes("panel-form"):
             kinds = {"demand": "a demand", "measured": "measured"}
@@ -61,7 +62,7 @@ class LogPanel:
         columns = tasks.columns_of(str(self._columns.value or ""))
         self._result.set_visibility(False)
         self._view.begin(
-            f"drive from {clipped(name)}", tasks.identified, content, name, self._session.drive,
+            f"drive from {clipped(name)}", tasks.identified, content, name, self._session.machine,
             str(self._torque_is.value), columns,
         )  # fmt: skip
 

@@ -29,16 +29,20 @@ Values = dict[str, tuple[Parameter, Any]]  # by path
 
 STEPS = 600
 DIGITS = 4
+NODE_DIGITS = 6  # of the gaps and inertias of a map
 SAME = 12  # digits in which two places of a map are one
 GAPS, INERTIAS = 25, 17  # of the map
 MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
 ZETA = "\N{GREEK SMALL LETTER ZETA}"
 MOST_DAMPING = 0.2  # damping ratio of a shaft, by its slider: geared trains have 0.01 to 0.06
 
+HEAD = "Units"  # the group that stands in the head of the page
+UNITS = ("deg, rpm", "rad, rad/s", "arcmin, rpm", "mm on 80 mm, rpm")
 LIMITS = "Limits"  # the group that is folded where there are none
 
 # by group: names of the parameters of a drive, and what stands before the field
 GROUPS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    HEAD: (("units", "units"),),
     "Drive": (("name", "name"),),
     "Motor": (
         ("starting_torque", "starting torque"),
@@ -106,12 +110,17 @@ class Entry:
     label: str
     symbol: str
 
+    @property
+    def suggestions(self) -> tuple[str, ...]:
+        """Texts that a field of words offers."""
+        return UNITS if self.path == "units" else ()
+
 
 def entries(machine: Machine) -> Mapping[str, Entry]:
     """The fields of a machine by their paths, in their order on the page.
 
-    >>> list(entries(Drive.load("crane-4amtkf")))[:2]
-    ['name', 'motor.starting_torque']
+    >>> list(entries(Drive.load("crane-4amtkf")))[:3]
+    ['units', 'name', 'motor.starting_torque']
     >>> entries(Chain.load("crane-4-mass"))["shaft[2].gap"].group
     'pinion - wheel shaft'
     """
@@ -130,6 +139,8 @@ def _rows_of_drive() -> Iterator[tuple[str, str, str, str]]:
 
 def _rows_of_chain(chain: Chain) -> Iterator[tuple[str, str, str, str]]:
     """The same of a chain: its motor, then masses and shafts in their order."""
+    yield "units", HEAD, "units", ""
+    yield "name", "Chain", "name", ""
     for name, label in GROUPS["Motor"]:
         yield f"motor.{name}", "Motor", label, SYMBOLS.get(name, "")
     for i, mass in enumerate(chain.masses):
@@ -390,8 +401,8 @@ def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> A
         return None
     widest = 4.0 * gap if gap > 0.0 else 0.1
     return Axes(
-        tuple(rounded(v, 6) for v in np.linspace(0.0, widest, gaps)),
-        tuple(rounded(v, 6) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
+        tuple(rounded(v, NODE_DIGITS) for v in np.linspace(0.0, widest, gaps)),
+        tuple(rounded(v, NODE_DIGITS) for v in np.geomspace(inertia / 5.0, inertia * 5.0, inertias)),
     )
 
 

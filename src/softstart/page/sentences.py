@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
 from softstart.page.machines import Machine, Values, values_of
-from softstart.quantities import shortest
+from softstart.quantities import Units, shortest
+from softstart.views.printed import unit, units_of
 
 log = logging.getLogger("softstart.page")
 LONGEST = 300  # letters of an exception
 LONGEST_NAME = 60  # letters of a name in a sentence
 NAMED = 3  # parameters named in a sentence
-WORDS = ("name", "source")  # they change no result
+WORDS = ("name", "source", "units")  # they change no result
 
 
 OWN_MISTAKE = "This did not work, and that is a mistake in softstart, not in your input ({})."
@@ -79,12 +80,13 @@ def differences(drive: Machine, other: Machine) -> str:
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
-    'shaft.gap 1 rad, load.inertia 0.2 kg m2'
+    'shaft.gap 1 rad, load.inertia 0.2 kg m\N{SUPERSCRIPT TWO}'
     """
     found = [one for one in changes(drive, other) if one.parameter.name not in WORDS]
     if found and drive.name != other.name:
         return clipped(drive.name)
-    named = ", ".join(f"{one.path} {_value(one.parameter, one.old)}" for one in found[:NAMED])
+    seen = units_of(other)
+    named = ", ".join(f"{one.path} {_value(one.parameter, one.old, seen)}" for one in found[:NAMED])
     return named + (f" and {len(found) - NAMED} more" if len(found) > NAMED else "")
 
 
@@ -119,21 +121,26 @@ def _follows(one: Change, first: Values, second: Values, changed: set[str]) -> b
     )
 
 
-def _value(parameter: Parameter, value: Any) -> str:
+def _value(parameter: Parameter, value: Any, units: Units) -> str:
     if value is None:
         return "not given"
     if isinstance(value, str):
         return value
-    unit = "" if parameter.unit in ("", "1") else " " + parameter.unit.replace("*", " ").replace("^", "")
-    texts = [written(float(one), parameter.unit) for one in (value if isinstance(value, tuple) else (value,))]
-    return ", ".join(texts) + ("" if " " in texts[-1] else unit)
+    of = unit(units.of(parameter.unit))
+    each = value if isinstance(value, tuple) else (value,)
+    texts = [written(float(one), parameter.unit, units) for one in each]
+    return ", ".join(texts) + (f" {of}" if of and " " not in texts[-1] else "")
 
 
-def written(value: float, unit: str) -> str:
-    """A value as a person reads it: in the unit in which it was written, else six digits in SI.
+def written(value: float, si: str, units: Units) -> str:
+    """A value as a person reads it: in his unit or, in SI, in that in which it was written, with six digits.
 
-    >>> written(0.06981317007977318, "rad"), written(0.07, "rad"), written(1.0 / 3.0, "rad")
-    ('4 deg', '0.07', '0.333333')
+    >>> written(0.06981317007977318, "rad", Units()), written(1.0 / 3.0, "rad", Units())
+    ('4 deg', '0.333333')
+    >>> written(0.06981317007977318, "rad", Units("deg")), written(0.07, "rad", Units("deg"))
+    ('4', '4.0107')
     """
-    text = shortest(value, unit)
+    if units.of(si) != si:
+        return f"{units.shown(value, si):.6g}"
+    text = shortest(value, si)
     return text if " " in text else f"{value:.6g}"

@@ -28,13 +28,13 @@ from softstart.page.downloads import text_of
 from softstart.page.machines import Machine, changed
 from softstart.page.sentences import clipped
 from softstart.processes import Tell
-from softstart.quantities import show
+from softstart.quantities import Units, show
 from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import recommend
 from softstart.start.simulation import simulate
 from softstart.tuning.solving import tune
-from softstart.views.printed import fixed, unit
+from softstart.views.printed import digits, fixed, unit, units_of
 
 if TYPE_CHECKING:
     from softstart import reporting
@@ -261,9 +261,12 @@ def columns_of(text: str) -> dict[str, str]:
 
 
 def identified(
-    content: bytes, name: str, guess: Drive, torque_is: TorqueIs, columns: Mapping[str, str], *, tell: Tell
+    content: bytes, name: str, guess: Machine, torque_is: TorqueIs, columns: Mapping[str, str], *, tell: Tell
 ) -> Identified:
-    """The drive from the log in these bytes, with its intervals, from this guess."""
+    """The drive from the log in these bytes, with its intervals, from this guess.
+
+    Of a chain with one dominant gap it is the two masses that stand for it.
+    """
     tell(None, "reading the log")
     with tempfile.TemporaryDirectory(prefix="softstart-log-") as folder:
         path = Path(folder, "log.csv")
@@ -276,9 +279,21 @@ def identified(
     table = shown.estimates_table(found)
     rows = [dict(zip([column.heading for column in table.columns], row, strict=True)) for row in table.rows]
     figures = ("found", "from", "to")  # the guess is in the fields of the page
-    cells = [[one["parameter"] + ("" if one["unit"] == "1" else f", {unit(one['unit'])}"),
-              *(one[each] for each in figures)] for one in rows]  # fmt: skip
+    units = units_of(guess)
+    cells = [[one["parameter"] + ("" if one["unit"] == "1" else f", {unit(units.of(one['unit']))}"),
+              *(_seen(one[each], one["unit"], units) for each in figures)] for one in rows]  # fmt: skip
     return Identified(found.drive, ["parameter", *figures], cells, list(found.notes))
+
+
+def _seen(text: str, si: str, units: Units) -> str:
+    """A number of a table, as it is printed in SI, in the units of a user, with as many digits.
+
+    >>> _seen("0.0698", "rad", Units("deg")), _seen("unknown", "rad", Units("deg"))
+    ('4.00', 'unknown')
+    """
+    if units.of(si) == si or not re.fullmatch(r"[-+.e\d]+", text):
+        return text
+    return digits(units.shown(float(text), si), len(re.sub(r"e.*|^[-+0.]+|\.", "", text)) or 1)
 
 
 def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> str:

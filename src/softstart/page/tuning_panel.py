@@ -35,9 +35,9 @@ from softstart.page.panel_parts import (
     table,
 )
 from softstart.page.session import Session
-from softstart.quantities import values_in
+from softstart.quantities import Units, values_in
 from softstart.tuning.question import gaps_of, inertias_of
-from softstart.views.printed import fixed, unit
+from softstart.views.printed import fixed, unit, units_of
 
 FIRST = "shaped"  # the controller offered first, if it is there
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
@@ -55,7 +55,10 @@ class TuningPanel:
             first = FIRST if FIRST in names else names[0]
             self._name = choice("Strategy", names, first, "tuning-controller")
             self._gaps = field(
-                "Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", "0.5 (rad), 30 deg, or 2x: of the drive's own"
+                "Gaps",
+                "0.5x, 1x, 2x, 4x",
+                "tuning-gaps",
+                "0.5 (in the page's unit), 30 deg, or 2x the drive's",
             )
             self._inertias = field(
                 "Load inertias",
@@ -110,8 +113,8 @@ class TuningPanel:
     def _done(self, found: tasks.Tuned) -> None:
         self._found = found
         self._figures.set_content(facts(figures(found), "tuning-figures"))
-        self._gains.set_content(gain_table(found))
-        self._cells.set_content(cell_table(found))
+        self._gains.set_content(gain_table(found, units_of(self._view.subject)))
+        self._cells.set_content(cell_table(found, units_of(self._view.subject)))
         self._hint.set_visibility(False)
         self._result.set_visibility(True)
         self._stale.show_for(self._view.subject)
@@ -148,14 +151,20 @@ def tunable() -> list[str]:
 def grid_of(drive: Drive, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
     """Gaps in rad and load inertias in kg m2 from lists as typed; all mistakes in one InputError.
 
+    Bare numbers of gaps are in the unit of the drive.
+
     >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
     ([0.25, 1.0], [0.175, 0.35])
     """
     wrong: list[str] = []
     found: list[list[float]] = []
-    for text, name, read in ((gaps, "Gaps", gaps_of), (inertias, "Load inertias", inertias_of)):
+    units = units_of(drive)
+    for text, name, read, si in (
+        (gaps, "Gaps", gaps_of, "rad"),
+        (inertias, "Load inertias", inertias_of, "kg*m^2"),
+    ):
         try:
-            found.append(list(read(drive, values_in(text, name), name)))
+            found.append(list(read(drive, [units.typed(one, si) for one in values_in(text, name)], name)))
         except InputError as error:
             wrong.extend(error.sentences)
     if not wrong and len(found[0]) * len(found[1]) > MOST_CELLS:
@@ -189,24 +198,20 @@ def figures(found: tasks.Tuned) -> list[tuple[str, str]]:
     ]
 
 
-def gain_table(found: tasks.Tuned) -> str:
+def gain_table(found: tasks.Tuned, seen: Units) -> str:
     """The gains of the set for all, beside the defaults."""
     one = found.summary["robust"]
     meta = {name: one["defaults"].get(name) for name in one["gains"]}
-    units = units_of(found.controller)
+    si = {one.name: str(one.metadata.get("unit", "")) for one in fields(controller_class(found.controller))}
     rows = [
-        [name, units.get(name, ""), number(default, 5), number(one["gains"][name], 5)]
+        [name, unit(seen.of(si[name])), *(number(value and seen.shown(value, si[name]), 5) for value in
+                                          (default, one["gains"][name]))]
         for name, default in meta.items()
     ]  # fmt: skip
     return table(["gain", "unit", "default", "one set for all"], rows, 2, "tuning-gains")
 
 
-def units_of(name: str) -> dict[str, str]:
-    """Units of a controller's parameters, readable."""
-    return {one.name: unit(str(one.metadata.get("unit", ""))) for one in fields(controller_class(name))}
-
-
-def cell_table(found: tasks.Tuned) -> str:
+def cell_table(found: tasks.Tuned, units: Units) -> str:
     """One row a cell: gap, inertia, K_dyn before and after, the optimum where it was asked for, the gains."""
     schedule: dict[str, Any] = found.summary["schedule"]
     price: dict[str, Any] = found.summary["price"] or {}
@@ -217,9 +222,9 @@ def cell_table(found: tasks.Tuned) -> str:
     for i, gap in enumerate(found.summary["gaps"]):
         for j, inertia in enumerate(found.summary["load_inertias"]):
             k = (schedule["k_dyn_default"][i][j], one[i][j], schedule["k_dyn"][i][j])
-            row = [number(gap), number(inertia), *(fixed(value, 3) for value in k)]
+            row = [number(units.shown(gap, "rad")), number(inertia), *(fixed(value, 3) for value in k)]
             if best is not None:
                 row.append(fixed(best[i][j], 3))
             rows.append([*row, *(number(schedule[name][i][j]) for name in gains)])
-    head = ["gap rad", "J2 kg m\N{SUPERSCRIPT TWO}", "K_dyn default", "one set", "by cell"]
+    head = [f"gap {units.angle}", "J2 kg m\N{SUPERSCRIPT TWO}", "K_dyn default", "one set", "by cell"]
     return table([*head, *(["optimum"] if best is not None else []), *gains], rows, 0, "tuning-cells")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,21 +13,33 @@ from softstart.chain.model import Chain
 from softstart.chain.vibration import natural_vibration
 from softstart.controller import Controller
 from softstart.controller.base import label_of
+from softstart.controller.finding import ready_controller_names
 from softstart.errors import InputError, SimulationError, listed
 from softstart.input.files import write_whole
 from softstart.language import said, speaking
+from softstart.quantities import Units
 from softstart.reporting import document
 from softstart.reporting.first_page import answer, share_saved, tiles, verdicts
+from softstart.reporting.limit import Limit, chain_limit, how_near, limit_figure
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.project import Project
-from softstart.reporting.result import Progress, Provenance, controllers_of, provenance
+from softstart.reporting.resolution import Resolution
+from softstart.reporting.result import (
+    Progress,
+    Provenance,
+    checked_steps,
+    controllers_of,
+    provenance,
+)
+from softstart.reporting.sheet import Sheet, make_sheet, sheet_drive, sheet_section
 from softstart.start.comparison import REFERENCE, Comparison, compared
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
 from softstart.views import chain_schemes, chains, starts
 from softstart.views import fatigue as lives
-from softstart.views.printed import digits, fixed, short, unit
+from softstart.views.printed import digits, fixed, short, unit, units_of
 
+CHAIN_BUDGET = 60.0  # s, for the search of the optimum
 MOST_SHAFTS = 6  # with a column each in the table of strategies
 
 
@@ -47,6 +59,12 @@ class ChainReport:
         Versions, date, the chain's file and command.
     project : Project
         Customer, author, revisions; see `Project`.
+    limit : Limit
+        The bound that no start goes below, and the optimum found for the start time of the chosen strategy.
+    sheets : tuple of Sheet
+        The parameter sheet of the chosen strategy.
+    resolution : Resolution
+        The steps in which the inverter can be set.
 
     Examples
     --------
@@ -60,6 +78,9 @@ class ChainReport:
     failed: tuple[tuple[str, str], ...]
     provenance: Provenance
     project: Project = field(default_factory=Project)
+    limit: Limit = field(default_factory=Limit)
+    sheets: tuple[Sheet, ...] = ()
+    resolution: Resolution = field(default_factory=Resolution)
 
     @property
     def chosen(self) -> Row | None:
@@ -84,6 +105,8 @@ class ChainReport:
         return {
             **self.comparison.summary(),
             "chosen": self.chosen.name if self.chosen else None,
+            "limit": self.limit.summary(),
+            "sheets": [sheet.summary() for sheet in self.sheets],
             "failed": dict(self.failed),
             "provenance": self.provenance.summary(),
         }
@@ -103,6 +126,8 @@ def report_chain(
     *,
     controllers: Sequence[str | Controller] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
+    resolution: Resolution | Mapping[str, object] | str | None = None,
+    budget: float = CHAIN_BUDGET,
     progress: Progress | None = None,
     command: str = "",
     project: Project | str | Path | None = None,
@@ -113,7 +138,7 @@ def report_chain(
     ----------
     chain : Chain, str or Path
         The chain, or the name or file of one.
-    controllers, parameters, progress, command, project
+    controllers, parameters, resolution, budget, progress, command, project
         As in `report`; the project's file must have no [[source]], which are for parameters of a drive.
 
     Returns
@@ -145,13 +170,14 @@ def report_chain(
             f'project: [[source]] "{about.sources[0].parameter}" is a parameter of a drive, and '
             f'"{chain.name}" is a chain; leave these tables out, and name assumed values in its file.'
         )
+    steps = checked_steps(chain, resolution, budget)
     made = controllers_of(controllers, parameters or {})
     reference = simulate(chain, REFERENCE)
     rows: list[Row] = []
     failed: list[tuple[str, str]] = []
     for number, one in enumerate(made):
         if progress is not None:
-            progress(number / len(made), f"starting the chain under {label_of(one)}")
+            progress(0.4 * number / len(made), f"starting the chain under {label_of(one)}")
         try:
             rows.append(compared(chain, one, reference))
         except SimulationError as error:
@@ -161,7 +187,34 @@ def report_chain(
     comparison = Comparison(chain, tuple(rows), worst_case=rows[0].worst_case)
     with speaking(about.language.table):  # what is recommended is said once
         assert comparison.recommendation.text
-    return ChainReport(chain, comparison, tuple(failed), provenance(chain, command), about)
+        found = ChainReport(
+            chain, comparison, tuple(failed), provenance(chain, command), about, resolution=steps
+        )
+        return _with_limit_and_sheet(found, made, budget, progress or (lambda share, what: None))
+
+
+def _with_limit_and_sheet(
+    report: ChainReport, made: Sequence[Controller], budget: float, progress: Progress
+) -> ChainReport:
+    """The report with the sheet of the chosen strategy, and how gentle a start could be."""
+    best, chain, rows = report.chosen, report.drive, report.comparison.rows
+    sheets: list[Sheet] = []
+
+    def sheet() -> None:
+        if best is not None:
+            controller = next(one for one in made if label_of(one) == best.name)
+            sheets.append(make_sheet(chain, controller, best.run, report.resolution, best))
+
+    limit = chain_limit(
+        chain,
+        [row.run.start_time for row in rows],
+        [] if best is None else [best.run.start_time],
+        budget,
+        lambda share, what: progress(0.4 + 0.6 * share, what),
+        sheet,
+        seeds=[best.name] if best is not None and best.name in ready_controller_names() else None,
+    )
+    return replace(report, limit=limit, sheets=tuple(sheets))
 
 
 def _page(report: ChainReport) -> str:
@@ -170,6 +223,8 @@ def _page(report: ChainReport) -> str:
     sections = [
         ("compared", said("The strategies compared"), _strategies(report)),
         ("starts", said("The starts in detail"), _starts(report, figures)),
+        ("gentlest", said("How gentle could a start be?"), _limit(report, figures)),
+        ("sheet", said("Parameter sheets for the inverter"), _sheets(report)),
         ("chain", said("The chain"), _chain(report.drive, figures)),
         ("validity", said("What this report assumes, and where it holds"), _validity(report.drive)),
         (
@@ -297,7 +352,7 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
         parts += [
             tag("h3", row.name),
             tag("p", said("Parameters: {values}.", values=values))
-            if (values := _parameters(row.run.controller))
+            if (values := _parameters(row.run.controller, units_of(report.drive)))
             else None,
             printed(chains.shaft_table(row.run)),
         ]
@@ -315,14 +370,83 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
     return html(*parts, *pictures, _life(report))
 
 
-def _parameters(controller: Controller) -> str:
+def _limit(report: ChainReport, figures: Figures) -> Html:
+    """Every strategy beside what no start goes below, and the optimum that was found."""
+    chain, limit, best, rows = report.drive, report.limit, report.chosen, report.comparison.rows
+    if limit.refusal:
+        return tag("p", limit.refusal)
+    motor = chain.motor
+    assert motor is not None
+    least, most = motor.minimum_torque, min(motor.starting_torque, motor.maximum_torque)
+    bound = said(
+        "Lower bound: proved from the momentum of the load mass, for every torque from {least} to {most} N m "
+        "over time, however often and in whichever order the gaps close.",
+        least=short(float(least)),
+        most=short(float(most)),
+    )
+    none = said("There is no bound for this chain: gears with losses, or a motor on the load mass.")
+    caption = said(
+        "Every strategy (filled: the chosen one) by its start time and K_dyn. Below the dashed line "
+        "(hatched) no start is possible, with whatever motor torque and however it is controlled."
+    )
+    title = said("K_dyn of the chain against start time")
+    return html(
+        figures.shown(
+            "limit",
+            lambda: inlined(limit_figure(rows, [best] if best else [], limit), "limit", title),
+            caption,
+        ),
+        how_near(chain, rows, limit),
+        tag(
+            "ul",
+            joined(tag("li", one) for one in (bound if limit.bounds else none, *_on_optimum(limit))),
+            class_="notes",
+        ),
+    )
+
+
+def _on_optimum(limit: Limit) -> list[str]:
+    """What the search on the chain found."""
+    notes = [
+        said(
+            "In {time} s, the start time of the chosen strategy, the gentlest start found has K_dyn {k_dyn}: "
+            "by linear programs on the exact start of the chain, from the torque of that strategy. It is "
+            "simulated exactly, and not proved the gentlest; softstart optimize writes its torque.",
+            time=digits(p.start_time_bound),
+            k_dyn=fixed(p.k_dyn, 3),
+        )
+        for p in limit.found
+    ]
+    if limit.missing and limit.budget > 0.0:
+        notes.append(
+            said(
+                "No optimum was found within the {budget} s given (more: --budget).",
+                budget=short(limit.budget),
+            )
+        )
+    return notes
+
+
+def _sheets(report: ChainReport) -> Html:
+    """The sheet of the chosen strategy; its percentages are of the chain's motor."""
+    recommended = report.comparison.recommendation.recommended is not None
+    return sheet_section(
+        sheet_drive(report.drive),
+        report.sheets,
+        report.resolution,
+        report.chosen.name if report.chosen else "",
+        said("recommended") if recommended else said("gentlest unbeaten"),
+    )
+
+
+def _parameters(controller: Controller, units: Units) -> str:
     """What the controller is set up with, each value in its unit."""
     words = []
     for one in fields(controller):
-        value = getattr(controller, one.name)
-        if value is not None and "unit" in one.metadata:
-            number = short(value) if isinstance(value, float) else str(value)
-            words.append(f"{one.name.replace('_', ' ')} {number} {unit(one.metadata['unit'])}".strip())
+        value, si = getattr(controller, one.name), one.metadata.get("unit")
+        if value is not None and si is not None:
+            number = short(float(f"{units.shown(value, si):.4g}")) if isinstance(value, float) else str(value)
+            words.append(f"{one.name.replace('_', ' ')} {number} {unit(units.of(si))}".strip())
     return ", ".join(words)
 
 
@@ -385,10 +509,6 @@ def _validity(chain: Chain) -> Html:
             "The equations are solved as Taylor series from event to event; peaks are located, not read off "
             "a grid."
         ),
-        said(
-            "Not in this report: optima and bounds (softstart optimize and pareto take the chain), maps "
-            "over wear and load, and parameter sheets for inverters (for the drive that softstart reduce "
-            "writes)."
-        ),
+        said("Not in this report: maps over wear and load; the page (softstart serve) draws them."),
     ]
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

@@ -15,7 +15,7 @@ from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import realisable
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import SLOW, Recommendation, Row
-from softstart.views.printed import digits, fixed, short
+from softstart.views.printed import digits, fixed, short, units_of
 
 MOST_MAPS = 4
 
@@ -162,16 +162,18 @@ def choice_section(choice: Choice, answer: str) -> Html:
         )
     )
     order = sorted(choice.candidates, key=lambda one: (one.row.effort.order, one.row.run.k_dyn))
+    units = units_of(choice.candidates[0].row.run.drive)
     rows = [
         [
             one.name, said(one.row.run.controller.summary), said(one.row.effort.meaning), fixed(one.worst, 3),
-            digits(one.map.worst_at[0], 3), digits(one.map.worst_at[1], 3), one.verdict,
+            digits(units.shown(one.map.worst_at[0], "rad"), 3), digits(one.map.worst_at[1], 3), one.verdict,
         ]
         for one in order
     ]  # fmt: skip
     strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
     heads = said(
-        "strategy | what it does | takes | worst K_dyn on the map | at gap, rad | and J2, kg m² | verdict"
+        "strategy | what it does | takes | worst K_dyn on the map | at gap, {unit} | and J2, kg m² | verdict",
+        unit=units.angle,
     ).split(" | ")
     return html(
         tag("p", answer),

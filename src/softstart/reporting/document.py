@@ -15,7 +15,17 @@ from softstart.reporting.choice import Candidate, Choice, choice_section
 from softstart.reporting.drive_section import drive_section
 from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
 from softstart.reporting.limit import limit_section
-from softstart.reporting.markup import Figures, Html, css_string, html, joined, table, tag, with_comma
+from softstart.reporting.markup import (
+    Figures,
+    Html,
+    css_string,
+    html,
+    joined,
+    table,
+    tag,
+    typeset,
+    with_comma,
+)
 from softstart.reporting.project import Project
 from softstart.reporting.result import Provenance, Report
 from softstart.reporting.robustness import GAPS, INERTIAS, life_chapter, maps_picture, robustness_section
@@ -23,7 +33,7 @@ from softstart.reporting.sheet import sheet_section
 from softstart.reporting.strategies import strategies_section, trace_groups, traces_picture, traces_section
 from softstart.start.comparison import Comparison
 from softstart.views.drives import POSITIONS
-from softstart.views.printed import digits, fixed, short
+from softstart.views.printed import digits, fixed, short, units_of
 
 SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
@@ -59,7 +69,7 @@ def document(report: Report) -> str:
 def whole(project: Project, made: Callable[[], str]) -> str:
     """The page that is `made`, its figures drawn with any letters, with the project's decimal sign."""
     with _any_script(), speaking(project.language.table):
-        text = made()
+        text = typeset(made())
     return with_comma(text) if project.decimal == "comma" else text
 
 
@@ -155,6 +165,7 @@ def page(
 
 def validity_section(drive: Drive, project: Project) -> Html:
     """The assumptions behind all figures, and where their data are from."""
+    units = units_of(drive)
     damping = (
         said(
             "damping of the shaft: {d} N m s/rad, proportional to the speed of its twist",
@@ -184,7 +195,11 @@ def validity_section(drive: Drive, project: Project) -> Html:
         load,
         said("The start begins {position}.", position=said(POSITIONS[drive.start_position]))
         if isinstance(drive.start_position, str)
-        else said("The start begins at a twist of {twist} rad.", twist=short(float(drive.theta0))),
+        else said(
+            "The start begins at a twist of {twist} {unit}.",
+            twist=digits(units.shown(float(drive.theta0), "rad")),
+            unit=units.angle,
+        ),
         said(
             "Statements on wear and load hold from {least_gap} to {most_gap} times the gap and from "
             "{least_inertia} to {most_inertia} times the load inertia, for the values computed. Other "

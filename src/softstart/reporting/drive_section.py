@@ -17,9 +17,9 @@ from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
 from softstart.start import metrics
 from softstart.views import chain_schemes
-from softstart.views.printed import MINUS, RPM, digits, short, unit
+from softstart.views.printed import NOTHING, RPM, digits, short, unit, units_of
 
-HIDDEN = ("name", "source", "noise_seed", "encoder_phase")
+HIDDEN = ("name", "source", "units", "noise_seed", "encoder_phase")
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
 _ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
 _LABEL = 124.0  # px: what the gap and its label need at least
@@ -52,32 +52,38 @@ def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
 
 def _data(drive: Drive, project: Project) -> Html:
     """What is known of the drive and from where; in a sentence what is at its default."""
-    rows, defaults = [], []
-    sourced = bool(project.sources)
+    rows, absent, defaults = [], list[str](), list[str]()
+    sourced, units = bool(project.sources), units_of(drive)
     for parameter in PARAMETERS.values():
         value = getattr(drive, parameter.name)
         if value is None or value == "" or parameter.name in HIDDEN:
             continue
         values = value if isinstance(value, tuple) else (value,)
-        text = ", ".join(short(one) if isinstance(one, float) else str(one) for one in values)
-        other = ""
+        seen = [units.shown(one, parameter.unit) if isinstance(one, float) else one for one in values]
+        text = ", ".join(short(one) if isinstance(one, float) else str(one) for one in seen)
+        of, other = unit(units.of(parameter.unit)), ""
         if isinstance(value, str):
             pass
+        elif of != unit(parameter.unit):
+            other = f"{digits(value)} {unit(parameter.unit)}"
         elif parameter.unit == "rad/s":
             other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif parameter.unit == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
         source = project.source_of(parameter.path)
         if value == parameter.default and not source:
-            shown = f"{text} {unit(parameter.unit)}".strip()
-            defaults.append(f"{said(parameter.meaning)} {shown}")
+            shown = text if isinstance(value, str) else f"{text} {of}".strip()
+            meaning = said(parameter.meaning)
+            (absent if value in (0.0, math.inf) else defaults).append(
+                meaning if value == 0.0 else f"{meaning}: {shown}"
+            )
             continue
         rows.append(
             [
                 said(parameter.meaning),
                 parameter.symbol,
                 text,
-                "" if isinstance(value, str) else unit(parameter.unit).replace(" ", "\N{NO-BREAK SPACE}"),
+                "" if isinstance(value, str) else of.replace(" ", "\N{NO-BREAK SPACE}"),
                 other,
                 *([source or said("not stated")] if sourced else []),
             ]
@@ -93,14 +99,20 @@ def _data(drive: Drive, project: Project) -> Html:
             caption=said("Data of the drive, at the motor shaft"),
             text_columns=(0, 1, 3, 5)[: 3 + sourced],
         ),
-        tag("p", said("At their defaults: {defaults}.", defaults="; ".join(defaults)), class_="small")
-        if defaults
-        else None,
+        tag(
+            "p",
+            said(
+                "Not given, and therefore none: {absent}. At their defaults: {defaults}.",
+                absent="; ".join(absent) or NOTHING,
+                defaults="; ".join(defaults) or NOTHING,
+            ),
+            class_="small",
+        ),
     )
 
 
 def _derived(drive: Drive) -> Html:
-    rated, basis = rated_torque(drive)
+    (rated, basis), units = rated_torque(drive), units_of(drive)
     rows = [
         [
             said("mean shaft torque under the starting torque: K_dyn = 1"),
@@ -109,7 +121,11 @@ def _derived(drive: Drive) -> Html:
         ],
         [said("elastic frequency with the gap closed"), digits(float(drive.Omega) / (2.0 * math.pi)), "Hz"],
         [said("elastic period"), digits(1e3 * float(drive.elastic_period)), "ms"],
-        [said("twist of the shaft under the starting torque"), digits(float(drive.Ms / drive.c)), "rad"],
+        [
+            said("twist of the shaft under the starting torque"),
+            digits(units.shown(float(drive.Ms / drive.c), "rad")),
+            units.angle,
+        ],
         [
             said("100 % of torque in the parameter sheets: the {basis}", basis=said(basis)),
             digits(rated),
@@ -124,6 +140,7 @@ def _derived(drive: Drive) -> Html:
 def scheme(drive: Drive, prefix: str) -> Html:
     """The scheme as an <svg> element."""
     J1, J2, gap, c, d = (float(v) for v in (drive.J1, drive.J2, drive.gap, drive.c, drive.d))
+    units = units_of(drive)
     tallest = max(J1, J2)
     high1, high2 = (max(_LEAST, _TALLEST * (J / tallest) ** 0.25) for J in (J1, J2))
     windup = float(drive.Ms) / c
@@ -146,7 +163,7 @@ def scheme(drive: Drive, prefix: str) -> Html:
     parts += _shaft(x, spring, coil, c, damper)
     x += spring + 24.0
     if gap > 0.0:
-        label = said("gap {gap:.4g} rad", gap=gap).replace("-", MINUS)
+        label = said("gap {gap} {unit}", gap=digits(units.shown(gap, "rad")), unit=units.angle)
         room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
         parts += _claw(x, room, opening, float(drive.assumed.theta0) / gap, label)
         x += room
@@ -159,11 +176,12 @@ def scheme(drive: Drive, prefix: str) -> Html:
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high2 - 12.0, "phi2, w2"))
     width = x + max(64.0 + 150.0, 98.0 + 18.0 + _width(load, 12))
     title = said(
-        "Two masses and a gap: motor J1 = {J1} kg m², shaft c = {c} N m/rad, gap {gap} rad, load J2 = {J2} "
-        "kg m², load torque Mc = {Mc} N m",
+        "Two masses and a gap: motor J1 = {J1} kg m², shaft c = {c} N m/rad, gap {gap} {unit}, load J2 = "
+        "{J2} kg m², load torque Mc = {Mc} N m",
         J1=short(J1),
         c=short(c),
-        gap=short(gap),
+        gap=digits(units.shown(gap, "rad")),
+        unit=units.angle,
         J2=short(J2),
         Mc=short(float(drive.Mc)),
     )

@@ -15,7 +15,7 @@ from softstart.reporting.strategies import before_after_figure
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row
 from softstart.views.fatigue import factor
-from softstart.views.printed import digits, fixed, percent
+from softstart.views.printed import NOTHING, digits, fixed, percent
 
 if TYPE_CHECKING:
     from softstart.reporting.result import Report
@@ -69,7 +69,9 @@ def answer(
 
 
 def share_saved(row: Row, direct: Row | None) -> str:
-    """What a strategy saves of the peak of direct."""
+    """What a strategy saves of the peak of direct; a dash for direct itself."""
+    if row is direct:
+        return NOTHING
     saved = 1.0 - row.run.peak_torque / direct.run.peak_torque if direct else math.nan
     return percent(saved, 0 if abs(saved) >= 0.1 else 1)
 

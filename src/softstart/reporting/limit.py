@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.chain.model import Chain
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, listed
 from softstart.language import said
 from softstart.late import late
+from softstart.optimal.chains import problem
 from softstart.optimal.front import FrontPoint
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
@@ -27,7 +29,7 @@ from softstart.processes import Tell as WorkerTell
 from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
-from softstart.reporting.strategies import GREY, SMALL, WIDE, name_in_figure, ordered
+from softstart.reporting.strategies import GREY, K_DYN, SMALL, WIDE, name_in_figure, ordered
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import Row
 from softstart.views.drawing import COLOURS, DASHES, MARKERS, drawing, name_points, new_figure, plain_ticks
@@ -46,6 +48,7 @@ INSTANTS = 80  # of the curve of the bound
 EARLIER = 0.85  # of the quickest strategy: from where on the curve is drawn
 POLL = 0.1  # s
 GENTLER = 0.999  # times an optimum: what is no more than its last digits is not gentler
+SEARCHED = 0.5  # of the budget, after which the search on a chain goes into no new demand
 QUICK_SHARE = 0.3  # of the budget is kept for starts that are good and not proved best
 
 Tell = Callable[[float, str], object]
@@ -109,7 +112,7 @@ class Limit:
         }
 
 
-def bound_at(drive: Drive, start_time: float) -> float | None:
+def bound_at(drive: Drive | Chain, start_time: float) -> float | None:
     """The K_dyn that no start within `start_time` s can go below; None where there is no bound.
 
     >>> round(bound_at(Drive.load("crane-4amtkf").replace(target_speed=60.0), 0.2883042), 4)
@@ -118,10 +121,48 @@ def bound_at(drive: Drive, start_time: float) -> float | None:
     if not start_time > 0.0:
         return None
     try:
-        bound = momentum_bound(Problem(drive, start_time, TERMINAL)).k_dyn
+        bound = (
+            problem.momentum_bound(problem.ChainProblem(drive, start_time))
+            if isinstance(drive, Chain)
+            else momentum_bound(Problem(drive, start_time, TERMINAL))
+        )
     except InputError:
         return None
-    return bound if math.isfinite(bound) else None
+    return bound.k_dyn if math.isfinite(bound.k_dyn) and bound.kind != "none" else None
+
+
+def chain_limit(
+    chain: Chain,
+    own: Sequence[float],
+    asked: Sequence[float],
+    budget: float,
+    tell: Tell,
+    meanwhile: Callable[[], object] = lambda: None,
+    seeds: Sequence[str] | None = None,
+) -> Limit:
+    """The bound over the start times of a chain's strategies, and the optima found for those asked for.
+
+    All times in s. Of a chain an optimum is the best of what linear programs on its exact start find from
+    the demands of `seeds`, names of strategies, in the time given: not proved the gentlest.
+    """
+    known = [one for one in own if math.isfinite(one)]
+    if not known:
+        return Limit(refusal=said("No strategy reaches the target speed."))
+    times = np.linspace(EARLIER * min(known), max(known), INSTANTS).tolist()
+    curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
+    points: list[FrontPoint] = []
+    if asked and budget > 0.0:
+        points = _in_own_process(chain, asked, budget, tell, meanwhile, SEARCHED * budget, seeds)
+    else:
+        meanwhile()
+    found = {p.start_time_bound for p in points if p.found}
+    return Limit(
+        times=tuple(t for t, _ in curve),
+        bounds=tuple(b for _, b in curve),
+        points=tuple(points),
+        missing=tuple(t for t in asked if t not in found),
+        budget=budget,
+    )
 
 
 def limit(
@@ -189,13 +230,19 @@ def _by_formula(drive: Drive, asked: Iterable[float]) -> tuple[list[FrontPoint],
 
 
 def _in_own_process(
-    drive: Drive, asked: Sequence[float], budget: float, tell: Tell, meanwhile: Callable[[], object]
+    drive: Drive | Chain,
+    asked: Sequence[float],
+    budget: float,
+    tell: Tell,
+    meanwhile: Callable[[], object],
+    time_limit: float = 0.0,
+    seeds: Sequence[str] | None = None,
 ) -> list[FrontPoint]:
-    """Optima by the other methods, as many as are found in time."""
+    """Optima by the other methods, as many as are found in time; each search ends after its `time_limit`."""
     points: list[FrontPoint] = []
     worker = Worker(quiet=True)
     try:
-        worker.submit(optima, drive, asked, tells=True)
+        worker.submit(optima, drive, asked, time_limit, seeds, tells=True)
         began = time.monotonic()
         meanwhile()
         while True:
@@ -215,12 +262,20 @@ def _in_own_process(
     return points
 
 
-def optima(drive: Drive, start_times: Sequence[float], *, tell: WorkerTell) -> None:
+def optima(
+    drive: Drive | Chain,
+    start_times: Sequence[float],
+    time_limit: float = 0.0,
+    seeds: Sequence[str] | None = None,
+    *,
+    tell: WorkerTell,
+) -> None:
     """Look for the optima of start times, one after the other, and send each at once."""
     for start_time in start_times:
         try:
             point = FrontPoint.of_optimum(
-                optimize(drive, start_time, terminal=TERMINAL, time_limit=0.0), start_time
+                optimize(drive, start_time, terminal=TERMINAL, time_limit=time_limit, seeds=seeds),
+                start_time,
             )
         except InfeasibleError as error:
             point = FrontPoint.of_verdict(error.verdict, start_time, TERMINAL)
@@ -261,24 +316,32 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
     title = said("K_dyn against start time: {starts}", starts=starts)
     return html(
         figures.shown(
-            "limit", lambda: inlined(limit_figure(choice, limit), "limit", title), " ".join(caption)
+            "limit",
+            lambda: inlined(limit_figure(choice.rows, filled(choice), limit), "limit", title),
+            " ".join(caption),
         )
         if choice.of(REFERENCE)
         else None,
-        _how_near(drive, choice, limit),
+        how_near(drive, choice.rows, limit),
         tag("ul", joined(tag("li", one) for one in _notes(drive, choice, limit)), class_="notes"),
     )
 
 
-def _how_near(drive: Drive, choice: Choice, limit: Limit) -> Html:
+def filled(choice: Choice) -> list[Row]:
+    """The rows of the two strategies that the report is about."""
+    return [one.row for one in (choice.chosen, choice.ordinary) if one is not None]
+
+
+def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
     """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
-    in_doubt = any(limit.optimum_at(row.run.start_time) is None for row in choice.rows)
+    in_doubt = any(limit.optimum_at(row.run.start_time) is None for row in found)
+    in_doubt = in_doubt and isinstance(drive, Drive)
     heads = said("strategy | start time, s | K_dyn | lower bound at that time").split(" | ")
     heads += [said("optimum at that time"), said("times the optimum")] if limit.found else []
     heads += [said("gentlest start known in that time")] if in_doubt else []
     heads.append(said("times the bound"))
     rows = []
-    for row in ordered(choice.rows):
+    for row in ordered(found):
         run, bound = row.run, bound_at(drive, row.run.start_time)
         cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3), fixed(bound, 3)]
         if limit.found:
@@ -286,7 +349,7 @@ def _how_near(drive: Drive, choice: Choice, limit: Limit) -> Html:
             cells.append(fixed(best.k_dyn if best else None, 3))
             cells.append(fixed(run.k_dyn / best.k_dyn if best and best.k_dyn else None, 2))
         if in_doubt:
-            cells.append(fixed(limit.gentlest_known(run.start_time, choice.rows), 3))
+            cells.append(fixed(limit.gentlest_known(run.start_time, found), 3))
         rows.append([*cells, fixed(run.k_dyn / bound if bound else None, 2)])
     caption = said("How near each strategy comes to the limit in its own start time")
     return table(heads, rows, caption=caption, class_="names")
@@ -486,15 +549,15 @@ def _why_hard(drive: Drive) -> str:
     )
 
 
-def limit_figure(choice: Choice, limit: Limit) -> Any:
+def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> Any:
     """K_dyn against start time: the bound that nothing goes below, optima, every strategy."""
-    placed = [one for one in choice.candidates if not math.isnan(one.row.run.start_time)]
+    placed = [row for row in rows if not math.isnan(row.run.start_time)]
     optima = limit.found
-    own = [one.row.run.start_time for one in placed] + [p.start_time_bound for p in optima]
+    own = [row.run.start_time for row in placed] + [p.start_time_bound for p in optima]
     own += [one.start_time for one in limit.known]
     left, right = min(own), max(own)
     right = max(right, 1.001 * left)  # a single start
-    values = [one.row.run.k_dyn for one in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
+    values = [row.run.k_dyn for row in placed] + [p.k_dyn for p in optima if p.k_dyn is not None]
     values += [one.k_dyn for one in limit.known]
     with drawing():
         figure, axes = new_figure(1, 1, (WIDE, 3.6))
@@ -517,10 +580,10 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
                 color="black", lw=1.0, marker="+", ms=6, label=said("start found: possible, not proved best"),
                 zorder=3,
             )  # fmt: skip
-        for index, one in enumerate(placed):
-            best = one is choice.chosen or one is choice.ordinary
+        for index, row in enumerate(placed):
+            best = row in strong
             colour = COLOURS[(index + 1) % len(COLOURS)]
-            axes.plot([one.row.run.start_time], [one.row.run.k_dyn], MARKERS[index % len(MARKERS)],
+            axes.plot([row.run.start_time], [row.run.k_dyn], MARKERS[index % len(MARKERS)],
                       ms=8 if best else 6.5, mfc=colour if best else "white", mew=1.6,
                       color=colour, zorder=4)  # fmt: skip
         axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
@@ -528,15 +591,15 @@ def limit_figure(choice: Choice, limit: Limit) -> Any:
         if high > 4.0 * low:
             _logarithmic(axes, low, high)
         else:
-            axes.set_ylim(0.0, 1.1 * high)
+            room = max(high - low, 0.1 * high)
+            axes.set_ylim(max(0.0, low - 0.35 * room), high + 0.15 * room)
         axes.set_xlim(left, right)
         axes.set_xlabel(said("start time, s"))
-        axes.set_ylabel("K_dyn")
+        axes.set_ylabel(K_DYN)
         handles = axes.get_legend_handles_labels()[0]
         if handles:
             figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=SMALL)
-        rows = [one.row for one in placed]
-        points = [(name_in_figure(row.marked), row.run.start_time, row.run.k_dyn) for row in rows]
+        points = [(name_in_figure(row.marked), row.run.start_time, row.run.k_dyn) for row in placed]
         name_points(figure, axes, points)
     return figure
 

@@ -149,6 +149,34 @@ def inlined(figure: Any, key: str, title: str) -> Html:
     )
 
 
+_AS_IT_IS = re.compile(r"(<(pre|code|style|title|svg)\b.*?</\2>|<[^>]*>)", re.DOTALL)
+_UNIT = r"(?:N\xa0m|kg\xa0m|ms|s|rad|deg|rpm|mm|Hz|kW|W|%)(?![\w])"
+_TYPESET = (
+    (re.compile(r"\b(N|kg) m(?=\b|²)"), "\\1\xa0m"),
+    (re.compile(rf"(?<=\d) (?={_UNIT})"), "\xa0"),
+    (re.compile(rf", (?={_UNIT}[^\w]*$)"), ",\xa0"),  # the unit of a heading
+    (re.compile(r"\bK_dyn\b"), "K<sub>dyn</sub>"),
+)
+
+
+def typeset(page: str) -> str:
+    """A page in whose text no line ends between a number and its unit, and indices are set as such.
+
+    >>> typeset("<th>torque, N m</th><code>1 s</code><p>K_dyn 0.98 in 1 s</p>").replace("\xa0", "~")
+    '<th>torque,~N~m</th><code>1 s</code><p>K<sub>dyn</sub> 0.98 in 1~s</p>'
+    """
+    return _in_texts(page, _AS_IT_IS, _TYPESET)
+
+
+def _in_texts(page: str, skipped: re.Pattern[str], changes: Sequence[tuple[re.Pattern[str], str]]) -> str:
+    """A page with these replacements in its texts; elements that are skipped stay as they are."""
+    parts = skipped.split(page)  # text, what is skipped, name of its element, text, ...
+    texts = parts[::3]
+    for found, by in changes:
+        texts = [found.sub(by, text) for text in texts]
+    return "".join(text + other for text, other in zip(texts, [*parts[1::3], ""], strict=True))
+
+
 _SKIPPED = re.compile(r"(<(pre|code|style|title)\b.*?</\2>|<[^>]*>)", re.DOTALL)
 _DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
@@ -159,7 +187,4 @@ def with_comma(page: str) -> str:
     >>> with_comma("<p>0.981 in 1.5 s, softstart 0.1.0</p><code>04.005</code>")
     '<p>0,981 in 1,5 s, softstart 0.1.0</p><code>04.005</code>'
     """
-    parts = _SKIPPED.split(page)  # text, what is skipped, name of its element, text, ...
-    texts = (_DECIMAL.sub(r"\1,\2", text) for text in parts[::3])
-    skipped = [*parts[1::3], ""]
-    return "".join(text + other for text, other in zip(texts, skipped, strict=True))
+    return _in_texts(page, _SKIPPED, [(_DECIMAL, r"\1,\2")])

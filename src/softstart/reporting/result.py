@@ -293,7 +293,7 @@ def _report(
         drawn = drive.draws()
         drive = drive.drive
     drive = Drive.load(drive) if isinstance(drive, str) else drive
-    steps = _checked(drive, resolution, budget)
+    steps = checked_steps(drive, resolution, budget)
     made = controllers_of(controllers, parameters or {})
 
     def tell(share: float, what: str) -> None:
@@ -322,7 +322,8 @@ def _report(
     for index, candidate in enumerate(dict.fromkeys(chosen)):
         tell(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
         controller = used[rows.index(candidate.row)]
-        sheets.append(make_sheet(drive, controller, candidate.row.run, steps))
+        row = candidate.row
+        sheets.append(make_sheet(drive, controller, row.run, steps, row, drawn))
     times = [one.row.run.start_time for one in chosen]
     direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
     reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
@@ -348,14 +349,14 @@ def _report(
     )  # fmt: skip
 
 
-def _checked(
+def checked_steps(
     drive: object, resolution: Resolution | Mapping[str, object] | str | None, budget: object
 ) -> Resolution:
     """The resolution; all mistakes of the input at once."""
     wrong: list[str] = []
-    if not isinstance(drive, Drive):
+    if not isinstance(drive, Drive | Chain):
         wrong.append(f"drive = {drive!r}: give a Drive, the path of its file, or the name of a shipped one.")
-    elif drive.shape != ():
+    elif isinstance(drive, Drive) and drive.shape != ():
         wrong.append("drive: a report is about one drive; give one value for each parameter.")
     if not isinstance(budget, Real) or isinstance(budget, bool) or not 0.0 <= float(budget) < float("inf"):
         wrong.append(f"budget = {budget!r}: give a time in s, as 20, 0 or more.")

@@ -14,14 +14,15 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.language import said
 from softstart.late import late
+from softstart.quantities import Units
 from softstart.reporting.markup import Figures, Html, html, inlined, printed, tag
-from softstart.reporting.strategies import SMALL, WIDE, name_in_figure
+from softstart.reporting.strategies import K_DYN, SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.fatigue import Fatigue
 from softstart.views import fatigue as lives
 from softstart.views.drawing import drawing, new_figure, plain_ticks
-from softstart.views.printed import digits, fixed, short
+from softstart.views.printed import digits, fixed, short, units_of
 
 if TYPE_CHECKING:
     from matplotlib import colors, patches, ticker
@@ -112,10 +113,9 @@ def robustness(drive: Drive, controller: Controller) -> RobustnessMap:
 
 def robustness_section(drive: Drive, shown: Sequence[Mapped], figures: Figures) -> Html:
     """The maps of strategies, in one scale of colours."""
-    first = shown[0].map
-    gaps = said(
-        "gaps from {least} to {most} rad", least=digits(first.gaps[0], 3), most=digits(first.gaps[-1], 3)
-    )
+    first, units = shown[0].map, units_of(drive)
+    least, most = (digits(units.shown(gap, "rad"), 3) for gap in (first.gaps[0], first.gaps[-1]))
+    gaps = said("gaps from {least} to {most} {unit}", least=least, most=most, unit=units.angle)
     if drive.gap == 0.0:
         gaps = said("no gap (the drive has none, so the maps have one row and say nothing about play)")
     text = said(
@@ -135,23 +135,24 @@ def robustness_section(drive: Drive, shown: Sequence[Mapped], figures: Figures) 
 
 def maps_picture(drive: Drive, shown: Sequence[Mapped]) -> Html:
     """The maps as an <svg> element."""
-    first = shown[0].map
+    first, units = shown[0].map, units_of(drive)
     nominal = (
         min(first.gaps, key=lambda v: abs(v - float(drive.gap))),
         min(first.inertias, key=lambda v: abs(v - float(drive.J2))),
     )
     worst = "; ".join(
         said(
-            "{name}, worst {k_dyn} at gap {gap} rad and J2 {inertia} kg m²",
+            "{name}, worst {k_dyn} at gap {gap} {unit} and J2 {inertia} kg m²",
             name=one.name,
             k_dyn=fixed(one.map.worst, 3),
-            gap=short(one.map.worst_at[0]),
+            gap=digits(units.shown(one.map.worst_at[0], "rad"), 3),
+            unit=units.angle,
             inertia=short(one.map.worst_at[1]),
         )
         for one in shown
     )
     title = said("K_dyn over gap and load inertia: {worst}", worst=worst)
-    return inlined(maps_figure([(one.name, one.map) for one in shown], nominal), "maps", title)
+    return inlined(maps_figure([(one.name, one.map) for one in shown], nominal, units), "maps", title)
 
 
 def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[str, str, Html]]:
@@ -176,7 +177,9 @@ def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[st
     return [("life", said("How long the shaft line lasts"), content)]
 
 
-def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float, float]) -> Any:
+def maps_figure(
+    shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float, float], units: Units
+) -> Any:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
     first = shown[0][1]
     rows, columns = len(first.gaps), len(first.inertias)
@@ -185,7 +188,8 @@ def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float
     high = max(high, low * 1.02)
     scale = colors.LogNorm(low, high) if high > 3.0 * low else colors.Normalize(low, high)
     down = math.ceil(len(shown) / 2)
-    inertia, gap = _thousand(first.inertias), _thousand(first.gaps)
+    gaps = [units.shown(one, "rad") for one in first.gaps]
+    inertia, gap = _thousand(first.inertias), _thousand(gaps)
     with drawing():
         size = (WIDE, 0.35 + down * (0.75 + 0.31 * max(rows, 2)))
         figure, axes = new_figure(down, 2, size, squeeze=False)
@@ -208,16 +212,16 @@ def maps_figure(shown: Sequence[tuple[str, RobustnessMap]], nominal: tuple[float
             panel.set_xticks(
                 range(columns), [f"{v / inertia:.3g}" for v in first.inertias], fontsize=SMALL - 0.5
             )
-            panel.set_yticks(range(rows), [f"{v / gap:.3g}" for v in first.gaps], fontsize=SMALL - 0.5)
+            panel.set_yticks(range(rows), [f"{v / gap:.3g}" for v in gaps], fontsize=SMALL - 0.5)
             panel.tick_params(length=0)
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
         for panel in axes[:, 0]:
-            panel.set_ylabel(said("gap, {unit}", unit=f"{_powers(gap)}rad"), fontsize=SMALL)
+            panel.set_ylabel(said("gap, {unit}", unit=f"{_powers(gap)}{units.angle}"), fontsize=SMALL)
         for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
             panel.set_xlabel(said("load inertia J2, {unit}", unit=f"{_powers(inertia)}kg m²"), fontsize=SMALL)
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
-        bar.set_label("K_dyn", fontsize=SMALL)
+        bar.set_label(K_DYN, fontsize=SMALL)
         bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
         bar.solids.set_edgecolor("face")
         _plain_ticks(bar, low, high)

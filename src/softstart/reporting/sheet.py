@@ -12,6 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
+from softstart.chain.model import Chain
+from softstart.chain.run import ChainRun
+from softstart.chain.simulation import drive_of
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
@@ -22,12 +26,17 @@ from softstart.reporting.resolution import RATED, Resolution, nearest_step, rate
 from softstart.reporting.strategies import ORDINARY, kind_of
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
+from softstart.start.comparison import compared
+from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.printed import RPM, decimals_of, digits, fixed, short, unit
 
+AnyRun = Run | ChainRun
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
-ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started
+ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
+INSTANTS = 20_001  # of a chain's start, in which its motor torque is looked at
+NEIGHBOURS = 3  # rounded values up to which every combination of steps beside them is tried
 DOCUMENTED = (
     "acceleration-delay",
     "current-limit-feedback",
@@ -52,6 +61,7 @@ _DATA = {
 _LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
 _PROBE = 1e-3  # relative
 EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
+GEAR_COUNTS, GEAR_CYCLE = 4000.0, 3.3e-3  # DCS 500B: counts of the nominal torque, cycle at 50 Hz in s
 COARSE = 0.1  # a step above this share of the value is said to be coarse
 
 
@@ -81,7 +91,15 @@ class Setting:
         """The value half a step too low (-1) or too high (+1), within what the parameter may be."""
         assert self.step is not None
         assert isinstance(self.rounded, float)
+        if side == 0:
+            return self.rounded
         return min(max(self.rounded + 0.5 * side * self.step, self.least), max(self.most, self.rounded))
+
+    def beside(self, steps: int) -> float:
+        """The value so many steps beside the nearest one, within what the parameter may be."""
+        assert self.step is not None
+        assert isinstance(self.rounded, float)
+        return min(max(self.rounded + steps * self.step, self.least), self.most) if steps else self.rounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +107,7 @@ class FullRise:
     """A ramp for an inverter that asks for the time from 0 to 100 % of torque, s: exact, and rounded.
 
     `rise` is the time between the torques of the sheet (s) that comes of the rounded one, `run` the start.
+    For one that asks for a rate, exact and rounded are that rate as it counts it.
     """
 
     exact: float
@@ -113,16 +132,18 @@ class Sheet:
     `exact` and `rounded` are starts of the drive with the exact and the rounded values. `worst_k_dyn` is the
     largest K_dyn, `slowest` the longest start time (s) of `variants` starts in which the rounded values are
     half a step off, in the combinations that `corners` says; NaN if one of them fails. `worst_values`
-    belong to it. `own` is the drive whose numbers the strategy works with, `computes_with` says with which
-    of them. `torque_step` (N m) is that of the inverter.
+    belong to it. `moved` names settings that are not at their nearest step, because the rule by which the
+    strategy was chosen would not hold there; where it holds nowhere near, there is no start with rounded
+    values, and `failure` says why. `own` is the drive whose numbers the strategy works with, `computes_with`
+    says with which of them. `torque_step` (N m) is that of the inverter.
     """
 
     name: str
     kind: str
     settings: tuple[Setting, ...]
     own: Drive
-    exact: Run
-    rounded: Run | None
+    exact: AnyRun
+    rounded: AnyRun | None
     failure: str
     variants: int
     corners: bool
@@ -132,6 +153,8 @@ class Sheet:
     torque_step: float
     full_rise: FullRise | None
     computes_with: Sequence[str] | None
+    moved: tuple[str, ...] = ()
+    gear_ramp: FullRise | None = None
 
     @property
     def varied(self) -> list[Setting]:
@@ -143,7 +166,13 @@ class Sheet:
         return {
             "controller": self.name,
             "settings": [
-                {"name": s.name, "unit": s.unit, "exact": s.exact, "rounded": s.rounded, "step": s.step}
+                {
+                    "name": s.name,
+                    "unit": s.unit,
+                    "exact": s.exact,
+                    "rounded": s.rounded if self.rounded else None,
+                    "step": s.step,
+                }
                 for s in self.settings
             ],
             "k_dyn": self.exact.k_dyn,
@@ -158,24 +187,41 @@ class Sheet:
         }
 
 
-def make_sheet(drive: Drive, controller: Controller, exact: Run, resolution: Resolution) -> Sheet:
-    """The sheet of a strategy on a drive; `exact` is its start there."""
+def make_sheet(
+    machine: Drive | Chain,
+    controller: Controller,
+    exact: AnyRun,
+    resolution: Resolution,
+    row: Row | None = None,
+    drawn: Drive | None = None,
+) -> Sheet:
+    """The sheet of a strategy on a drive or chain; `exact` is its start there.
+
+    With the `row` by which the strategy was chosen, the values of the sheet keep what that row keeps, on the
+    drives `drawn` too where the drive is known within intervals.
+    """
+    drive = sheet_drive(machine)
     ready, own = controller.set_up(drive)
     settings = tuple(_settings(ready, drive, resolution))
     varied = [one for one in settings if one.step is not None]
-    values = {one.name: one.rounded for one in varied}
-    rounded: Run | None = None
+    rounded: AnyRun | None = None
     failure, variants, corners, worst, slowest = "", 0, False, math.nan, math.nan
     worst_values: dict[str, float] = {}
     full_rise: FullRise | None = None
+    gear_ramp: FullRise | None = None
+    moved: tuple[str, ...] = ()
     try:
-        rounded = simulate(drive, replace(ready, **values), fitted_to=own)
-        if kind_of(controller) in ORDINARY:
-            full_rise = _full_rise(drive, replace(ready, **values), own, resolution)
+        settings, moved = _within_the_rule(machine, ready, own, settings, row, drawn)
+        varied = [one for one in settings if one.step is not None]
+        values = {one.name: one.rounded for one in varied}
+        rounded = _start(machine, replace(ready, **values), own)
+        if kind_of(controller) in ORDINARY and isinstance(machine, Drive):
+            full_rise = _full_rise(machine, replace(ready, **values), own, resolution)
+            gear_ramp = _gear_ramp(machine, replace(ready, **values), own)
         if varied:
-            sides = _sides(len(varied))
-            corners = len(varied) <= ALL_CORNERS
-            k_dyn, time = _starts(drive, ready, own, varied, sides)
+            corners = len(varied) <= ALL_CORNERS and isinstance(machine, Drive)
+            sides = _sides(len(varied), corners)
+            k_dyn, time = _starts(machine, ready, own, varied, sides)
             variants, worst, slowest = len(sides), float(np.max(k_dyn)), float(np.max(time))
             if rounded.k_dyn > worst:  # the values as they are set are among what may be
                 worst, worst_values = rounded.k_dyn, {one.name: float(one.rounded) for one in varied}
@@ -186,12 +232,78 @@ def make_sheet(drive: Drive, controller: Controller, exact: Run, resolution: Res
     except (SimulationError, InputError) as error:
         failure = " ".join(str(error).split())
     return Sheet(
-        name=label_of(exact.controller), kind=kind_of(controller), settings=settings,
+        name=label_of(exact.controller or controller), kind=kind_of(controller), settings=settings,
         own=own, exact=exact, rounded=rounded, failure=failure, variants=variants, corners=corners,
         worst_k_dyn=worst, slowest=slowest, worst_values=worst_values,
         torque_step=resolution.step("", "N*m", rated_torque(drive)[0]) or 0.0, full_rise=full_rise,
-        computes_with=computes_with(ready, own),
+        computes_with=computes_with(ready, own), moved=moved, gear_ramp=gear_ramp,
     )  # fmt: skip
+
+
+def sheet_drive(machine: Drive | Chain) -> Drive:
+    """The drive whose motor and numbers a sheet names: of a chain the two masses that stand for it."""
+    return machine if isinstance(machine, Drive) else drive_of(machine)
+
+
+def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> AnyRun:
+    """A start under a controller with the numbers of `own`; K_dyn of a chain refers to that chain."""
+    base: Any = None if isinstance(machine, Drive) else machine
+    found: AnyRun = simulate(machine, controller, fitted_to=own, base=base)
+    return found
+
+
+def _within_the_rule(
+    machine: Drive | Chain,
+    ready: Controller,
+    own: Drive,
+    settings: Sequence[Setting],
+    row: Row | None,
+    drawn: Drive | None,
+) -> tuple[tuple[Setting, ...], tuple[str, ...]]:
+    """The settings at the steps nearest to them that keep what the row keeps, and which were moved for that.
+
+    Raises SimulationError where no step beside the nearest ones does.
+    """
+    if row is None:
+        return tuple(settings), ()
+    varied = [one for one in settings if one.step is not None and not isinstance(one.rounded, str)]
+    reason = ""
+    for steps in _steps_beside(len(varied)):
+        tried = {one.name: one.beside(step) for one, step in zip(varied, steps, strict=True)}
+        moved = tuple(one.name for one in varied if tried[one.name] != one.rounded)
+        if any(steps) and not moved:
+            continue
+        broken = _broken(machine, replace(ready, **tried), own, row, drawn)
+        if not broken:
+            return tuple(replace(s, rounded=tried.get(s.name, s.rounded)) for s in settings), moved
+        reason = reason or broken
+    raise SimulationError(
+        said(
+            "rounded to these steps the strategy breaks the rule by which it was chosen ({reason}), and so "
+            "it does a step beside them: finer steps are needed.",
+            reason=reason,
+        )
+    )
+
+
+def _steps_beside(count: int) -> list[tuple[int, ...]]:
+    """Steps away from the nearest ones, the smallest changes first."""
+    alone = [tuple(side if k == i else 0 for k in range(count)) for i in range(count) for side in (-1, 1)]
+    if count <= NEIGHBOURS:
+        together = sorted(itertools.product((-1, 0, 1), repeat=count), key=lambda one: sum(map(abs, one)))
+        return list(together)
+    return [(0,) * count, *alone]
+
+
+def _broken(machine: Drive | Chain, controller: Controller, own: Drive, row: Row, drawn: Drive | None) -> str:
+    """What these values break of what the row keeps, a flag or a limit in the worst case, or nothing."""
+    cases = tuple(case for case in row.worst_case if case in CASES)
+    found = compared(machine, controller, row.direct, fitted_to=own, worst_case=cases, drawn=drawn)
+    if found.flags and not row.flags:
+        return found.flags[0].text
+    limits = checked_limits(machine)
+    before = {margin.name: margin.kept for margin in row.margins(limits)}
+    return next((str(one) for one in found.margins(limits) if before[one.name] and not one.kept), "")
 
 
 def _full_rise(drive: Drive, ready: Any, own: Drive, resolution: Resolution) -> FullRise | None:
@@ -203,6 +315,17 @@ def _full_rise(drive: Drive, ready: Any, own: Drive, resolution: Resolution) -> 
     rounded = nearest_step(exact, resolution.time)
     run = simulate(drive, replace(ready, time=rounded * share), fitted_to=own)
     return FullRise(exact, rounded, rounded * share, run)
+
+
+def _gear_ramp(drive: Drive, ready: Any, own: Drive) -> FullRise | None:
+    """A straight ramp as the gear backlash compensation of a DCS 500B counts it; None for another one."""
+    share = (ready.full_torque - ready.initial) / rated_torque(drive)[0]
+    if kind_of(ready) != "ramp" or not (share > 0.0 and ready.time > 0.0):
+        return None
+    exact = float(GEAR_COUNTS * share * GEAR_CYCLE / ready.time)
+    rounded = max(1.0, float(round(exact)))
+    rise = GEAR_COUNTS * share * GEAR_CYCLE / rounded
+    return FullRise(exact, rounded, rise, simulate(drive, replace(ready, time=rise), fitted_to=own))
 
 
 def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> list[Setting]:
@@ -230,18 +353,27 @@ def _settings(ready: Controller, drive: Drive, resolution: Resolution) -> list[S
     return found
 
 
-def _sides(count: int) -> list[tuple[int, ...]]:
-    """All combinations of half steps; each value alone and all together where they are too many."""
-    if count <= ALL_CORNERS:
+def _sides(count: int, corners: bool) -> list[tuple[int, ...]]:
+    """All combinations of half steps, or each value alone and all together."""
+    if corners:
         return list(itertools.product((-1, 1), repeat=count))
     alone = [tuple(side if k == i else 0 for k in range(count)) for i in range(count) for side in (-1, 1)]
     return [*alone, (-1,) * count, (1,) * count]
 
 
 def _starts(
-    drive: Drive, ready: Controller, own: Drive, varied: Sequence[Setting], sides: Sequence[tuple[int, ...]]
+    drive: Drive | Chain,
+    ready: Controller,
+    own: Drive,
+    varied: Sequence[Setting],
+    sides: Sequence[tuple[int, ...]],
 ) -> tuple[Any, Any]:
-    """K_dyn and start times of the drive with the values off by these half steps."""
+    """K_dyn and start times of the drive or chain with the values off by these half steps."""
+    if not isinstance(drive, Drive):
+        each = [{one.name: one.off(side) for one, side in zip(varied, row, strict=True)} for row in sides]
+        runs = [_start(drive, replace(ready, **values), own) for values in each]
+        times = np.array([run.start_time for run in runs])
+        return np.where(np.isnan(times), np.nan, [run.k_dyn for run in runs]), times
     columns = {
         one.name: np.array([one.off(row[k]) for row in sides])
         if any(row[k] for row in sides)
@@ -317,10 +449,17 @@ def sheet_section(
     )
 
 
+def _motor_torque(run: AnyRun) -> Vector:
+    """The motor torque over a start, N m."""
+    return run.u if isinstance(run, Run) else run.at(np.linspace(0.0, run.end_time, INSTANTS))["u"]
+
+
 FUNCTIONS = {
     "limit": later("torque limit"),
     "braking": later("torque limit, generating"),
     "reference": later("torque reference"),
+    "backlash": later("torque limit after a change of direction, and its ramp"),
+    "ramp": later("ramp and S-curve of the speed reference"),
     "preload": later("torque before the brake opens, and its ramp"),
 }
 
@@ -328,7 +467,7 @@ FUNCTIONS = {
 def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
     """Where inverters have what the sheets name: names as public manuals print them, and no others."""
     text = (Path(__file__).with_name("inverters.toml")).read_text("utf-8")
-    low = min(float(np.min((sheet.rounded or sheet.exact).u)) for sheet in sheets)
+    low = min(float(np.min(_motor_torque(sheet.rounded or sheet.exact))) for sheet in sheets)
     asked = [key for key in FUNCTIONS if key != "braking" or low < 0.0]
     asked = [key for key in asked if key != "preload" or drive.brake == "motor"]
     rows, sources = list[list[Part]](), list[Part]()
@@ -354,8 +493,9 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
             said(
                 "Only names that a public manual prints; what is missing was not found there. The ramps of "
                 "the sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves "
-                "of speed) are ramps of the speed reference and do not replace them. Check the names "
-                "against the manual of your firmware."
+                "of speed) are ramps of the speed reference and do not replace them: make them shorter than "
+                "the start, so that they do not limit it. Check the names against the manual of your "
+                "firmware."
             ),
             " ",
             joined(sources, " "),
@@ -378,6 +518,8 @@ def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
             text_columns=(0, 1, 3, 4),
             class_="sheet",
         )
+        if rows and sheet.rounded is not None
+        else None
         if rows
         else tag("p", said("This strategy has no parameters.")),
         _outcome(sheet),
@@ -408,9 +550,11 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
     meaning = said(one.meaning)
     if one.name == "period":
         meaning = said("{meaning} of the control code", meaning=meaning)
-        return [name, meaning, f"≤ {short(value)}", shown, "", short(value)]
+        digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
+        most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
+        return [name, meaning, f"≤ {short(float(f'{most:.3g}'))}", shown, "", short(float(f"{value:.5g}"))]
     if one.step is None:
-        meaning = said("{meaning} (not rounded)", meaning=meaning)
+        meaning, text = said("{meaning} (not rounded)", meaning=meaning), short(float(f"{value:.4g}"))
     return [name, meaning, text, shown, other, short(float(f"{exact:.5g}"))]
 
 
@@ -460,7 +604,8 @@ def _limits(sheet: Sheet, drive: Drive) -> str:
     """The torque limits that leave this start as it is, in steps of the inverter."""
     run = sheet.rounded or sheet.exact
     rated, basis = rated_torque(drive)
-    low, high = min(float(np.min(run.u)), 0.0), float(np.max(run.u))
+    given = _motor_torque(run)
+    low, high = min(float(np.min(given)), 0.0), float(np.max(given))
     step = sheet.torque_step
     text = []
     for torque in (high, low):
@@ -487,6 +632,11 @@ def _limits(sheet: Sheet, drive: Drive) -> str:
 
 def _notes(sheet: Sheet, drive: Drive) -> list[str]:
     notes = []
+    if sheet.moved:
+        moved = listed([name.replace("_", " ") for name in sheet.moved])
+        notes.append(
+            said("Not at the nearest step, which would break the rule of section 1: {moved}.", moved=moved)
+        )
     if sheet.variants:
         notes.append(
             said(
@@ -500,6 +650,17 @@ def _notes(sheet: Sheet, drive: Drive) -> list[str]:
                 count=sheet.variants,
             )
         )
+        permitted = drive.limits.shaft_torque
+        peak = sheet.worst_k_dyn * sheet.exact.peak_torque / sheet.exact.k_dyn
+        if permitted is not None and peak > float(permitted):
+            notes.append(
+                said(
+                    "Half a step off the shaft torque may reach {peak} N m, more than the {permitted} N m "
+                    "that are permitted: set these values exactly, or finer ones.",
+                    peak=digits(peak),
+                    permitted=digits(float(permitted)),
+                )
+            )
         if math.isnan(sheet.worst_k_dyn):
             notes.append(
                 said("In at least one of them the load does not reach its target speed: set finer steps.")
@@ -535,6 +696,19 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
                 takes=digits(1e3 * rise.rise),
                 k_dyn=fixed(rise.run.k_dyn, 4),
                 time=digits(rise.run.start_time, 5),
+            )
+        )
+    if gear := sheet.gear_ramp:
+        notes.append(
+            said(
+                "ABB DCS 500B, gear backlash compensation (4000 counts of the rated torque, each 3.3 ms at "
+                "50 Hz): GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP {exact}, set "
+                "to {rounded}. The rise then takes {takes} ms, K_dyn is {k_dyn} and the start time {time} s.",
+                exact=digits(gear.exact),
+                rounded=short(gear.rounded),
+                takes=digits(1e3 * gear.rise),
+                k_dyn=fixed(gear.run.k_dyn, 4),
+                time=digits(gear.run.start_time, 5),
             )
         )
     if sheet.kind == "s-curve":

@@ -21,7 +21,7 @@ from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
-from softstart.views.printed import RPM, digits, fixed, short
+from softstart.views.printed import digits, fixed, short, units_of
 from softstart.views.starts import INTERVALS_NOTE, clipped_torque, position_notes
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ ACROSS, AT_ONCE = 3, 18  # panels side by side, and in one figure: what a page h
 LATE = 1.6  # times the median start time, up to which traces are shown
 GREY, SMALL = "#666666", 8.5
 WIDE = 7.1  # inches: what an A4 page holds
+K_DYN = r"$\mathregular{K_{dyn}}$"  # on an axis
 LONGEST = 32  # letters of a name in a figure
 
 
@@ -261,23 +262,27 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
         longest = max(
             run.start_time if run.start_time > 0.0 else run.end_time for run in (r.run for r in rows)
         )
+        units = units_of(rows[0].run.drive)
         styles = ((COLOURS[1], DASHES[0], 1.1), (COLOURS[0], DASHES[0], 2.0))[-len(rows) :]
         for row, (colour, dash, width) in zip(rows, styles, strict=True):
             run, name = row.run, name_in_figure(row.name)
             torque.plot(run.t, run.T, color=colour, ls=dash, lw=width, label=name)
             torque.plot([run.peak_time], [_peak(run)], "o", ms=4, color=colour)
-            speed.plot(run.t, run.w2 * RPM, color=colour, ls=dash, lw=width)
+            speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, ls=dash, lw=width)
         permissible = rows[0].run.drive.limits.shaft_torque
         if permissible is not None:
             torque.axhline(
                 permissible, color="#B00020", lw=1.4, ls=DASHES[1], label=said("permissible torque")
             )
-        for panel, what in ((torque, said("shaft torque, N m")), (speed, said("load speed, rpm"))):
+        torque.set_ylim(bottom=min(0.0, torque.get_ylim()[0]))  # "15 % less" is seen as that
+        labels = said("shaft torque, N m"), said("load speed, {unit}", unit=units.speed)
+        for panel, what in zip((torque, speed), labels, strict=True):
             panel.set_xlim(0.0, 1.1 * longest)
             panel.set_ylabel(what, fontsize=SMALL)
             panel.set_xlabel(said("time, s"), fontsize=SMALL)
             panel.tick_params(labelsize=SMALL - 0.5)
-        speed.axhline(float(rows[0].run.drive.target_speed) * RPM, color=GREY, lw=0.8, ls=":")
+        target = units.shown(float(rows[0].run.drive.target_speed), "rad/s")
+        speed.axhline(target, color=GREY, lw=0.8, ls=":")
         figure.legend(
             handles=torque.get_legend_handles_labels()[0], loc="outside upper left", ncols=3, fontsize=SMALL
         )

@@ -75,7 +75,7 @@ def scheme_svg(chain: Chain) -> str:
         text(24.0, 523.0 + 15.0 * i, said(line), 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)
     ]
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="550" '
+        f'<svg class="scheme" xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="550" '
         f'viewBox="0 0 {width:.0f} 550" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
         f'<rect width="100%" height="100%" fill="white"/>\n'
         + "\n".join([*heading, *parts, *foot])

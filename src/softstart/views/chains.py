@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.language import later, said
-from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure
+from softstart.views.drawing import COLOURS, DASHES, SHAFTS, drawing, entitle, new_figure
 from softstart.views.drives import POSITIONS
 from softstart.views.numbers import Table, column_of, first_of, number, printable, short
+from softstart.views.printed import units_of
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain
@@ -426,12 +427,13 @@ def run_figure(run: ChainRun) -> Any:
     """Shaft torques with their located peaks, speeds of the masses, and where each twist is in its gap."""
     masses = [mass.name for mass in run.chain.masses]
     shafts = [f"{a} - {b}" for a, b in pairwise(masses)]
-    gap = run.chain.at_motor_shaft().gap
+    gap, units = run.chain.at_motor_shaft().gap, units_of(run.chain)
     with drawing():
         figure, (torque, speed, twist) = new_figure(3, size=(8.0, 7.5), sharex=True)
+        entitle(figure, said("{name}, at the motor shaft", name=run.chain.name))
         torque.plot(run.t, run.u, color="black", lw=1.0, label=said("motor"))
         for k, name in enumerate(shafts):
-            style = {"color": COLOURS[k % len(COLOURS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
+            style = {"color": SHAFTS[k % len(SHAFTS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
             torque.plot(run.t, run.T[:, k], label=name, **style)
             at = run.at(run.peak_times[k])["T"][k]
             torque.plot(run.peak_times[k], at, "o", ms=4, color=style["color"])
@@ -439,18 +441,17 @@ def run_figure(run: ChainRun) -> Any:
                 twist.plot(run.t, 2.0 * run.twist[:, k] / gap[k], label=name, **style)
         for i, name in enumerate(masses):
             colour, dash = COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]
-            speed.plot(run.t, run.w[:, i], color=colour, ls=dash, label=name)
+            speed.plot(run.t, units.shown(run.w[:, i], "rad/s"), color=colour, ls=dash, label=name)
         for flank in (-1.0, 1.0):
             twist.axhline(flank, color="black", lw=0.8)
         torque.set_ylabel(said("torque, N m"))
-        speed.set_ylabel(said("speed, rad/s"))
+        speed.set_ylabel(said("speed, {unit}", unit=units.speed))
         twist.set_ylabel(said("twist over half the gap"))
         twist.set_xlabel(said("time, s"))
-        torque.set_title(said("{name}, at the motor shaft", name=run.chain.name))
         few = len(masses) <= 8  # else their names would cover the curves
         for axes in (torque, speed, twist):
             if axes.get_legend_handles_labels()[0] and few:
-                axes.legend(fontsize=7.5, ncols=2, loc="best")
+                axes.legend(fontsize=7.5, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
             elif axes.get_legend_handles_labels()[0]:
                 axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

@@ -30,6 +30,7 @@ else:
 
 # Okabe-Ito: told apart by colour-blind readers and in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
+SHAFTS = tuple(COLOURS[k] for k in (0, 2, 4, 3, 5, 7))  # of a chain; the motor has another one
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0, (8, 2)))
 GREY, SMALL = "#666666", 9.5
 GAP_SHADE = "#E8ECEF"

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from softstart.chain.model import Chain
+from softstart.drive import Drive
+from softstart.quantities import Units
 from softstart.views import numbers
 
 MINUS, NOTHING = "\N{MINUS SIGN}", "\N{EN DASH}"
@@ -57,6 +61,18 @@ def unit(written: str) -> str:
     ('N m', 'rad/s')
     """
     return UNITS.get(written, written.replace("*", " "))
+
+
+def units_of(machine: Drive | Chain) -> Units:
+    """The units in which angles and speeds of a machine are seen: those that it names, else as it has them.
+
+    >>> units_of(Drive.load("hoist-15kw")), units_of(Drive.load("servo-axis-small")).angle
+    (Units(angle='deg', speed='rpm', diameter=0.0), ...)
+    """
+    of: Any = machine
+    gaps = [shaft.gap for shaft in of.shafts] if isinstance(machine, Chain) else [of.gap]
+    speeds = [] if of.target_speed is None else [of.target_speed]
+    return Units.read(machine.units, map(float, gaps), map(float, speeds))
 
 
 def percent(share: float, decimals: int = 1) -> str:

@@ -20,6 +20,7 @@ from softstart.views.drawing import (
     DASHES,
     GREY,
     MARKERS,
+    SHAFTS,
     drawing,
     entitle,
     head,
@@ -441,7 +442,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
                 label=said("motor") if chain else said("motor torque u"),
             )
             for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
-                panel.plot(run.t, torque, color=COLOURS[2 * k % len(COLOURS)], label=name)
+                panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], label=name)
             panel.set_title(
                 said(
                     "{name}:  K_dyn {k_dyn:.3f},  start {time:.4f} s",

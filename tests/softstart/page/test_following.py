@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 from typing import Any
 
 import pytest
@@ -14,10 +15,14 @@ from softstart import simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.drive import PARAMETERS
+from softstart.page import links
 from softstart.page.controls import Controls
+from softstart.page.downloads import command_text
 from softstart.page.frames import Screen
 from softstart.page.live import GLANCES, WINDOW, Live
+from softstart.page.machines import here, values_of
 from softstart.page.session import Session
+from softstart.quantities import parse
 
 
 class Line:
@@ -186,7 +191,7 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     assert session.drive.gap == 0.5
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
-    assert screen.first()["fields"]["shaft.gap"][:3] == ["4 deg", 21, "0.06981 rad"]
+    assert screen.first()["fields"]["shaft.gap"][:3] == ["4", 21, "0.06981 rad"]
 
 
 def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
@@ -253,8 +258,59 @@ def test_a_slider_sets_exactly_the_value_that_its_field_shows():
         controls.take({"what": "slide", "path": path, "position": 300})
         assert not screen.mistakes, path
         text, position, _, _ = screen.first()["fields"][path]
-        assert float(text) == scale.value(300)
+        value, si = values_of(session.machine)[path][1], screen.si(path)
+        assert parse(screen.units.typed(text, si), si) == value == pytest.approx(scale.value(300), rel=1e-3)
         assert position == pytest.approx(300, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("machine", "gap"), [("crane-4amtkf", "shaft.gap"), ("crane-4-mass", "shaft[1].gap")]
+)
+def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
+    """In fields, sliders, plots, map, link and command; a bare number is one of them, and stays it."""
+    session = Session(machine, controllers=["direct", "ramp"])
+    controls, screen = controls_of(session)
+    loaded = session.origin
+    assert (screen.units.angle, screen.units.speed) == ("rad", "rpm")  # as its file has them
+    controls.take({"what": "edit", "path": "units", "text": "deg, rad/s"})
+    frame = screen.first()
+    rows = {row["path"]: row for group in frame["groups"] for row in group["rows"]}
+    assert (rows[gap]["unit"], rows["start.target_speed"]["unit"]) == ("deg", "rad/s")
+    first = values_of(loaded)[gap][1]
+    assert float(frame["fields"][gap][0]) == pytest.approx(math.degrees(first), rel=1e-5)
+    assert values_of(session.machine)[gap][1] == first  # only what is typed changes
+    assert frame["traces"]["direct"]["units"]["angle"] == "deg"
+    assert frame["here"][0] == pytest.approx(math.degrees(here(loaded)[0]), rel=1e-12)
+
+    controls.take({"what": "edit", "path": gap, "text": "4"})
+    assert values_of(session.machine)[gap][1] == parse("4 deg", "rad")
+    controls.take({"what": "slide", "path": gap, "position": 77})
+    text = screen.first()["fields"][gap][0]
+    assert len(text) <= 5
+    assert f'"{text} deg"' in session.machine.to_toml()
+    assert f"{gap}={text}deg" in command_text(session.machine, {"direct": make_controller("direct")})
+    assert links.bench_of(links.link_of(session), session.bench).drive == session.machine
+    controls.take({"what": "jump", "gap": 30.0, "inertia": here(loaded)[1]})
+    assert screen.first()["here"][0] == pytest.approx(30.0, rel=1e-6)
+    session.undo()
+    session.undo()
+    session.undo()
+    session.undo()
+    assert (session.machine, screen.units.angle) == (loaded, "rad")
+
+    controls.take({"what": "edit", "path": "units", "text": "mm on 80 mm"})
+    controls.take({"what": "edit", "path": gap, "text": "0.3"})
+    assert values_of(session.machine)[gap][1] == 0.0075
+    controls.take({"what": "edit", "path": "units", "text": "cubits"})
+    assert 'write for example "deg, rpm"' in screen.mistakes["units"]
+
+
+def test_a_unit_that_was_typed_is_that_of_the_page_and_stays_at_a_gap_of_0():
+    session = Session("hoist-15kw", controllers=["direct"])
+    controls, screen = controls_of(session)
+    assert screen.units.angle == "deg"
+    controls.take({"what": "slide", "path": "shaft.gap", "position": 0})
+    assert (session.drive.gap, screen.units.angle) == (0.0, "deg")
 
 
 def test_parameters_of_the_selected_strategy_are_fields():
@@ -307,9 +363,8 @@ def test_every_strategy_shows_the_values_that_it_starts_with():
         for path, (text, *_) in shown.items():
             if path.startswith("strategy."):
                 value = own[path.removeprefix("strategy.")]
-                assert (
-                    text == value if isinstance(value, str) else float(text) == pytest.approx(value, rel=1e-3)
-                )
+                seen = value if isinstance(value, str) else screen.units.shown(value, screen.si(path))
+                assert text == seen if isinstance(seen, str) else float(text) == pytest.approx(seen, rel=1e-3)
         assert {path for path in shown if path.startswith("strategy.")} == screen.strategy_paths()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from itertools import product
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from softstart.controller import make_controller
 from softstart.page.frames import CHANNELS, Screen, drawn, landmarks, thinned, traces_of
 from softstart.page.machines import STEPS, Scale, axes_about, k_dyn_row, scales_about
 from softstart.page.session import Session
+from softstart.quantities import Units
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -90,13 +92,14 @@ def test_the_limit_of_the_map_is_the_permissible_torque_over_the_mean_one(kept):
 
 def test_packed_traces_come_back_to_single_precision():
     found = Session(controllers=["direct"]).result("direct")
-    for whole in (True, False):
-        picture = drawn(found, whole)
+    for units, whole in product((Units(), Units("deg", "rpm")), (True, False)):
+        picture = drawn(found, units, whole)
         assert (picture["channels"] == ["t", "T"]) is not whole
         rows = np.frombuffer(base64.b64decode(picture["data"]), dtype="<f4")
         traces = traces_of(found.run)
         for name, row in zip(picture["channels"], rows.reshape(len(picture["channels"]), -1), strict=True):
-            assert np.array_equal(row, traces[name].astype("f4"))
+            si = {"w": "rad/s", "t": "rad"}.get(name[0], "") if len(name) > 1 else ""
+            assert np.array_equal(row, units.shown(traces[name], si).astype("f4"))
 
 
 @pytest.mark.parametrize("controller", ["direct", "shaped", "current-limit-feedback"])

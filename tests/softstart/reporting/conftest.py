@@ -12,6 +12,11 @@ COMMAND = "softstart report '<b>.toml' --out report.html"
 STEPS = "torque=0.5%,time=10ms,speed=2rpm,share=5%"
 
 
+def untypeset(page: str) -> str:
+    """A page without what only the eye needs: indices, and spaces at which no line ends."""
+    return page.replace("\N{NO-BREAK SPACE}", " ").replace("K<sub>dyn</sub>", "K_dyn")
+
+
 @pytest.fixture(scope="session")
 def hostile() -> Report:
     """A report whose every text from outside tries to break out; all strategies but the costly ones."""

@@ -54,7 +54,7 @@ def test_verdicts_are_the_margins_of_the_rule(made):
     point = Page(document.document(replaced(made, decimal="point")))
     (table,) = [rows for rows in point.tables if rows[0][-1] == "verdict" and "margin" in rows[0]]
     wanted = [
-        ["fail" if margin.share < 0.0 else "pass", row.name, f"{100.0 * margin.share:.1f}\N{NO-BREAK SPACE}%"]
+        ["fail" if margin.share < 0.0 else "pass", row.name, f"{100.0 * margin.share:.1f} %"]
         for row in before_and_after(made.choice, made.comparison)
         for margin in row.margins(HOIST.limits)
     ]
@@ -133,7 +133,7 @@ def test_each_inverter_has_a_source_and_only_functions_that_are_known():
     for family in families:
         assert set(family) <= {"name", "source", *sheet.FUNCTIONS}
         assert re.search(r"p\. \d+", family["source"]), family["name"]
-        assert "limit" in family
+        assert {"limit", "backlash"} & set(family)
 
 
 def test_preload_of_the_brake_is_named_only_where_there_is_a_brake(made, page):

@@ -12,7 +12,7 @@ from softstart.reporting.markup import VOID, css_string, inlined
 from softstart.views.fatigue import factor
 from softstart.views.numbers import plain
 
-from .conftest import COMMAND, HOSTILE
+from .conftest import COMMAND, HOSTILE, untypeset
 
 OPEN = VOID | {"path", "use", "rect", "line", "polyline"}
 
@@ -24,7 +24,7 @@ class Page(HTMLParser):
         super().__init__()
         self.elements, self.ids, self.attributes, self.text, self.inside = Counter(), [], [], [], []
         self.tables, self.cells = [], None
-        self.feed(text)
+        self.feed(untypeset(text))
         assert self.inside == []
 
     def handle_startendtag(self, name, attributes):

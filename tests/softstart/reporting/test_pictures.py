@@ -16,6 +16,7 @@ from softstart.reporting.limit import Limit, limit_figure
 from softstart.reporting.markup import Figures
 from softstart.reporting.robustness import maps_figure
 from softstart.reporting.strategies import _frame, traces_figure, traces_section
+from softstart.views.printed import units_of
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -52,20 +53,22 @@ def test_names_in_figures_are_taken_literally():
 
 def test_a_single_strategy_has_a_limit_figure():
     choice = report(CRANE, controllers=["direct"], budget=0.0).choice
-    left, right = limit_figure(choice, Limit()).axes[0].get_xlim()
+    left, right = limit_figure(choice.rows, [], Limit()).axes[0].get_xlim()
     assert left <= choice.chosen.row.run.start_time <= right
 
 
 def test_small_inertias_stand_in_powers_that_keep_their_labels_apart():
     servo = Drive.load("servo-axis-small")
     made = report(servo, controllers=["direct"], budget=0.0)
-    one = made.choice.of("direct")
-    axes = maps_figure([(one.name, one.map)], (one.map.gaps[2], one.map.inertias[3])).axes[0]
+    one, units = made.choice.of("direct"), units_of(servo)
+    axes = maps_figure([(one.name, one.map)], (one.map.gaps[2], one.map.inertias[3]), units).axes[0]
     labels = [tick.get_text() for tick in axes.get_xticklabels()]
     assert labels == ["52", "78", "104", "130", "162"]
     assert "10^{-6}" in axes.get_xlabel()
     assert all(len(text) <= 5 for text in labels)
-    assert math.isclose(float(axes.get_yticklabels()[2].get_text()), float(servo.gap), rel_tol=5e-3)
+    assert math.isclose(
+        float(axes.get_yticklabels()[2].get_text()), units.shown(servo.gap, "rad"), rel_tol=5e-3
+    )
 
 
 @pytest.mark.parametrize("drive", ["tiny", "huge", "crane-4amtkf", "servo-axis-small", "nordin-servo-60kw"])

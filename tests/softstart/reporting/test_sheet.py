@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, simulate
+from softstart import Drive, InputError, compare, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.reporting import Resolution, report
@@ -79,6 +79,27 @@ def test_gains_tuned_for_another_drive_keep_its_numbers():
     values = {one.name: one.rounded for one in sheet.settings}
     assert sheet.name == "shaped (mine)"
     assert sheet.rounded.k_dyn == simulate(crane, "shaped", parameters=values, fitted_to=light).k_dyn
+
+
+@pytest.mark.parametrize(
+    ("step", "time", "moved"),
+    [("10ms", 0.11, ()), ("80ms", 0.16, ("time",)), ("1s", None, ())],
+)
+def test_a_sheet_keeps_the_rule_by_which_its_strategy_was_chosen(step, time, moved):
+    """With the worn gap a ramp in 80 ms exceeds the limit; one in a second is slow: neither is printed."""
+    drive = Drive.load("crane-4amtkf").replace(permissible_torque=193.0)
+    made = report(drive, controllers=["direct", "ramp"], resolution=f"time={step}", budget=0.0)
+    (sheet,) = made.sheets
+    assert (sheet.name, sheet.moved) == ("ramp", moved)
+    if time is None:
+        assert sheet.rounded is None
+        assert "takes 2.27 times as long as direct start" in sheet.failure
+        assert made.summary()["sheets"][0]["settings"][1]["rounded"] is None
+        assert ">set to<" not in made.to_html()
+        return
+    assert sheet.rounded.controller.time == pytest.approx(time)
+    worn = compare(drive, [sheet.rounded.controller]).rows[0]
+    assert all(margin.kept for margin in worn.margins(drive.limits))
 
 
 def test_torque_is_not_rounded_beyond_the_motor():
@@ -175,6 +196,17 @@ def test_the_time_from_0_to_100_percent_is_rounded_and_started_too(name):
     assert (rise.run.k_dyn, rise.run.start_time) == (again.k_dyn, again.start_time)
     notes = " ".join(_notes(sheet, drive))
     assert f"Set to 50 ms the rise takes {1e3 * rise.rise:.1f} ms, K_dyn is {again.k_dyn:.4f}" in notes
+
+
+def test_a_ramp_is_started_as_the_gear_backlash_compensation_of_an_inverter_counts_it():
+    _, sheet = sheet_of("ramp", "time=1ms")
+    gear, settings = sheet.gear_ramp, {one.name: one.rounded for one in sheet.settings}
+    rise = settings["full_torque"] - settings["initial"]
+    step = gear.rounded / 4000.0 * rated_torque(sheet.own)[0]  # N m in each cycle of 3.3 ms
+    assert gear.rise == pytest.approx(rise / step * 3.3e-3)
+    assert gear.run.controller.time == gear.rise
+    assert any("GEAR.TORQ RAMP" in note for note in _notes(sheet, sheet.own))
+    assert sheet_of("s-curve", "time=1ms")[1].gear_ramp is None
 
 
 def test_torque_limits_are_multiples_that_leave_the_start_alone():

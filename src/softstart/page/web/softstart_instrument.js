@@ -8,6 +8,7 @@ export default {
     <strong class="brand">softstart</strong>
     <span class="drive-name"></span>
     <span class="steps" role="group" aria-label="Undo and redo"></span>
+    <div class="units fields"></div>
     <span class="pulse" title="From the slider to the drawn picture, and pictures in the last second"></span>
     <div class="theme" role="radiogroup" aria-label="Colours"></div>
   </header>

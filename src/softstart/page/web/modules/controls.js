@@ -4,8 +4,9 @@ import { element } from "./numbers.js";
 const STEPS = 600;
 
 export class Controls {
-  constructor(place, own, say) {
+  constructor(place, own, head, say) {
     this.say = say;
+    this.head = head;
     this.rows = new Map();
     this.own = own;
     this.groups = place.appendChild(element("div"));
@@ -20,7 +21,8 @@ export class Controls {
   // the parameters of the drive or chain, in place of those of the one before
   machine(groups) {
     for (const path of this.rows.keys()) if (!path.startsWith("strategy.")) this.rows.delete(path);
-    this.groups.replaceChildren(...groups.map(({ title, rows, folded }) => {
+    this.head.replaceChildren(...groups.filter(({ head }) => head).flatMap(({ rows }) => rows.flatMap((row) => this.row(row))));
+    this.groups.replaceChildren(...groups.filter(({ head }) => !head).map(({ title, rows, folded }) => {
       const box = this.box(title, rows);
       if (!folded) return box;
       box.firstChild.remove();

@@ -6,7 +6,7 @@ const FACTS = [
   ["time_lost", "after direct", "s", (f) => fixed(f.time_lost, 4)],
   ["peak_torque", "peak torque", "N m", (f) => significant(f.peak_torque, 5)],
   ["base", "mean torque", "N m", (f) => significant(f.base, 5)],
-  ["impact_speed", "first impact", "rad/s", (f) => significant(f.impact_speed, 4)],
+  ["impact_speed", "first impact", "", (f) => significant(f.impact_speed, 4)],
   ["contacts", "contacts", "", (f) => (f.contacts ?? "\u2013").toString()],
 ];
 
@@ -22,7 +22,9 @@ export class Figure {
     for (const [key, label, unit] of FACTS) {
       const value = element("dd", {}, "");
       this.facts.set(key, value);
-      list.append(element("div", {}, element("dt", {}, label), value, element("dd", { class: "unit" }, unit)));
+      const of = element("dd", { class: "unit" }, unit);
+      if (key === "impact_speed") this.speed = of;
+      list.append(element("div", {}, element("dt", {}, label), value, of));
     }
     const head = element("div", { class: "head" }, element("div", { class: "caption" }, "K", element("sub", {}, "dyn")), this.value);
     place.append(element("div", { class: "of" }, this.name, keep), head, list, this.status);
@@ -38,6 +40,7 @@ export class Figure {
       const shown = text(figure);
       if (place.textContent !== shown) place.textContent = shown;
     }
+    if (figure.speed_unit && this.speed.textContent !== figure.speed_unit) this.speed.textContent = figure.speed_unit;
     this.said = figure.reached ? figure.position : figure.status;
     this.tell();
   }

@@ -22,7 +22,7 @@ export class Instrument {
     const say = (message) => this.say(message);
     this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
     this.scheme = new Scheme(root.querySelector(".controls"));
-    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), say);
+    this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), root.querySelector(".units"), say);
     this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"), say);
     this.table = new Table(root.querySelector(".strategies"), this.theme, say);

@@ -178,7 +178,7 @@ export class GapMap {
     const k = this.rows[node[1]]?.[node[0]];
     const other = this.pinned ? this.pinned.rows[node[1]]?.[node[0]] : undefined;
     const against = other === undefined || this.pinned.head.strategy === this.head.strategy ? "" : ` (${this.pinned.head.strategy}: ${fixed(other, 3)})`;
-    this.said.textContent = `${this.head.symbols[0]} ${significant(this.head.gaps[node[0]], 4)} rad   ${this.head.symbols[1]} ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}${against}`;
+    this.said.textContent = `${this.head.symbols[0]} ${significant(this.head.gaps[node[0]], 4)} ${this.head.unit}   ${this.head.symbols[1]} ${significant(this.head.inertias[node[1]], 4)} kg m\u00b2   K ${fixed(k, 3)}${against}`;
   }
 
   walk(event) {
@@ -317,7 +317,7 @@ export class GapMap {
     for (const mark of marks) {
       pen.fillText(label(mark, marks.digits), this.place(mark, inertias[0])[0], box.y + box.h + 14);
     }
-    pen.fillText(`${this.head.labels[0]}, rad`, box.x + box.w / 2, box.y + box.h + 29);
+    pen.fillText(`${this.head.labels[0]}, ${this.head.unit}`, box.x + box.w / 2, box.y + box.h + 29);
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     for (let row = 0; row < inertias.length; row += Math.max(1, Math.round(inertias.length / Math.max(2, box.h / 34)))) {

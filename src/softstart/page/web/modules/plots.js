@@ -465,7 +465,7 @@ export class Plots {
     const range = this.ranges[1].fit(low, high);
     Object.assign(panel, { low: range.low, high: range.high });
     this.shade(panel, main.stages);
-    this.frame(panel, range, "Speed", "rad/s");
+    this.frame(panel, range, "Speed", main.units.speed);
     const between = many(main) && main.bodies.length > 2 ? [["between", quiet, [], 0.7]] : [];
     this.legend(panel, [...between, ["motor \u03c9\u2081", ink, [5, 3], 1.2], ["load \u03c9\u2082", own, [], 2.2]]);
     this.inside(panel, () => {
@@ -489,7 +489,7 @@ export class Plots {
     const range = this.ranges[2].fit(low, high);
     Object.assign(panel, { low: range.low, high: range.high });
     this.shade(panel, main.stages);
-    this.frame(panel, range, "Twist \u03c6\u2081 \u2212 \u03c6\u2082, flanks dashed", "rad");
+    this.frame(panel, range, "Twist \u03c6\u2081 \u2212 \u03c6\u2082, flanks dashed", main.units.angle);
     this.legend(panel, [["gap open", shade, [], 10]]);
     this.inside(panel, () => {
       this.level(panel, half, quiet);
@@ -543,10 +543,10 @@ export class Plots {
     if (many(main)) among.unshift(...main.shafts.map(({ name, T }) => [this.own(state), name, own(T), ""]));
     const twists = many(main)
       ? main.shafts.filter(({ gap }) => gap > 0).map(({ gap, T, theta }) => ["", `\u03b8${below(Number(T.slice(2, -1)) + 1)}`, own(theta), ""])
-      : [["", "\u03b8", own("theta"), "rad"]];
+      : [["", "\u03b8", own("theta"), main.units.angle]];
     const texts = [
       [["", "t", t, "s"], ["", "T", own("T"), "N m"], ["", "u", own("u"), "N m"]],
-      [["", "\u03c9\u2081", own("w1"), ""], ["", "\u03c9\u2082", own("w2"), "rad/s"]],
+      [["", "\u03c9\u2081", own("w1"), ""], ["", "\u03c9\u2082", own("w2"), main.units.speed]],
       twists,
     ];
     panels.forEach((panel, index) => {
@@ -597,11 +597,13 @@ export class Plots {
     unpackAll(state);
     const [from, to] = this.seen;
     const main = state.traces.get(state.selected);
+    const { angle, speed } = main.units;
     const parts = many(main)
-      ? [...main.shafts.flatMap(({ name, T, theta }) => [[T, `T ${name} [N m]`], [theta, `twist ${name} [rad]`]]), ...main.bodies.map(({ name, w }) => [w, `w ${name} [rad/s]`])]
+      ? [...main.shafts.flatMap(({ name, T, theta }) => [[T, `T ${name} [N m]`], [theta, `twist ${name} [${angle}]`]]), ...main.bodies.map(({ name, w }) => [w, `w ${name} [${speed}]`])]
       : [];
     const channels = ["t", "T", "u", "w1", "w2", "theta", ...parts.map(([channel]) => channel)];
-    const heads = ["strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_rad_s,load_speed_rad_s,twist_rad", ...parts.map(([, head]) => quoted(head))];
+    const [w, a] = [speed, angle].map((unit) => unit.replace("/", "_"));
+    const heads = [`strategy,time_s,shaft_torque_Nm,motor_torque_Nm,motor_speed_${w},load_speed_${w},twist_${a}`, ...parts.map(([, head]) => quoted(head))];
     const lines = [heads.join(",")];
     const drawn = state.order.filter((one) => one === state.selected || state.shown.includes(one));
     const traces = drawn.map((name) => [name, state.traces.get(name)]);

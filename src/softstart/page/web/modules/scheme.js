@@ -83,7 +83,7 @@ export class Scheme {
     const given = known ? Math.abs(valueAt(trace, "u", t)) / (trace.largest_u ??= Math.max(...trace.u.map(Math.abs)) || 1) : 0.5;
     this.parts.torque.style.strokeWidth = 0.6 + 1.8 * given;
     this.turning.forEach((line, i) => {
-      const angle = known ? angleAt(trace, trace.bodies[this.ends[i]].w, t) : 0;
+      const angle = known ? trace.units.turn * angleAt(trace, trace.bodies[this.ends[i]].w, t) : 0;
       line.setAttribute("d", known ? turned(this.bodies[i], angle) : "");
     });
     const all = (name) => states.map((state) => (name === "share" ? state.share.toFixed(4) : state[name])).join(" ");

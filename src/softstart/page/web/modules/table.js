@@ -29,7 +29,7 @@ export class Table {
     });
     this.heads = heads;
     const first = element("th", { scope: "col", class: "eye" }, element("span", { class: "hidden" }, "drawn"));
-    const last = element("th", { class: "bar-head", scope: "col" }, element("span", {}, "K, line at 1"));
+    const last = element("th", { class: "bar-head", scope: "col" }, element("span", {}, "K (line: 1)"));
     const head = element("tr", {}, first, ...heads, last);
     place.append(element("table", {}, element("thead", {}, head), this.body, this.foot()));
   }

@@ -47,7 +47,7 @@ export function extent(trace, channel, [from, to], low = Infinity, high = -Infin
   return [low, high];
 }
 
-// angle of a body since the start, rad: its speed summed up
+// angle of a body since the start: its speed summed up
 export function angleAt(trace, channel, t) {
   const sums = ((trace.sums ??= {})[channel] ??= summed(trace.t, trace[channel]));
   const i = Math.min(indexAt(trace.t, t), sums.length - 1);
