@@ -96,9 +96,9 @@ BUDGET = {
     # names of functions of inverters, what is assumed; 370 and a file: the report of a chain
     # 15: lives of its shafts, parameters with their units
     # 630 and a file: sentences are templates, a value a line; translations of them
-    # 165: limit, optimum and parameter sheet of a chain; 110: sheets that keep the rule; 30: the ramp of a gear
-    # backlash function; 120: units of the user, indices and spaces as printers set them
-    "reporting": (4860, 16, 4, 0),
+    # 165: limit, optimum and parameter sheet of a chain; 110: sheets that keep the rule; 30: the ramp of a
+    # gear backlash function; 120: units of the user, indices and spaces as printers set them
+    "reporting": (4865, 16, 4, 0),
     "stages": (680, 6, 1, 0),
     # the worst of several positions, release of a brake, torque cut off; 500 and a file: `fatigue`; 60:
     # silent controllers are named, figures of long starts are taken in turns; 450 and a file: settled times,

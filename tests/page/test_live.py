@@ -441,6 +441,20 @@ def test_a_parameter_of_a_strategy_follows_its_slider_and_goes_back_to_its_defau
     wait_for_k(page, simulate(CRANE, "ramp").k_dyn)
 
 
+def test_a_printed_page_has_plots_table_and_data_within_its_width(page):
+    """Nothing that is pressed is on paper; the picture of it was looked at."""
+    at_rest(opened(page))
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 700, "height": 990})  # A4 without its margins
+    for part in (".plots canvas", ".map canvas", ".strategies table", ".advice", ".controls", ".figure"):
+        place = page.locator(part).bounding_box()
+        assert place["width"] > 150, part
+        assert place["x"] + place["width"] <= 700, part
+    for part in (".panels", ".player", ".theme", ".steps", '[data-path="shaft.gap"] input[type=range]'):
+        assert not page.locator(part).is_visible(), part
+    assert page.evaluate("document.documentElement.scrollWidth") <= 700
+
+
 def test_colours_follow_the_system_and_the_switch(page):
     page.emulate_media(color_scheme="dark")
     opened(page)

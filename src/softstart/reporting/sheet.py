@@ -702,8 +702,9 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
         notes.append(
             said(
                 "ABB DCS 500B, gear backlash compensation (4000 counts of the rated torque, each 3.3 ms at "
-                "50 Hz): GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP {exact}, set "
-                "to {rounded}. The rise then takes {takes} ms, K_dyn is {k_dyn} and the start time {time} s.",
+                "50 Hz): GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP {exact}, "
+                "set to {rounded}. The rise then takes {takes} ms, K_dyn is {k_dyn} and the start time "
+                "{time} s.",
                 exact=digits(gear.exact),
                 rounded=short(gear.rounded),
                 takes=digits(1e3 * gear.rise),

@@ -52,7 +52,7 @@ TOML = [
     ("[motor]", "gap = 0.5\n[motor]", "gap = 0.5: ", "gap belongs below [shaft]"),
     ("[motor]", "load_kind = 'active'\n[motor]", 'load_kind = "active": ', "written kind, below [load]"),
     ("[motor]", "nam = 'x'\n[motor]", 'nam = "x": ', "did you mean name?"),
-    ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, [motor], [shaft]"),
+    ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, units, [motor]"),
     ("[motor]", "clutch = 3\n[motor]", "clutch = 3: ", "has no key clutch"),
 ]  # fmt: skip
 

@@ -93,7 +93,7 @@ PYTHON = [
     ("J1", 1, "J1 = 1: ", "did you mean motor_inertia?"),
     ("inertia", 1, "inertia = 1: ", "did you mean motor_inertia or load_inertia?"),
     ("Load_Kind", "active", 'Load_Kind = "active": ', "did you mean load_kind?"),
-    ("colour", "red", 'colour = "red": ', "the names are name, source, motor_inertia"),
+    ("colour", "red", 'colour = "red": ', "the names are name, source, units, motor_inertia"),
     ("motor_inertia", 1e-320, "motor_inertia = 1e-320: ", "must be between 1e-30 and 1e+30"),
     ("stiffness", 5e-324, "stiffness = 5e-324: ", "must be between 1e-30 and 1e+30"),
 ]  # fmt: skip
@@ -155,7 +155,7 @@ SETTINGS = [
     ("inertia=1", "inertia=1: ", "did you mean motor.inertia or load.inertia?"),
     ("J2=1", "J2=1: ", "did you mean load.inertia?"),
     ("load=1", "load=1: ", "load is a table, name one of its keys, such as load.inertia"),
-    ("zzz.yyy=1", "zzz.yyy=1: ", "there are name, source, motor.inertia"),
+    ("zzz.yyy=1", "zzz.yyy=1: ", "there are name, source, units, motor.inertia"),
     ("load.kind=reactve", 'load.kind = "reactve": ', 'did you mean "reactive"?'),
     ("shaft.gap=2 m", 'shaft.gap = "2 m": ', "m is a length"),
     ("shaft.gap=0.5,2", 'shaft.gap = "0.5,2": ', "decimal point"),

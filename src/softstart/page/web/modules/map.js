@@ -6,7 +6,7 @@ import { element, fixed, label, sharp, significant, ticks } from "./numbers.js";
 const STOPS = [[0, 34, 78], [42, 63, 109], [87, 93, 109], [112, 113, 115], [138, 134, 120], [165, 156, 116], [195, 179, 105], [225, 204, 85], [254, 232, 56]];
 // gentler is blue, harsher is red, equal is white
 const WAYS = [[33, 102, 172], [103, 169, 207], [209, 229, 240], [247, 247, 247], [253, 219, 199], [239, 138, 98], [178, 24, 43]];
-const LEFT = 52, RIGHT = 46, TOP = 8, BOTTOM = 34;
+const LEFT = 60, RIGHT = 46, TOP = 8, BOTTOM = 34;
 const K = {
   stops: STOPS,
   share: (k) => Math.log(k / 0.75) / Math.log(8),
