@@ -163,7 +163,8 @@ def scheme(drive: Drive, prefix: str) -> Html:
     parts += _shaft(x, spring, coil, c, damper)
     x += spring + 24.0
     if gap > 0.0:
-        label = said("gap {gap} {unit}", gap=digits(units.shown(gap, "rad")), unit=units.angle)
+        seen = short(float(f"{units.shown(gap, 'rad'):.4g}"))
+        label = said("gap {gap} {unit}", gap=seen, unit=units.angle)
         room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
         parts += _claw(x, room, opening, float(drive.assumed.theta0) / gap, label)
         x += room

@@ -472,10 +472,14 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
     asked = [key for key in asked if key != "preload" or drive.brake == "motor"]
     rows, sources = list[list[Part]](), list[Part]()
     for number, family in enumerate(tomllib.loads(text)["family"], start=1):
+        named = [key for key in asked if key in family]
         rows += [
-            [f"{family['name']} [{number}]", said(FUNCTIONS[key]), tag("code", family[key])]
-            for key in asked
-            if key in family
+            [
+                f"{family['name']} [{number}]" if key == named[0] else "",
+                said(FUNCTIONS[key]),
+                tag("code", family[key]),
+            ]
+            for key in named
         ]
         sources.append(tag("code", f"[{number}] {family['source']}."))
     return tag(
