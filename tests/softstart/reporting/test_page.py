@@ -125,7 +125,7 @@ def test_numbers_are_those_of_compare(read, hostile):
         assert cells["K_dyn, J2 \N{MULTIPLICATION SIGN} 0.4"] == f"{row.k_dyn_light_load:.3f}"
         assert float(cells["start time, s"]) == pytest.approx(row.run.start_time, rel=1e-3)
         assert float(cells["peak torque, N m"]) == pytest.approx(row.run.peak_torque, rel=1e-3)
-        lost = float(cells["time lost, s"].replace("\N{MINUS SIGN}", "-"))
+        lost = float(cells["later, s"].replace("\N{MINUS SIGN}", "-"))
         assert lost == pytest.approx(row.time_lost, abs=1e-4)
 
 
