@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.chain import kernel_start as kernel
 from softstart.chain.kernel_records import SHAFT, Numbers, numbers
 from softstart.chain.model import Chain
 from softstart.chain.run import ChainRecorder, mean_torque_of
 from softstart.chain.simulation import check_end, drive_of
-from softstart.controller.base import CompiledController, Controller, Sensor
+from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -22,7 +24,7 @@ from softstart.late import late
 from softstart.plant import layout
 from softstart.plant.start import N_MEASURED, NEW_STATE
 from softstart.processes import Pool
-from softstart.start.batch import figures
+from softstart.start.batch import Figures, figures, margins
 from softstart.start.engine import MAX_EVENTS, check_limits, run_one, watched
 
 if TYPE_CHECKING:
@@ -40,8 +42,11 @@ FIGURES = (
     "end_time",
     "torque_excess",
     "torque_excess_time",
-    "status",
+    "gap_events",
 )
+LATEST = ("start_time", "torque_excess", "torque_excess_time")  # of several positions the largest counts
+
+Rows = NDArray[np.int64]
 
 
 def simulate_chains(
@@ -111,111 +116,219 @@ def simulate_chains(
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
     made = make_controller(controller, parameters)
-    owners = [i for i, chain in enumerate(listed) for _ in chain.positions]
-    given = [
-        numbers(one, None, time_limit, max_events) for chain in listed for one in chain.positions.values()
-    ]
+    batch = prepared(listed, time_limit, max_events)
+    for i, chain in enumerate(listed):
+        check_end(chain, made, until, batch.p[batch.begins[i]])
+    nominal = fitted_to if fitted_to is None or isinstance(fitted_to, Drive) else drive_of(fitted_to)
+    told = [drive_of(one) for one in listed] if nominal is None else nominal
+    count = workers or os.cpu_count() or 1
+    means = np.array([mean_torque_of(base or fitted_to or chain) for chain in listed])
+    found = batch.figures(np.arange(len(listed)), made, told, means, until=until, workers=count)
+    data: dict[str, Any] = {
+        name: ("start", values, {"units": unit, "long_name": meaning})
+        for name, (values, unit, meaning) in found.items()
+        if name in (*FIGURES, "status")
+    }
+    for name, unit, meaning in (
+        ("peak_torques", "N*m", "largest |T| of each shaft"),
+        ("k_dyns", "1", "K_dyn of each shaft"),
+    ):
+        columns = [found[f"{name[:-1]}_{k + 1}"][0] for k in range(len(listed[0].shafts))]
+        data[name] = (("start", "shaft"), np.stack(columns, axis=1), {"units": unit, "long_name": meaning})
+    names = {chain.shaft_names for chain in listed}
+    coordinates = {"shaft": list(names.pop())} if len(names) == 1 else {}
+    return xarray.Dataset(data, coords={"chain": ("start", [chain.name for chain in listed]), **coordinates})
+
+
+def prepared(
+    chains: Sequence[Chain], time_limit: float | None = None, max_events: int = MAX_EVENTS
+) -> ChainBatch:
+    """Chains that go through one call of the kernel; InputError for chains that do not match."""
+    each = [list(chain.positions.values()) for chain in chains]
+    given = [numbers(one, None, time_limit, max_events) for several in each for one in several]
     if len({(one.count, one.place) for one in given}) > 1:
         raise InputError(
             "chains: starts in one call have the same number of masses, and motors and loads on the same "
             "ones; sort the chains by that."
         )
-    for i, one in zip(owners, given, strict=True):
-        check_end(listed[i], made, until, one)
-    results = np.empty((len(given), layout.N_X))
-    ends = np.zeros((len(given), given[0].count - 1), SHAFT)
-    nominal = fitted_to if fitted_to is None or isinstance(fitted_to, Drive) else drive_of(fitted_to)
-    _compute(made, listed, owners, given, nominal, until, results, ends, workers or os.cpu_count() or 1)
-    return _labelled(listed, owners, results, ends, base or fitted_to, until)
+    return ChainBatch(
+        tuple(chains),
+        np.cumsum([0, *(len(several) for several in each)]),
+        given[0],
+        np.stack([one.p for one in given]),
+        np.stack([one.masses for one in given]),
+        np.stack([one.shafts for one in given]),
+        np.stack([chain.at_motor_shaft().permissible for chain in chains]),
+    )
 
 
-def _compute(
-    made: Controller,
-    listed: Sequence[Chain],
-    owners: Sequence[int],
-    given: Sequence[Numbers],
-    nominal: Drive | None,
-    until: float | None,
-    results: layout.Matrix,
-    ends: Any,
-    workers: int,
-) -> None:
-    """Fill `results` and `ends`; plain controllers one start at a time."""
-    end = math.inf if until is None else until
-    set_up = [made.set_up(nominal)] if nominal is not None else [made.set_up(drive_of(one)) for one in listed]
-    ready, own = set_up[0]
-    if not isinstance(ready, CompiledController):
-        for row, (i, one) in enumerate(zip(owners, given, strict=True)):
-            ready, own = set_up[i if len(set_up) > 1 else 0]
-            recorder = ChainRecorder(one, int(ready.sensors), rows=0)
-            recorder.x[layout.STATUS] = run_one(ready, own, recorder, end)
-            results[row], ends[row] = recorder.x, recorder.start.shafts
-        return
-    chosen = set_up if len(set_up) == 1 else [set_up[i] for i in owners]
-    vectors = [np.asarray(_vector(one, drive), dtype=np.float64).ravel() for one, drive in chosen]
-    parameters = np.ascontiguousarray(np.stack(vectors))
-    p = np.stack([one.p for one in given])
-    masses, shafts = np.stack([one.masses for one in given]), np.stack([one.shafts for one in given])
-    step, sees = type(ready).kernel, int(ready.sensors)
+@dataclass(frozen=True, eq=False)
+class ChainBatch:
+    """Chains as rows of the kernel, written once for many calls: a row for each position of each chain.
 
-    def run(part: slice) -> None:
-        numbers_of = parameters[part] if len(chosen) > 1 else parameters
-        scratch = given[0].start()._replace(p=np.zeros(layout.N_P))  # each thread writes into its own
-        with watched(ready):
-            kernel.run_many(
-                step, p[part], masses[part], shafts[part], numbers_of, sees,
-                bool(ready.sensors & Sensor.STAGE), end, results[part], ends[part], scratch,
-                np.zeros(N_MEASURED), np.zeros(ready.state_size), np.zeros(NEW_STATE + ready.state_size),
-            )  # fmt: skip
+    `begins` has the first row of each chain, and one more at the end; `permissible` the torques of shafts.
+    """
 
-    with Pool(min(workers, len(given)), threads=True) as pool:
-        for _ in pool.results(run, (slice(i, i + TURN) for i in range(0, len(given), TURN))):
-            pass
+    chains: tuple[Chain, ...]
+    begins: Rows
+    first: Numbers
+    p: layout.Matrix
+    masses: Any
+    shafts: Any
+    permissible: layout.Matrix
+
+    def figures(
+        self,
+        which: Rows,
+        controller: Controller | Sequence[Controller],
+        fitted: Drive | Sequence[Drive],
+        base: Any,
+        time_limit: float | None = None,
+        *,
+        until: float | None = None,
+        workers: int = 1,
+    ) -> Figures:
+        """Figures by name of the starts of chains `which`, of several positions the worst.
+
+        The controller is set up for one drive, for a batch with an element for each place in `which`, or for
+        each of several drives by itself; each place may have its own. `base` is M12avg in N m, one or one a
+        start.
+        """
+        spans = [np.arange(self.begins[i], self.begins[i + 1]) for i in which.tolist()]
+        owners = np.repeat(np.arange(which.size), [span.size for span in spans])
+        rows = np.concatenate(spans)
+        results, ends = self._notes(rows, owners, controller, fitted, time_limit, until, workers)
+        return self._read(which, spans, owners, results, ends, base, until)
+
+    def named(self) -> Figures:
+        """The names of all figures, with units and meanings, of starts that are not made."""
+        one, owners = np.array([0]), np.zeros(1, np.int64)
+        nothing = np.zeros((1, layout.N_X)), np.zeros((1, self.first.count - 1), SHAFT)
+        return self._read(one, [one], owners, *nothing, 1.0, None)
+
+    def _read(
+        self,
+        which: Rows,
+        spans: list[Rows],
+        owners: Rows,
+        results: layout.Matrix,
+        ends: Any,
+        base: Any,
+        until: float | None,
+    ) -> Figures:
+        """The figures in the kernel's notes; `spans` are the rows of each start."""
+        torques, at = np.abs(ends["peak"]), np.arange(owners.size)
+        worst = torques.argmax(axis=1)
+        results[:, layout.PEAK], results[:, layout.PEAK_TIME] = (
+            torques[at, worst],
+            ends["peak_time"][at, worst],
+        )
+        means = np.broadcast_to(np.asarray(base, dtype=np.float64), which.shape)
+        found = figures(results, means[owners], until)
+        good = ~np.isnan(found["k_dyn"][0])
+        begins = np.cumsum([0, *(span.size for span in spans[:-1])])
+        if owners.size > which.size:
+            # the position with the largest torque, or one whose start could not be finished
+            ranked = np.where(good, torques.max(axis=1), np.inf)
+            ends_at = np.append(begins[1:], owners.size)
+            chosen = np.array([i + int(ranked[i:j].argmax()) for i, j in zip(begins, ends_at, strict=True)])
+        else:
+            chosen = at
+        torques[~good] = math.nan
+        latest = {
+            name: (np.maximum.reduceat(found[name][0], begins) if name in LATEST else found[name][0][chosen])
+            for name in FIGURES
+        }
+        kept: Figures = {name: (latest[name], *found[name][1:]) for name in FIGURES}
+        largest = np.maximum.reduceat(torques, begins, axis=0)
+        names = self.chains[0].shaft_names
+        for k, place in enumerate(names):
+            kept[f"k_dyn_{k + 1}"] = (largest[:, k] / means, "1", f"K_dyn of {place}")
+        for k, place in enumerate(names):
+            kept[f"peak_torque_{k + 1}"] = (largest[:, k], "N*m", f"largest |T| of {place}")
+        used = 100.0 * np.nan_to_num(largest / self.permissible[which]).max(axis=1)
+        kept["used_torque"] = (
+            np.where(np.isnan(kept["k_dyn"][0]), np.nan, used),
+            "%",
+            "largest |T| over what its shaft permits",
+        )
+        kept |= margins(kept, self.chains[0].limits)
+        return {**kept, "status": (found["status"][0][chosen], *found["status"][1:])}
+
+    def _notes(
+        self,
+        rows: Rows,
+        owners: Rows,
+        controller: Controller | Sequence[Controller],
+        fitted: Drive | Sequence[Drive],
+        time_limit: float | None,
+        until: float | None,
+        workers: int,
+    ) -> tuple[layout.Matrix, Any]:
+        """The kernel's notes of the starts of these rows, and their shafts as they are at the end."""
+        p = self.p[rows]
+        if time_limit is not None:
+            p[:, layout.TIME_LIMIT] = time_limit
+        results, ends = np.empty((rows.size, layout.N_X)), np.zeros((rows.size, self.first.count - 1), SHAFT)
+        end = math.inf if until is None else until
+        masses, shafts = self.masses[rows], self.shafts[rows]
+        set_up = _set_up(controller, fitted)
+        compiled = _compiled(set_up)
+        if compiled is None:
+            if isinstance(fitted, Drive) and fitted.shape != ():
+                set_up = _set_up(controller, list(fitted.elements()))
+            for row, owner in enumerate(owners.tolist()):
+                ready, own = set_up[owner if len(set_up) > 1 else 0]
+                one = replace(self.first, p=p[row], masses=masses[row], shafts=shafts[row])
+                recorder = ChainRecorder(one, int(ready.sensors), rows=0)
+                recorder.x[layout.STATUS] = run_one(ready, own, recorder, end)
+                results[row], ends[row] = recorder.x, recorder.start.shafts
+            return results, ends
+        made, vectors = compiled
+        numbers_of = vectors[owners] if len(vectors) > 1 else vectors
+        step, sees = type(made).kernel, int(made.sensors)
+
+        def run(part: slice) -> None:
+            scratch = self.first.start()._replace(p=np.zeros(layout.N_P))  # each thread writes into its own
+            with watched(made):
+                kernel.run_many(
+                    step, p[part], masses[part], shafts[part],
+                    numbers_of[part] if len(numbers_of) > 1 else numbers_of, sees,
+                    bool(made.sensors & Sensor.STAGE), end, results[part], ends[part], scratch,
+                    np.zeros(N_MEASURED), np.zeros(made.state_size), np.zeros(NEW_STATE + made.state_size),
+                )  # fmt: skip
+
+        parts = [slice(i, i + TURN) for i in range(0, rows.size, TURN)]
+        if workers == 1 or len(parts) == 1:
+            for part in parts:
+                run(part)
+        else:
+            with Pool(min(workers, len(parts)), threads=True) as pool:
+                for _ in pool.results(run, iter(parts)):
+                    pass
+        return results, ends
 
 
-def _vector(ready: Controller, own: Drive) -> layout.Vector:
-    """The numbers of a compiled controller for its drive."""
+SetUp = list[tuple[Controller, Drive]]
+
+
+def _set_up(controller: Controller | Sequence[Controller], fitted: Drive | Sequence[Drive]) -> SetUp:
+    """Controllers as they are set up, each with the drive of its numbers: one for all starts, or one each."""
+    made = [controller] if isinstance(controller, Controller) else controller
+    drives = [fitted] if isinstance(fitted, Drive) else fitted
+    if isinstance(fitted, Drive) and fitted.shape != () and isinstance(made[0], PlainController):
+        return [(made[0], fitted)]  # a plain controller is set up start by start
+    return [made[i % len(made)].set_up(drives[i % len(drives)]) for i in range(max(len(made), len(drives)))]
+
+
+def _compiled(set_up: SetUp) -> tuple[CompiledController, layout.Matrix] | None:
+    """A compiled controller and its numbers, a row for all starts or one each; None for a plain one."""
+    rows = []
+    for ready, own in set_up:
+        if not isinstance(ready, CompiledController):
+            return None
+        vector = np.asarray(ready.vector(own), dtype=np.float64)
+        rows.append(vector.reshape(-1, vector.shape[-1]))
+    ready = set_up[0][0]
     assert isinstance(ready, CompiledController)
-    return ready.vector(own)
-
-
-def _labelled(
-    listed: Sequence[Chain],
-    owners: Sequence[int],
-    results: layout.Matrix,
-    ends: Any,
-    base: Drive | Chain | None,
-    until: float | None,
-) -> xarray.Dataset:
-    """The figures of each chain, of its positions the worst."""
-    peaks, at = np.abs(ends["peak"]), np.arange(len(owners))
-    worst = peaks.argmax(axis=1)
-    results[:, layout.PEAK], results[:, layout.PEAK_TIME] = peaks[at, worst], ends["peak_time"][at, worst]
-    means = np.array([mean_torque_of(base or chain) for chain in listed])
-    found = figures(results, means[list(owners)], until)
-    good = ~np.isnan(found["k_dyn"][0])
-    rows = [np.flatnonzero(np.array(owners) == i) for i in range(len(listed))]
-    # of several positions that with the largest torque, or one whose start could not be finished
-    chosen = np.array([row[np.where(good[row], peaks[row].max(axis=1), np.inf).argmax()] for row in rows])
-    data: dict[str, Any] = {}
-    for name in FIGURES:
-        values, unit, meaning = found[name]
-        picked = values[chosen]
-        if name in ("start_time", "torque_excess", "torque_excess_time"):
-            picked = np.array([values[row].max() for row in rows])
-        data[name] = ("start", picked, {"units": unit, "long_name": meaning})
-    peaks[~good] = math.nan
-    largest = np.stack([peaks[row].max(axis=0) for row in rows])
-    data["peak_torques"] = (
-        ("start", "shaft"),
-        largest,
-        {"units": "N*m", "long_name": "largest |T| of each shaft"},
-    )
-    data["k_dyns"] = (
-        ("start", "shaft"),
-        largest / means[:, None],
-        {"units": "1", "long_name": "K_dyn of each shaft"},
-    )
-    names = {chain.shaft_names for chain in listed}
-    coordinates = {"shaft": list(names.pop())} if len(names) == 1 else {}
-    return xarray.Dataset(data, coords={"chain": ("start", [chain.name for chain in listed]), **coordinates})
+    return ready, np.ascontiguousarray(np.concatenate(rows))

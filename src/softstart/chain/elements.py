@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, Self, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind, Position
 from softstart.input.documents import Table
@@ -195,6 +195,18 @@ class Shaft(ParameterSet):
     def rigid(self) -> bool:
         """Whether there is no spring in it."""
         return math.isinf(self.stiffness)
+
+    def widened(self, factor: float) -> Self:
+        """The shaft with so many times its gap; an angle keeps its share of it, one beyond its overlap.
+
+        >>> Shaft(100.0, gap=0.2, start_position=0.05).widened(2.0).start_position
+        0.1
+        """
+        theta, half = self.start_position, 0.5 * self.gap
+        if theta is not None:
+            inside = max(-half, min(theta, half))
+            theta = factor * inside + (theta - inside)
+        return self.replace(gap=factor * self.gap, backlash=None, diameter=None, start_position=theta)
 
 
 class Motor(ParameterSet):

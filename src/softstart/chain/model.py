@@ -325,20 +325,12 @@ class Chain:
         >>> Chain.load("crane-4-mass").changed(gaps=4.0).shafts[1].gap
         0.8
         """
-
-        def moved(shaft: Shaft) -> Shaft:
-            theta, half = shaft.start_position, 0.5 * shaft.gap
-            if theta is not None:
-                inside = max(-half, min(theta, half))
-                theta = gaps * inside + (theta - inside)
-            return shaft.replace(gap=gaps * shaft.gap, backlash=None, diameter=None, start_position=theta)
-
         load = self.load_index
         masses = [
             mass.replace(inertia=load_inertia * mass.inertia) if i == load else mass
             for i, mass in enumerate(self.masses)
         ]
-        return replace(self, masses=tuple(masses), shafts=tuple(map(moved, self.shafts)))
+        return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
     # ---- the chain at one shaft --------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.balancing.periodic_torque import PeriodicTorque
-from softstart.chain.kernel_records import Numbers, numbers
+from softstart.chain.kernel_records import numbers
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.run import ChainRecorder, ChainRun
@@ -106,7 +106,7 @@ def simulate_chain(
             raise InputError(f"{name} = {other!r}: give a single Drive, or a Chain.")
     made = None if controller is None else make_controller(controller, parameters)
     if len(chain.positions) > 1:
-        check_end(chain, made, until, numbers(chain, excitation, time_limit, max_events))
+        check_end(chain, made, until, numbers(chain, excitation, time_limit, max_events).p)
         told = fitted_to or (None if made is None else chain)
         return worst_run(
             {
@@ -119,7 +119,7 @@ def simulate_chain(
             chain=chain,
         )  # fmt: skip
     given = numbers(chain, excitation, time_limit, max_events)
-    check_end(chain, controller, until, given)
+    check_end(chain, controller, until, given.p)
     fitted, own = None, None
     if made is None:
         recorder = ChainRecorder(given, 0)
@@ -145,13 +145,13 @@ def drive_of(chain: Chain) -> Drive:
         raise InputError(sentences) from None
 
 
-def check_end(chain: Chain, controller: object, until: float | None, given: Numbers) -> None:
+def check_end(chain: Chain, controller: object, until: float | None, p: layout.Vector) -> None:
     """A run needs an end."""
     if controller is not None and chain.motor is None:
         raise InputError(
             "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
         )
-    if until is not None or given.p[layout.TIME_LIMIT] < math.inf:
+    if until is not None or p[layout.TIME_LIMIT] < math.inf:
         return
     if controller is None or chain.target_speed is None:
         raise InputError(

@@ -16,13 +16,12 @@ from softstart.cli.options import (
     json_option,
     out_option,
     param_option,
-    read_drive,
+    read_machine,
     set_option,
 )
 from softstart.cli.running import Attributed, make_controllers, working
 from softstart.late import late
 from softstart.views.drawing import save_figure
-from softstart.views.drives import drive_lines
 from softstart.views.markdown import (
     figure_table,
     markdown,
@@ -31,6 +30,7 @@ from softstart.views.markdown import (
     write_drive_report,
     write_table,
 )
+from softstart.views.starts import machine_lines
 from softstart.views.terminal import (
     present,
     print_conclusion,
@@ -43,14 +43,14 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.drive import Drive
+    from softstart.chain.machines import Machine
     from softstart.views import linear as views
 else:  # no numba for a help, a wrong option or the Tab key
     views = late("softstart.views.linear")
 
 
 @click.command(cls=Command)
-@drive_argument(read_drive)
+@drive_argument(read_machine)
 @controller_option(
     "--controller", "NAME", "A controller's name, or path/to/file.py:ClassName.", required=True
 )
@@ -62,7 +62,7 @@ else:  # no numba for a help, a wrong option or the Tab key
 )
 def linear(
     *,
-    drive: Drive,
+    drive: Machine,
     controller: str,
     params: dict[str, str],
     as_json: bool,
@@ -70,10 +70,10 @@ def linear(
 ) -> None:
     """Linearise the control loop: stability margins, modes, limit cycles.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); by default the crane drive of
-    the literature. The controller's step function is linearised at an instant of its start at which the gap
-    is closed; the loop is broken at the torque demand. Limit cycles through the gap are predicted by the
-    describing function and checked on the exact plant.
+    DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
+    drive of the literature. The controller's step function is linearised at an instant of its start at which
+    all gaps are closed; the loop is broken at the torque demand. Limit cycles through the gap of a drive are
+    predicted by the describing function and checked on the exact plant.
     """
     with output_folder(out) as folder:
         with working("running and linearising the start ..."):
@@ -89,7 +89,7 @@ def linear(
 
 
 def _show(to: Console, view: softstart.LinearView) -> None:
-    print_lines(to, drive_lines(view.drive))
+    print_lines(to, machine_lines(view.drive))
     sentence(to, f"  under  {view.name}")
     to.print()
     if view.margins is None:

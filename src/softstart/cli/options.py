@@ -120,11 +120,6 @@ def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Ch
     return _identified(name, settings) or read_machine(name, settings)
 
 
-def read_drive_or_identified(name: str, settings: Sequence[str]) -> Drive | Identification:
-    """The one drive, or the identification in a folder, with its changes."""
-    return _identified(name, settings) or read_drive(name, settings)
-
-
 def _read_fitted_to(name: str, option: str) -> Drive:
     """The drive of --fitted-to."""
     mistakes = Mistakes()

@@ -24,9 +24,9 @@ from softstart.late import late
 from softstart.page.serve import Address, check_installed, listening, run
 
 if TYPE_CHECKING:
+    from softstart.chain.machines import Machine
     from softstart.page import machines
     from softstart.page import session as sessions
-    from softstart.page.machines import Machine
 else:
     machines = late("softstart.page.machines")
     sessions = late("softstart.page.session")

@@ -28,8 +28,8 @@ from softstart.cli.options import (
     named_as_options,
     out_option,
     param_option,
-    read_drive,
     read_list,
+    read_machine,
     scheduler_option,
     set_option,
     until_option,
@@ -46,6 +46,7 @@ from softstart.views.terminal import present
 if TYPE_CHECKING:
     import xarray
 
+    from softstart.chain.machines import Machine
     from softstart.drive import Drive
     from softstart.sweeping import grid as grids
     from softstart.sweeping import maker as makers
@@ -69,7 +70,7 @@ def _check_controller(given: Mapping[str, Any]) -> None:
 
 
 @click.command(cls=Command, checks=[_check_controller])
-@drive_argument(read_drive)
+@drive_argument(read_machine)
 @controller_option(
     "--controller",
     "NAME",
@@ -84,8 +85,9 @@ def _check_controller(given: Mapping[str, Any]) -> None:
     required=True,
     shell_complete=axes_known,
     help="Axis of the grid: a parameter of the drive, shaft.gap=0.25:4:100 (from:to:count, with :log for "
-    "geometric spacing) or load.kind=active,reactive, or of the controller, controller.torque='10 N*m,20 "
-    "N*m'. May be repeated.",
+    "geometric spacing), 1x:4x:7 (multiples of the drive's) or load.kind=active,reactive, or of the "
+    "controller, controller.torque='10 N*m,20 N*m'. Of a chain shaft.gap is the sum of all gaps, "
+    "shaft[2].gap or mass[crane].inertia one part. May be repeated.",
 )
 @param_option("Set a parameter of the controller for all starts. May be repeated.")
 @set_option
@@ -118,7 +120,7 @@ def _check_controller(given: Mapping[str, Any]) -> None:
 )
 def sweep(
     *,
-    drive: Drive,
+    drive: Machine,
     controller: str | None,
     axes: tuple[str, ...],
     params: dict[str, str],
@@ -130,8 +132,8 @@ def sweep(
 ) -> None:
     """Simulate a grid of drives and controllers of any size.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives); by default the crane drive of
-    the literature. The results are a Zarr store that xarray opens.
+    DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
+    drive of the literature. The results are a Zarr store that xarray opens.
     """
     asked |= {"fitted_to": fitted_to, **({} if figures is None else {"figures": figures})}
     begin = time.monotonic()
@@ -165,7 +167,7 @@ def sweep(
 
 
 def _computed(
-    drive: Drive,
+    drive: Machine,
     controller: str | None,
     values: dict[str, str],
     axes: tuple[str, ...],
@@ -174,7 +176,7 @@ def _computed(
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
     with working("starting the first drive ...") as tell, Attributed():
-        grid = read_axes(axes, makers.Maker(controller or "", values, code_allowed()))
+        grid = read_axes(axes, makers.Maker(controller or "", values, code_allowed()), drive)
         last: Progress | None = None
         shown = 0.0
 
@@ -212,8 +214,8 @@ def _kept(out: str | None) -> Iterator[Path | None]:
 MOST_VALUES = 1_000_000  # of a range
 
 
-def read_axes(texts: Sequence[str], maker: makers.Maker) -> dict[str, Any]:
-    """The grid of several --axis; all mistakes at once.
+def read_axes(texts: Sequence[str], maker: makers.Maker, machine: Machine | None = None) -> dict[str, Any]:
+    """The grid of several --axis over a drive or chain; all mistakes at once.
 
     >>> from softstart.sweeping.maker import Maker
     >>> grid = read_axes(["shaft.gap=0.5:2:4", "load.inertia=700 kg*cm^2, 0.175"], Maker("direct"))
@@ -238,7 +240,7 @@ def read_axes(texts: Sequence[str], maker: makers.Maker) -> dict[str, Any]:
     for key, values in split.items():
         with mistakes.noted():
             try:
-                name, read = _read(key, values, parameters)
+                name, read = _read(key, values, parameters, machine)
             except InputError as error:
                 raise InputError([f"--axis {sentence}" for sentence in error.sentences]) from error
             if name in grid:
@@ -262,14 +264,16 @@ def _parameters(split: dict[str, str], maker: makers.Maker, mistakes: Mistakes) 
     return found
 
 
-def _read(key: str, text: str, parameters: makers.Parameters | None) -> tuple[str, Any]:
+def _read(
+    key: str, text: str, parameters: makers.Parameters | None, machine: Machine | None
+) -> tuple[str, Any]:
 
     parts = [part.strip() for part in text.split(":")]
     is_range = len(parts) in (3, 4) and key != "controller" and not any(".py" in part for part in parts)
     if not is_range:
-        column = grids.read_column(key, _listed(key, text), parameters)
+        column = grids.read_column(key, _listed(key, text), parameters, machine)
         return column.name, column.values
-    column = grids.read_column(key, parts[:2], parameters)
+    column = grids.read_column(key, parts[:2], parameters, machine)
     if not column.numeric:
         raise InputError(f'{key} = "{text}": these values are names; write them with commas between.')
     return column.name, _spaced(key, text, parts, *column.values.tolist())
@@ -291,5 +295,5 @@ def _spaced(key: str, text: str, parts: Sequence[str], first: float, last: float
 
 def _listed(key: str, text: str) -> list[str]:
     owner, name = grids.target_of(key) or ("unknown", "")
-    counts = owner == "drive" and PARAMETERS[name].limit.startswith("a whole number")
+    counts = owner == "drive" and name in PARAMETERS and PARAMETERS[name].limit.startswith("a whole number")
     return values_in(text, key, whole=counts or owner in ("controller", "unknown"))

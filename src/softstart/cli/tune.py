@@ -22,7 +22,7 @@ from softstart.cli.options import (
     out_option,
     param_option,
     quantity,
-    read_drive_or_identified,
+    read_machine_or_identified,
     scheduler_option,
     set_option,
     workers_option,
@@ -36,7 +36,7 @@ from softstart.views.markdown import kept_state, output_folder
 from softstart.views.terminal import present
 
 if TYPE_CHECKING:
-    from softstart.drive import Drive
+    from softstart.chain.machines import Machine
     from softstart.identification.result import Identification
     from softstart.tuning.outcome import Tuning
     from softstart.views import tuning as views
@@ -132,7 +132,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 
 
 @click.command(cls=Command)
-@drive_argument(read_drive_or_identified)
+@drive_argument(read_machine_or_identified)
 @controller_option(
     "--controller", "NAME", "The controller to tune, or path/to/file.py:ClassName.", required=True
 )
@@ -141,7 +141,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     metavar="GAP,...",
     type=Reading(lambda text, option: read_grid(text, option, "rad")),
     help="Gaps: 0.5,1 (rad), '30 deg', 2x (multiple of the drive's), or a range from:to:count such as "
-    "0.5:2:7. Default: 0.5x,1x,2x,4x.",
+    "0.5:2:7; of a chain the sum of all gaps. Default: 0.5x,1x,2x,4x.",
 )
 @click.option(
     "--inertias",
@@ -176,7 +176,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     multiple=True,
     type=Reading(read_tolerances),
     help="Tolerance of a parameter of the drive, stiffness=10% or load_torque=2, or values to cover, "
-    "encoder_phase=0,0.5. May be repeated.",
+    "encoder_phase=0,0.5; of a chain also shaft[2].gap=20%. May be repeated.",
 )
 @click.option(
     "--quantile", metavar="SHARE", type=quantity("1"), default="1", help="Quantile of the starts that is "
@@ -188,7 +188,12 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
     type=choice(*QUESTIONS),
     help="Compute the gain schedule or the robust set only.",
 )
-@click.option("--no-optimum", is_flag=True, help="Skip the certified optima, which take longest.")
+@click.option(
+    "--optimum/--no-optimum",
+    "certified",
+    default=None,
+    help="Compute or skip the optimum of each cell, which takes longest. Default: compute that of drives.",
+)
 @click.option(
     "--seed", metavar="N", type=count(0), default="0", help="Seed of the random search. Default: 0."
 )
@@ -205,24 +210,24 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 )
 def tune(
     *,
-    drive: Drive | Identification,
+    drive: Machine | Identification,
     controller: str,
     params: dict[str, str],
     only: str | None,
-    no_optimum: bool,
+    certified: bool | None,
     as_json: bool,
     out: str | None,
     **asked: Any,
 ) -> None:
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
-    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives), or the folder of an
-    identification: the gains are then robust over its confidence region. By default the crane drive of the
-    literature. The gains are written as files that every command accepts as a controller: softstart simulate
-    DRIVE --controller DIR/robust.toml
+    DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an
+    identification: the gains are then robust over its confidence region. Of a chain the torques of all shafts
+    count. By default the crane drive of the literature. The gains are written as files that every command
+    accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
     """
     asked |= {
-        "parameters": params, "certified": not no_optimum,
+        "parameters": params, "certified": certified,
         "schedule": only != "robust", "robust": only != "schedule",
     }  # fmt: skip
     with output_folder(out) as folder, kept_state(out, STATE, "finished parts") as state:
@@ -245,7 +250,7 @@ def tune(
 
 
 def _computed(
-    drive: Drive | Identification, controller: str, state: Path | None, asked: dict[str, Any]
+    drive: Machine | Identification, controller: str, state: Path | None, asked: dict[str, Any]
 ) -> Tuning:
     with working("starting the drive ...") as progress:
         make_controllers([controller], {controller: asked["parameters"]}, prefix=False)

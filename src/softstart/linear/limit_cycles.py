@@ -51,7 +51,7 @@ from softstart.drive import Drive
 from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint
 from softstart.linear.sampled_plant import SampledPlant, motor_alone, sampled
-from softstart.linear.sampled_start import Sample, SampledStart
+from softstart.linear.sampled_start import Part, Sample, SampledStart
 from softstart.linear.systems import System, at_points, zeros_of
 from softstart.plant import layout, record
 from softstart.plant import start as kernel
@@ -348,6 +348,7 @@ def _on_the_cycle(
     start: SampledStart, point: OperatingPoint, base: Sample, outside: Outside, cycle: Cycle, factor: float
 ) -> Sample:
     """A sample with the gap open, in the middle of the part of it that the twist crosses, going up."""
+    assert isinstance(start.drive, Drive)
     half = 0.5 * float(start.drive.gap)
     amplitude, bias = factor * cycle.amplitude, cycle.bias
     low, high = max(-half, bias - amplitude), min(half, bias + amplitude)
@@ -365,7 +366,7 @@ def _on_the_cycle(
     b1, b2 = outside.decays
     phi1, w2 = (u - torque) / (J1 * (s * (s + b1))), torque / (J2 * (s + b2))
     motor_angle = base.x[layout.PHI2] + base.x[layout.THETA] + phi1.imag
-    changes = {
+    changes: dict[Part, float] = {
         layout.THETA: twist - base.x[layout.THETA],
         layout.PHI2: motor_angle - twist - base.x[layout.PHI2],
         layout.V: (s * turn).imag - base.x[layout.V],

@@ -33,10 +33,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softstart.arrays import Complex, Vector
-from softstart.drive import Drive
+from softstart.chain.machines import Machine
+from softstart.chain.model import Chain
 from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint, closed
-from softstart.linear.sampled_plant import Continuous, SampledPlant, in_contact, sampled
+from softstart.linear.sampled_plant import (
+    Continuous,
+    SampledPlant,
+    Sizes,
+    in_contact,
+    motor_of,
+    motor_side,
+    sampled,
+    sizes_of,
+)
 from softstart.linear.systems import (
     TOLERANCE,
     Mode,
@@ -51,7 +61,6 @@ from softstart.linear.systems import (
     zeros_of,
 )
 from softstart.plant.start import M_MOTOR_TORQUE
-from softstart.start.metrics import base_torque
 
 if TYPE_CHECKING:
     import control
@@ -246,11 +255,15 @@ def turned(delay: float, frequency: float, period: float, delayed: Callable[[flo
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A controller linearised at `point`, on a drive that need not be that of the point."""
+    """A controller linearised at `point`, on a drive or chain that need not be that of the point.
 
-    drive: Drive
+    `open` is the loop of the motor with what turns with it while all gaps of a chain are open.
+    """
+
+    drive: Machine
     point: OperatingPoint
     differencing: bool
+    open: bool = False
 
     @property
     def period(self) -> float:
@@ -305,7 +318,7 @@ class Loop:
         The rotation of the whole drive, which a torque controller leaves free (poles at 1), is excluded.
         """
         found = modes(self._closed_outputs, self.period, self.tolerance)
-        return tuple(mode for mode in found if mode.frequency > SLOW * float(self.drive.Omega))
+        return tuple(mode for mode in found if mode.frequency > SLOW * self._sizes.Omega)
 
     @cached_property
     def stable(self) -> bool:
@@ -325,12 +338,15 @@ class Loop:
         return scaled(system, self._scales(self.plant), np.zeros(0), outputs)
 
     def _plant(self, further: float) -> SampledPlant:
-        delay = float(self.drive.computing_delay) + further
+        delay = float(motor_of(self.drive).computing_delay) + further
         inputs = self.point.derivative.inputs
         return sampled(self._continuous, self.period, delay, inputs, self.differencing)
 
     @cached_property
     def _continuous(self) -> Continuous:
+        if self.open:
+            assert isinstance(self.drive, Chain)
+            return motor_side(self.drive)
         return in_contact(self.drive)
 
     def _broken(self, plant: SampledPlant) -> System:
@@ -344,9 +360,13 @@ class Loop:
         system = scaled(self._broken(plant), self._scales(plant), self._base, self._base)
         return unscaled(minimal(system), self._base, self._base)
 
+    @cached_property
+    def _sizes(self) -> Sizes:
+        return sizes_of(self.drive)
+
     @property
     def _base(self) -> Vector:
-        return np.array([float(base_torque(self.drive))])
+        return np.array([self._sizes.base])
 
     @property
     def _law_scales(self) -> Vector:
@@ -354,12 +374,10 @@ class Loop:
 
     def _scales(self, plant: SampledPlant) -> Vector:
         """The size of each state: windup, elastic speed, mean torque."""
-        base = float(self._base[0])
-        windup = base / float(self.drive.c)
-        speed = float(self.drive.Omega) * windup
-        size = plant.system.A.shape[0]
-        sizes = np.full(size, base)
-        sizes[:4] = windup, windup, speed, speed
+        own, angles = self._sizes, self._continuous.angles
+        sizes = np.full(plant.system.A.shape[0], own.base)
+        sizes[:angles] = own.windup
+        sizes[angles : angles + self._continuous.speeds] = own.speed
         if self.differencing:
-            sizes[-1] = windup
+            sizes[-1] = own.windup
         return np.concatenate([sizes, self._law_scales])

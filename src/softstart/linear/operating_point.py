@@ -23,12 +23,12 @@ from enum import Enum
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.linear.sampled_plant import SampledPlant, in_contact, sampled
-from softstart.linear.sampled_start import Sample, SampledStart, Step
+from softstart.chain.machines import Machine
+from softstart.chain.model import Chain
+from softstart.linear.sampled_plant import SampledPlant, in_contact, motor_of, sampled, sizes_of
+from softstart.linear.sampled_start import Part, Sample, SampledStart, Step
 from softstart.linear.systems import System, moved, part, shown
-from softstart.plant import layout
 from softstart.plant import start as kernel
-from softstart.start.metrics import base_torque
 
 LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
 MOST_SAMPLES = 20_000
@@ -78,15 +78,12 @@ class OperatingPoint:
 
 def run_until_steady(start: SampledStart) -> SampledRun:
     """Run the start until it is steady, at most for LONGEST and STIFF."""
-    drive = start.drive
-    period = float(drive.elastic_period)
-    friction, b1, b2 = drive.frictions
-    net = max(drive.Ms - drive.Mc - (friction + (b1 + b2) * drive.target_speed), 0.01 * (drive.Ms - drive.Mc))
-    stiff = (drive.J1 + drive.J2) * drive.target_speed / net
-    enough = STEADY * float(base_torque(drive))
+    sizes = sizes_of(start.drive)
+    period = sizes.period
+    enough = STEADY * sizes.base
     samples: list[Sample] = []
     steady = False
-    for sample in start.samples(LONGEST * period + STIFF * float(stiff)):
+    for sample in start.samples(LONGEST * period + STIFF * _stiff(start.drive)):
         samples.append(sample)
         if len(samples) >= MOST_SAMPLES:
             break
@@ -94,12 +91,25 @@ def run_until_steady(start: SampledStart) -> SampledRun:
             back = max(WINDOW, math.ceil(2.0 * period / (sample.ask_again - sample.time)))
             recent = samples[-back:]
             if len(recent) == back and all(one.pressing for one in recent):
-                torques = [shaft_torque(start, one) for one in recent]
+                torques = [start.shaft_torque(one) for one in recent]
                 demands = [one.demand for one in recent]
                 steady = max(np.ptp(torques), np.ptp(demands)) <= enough
                 if steady:
                     break
     return _in_contact(tuple(samples), steady)
+
+
+def _stiff(machine: Machine) -> float:
+    """The time of a stiff start under the starting torque, s."""
+    if isinstance(machine, Chain):
+        assert machine.motor is not None
+        arrays, Ms = machine.at_motor_shaft(), machine.motor.starting_torque
+        left = Ms - float((arrays.Mc / arrays.efficiency_from_motor).sum())
+        return float(arrays.J.sum()) * float(machine.target_speed or 0.0) / max(left, 0.01 * Ms)
+    drive = machine
+    friction, b1, b2 = drive.frictions
+    net = max(drive.Ms - drive.Mc - (friction + (b1 + b2) * drive.target_speed), 0.01 * (drive.Ms - drive.Mc))
+    return float((drive.J1 + drive.J2) * drive.target_speed / net)
 
 
 def _in_contact(samples: tuple[Sample, ...], steady: bool) -> SampledRun:
@@ -117,18 +127,12 @@ def _in_contact(samples: tuple[Sample, ...], steady: bool) -> SampledRun:
     return SampledRun(samples, *best, steady)
 
 
-def shaft_torque(start: SampledStart, sample: Sample) -> float:
-    """Shaft torque at a sample on the driving flank, N m."""
-    p, x = start.p, sample.x
-    return float(p[layout.C] * (x[layout.THETA] - 0.5 * p[layout.GAP]) + p[layout.D] * x[layout.V])
-
-
 def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoint]:
     """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
     if run.last - run.first < 2:
         return []
     plant = sampled(
-        in_contact(start.drive), run.period, float(start.drive.computing_delay), seen(start.sees),
+        in_contact(start.drive), run.period, float(motor_of(start.drive).computing_delay), seen(start.sees),
         start.differencing,
     )  # fmt: skip
     ends = {run.first + 1, run.last}
@@ -140,16 +144,12 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
 
 def _linearised_at(start: SampledStart, run: SampledRun, index: int, plant: SampledPlant) -> OperatingPoint:
     sample = run.samples[index]
-    drive = start.drive
-    base = float(base_torque(drive))
-    windup = base / float(drive.c)
-    speed = float(drive.Omega) * windup
+    size = sizes_of(start.drive)
+    base, windup, speed = size.base, size.windup, size.speed
     inputs = seen(start.sees)
     sizes = {1: windup, 2: speed, 3: base, 5: base, 6: speed}
     input_scales = np.array([sizes[i] for i in inputs])
-    found = derivative(
-        start.step, sample, inputs, _scales(run, index, float(drive.elastic_period)), input_scales, base
-    )
+    found = derivative(start.step, sample, inputs, _scales(run, index, size.period), input_scales, base)
     whole = System(found.A, found.B, found.C, found.D)
     reached = moved(whole)
     kept = [reached[i] for i in shown(part(whole, reached))]
@@ -176,15 +176,9 @@ def _mismatch(
     """The linear loop against the exact plant under the controller, after small displacements both ways."""
     rows = point.plant.rows
     worst = 0.0
-    displacements = (
-        ({layout.THETA: windup}, {"phi1": windup, "z": windup}),
-        ({layout.V: speed}, {"w1": speed}),
-        ({layout.W2: speed}, {"w1": speed, "w2": speed}),
-        ({layout.PHI2: windup}, {"phi1": windup}),
-    )
     loop, read = closed(point.plant, point.law)
     read = np.vstack([np.hstack([rows["T"], np.zeros((1, point.law.A.shape[0]))]), read])
-    for moves, same in displacements:
+    for moves, same in start.displacements(windup, speed):
         state = np.zeros(loop.shape[0])
         for name, size in same.items():
             state[: rows["T"].shape[1]] += size * rows[name][0]
@@ -212,13 +206,13 @@ def closed(plant: SampledPlant, law: System) -> tuple[Vector, Vector]:
     return whole + np.vstack([B, np.zeros((law.A.shape[0], 1))]) @ read, read
 
 
-def _replayed(start: SampledStart, sample: Sample, moves: dict[int, float], period: float) -> Vector | None:
+def _replayed(start: SampledStart, sample: Sample, moves: dict[Part, float], period: float) -> Vector | None:
     """Shaft torque and demand at the samples from here on; None if the contact does not last."""
     rows = []
     for one in start.from_sample(sample.displaced(moves), sample.time + (WINDOW - 0.5) * period):
         if not one.pressing:
             return None
-        rows.append((shaft_torque(start, one), one.demand))
+        rows.append((start.shaft_torque(one), one.demand))
     return np.array(rows) if len(rows) == WINDOW else None
 
 

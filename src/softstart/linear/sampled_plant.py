@@ -1,8 +1,8 @@
-"""The drive at the sample instants: exact, with held demand, torque lag and computing delay.
+"""The drive or chain at the sample instants: exact, with held demand, torque lag and computing delay.
 
-In contact, while the driving flank presses, the drive is linear (`softstart.drive.control_systems`). A demand
-made at t_k acts from t_k + computing_delay on, through the torque lag. Between those instants the motion
-is a matrix exponential, so the sampled system is exact:
+In contact, while the flanks of all gaps press, the drive is linear (`softstart.drive.control_systems`). A
+demand made at t_k acts from t_k + computing_delay on, through the torque lag. Between those instants the
+motion is a matrix exponential, so the sampled system is exact:
 
     x+ = Ad x + G1 d[k-n-1] + G0 d[k-n],   computing_delay = n h + f, 0 <= f < h,
     G0 = int_0^(h-f) e^(A s) B ds,         G1 = e^(A (h-f)) int_0^f e^(A s) B ds
@@ -18,7 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from softstart.arrays import Matrix
+from softstart.chain.elements import Motor
+from softstart.chain.kernel_records import elastic_period
+from softstart.chain.machines import Machine
+from softstart.chain.model import Chain, ChainArrays
+from softstart.chain.run import mean_torque_of
 from softstart.drive import Drive
+from softstart.errors import InputError
 from softstart.linear.systems import System
 from softstart.plant import start as kernel
 
@@ -29,47 +35,162 @@ TERMS = 18  # of the exponential's series: 2^-18/18! is below rounding
 class Continuous:
     """Rates of change of the states under a motor torque: dx/dt = A x + B u; `rows` reads quantities off x.
 
-    With a torque lag the motor torque is the last state and its demand the input.
+    With a torque lag the motor torque is the last state and its demand the input. The first states are so
+    many `angles`, then so many `speeds`.
     """
 
     A: Matrix
     B: Matrix
     rows: dict[str, Matrix]
+    angles: int
+    speeds: int
 
 
-def in_contact(drive: Drive) -> Continuous:
-    """Motor, shaft and load while the flank presses: states phi1, then z, w1, w2 of `Drive.to_control`."""
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of torques and angles of a machine, N m and rad; its first frequency, rad/s, and period, s."""
+
+    base: float
+    windup: float
+    Omega: float
+    period: float
+
+    @property
+    def speed(self) -> float:
+        """Of an elastic vibration with the windup as amplitude, rad/s."""
+        return self.Omega * self.windup
+
+
+def sizes_of(machine: Machine) -> Sizes:
+    """The sizes of a drive or a chain with all gaps closed."""
+    base = mean_torque_of(machine)
+    if not isinstance(machine, Chain):
+        return Sizes(base, base / float(machine.c), float(machine.Omega), float(machine.elastic_period))
+    windup, period = base * float((1.0 / machine.at_motor_shaft().c).sum()), elastic_period(machine)
+    if not period > 0.0:
+        raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
+    return Sizes(base, windup, 2.0 * np.pi / period, period)
+
+
+def motor_of(machine: Machine) -> Drive | Motor:
+    """What has the motor's lag, delay and encoder."""
+    if not isinstance(machine, Chain):
+        return machine
+    assert machine.motor is not None
+    return machine.motor
+
+
+def in_contact(machine: Machine) -> Continuous:
+    """Motor, shaft and load while the flank presses: states phi1, then z, w1, w2 of `Drive.to_control`.
+
+    Of a chain the angle of the motor, the twists of all springs and the speeds of all bodies: masses that are
+    joined rigidly are one. Its gears with losses pass power on from the motor to the load.
+    """
+    if isinstance(machine, Chain):
+        arrays = machine.at_motor_shaft()
+        return _chain_between(machine, arrays, range(arrays.J.size))
+    drive = machine
     own = drive.to_control()
     A = np.zeros((4, 4))
     A[0, 2] = 1.0
     A[1:, 1:] = own.A
     B = np.vstack([[[0.0]], own.B[:, :1]])
     torque = np.hstack([[[0.0]], own.C[3:4]])
-    return _with_lag(drive, A, B, {"phi1": _row(4, 0), "z": _row(4, 1), "w1": _row(4, 2), "w2": _row(4, 3),
-                                   "T": torque})  # fmt: skip
+    rows = {"phi1": _row(4, 0), "z": _row(4, 1), "w1": _row(4, 2), "w2": _row(4, 3), "T": torque}
+    return _with_lag(drive, A, B, rows, 2)
 
 
-def motor_alone(drive: Drive) -> Continuous:
+def _chain_between(chain: Chain, arrays: ChainArrays, masses: range) -> Continuous:
+    """Neighbouring masses of a chain with all gaps closed, as if there were no others."""
+    joints = range(masses.start, masses.stop - 1)
+    if any(arrays.rigid[k] for k in joints if k in (arrays.motor - 1, arrays.motor)):
+        raise InputError(
+            f"{chain.name}: a shaft beside the motor is rigid, and the loop is that of its spring; give it a "
+            "stiffness, or make one mass of the two."
+        )
+    body = {masses.start: 0}  # of each mass
+    for k in joints:
+        body[k + 1] = body[k] + (not arrays.rigid[k])
+    springs = [k for k in joints if not arrays.rigid[k]]
+    angles, speeds = 1 + len(springs), 1 + len(springs)
+    n = angles + speeds
+    J = np.zeros(speeds)
+    A, B = np.zeros((n, n)), np.zeros((n, 1))
+    speed = {i: angles + body[i] for i in masses}
+    for i in masses:
+        J[body[i]] += arrays.J[i]
+    for i in masses:
+        A[speed[i], speed[i]] -= arrays.d_ground[i] / J[body[i]]
+    A[0, speed[arrays.motor]] = 1.0
+    B[speed[arrays.motor], 0] = 1.0 / J[body[arrays.motor]]
+    rows = {"phi1": _row(n, 0), "w1": _row(n, speed[arrays.motor]), "z": np.zeros((1, n))}
+    rows["w2"] = _row(n, speed[arrays.load]) if arrays.load in masses else np.zeros((1, n))
+    rows["T"] = np.zeros((1, n))
+    beside = arrays.motor if arrays.load > arrays.motor or arrays.motor == 0 else arrays.motor - 1
+    for place, k in enumerate(springs, start=1):
+        torque = np.zeros((1, n))
+        torque[0, place] = arrays.c[k]
+        torque[0, speed[k]] += arrays.d[k]
+        torque[0, speed[k + 1]] -= arrays.d[k]
+        before, after = _shares(arrays, k)
+        A[place, speed[k]], A[place, speed[k + 1]] = 1.0, -1.0
+        A[speed[k]] -= before * torque[0] / J[body[k]]
+        A[speed[k + 1]] += after * torque[0] / J[body[k + 1]]
+        rows[f"theta {k}"] = _row(n, place)
+        if k == beside:
+            sign = 1.0 if arrays.motor <= k else -1.0
+            rows["T"], rows["z"] = sign * torque, sign * rows[f"theta {k}"]
+    rows |= {f"w {i}": _row(n, speed[i]) for i in masses}
+    return _with_lag(chain, A, B, rows, angles)
+
+
+def _shares(arrays: ChainArrays, k: int) -> tuple[float, float]:
+    """The shares of a shaft's torque that act on the masses before and after: its gear takes the rest."""
+    eta, at_after = float(arrays.efficiency[k]), arrays.gear[k] > k
+    loss = eta if at_after == (arrays.motor <= k) else 1.0 / eta  # behind the spring, or before it
+    return (1.0, loss) if at_after else (loss, 1.0)
+
+
+def motor_side(chain: Chain) -> Continuous:
+    """The masses that turn with the motor while all gaps are open."""
+    arrays = chain.at_motor_shaft()
+    first = last = arrays.motor
+    while first > 0 and arrays.gap[first - 1] == 0.0:
+        first -= 1
+    while last < arrays.gap.size and arrays.gap[last] == 0.0:
+        last += 1
+    if first == last:
+        return motor_alone(chain)
+    return _chain_between(chain, arrays, range(first, last + 1))
+
+
+def motor_alone(machine: Machine) -> Continuous:
     """The motor without the shaft: states phi1, w1."""
-    A = np.array([[0.0, 1.0], [0.0, -float(drive.motor_viscous_friction / drive.J1)]])
-    B = np.array([[0.0], [1.0 / float(drive.J1)]])
+    if isinstance(machine, Chain):
+        arrays = machine.at_motor_shaft()
+        J, viscous = float(arrays.J[arrays.motor]), float(arrays.d_ground[arrays.motor])
+    else:
+        J, viscous = float(machine.J1), float(machine.motor_viscous_friction)
+    A = np.array([[0.0, 1.0], [0.0, -(viscous / J)]])
+    B = np.array([[0.0], [1.0 / J]])
     nothing = np.zeros((1, 2))
-    return _with_lag(drive, A, B, {"phi1": _row(2, 0), "w1": _row(2, 1), "w2": nothing, "T": nothing})
+    return _with_lag(machine, A, B, {"phi1": _row(2, 0), "w1": _row(2, 1), "w2": nothing, "T": nothing}, 1)
 
 
 def _row(n: int, index: int) -> Matrix:
     return np.eye(n)[index : index + 1]
 
 
-def _with_lag(drive: Drive, A: Matrix, B: Matrix, rows: dict[str, Matrix]) -> Continuous:
-    lag = float(drive.torque_lag)
+def _with_lag(machine: Machine, A: Matrix, B: Matrix, rows: dict[str, Matrix], angles: int) -> Continuous:
+    lag = float(motor_of(machine).torque_lag)
     n = A.shape[0]
-    if lag <= 1e-12 * float(drive.elastic_period):  # the exact plant neglects such a lag, too
-        return Continuous(A, B, rows)
+    period = elastic_period(machine) if isinstance(machine, Chain) else float(machine.elastic_period)
+    if lag <= 1e-12 * period:  # the exact plant neglects such a lag, too
+        return Continuous(A, B, rows, angles, n - angles)
     whole = np.block([[A, B], [np.zeros((1, n)), np.array([[-1.0 / lag]])]])
     rows = {name: np.hstack([row, [[0.0]]]) for name, row in rows.items()}
     rows["u"] = _row(n + 1, n)
-    return Continuous(whole, np.vstack([np.zeros((n, 1)), [[1.0 / lag]]]), rows)
+    return Continuous(whole, np.vstack([np.zeros((n, 1)), [[1.0 / lag]]]), rows, angles, n - angles)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.chain.machines import Machine, knob, with_values
+from softstart.chain.model import Chain, load_machine
 from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
@@ -22,8 +24,8 @@ from softstart.linear.operating_point import (
     SampledRun,
     operating_points,
     run_until_steady,
-    shaft_torque,
 )
+from softstart.linear.sampled_plant import sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
 from softstart.plant import layout
@@ -50,10 +52,10 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Variation:
-    """The loop of the same controller on a drive that it was not set up for."""
+    """The loop of the same controller on a drive that it was not set up for, or with all gaps open."""
 
     name: str
-    drive: Drive = field(repr=False)
+    drive: Machine = field(repr=False)
     stable: bool
     margins: Margins
     least_damping: float
@@ -74,8 +76,8 @@ class LinearView:
 
     Parameters
     ----------
-    drive : Drive
-        The drive.
+    drive : Drive or Chain
+        The drive or chain.
     controller : Controller
         The controller, set up.
     kind : str
@@ -88,7 +90,7 @@ class LinearView:
     own_loop : Loop, optional
         The loop on this drive.
     outside : Outside, optional
-        Everything but the shaft, for limit cycles.
+        Everything but the shaft, for limit cycles; None of a chain.
     margins : Margins, optional
         Margins and crossings of the loop: rad, s, rad/s.
     modes : tuple of Mode
@@ -98,7 +100,7 @@ class LinearView:
     variations : tuple of Variation
         The same controller on other drives.
     cycles : tuple of PredictedCycle
-        Limit cycles through the gap, predicted and checked.
+        Limit cycles through the gap, predicted and checked; none of a chain, which has several gaps.
 
     Examples
     --------
@@ -113,7 +115,7 @@ class LinearView:
     1633-1649, doi:10.1016/S0005-1098(02)00047-X.
     """
 
-    drive: Drive
+    drive: Machine
     controller: Controller
     kind: str
     notes: tuple[str, ...]
@@ -159,7 +161,7 @@ class LinearView:
     def elastic_mode(self) -> Mode | None:
         """The oscillatory mode whose frequency is nearest to the elastic frequency Omega, on a log scale."""
         swinging = [mode for mode in self.modes if mode.damping_ratio < 1.0 and mode.value.imag > 0.0]
-        Omega = float(self.drive.Omega)
+        Omega = sizes_of(self.drive).Omega
         return min(swinging, key=lambda mode: abs(math.log(mode.frequency / Omega)), default=None)
 
     @property
@@ -265,31 +267,35 @@ class LinearView:
 
 
 def linear_view(
-    drive: Drive | str,
+    drive: Machine | str,
     controller: str | Controller,
     parameters: Mapping[str, object] | None = None,
     *,
-    fitted_to: Drive | None = None,
+    fitted_to: Machine | None = None,
     inertias: Sequence[float] = INERTIAS,
     stiffnesses: Sequence[float] = STIFFNESSES,
     limit_cycles: bool = True,
 ) -> LinearView:
     """Linearise a controller as it runs, in contact, and analyse its loop: margins, modes, limit cycles.
 
+    Of a chain it is the loop from motor torque to motor speed through all its masses, with all gaps closed;
+    among the variations stands the same controller with all gaps open.
+
     Parameters
     ----------
-    drive : Drive or str
-        A drive, or the name or file of one.
+    drive : Drive, Chain or str
+        A drive or chain, or the name or file of one.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or a Controller object, built in or not.
     parameters : mapping, optional
         Parameters of a controller given by name; numbers in SI, or text with units.
-    fitted_to : Drive, optional
+    fitted_to : Drive or Chain, optional
         The drive for which the controller is set up, if not `drive`.
     inertias, stiffnesses : sequence of float, optional
-        Factors on J2 and c with which the margins of the same controller are computed too.
+        Factors on J2 and c with which the margins of the same controller are computed too; of a chain on the
+        inertia of its load mass and on all stiffnesses.
     limit_cycles : bool, optional
-        Whether limit cycles through the gap are predicted and tried on the exact plant.
+        Whether limit cycles through the gap of a drive are predicted and tried on the exact plant.
 
     Returns
     -------
@@ -317,10 +323,12 @@ def linear_view(
     'open loop'
     """
     if isinstance(drive, str):
-        drive = Drive.load(drive)
+        drive = load_machine(drive)
     made = make_controller(controller, parameters)
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
-    start = SampledStart.of(drive.assumed, made, fitted_to)  # the loop in contact is the same from anywhere
+    # the loop in contact is the same from anywhere
+    assumed = drive.assumed if isinstance(drive, Drive) else next(iter(drive.positions.values()))
+    start = SampledStart.of(assumed, made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
     points = operating_points(start, run)
@@ -341,13 +349,21 @@ def linear_view(
         return LinearView(drive, start.controller, "events", (sentence,), point)
     own = Loop(drive, point, start.differencing)
     modes = own.modes()
-    varied = [(f"J2 x {k:g}", {"load_inertia": k * drive.J2}) for k in inertias]
-    varied += [(f"c x {k:g}", {"stiffness": k * drive.c}) for k in stiffnesses]
-    outside = Outside(drive, point.law, point.derivative.inputs, point.plant, start.differencing)
-    found = _cycles(start, run, point, outside) if limit_cycles else ()
+    own_values = [float(found.value) for key in ("load_inertia", "stiffness") if (found := knob(drive, key))]
+    varied = [(f"J2 x {k:g}", {"load_inertia": k * own_values[0]}) for k in inertias]
+    varied += [(f"c x {k:g}", {"stiffness": k * own_values[1]}) for k in stiffnesses]
+    variations = [_varied(name, Loop(with_values(start.drive, change), point, start.differencing))
+                  for name, change in varied]  # fmt: skip
+    outside: Outside | None = None
+    cycled: tuple[PredictedCycle, ...] = ()
+    if isinstance(drive, Chain):
+        variations.append(_varied("all gaps open", Loop(start.drive, point, start.differencing, open=True)))
+    else:
+        outside = Outside(drive, point.law, point.derivative.inputs, point.plant, start.differencing)
+        cycled = _cycles(start, run, point, outside) if limit_cycles else ()
     return LinearView(
         drive, start.controller, "loop", _notes(name, run, point, own), point, own, outside, own.margins(),
-        modes, own.stable, tuple(_varied(start, point, *one) for one in varied), found,
+        modes, own.stable, tuple(variations), cycled,
     )  # fmt: skip
 
 
@@ -377,7 +393,10 @@ def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[floa
     for name, one in (("drive", drive), ("fitted_to", fitted_to)):
         if one is None:
             continue
-        if not isinstance(one, Drive):
+        if isinstance(one, Chain):
+            if one.motor is None or one.target_speed is None:
+                wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
+        elif not isinstance(one, Drive):
             wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
         elif one.shape != ():
             wrong.append(
@@ -427,24 +446,22 @@ def _notes(name: str, run: SampledRun, point: OperatingPoint, own: Loop) -> tupl
     return tuple(notes)
 
 
-def _varied(start: SampledStart, point: OperatingPoint, name: str, change: Mapping[str, Any]) -> Variation:
-    drive = start.drive.replace(**change)
-    loop = Loop(drive, point, start.differencing)
+def _varied(name: str, loop: Loop) -> Variation:
     least = min((mode.damping_ratio for mode in loop.modes()), default=math.nan)
-    return Variation(name, drive, loop.stable, loop.margins(), least)
+    return Variation(name, loop.drive, loop.stable, loop.margins(), least)
 
 
 def _cycles(
     start: SampledStart, run: SampledRun, point: OperatingPoint, outside: Outside
 ) -> tuple[PredictedCycle, ...]:
-    drive = start.drive
+    drive = outside.drive
     holds = outside.holds_speed()
     rest = run.samples[run.last if not holds else -1]
     back = max(1, round(float(drive.elastic_period) / run.period))
     recent = run.samples[max(run.first, run.last - back) : run.last + 1]
     w1, w2 = rest.x[layout.W2] + rest.x[layout.V], rest.x[layout.W2]
     against = float(drive.Mc + drive.load_viscous_friction * w2)
-    mean = against if holds else float(np.mean([shaft_torque(start, one) for one in recent]))
+    mean = against if holds else float(np.mean([start.shaft_torque(one) for one in recent]))
     takes = float(drive.motor_friction + drive.motor_viscous_friction * w1)
     demand = mean + takes if holds else float(np.mean([one.demand for one in recent]))
     room = min(float(drive.maximum_torque) - demand, demand - float(drive.minimum_torque))

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
+from softstart.chain.machines import values_of
 from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, STRATEGY, Screen
-from softstart.page.machines import DIGITS, NODE_DIGITS, Entry, values_of
+from softstart.page.machines import DIGITS, NODE_DIGITS, Entry
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
 

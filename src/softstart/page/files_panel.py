@@ -8,12 +8,13 @@ from weakref import WeakMethod
 
 from nicegui import ui
 
+from softstart.chain.machines import Machine
 from softstart.chain.model import Chain
 from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, drive_file, file_name, profile_of, shipped_drives, text_of
 from softstart.page.jobs import Jobs
-from softstart.page.machines import Machine, machine_from, single
+from softstart.page.machines import machine_from, single
 from softstart.page.panel_parts import (
     POLL,
     JobView,

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.chain.machines import Machine, here, two_masses, values_of
 from softstart.chain.run import ChainRun, mean_torque_of
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
@@ -26,19 +27,15 @@ from softstart.page.machines import (
     LIMITS,
     Axes,
     Entry,
-    Machine,
     Scale,
     axes_about,
     bases,
     entries,
-    here,
     k_dyn_row,
     map_words,
     placeless,
     scales_about,
     scales_of,
-    told,
-    values_of,
 )
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
@@ -408,7 +405,7 @@ class Screen:
 def _told(session: Session, found: Strategy) -> Drive:
     """The drive for which the strategy is set up."""
     own = getattr(found.run, "told", None)
-    return told(session.machine) if own is None else own
+    return two_masses(session.machine) if own is None else own
 
 
 def parameters_of(controller: Controller) -> list[Field[Any]]:

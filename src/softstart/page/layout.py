@@ -9,12 +9,12 @@ from pathlib import Path
 from types import new_class
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.machines import Machine
 from softstart.late import late
 from softstart.page import USER
 from softstart.page.controls import Controls
 from softstart.page.frames import Screen
 from softstart.page.live import Frame, Live
-from softstart.page.machines import Machine
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
 

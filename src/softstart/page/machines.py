@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.elements import START, TOP, Shaft
+from softstart.chain.elements import Shaft
+from softstart.chain.machines import Machine, here, moved, two_masses, values_of
 from softstart.chain.model import Chain, is_chain_text
 from softstart.chain.run import mean_torque_of
-from softstart.chain.simulation import drive_of
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
@@ -23,9 +23,6 @@ from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.simulation import simulate
 from softstart.tuning.ranges import ranges_of, tunable
-
-Machine = Drive | Chain
-Values = dict[str, tuple[Parameter, Any]]  # by path
 
 STEPS = 600
 DIGITS = 4
@@ -170,25 +167,6 @@ def _below(index: int) -> str:
     return "".join(chr(ord("\N{SUBSCRIPT ZERO}") + int(digit)) for digit in str(index + 1))
 
 
-def values_of(machine: Machine) -> Values:
-    """All parameters of a machine by their paths, each with its value.
-
-    >>> values_of(Chain.load("crane-4-mass"))["shaft[2].gap"][1]
-    0.2
-    """
-    if not isinstance(machine, Chain):
-        return {one.path: (one, getattr(machine, name)) for name, one in PARAMETERS.items()}
-    found = {one.name: (one, getattr(machine, one.name)) for one in TOP.parameters}
-    parts: list[tuple[str, Any]] = [("motor", machine.motor)] if machine.motor is not None else []
-    parts += [(f"mass[{i}]", mass) for i, mass in enumerate(machine.masses, 1)]
-    parts += [(f"shaft[{i}]", shaft) for i, shaft in enumerate(machine.shafts, 1)]
-    for path, part in parts:
-        given = part.values()
-        found |= {f"{path}.{name}": (one, given[name]) for name, one in part.PARAMETERS.items()}
-    start = {"load": machine.load_mass, "target_speed": machine.target_speed, "position": machine.position}
-    return found | {f"start.{one.name}": (one, start[one.name]) for one in START.parameters}
-
-
 def changed(machine: Machine, settings: Mapping[str, str]) -> Machine:
     """The machine with changes as typed, by the paths of their parameters.
 
@@ -242,11 +220,6 @@ def single(machine: Machine) -> Machine:
             "one; give one value a key."
         )
     return machine
-
-
-def told(machine: Machine) -> Drive:
-    """The drive for which strategies are set up; of a chain its modal reduction to two masses."""
-    return drive_of(machine) if isinstance(machine, Chain) else machine.assumed
 
 
 def rounded(value: float, digits: int = DIGITS) -> float:
@@ -363,7 +336,7 @@ def scales_of(controller: Controller, origin: Machine) -> Mapping[str, Scale]:
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
     found = {}
-    default = controller.defaults(told(origin))
+    default = controller.defaults(two_masses(origin))
     names = tunable(controller)
     for one in ranges_of(controller, names) if names else ():
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))
@@ -406,13 +379,6 @@ def axes_about(origin: Machine, gaps: int = GAPS, inertias: int = INERTIAS) -> A
     )
 
 
-def here(machine: Machine) -> tuple[float, float]:
-    """Where the machine stands in the map: gap and load inertia."""
-    if isinstance(machine, Chain):
-        return float(machine.at_motor_shaft().gap.sum()), machine.masses[machine.load_index].inertia
-    return float(machine.gap), float(machine.load_inertia)
-
-
 def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
     """Symbols and names of the two axes of a map, gap and load inertia.
 
@@ -424,22 +390,6 @@ def map_words(machine: Machine) -> tuple[tuple[str, str], tuple[str, str]]:
         symbols = f"\N{N-ARY SUMMATION}{gap}", f"J{_below(machine.load_index)}"
         return symbols, ("all gaps, at the motor shaft", f"inertia of {machine.load_mass}")
     return (gap, SYMBOLS["load_inertia"]), (f"gap {gap}", SYMBOLS["load_inertia"])
-
-
-def moved(machine: Machine, gap: float, inertia: float, origin: Machine | None = None) -> Machine:
-    """The machine at another place of its map; a chain whose gaps are all closed has them as its `origin`.
-
-    >>> here(moved(Chain.load("crane-4-mass"), 1.0, 70.0))
-    (1.0, 70.0)
-    """
-    if not isinstance(machine, Chain):
-        return machine.with_gap(gap, load_inertia=inertia)
-    whole, load = here(machine)
-    if whole == 0.0 and isinstance(origin, Chain):
-        shafts = zip(machine.shafts, origin.shafts, strict=True)
-        machine = replace(machine, shafts=tuple(one.replace(gap=first.gap) for one, first in shafts))
-        whole = here(machine)[0]
-    return machine.changed(gaps=gap / whole if whole > 0.0 else 1.0, load_inertia=inertia / load)
 
 
 def placeless(machine: Machine, axes: Axes, origin: Machine) -> Machine:

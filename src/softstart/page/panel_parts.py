@@ -13,9 +13,9 @@ from weakref import WeakMethod
 
 from nicegui import app, context, ui
 
+from softstart.chain.machines import Machine
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
-from softstart.page.machines import Machine
 from softstart.page.sentences import changed_since, sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import NOTHING

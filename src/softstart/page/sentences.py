@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 from typing import Any, NamedTuple
 
+from softstart.chain.machines import Machine, Values, values_of
 from softstart.errors import InputError, SimulationError
 from softstart.input.parameters import Parameter
-from softstart.page.machines import Machine, Values, values_of
 from softstart.quantities import Units, shortest
 from softstart.views.printed import unit, units_of
 

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     import uvicorn
     from nicegui import ui
 
+    from softstart.chain.machines import Machine
     from softstart.page import layout
-    from softstart.page.machines import Machine
 else:  # of the extra "ui", and only for a server
     fastapi, uvicorn, nicegui, ui = late("fastapi"), late("uvicorn"), late("nicegui"), late("nicegui.ui")
     layout = late("softstart.page.layout")

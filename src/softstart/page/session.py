@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.machines import Machine, moved
 from softstart.chain.model import Chain, load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import Machine, changed, machine_from, moved, single, without
+from softstart.page.machines import changed, machine_from, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.fatigue import chain_fatigue
+from softstart.chain.machines import Machine
 from softstart.chain.model import Chain
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS, Drive
@@ -25,7 +26,7 @@ from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
-from softstart.page.machines import Machine, changed
+from softstart.page.machines import changed
 from softstart.page.sentences import clipped
 from softstart.processes import Tell
 from softstart.quantities import Units, show
@@ -180,7 +181,7 @@ class Tuned:
 
 
 def tuning(
-    drive: Drive,
+    drive: Machine,
     controller: str,
     gaps: Sequence[Any] | None,
     inertias: Sequence[Any] | None,

@@ -9,9 +9,9 @@ from typing import Any
 
 from nicegui import ui
 
+from softstart.chain.machines import Machine
 from softstart.controller.finding import controller_class, controller_names, make_controller
 from softstart.controller.tuned import RobustFile, RobustGains, Tuned, read_gains, scheduled
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.page import tasks
 from softstart.page.downloads import file_name
@@ -96,7 +96,7 @@ class TuningPanel:
         if self._view.busy:
             return
         try:
-            drive = self._session.drive
+            drive = self._session.machine
             gaps, inertias = grid_of(drive, str(self._gaps.value), str(self._inertias.value))
         except InputError as error:
             self._view.refuse(error)
@@ -148,11 +148,12 @@ def tunable() -> list[str]:
     return found
 
 
-def grid_of(drive: Drive, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
+def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list[float]]:
     """Gaps in rad and load inertias in kg m2 from lists as typed; all mistakes in one InputError.
 
     Bare numbers of gaps are in the unit of the drive.
 
+    >>> from softstart.drive import Drive
     >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
     ([0.25, 1.0], [0.175, 0.35])
     """

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 else:
     xarray = late("xarray")
 
+Figures = dict[str, tuple[Any, str, str]]  # name -> values, unit, meaning
+
 PATIENCE = 0.2  # s
 FIRST_TURN = 32  # starts
 
@@ -176,7 +178,7 @@ def _parts(count: int) -> Iterator[slice]:
 
 def figures(
     results: at.Matrix, base: Any, until: float | None = None, limits: Limits | None = None
-) -> dict[str, tuple[Any, str, str]]:
+) -> Figures:
     """The figures of `array_starts` as name -> (values, unit, meaning).
 
     `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start; `limits`
@@ -196,7 +198,7 @@ def figures(
     first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
     k_dyn = stages.dynamic_coefficient(np.where(good, peak, 0.0), base)
     k_first = stages.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
-    found: dict[str, tuple[Any, str, str]] = {
+    found: Figures = {
         "k_dyn": (kept(k_dyn), "1", "dynamic coefficient of the whole run, [G](16)"),
         "k_dyn_first_contact": (
             np.where(np.isnan(kept(first)), np.nan, k_first),
@@ -212,13 +214,28 @@ def figures(
     if np.any(results[:, at.POSITION]):
         names = np.array(["", *UNKNOWN_POSITIONS])[results[:, at.POSITION].astype(np.int64)]
         found["position"] = (names, "", "position with the largest |T|, of those that are possible")
-    if limits is not None and (limits.shaft_torque is not None or limits.start_time is not None):
-        timed = {name: found[name][0] for name in ("peak_torque", "start_time")}
-        margin = np.where(np.isnan(timed["start_time"]), np.nan, limits.margin(timed))
-        found["margin"] = (margin, "1", "least share left of the limits of shaft torque and start time")
-        found["keeps_limits"] = ((margin >= 0.0) * 1.0, "1", "1 where these limits are kept, else 0")
+    if limits is not None:
+        found |= margins(found, limits)
     found["status"] = (np.array([kind.name for kind in kinds])[which], "", "how the start ended")
     return found
+
+
+def has_margin(limits: Limits) -> bool:
+    """Whether there is a limit of torque or time, whose margin each start tells."""
+    return any(one is not None for one in (limits.shaft_torque, limits.start_time, limits.used_torque))
+
+
+def margins(found: Figures, limits: Limits) -> Figures:
+    """Of starts with these figures what is left of the limits of torque and time; nothing without limits."""
+    if not has_margin(limits):
+        return {}
+    judged = ("peak_torque", "used_torque", "start_time")
+    timed: dict[str, Any] = {name: found[name][0] for name in judged if name in found}
+    margin = np.where(np.isnan(timed["start_time"]), np.nan, limits.margin(timed))
+    return {
+        "margin": (margin, "1", "least share left of the limits of shaft torque and start time"),
+        "keeps_limits": ((margin >= 0.0) * 1.0, "1", "1 where these limits are kept, else 0"),
+    }
 
 
 def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -> xarray.Dataset:

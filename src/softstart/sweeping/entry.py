@@ -14,11 +14,14 @@ from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softstart.chain.machines import Machine
+from softstart.chain.model import Chain, load_machine
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers, why_not_sendable
 from softstart.quantities import nearest, show
+from softstart.start.batch import has_margin
 from softstart.sweeping.grid import Axis, Plan, checked_chunk, plan_for, read_grid
 from softstart.sweeping.maker import Maker, with_whole_path
 from softstart.sweeping.results import Memory, check_netcdf, write_netcdf
@@ -33,14 +36,14 @@ OF_LIMITS = ("margin", "keeps_limits")  # figures of a drive with limits
 
 
 def sweep(
-    drive: Drive | str,
+    drive: Machine | str,
     controller: str | Controller | None,
     grid: Mapping[str, Any],
     *,
     parameters: Mapping[str, object] | None = None,
     until: float | None = None,
-    fitted_to: Drive | None = None,
-    base: Drive | None = None,
+    fitted_to: Machine | None = None,
+    base: Machine | None = None,
     to: str | os.PathLike[str] | None = None,
     netcdf: str | os.PathLike[str] | None = None,
     figures: tuple[str, ...] | list[str] | None = None,
@@ -55,20 +58,23 @@ def sweep(
 
     Parameters
     ----------
-    drive : Drive or str
-        The drive, or its name or file; it has what the grid does not vary.
+    drive : Drive, Chain or str
+        The drive or chain, or its name or file; it has what the grid does not vary.
     controller : str, Controller or None
         A name, `path/to/file.py:ClassName` or an object; None where controllers are an axis.
     grid : mapping
         The axes, in order: values by parameter. A parameter of the drive by name (`gap`) or as in a file
         (`shaft.gap`), one of the controller as `controller.NAME`, and `controller` itself with names. Values
         are numbers in SI, strings with units or texts (`load.kind`). A mapping instead of values is one axis
-        of samples, whose parameters vary together: {"sample": {"gap": [...], "load.inertia": [...]}}.
+        of samples, whose parameters vary together: {"sample": {"gap": [...], "load.inertia": [...]}}. "2x" is
+        twice the own value. Of a chain `gap` is the sum of all its gaps at the motor shaft, widened alike,
+        and any mass or shaft may be named by number or name: `mass[2].inertia`, `shaft[rotor - pinion].gap`;
+        the coordinate is then called `mass_2_inertia`.
     parameters : mapping, optional
         Parameters of the controller that are the same everywhere.
     until, time_limit : float, optional
         As in `simulate`, s.
-    fitted_to, base : Drive, optional
+    fitted_to, base : Drive or Chain, optional
         As in `simulate`.
     to : path, optional
         Zarr folder for the results. It is written chunk by chunk; the same call on it goes on where an
@@ -77,6 +83,7 @@ def sweep(
         Also write the finished results into this netCDF file.
     figures : sequence of str, optional
         Those to keep, by name; the status always is. By default K_dyn, start time, peak torque and contacts;
+        of a chain with K_dyn of each shaft (`k_dyn_1`) and no contacts;
         of a drive with limits also `margin`, the least share left of the limits of shaft torque and start
         time (below 0 where one is exceeded, NaN without a start), and `keeps_limits`, 1 or 0.
     chunk : int, optional
@@ -117,7 +124,7 @@ def sweep(
     docs/sweeps.md; each start: see `simulate`.
     """
     if isinstance(drive, str):
-        drive = Drive.load(drive)
+        drive = load_machine(drive)
     maker = _maker(controller, parameters, allow_code)
     axes = _checked(drive, maker, grid, until, time_limit, fitted_to, base, figures)
     kept = _figures_kept(drive, figures)
@@ -222,7 +229,8 @@ def _checked(
     wrong: list[str] = []
     axes: tuple[Axis, ...] = ()
     for name, other in (("drive", drive), ("fitted_to", fitted_to), ("base", base)):
-        if not (isinstance(other, Drive) and other.shape == ()) and not (other is None and name != "drive"):
+        one = isinstance(other, Chain) or (isinstance(other, Drive) and other.shape == ())
+        if not one and not (other is None and name != "drive"):
             shown = f"a Drive with fields of shape {other.shape}" if isinstance(other, Drive) else show(other)
             wrong.append(f"{name} = {shown}: give one single Drive; what varies goes into the grid.")
     for name, value in (("until", until), ("time_limit", time_limit)):
@@ -230,12 +238,13 @@ def _checked(
             isinstance(value, Real) and not isinstance(value, bool) and 0.0 < float(value) < math.inf
         ):
             wrong.append(f"{name} = {show(value)}: give a time above 0 s as a number, or leave it out.")
-    wrong += _figure_mistakes(figures)
+    machine = drive if isinstance(drive, Chain | Drive) else None
+    wrong += _figure_mistakes(figures, machine)
     if not maker.given and not (isinstance(grid, Mapping) and "controller" in grid):
         wrong.append("controller = None: name a controller, or make several an axis of the grid.")
     else:
         try:
-            axes = read_grid(grid, maker)
+            axes = read_grid(grid, maker, machine)
         except InputError as error:
             wrong.extend(error.sentences)
     if wrong:
@@ -243,11 +252,14 @@ def _checked(
     return axes
 
 
-def _figures_kept(drive: Drive, figures: tuple[str, ...] | list[str] | None) -> tuple[str, ...]:
+def _figures_kept(drive: Machine, figures: tuple[str, ...] | list[str] | None) -> tuple[str, ...]:
     """The figures asked for, or the usual ones; InputError for a margin where there are no limits."""
-    limited = drive.limits.shaft_torque is not None or drive.limits.start_time is not None
+    limited = has_margin(drive.limits)
     if figures is None:
-        return FIGURES + OF_LIMITS if limited else FIGURES
+        usual: tuple[str, ...] = FIGURES
+        if isinstance(drive, Chain):
+            usual = (*FIGURES[:3], *(f"k_dyn_{k + 1}" for k in range(len(drive.shafts))))
+        return usual + OF_LIMITS if limited else usual
     wrong = [name for name in figures if name in OF_LIMITS and not limited]
     if wrong:
         raise InputError(
@@ -257,12 +269,12 @@ def _figures_kept(drive: Drive, figures: tuple[str, ...] | list[str] | None) -> 
     return tuple(dict.fromkeys(figures))
 
 
-def _figure_mistakes(figures: object) -> list[str]:
+def _figure_mistakes(figures: object, machine: Machine | None) -> list[str]:
     if figures is None:
         return []
     if isinstance(figures, str) or not isinstance(figures, tuple | list) or not figures:
         return [f"figures = {show(figures)}: name figures in a list, as ['k_dyn', 'start_time']."]
-    known = list(known_figures())
+    known = list(known_figures(machine if isinstance(machine, Chain) else None))
     wrong = []
     for name in figures:
         if name not in known:

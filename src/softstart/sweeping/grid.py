@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softstart.chain.machines import BY_PATH, Machine, knob, knobs
+from softstart.chain.model import Chain
 from softstart.controller.finding import quantity
 from softstart.drive import LIMIT_TABLES, PARAMETERS
 from softstart.errors import InputError
@@ -22,7 +24,6 @@ from softstart.sweeping.maker import Maker, Parameters
 
 Owner = Literal["drive", "parameter", "controller"]
 PREFIX = "controller"
-_BY_PATH = {path: p.name for p in PARAMETERS.values() for path in (p.formerly, p.path) if path}
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +83,10 @@ class Axis:
         return all(column.numeric for column in self.columns)
 
 
-def read_grid(grid: object, maker: Maker) -> tuple[Axis, ...]:
+def read_grid(grid: object, maker: Maker, machine: Machine | None = None) -> tuple[Axis, ...]:
     """The axes in the order of the grid, or one InputError for all that is wrong with them.
+
+    `machine` is the one that is varied, of whose values "2x" is a multiple; without it any drive.
 
     >>> axes = read_grid({"load.inertia": ["700 kg*cm^2", 0.175], "gap": [0.5, 1, 2]}, Maker("direct"))
     >>> [(axis.name, axis.columns[0].values.tolist()) for axis in axes]
@@ -102,7 +105,7 @@ def read_grid(grid: object, maker: Maker) -> tuple[Axis, ...]:
         columns: list[Column] = []
         for name, given in pairs:
             try:
-                column = read_column(str(name), given, parameters)
+                column = read_column(str(name), given, parameters, machine)
             except InputError as error:
                 wrong.extend(error.sentences)
                 continue
@@ -125,7 +128,7 @@ def read_grid(grid: object, maker: Maker) -> tuple[Axis, ...]:
     return tuple(axes)
 
 
-def target_of(key: str) -> tuple[Owner, str] | None:
+def target_of(key: str, machine: Machine | None = None) -> tuple[Owner, str] | None:
     """Whose parameter a key of the grid names, and which; None for an unknown one.
 
     >>> target_of("load.inertia"), target_of("controller.torque"), target_of("controller")
@@ -135,15 +138,25 @@ def target_of(key: str) -> tuple[Owner, str] | None:
         return "controller", ""
     if key.startswith((f"{PREFIX}.", f"{PREFIX}_")):
         return "parameter", key[len(PREFIX) + 1 :]
-    name = _BY_PATH.get(key, key)
+    if machine is not None:
+        found = knob(machine, key)
+        return None if found is None else ("drive", found.name)
+    name = BY_PATH.get(key, key)
     return ("drive", name) if name in PARAMETERS else None
 
 
-def read_column(key: str, values: object, parameters: Parameters | None) -> Column:
-    """One column; `parameters` are those of the controllers, None where these are not known."""
-    target = target_of(key)
+def read_column(
+    key: str, values: object, parameters: Parameters | None, machine: Machine | None = None
+) -> Column:
+    """One column; `parameters` are those of the controllers, None where these are not known.
+
+    >>> crane = Chain.load("crane-4-mass")
+    >>> read_column("shaft[2].gap", ["0.5x", "2x"], None, crane).values.tolist()
+    [0.1, 0.4]
+    """
+    target = target_of(key, machine)
     if target is None:
-        raise InputError(_unknown(key, parameters))
+        raise InputError(_unknown(key, parameters, machine))
     owner, field = target
     if isinstance(values, str | bytes) or not (isinstance(values, Sequence) or hasattr(values, "__array__")):
         raise InputError(f"{key} = {show(values)}: give the values of this axis in a list, as [0.5, 1, 2].")
@@ -152,7 +165,7 @@ def read_column(key: str, values: object, parameters: Parameters | None) -> Colu
     if owner == "controller":
         return Column(PREFIX, owner, "", "", "controller", _texts(key, values))
     if owner == "drive":
-        return _of_drive(key, field, values)
+        return _of_drive(key, field, values, machine)
     if parameters is None:  # the controllers themselves are wrong, which is told elsewhere
         raise InputError([])
     if field not in parameters:
@@ -188,8 +201,11 @@ def _parameters(grid: Mapping[Any, Any], maker: Maker, wrong: list[str]) -> Para
         return None
 
 
-def _of_drive(key: str, name: str, values: object) -> Column:
-    parameter = PARAMETERS[name]
+def _of_drive(key: str, name: str, values: object, machine: Machine | None) -> Column:
+    found = None if machine is None else knob(machine, name)
+    parameter = PARAMETERS[name] if found is None else found.parameter
+    if found is not None and parameter.unit and not parameter.many:
+        values = [_multiple(value, found.value) for value in values]  # type: ignore[attr-defined]
     if (not parameter.unit and not parameter.choices) or parameter.table in LIMIT_TABLES:
         raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
     wording = Wording(written={name: key})
@@ -207,6 +223,17 @@ def _of_drive(key: str, name: str, values: object) -> Column:
     except RefusedError as reason:
         raise InputError(wording.refused(parameter, values, reason)) from None
     return Column(name, "drive", name, parameter.unit, parameter.meaning, _flat(key, read))
+
+
+def _multiple(value: Any, own: Any) -> Any:
+    """What "2x" of the machine's own value is; anything else as it is."""
+    text = value.strip() if isinstance(value, str) else ""
+    if not (text.endswith("x") and isinstance(own, float)):
+        return value
+    try:
+        return float(f"{float(text[:-1]) * own:.12g}")
+    except ValueError:
+        return value  # which is refused with its sentence
 
 
 def _flat(key: str, values: object) -> Any:
@@ -250,16 +277,19 @@ def _paired(name: str, columns: list[Column], count: int, wrong: list[str]) -> l
     return [Axis(name, tuple(columns))] if columns else []
 
 
-def _unknown(key: str, parameters: Parameters | None) -> str:
-    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else list(meant_by(key, PARAMETERS))
+def _unknown(key: str, parameters: Parameters | None, machine: Machine | None = None) -> str:
+    of_drive = [] if isinstance(machine, Chain) else list(meant_by(key, PARAMETERS))
+    meant = [f"{PREFIX}.{key}"] if key in (parameters or ()) else of_drive
     if not meant:
         own = [f"{PREFIX}.{name}" for name in parameters or ()]
-        close = nearest(key, [*_BY_PATH, *own, *(parameters or ()), PREFIX])
+        words = BY_PATH if machine is None else knobs(machine)
+        close = nearest(key, [*words, *own, *(parameters or ()), PREFIX])
         meant = [f"{PREFIX}.{close}" if close in (parameters or ()) else close] if close else []
+    what = "chain" if isinstance(machine, Chain) else "drive"
     hint = (
         f"did you mean {' or '.join(meant)}?"
         if meant
-        else "take a parameter of the drive or controller.NAME."
+        else f"take a parameter of the {what} or controller.NAME."
     )
     return f"{key}: there is no such axis; {hint}"
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart import __version__
+from softstart.chain.model import Chain
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.start.status import Status
@@ -42,13 +43,14 @@ class Variable:
     values: Any = None
 
 
-def figure_variables(axes: tuple[Axis, ...], figures: tuple[str, ...]) -> list[Variable]:
+def figure_variables(axes: tuple[Axis, ...], question: Question) -> list[Variable]:
     """The figures, and at the end the status, whose chunk in a folder says that all the others are there."""
     dims = tuple(axis.name for axis in axes)
     found = []
-    for name in figures:
+    known = known_figures(question.drive if isinstance(question.drive, Chain) else None)
+    for name in question.figures:
         if name != STATUS:
-            unit, meaning = known_figures()[name]
+            unit, meaning = known[name]
             found.append(Variable(name, dims, np.dtype("f8"), np.nan, {"units": unit, "long_name": meaning}))
     attributes = {
         "long_name": "how the start ended",
@@ -105,7 +107,7 @@ class Memory:
         self.plan, self.axes, self.question = plan, axes, question
         self.arrays = {
             one.name: np.full(plan.shape, one.fill, dtype=one.dtype)
-            for one in figure_variables(axes, question.figures)
+            for one in figure_variables(axes, question)
         }
 
     def keep(self, place: tuple[slice, ...], block: Block) -> None:
@@ -118,7 +120,7 @@ class Memory:
         return xarray.Dataset(
             {
                 one.name: (one.dims, self.arrays[one.name], one.attributes)
-                for one in figure_variables(self.axes, self.question.figures)
+                for one in figure_variables(self.axes, self.question)
             },
             coords={
                 one.name: (
@@ -168,7 +170,7 @@ def _write(
             file.attrs["coordinates"] = " ".join(samples)
         for one in coordinate_variables(axes):
             _variable(file, one, None)[...] = one.values
-        for one in figure_variables(axes, question.figures):
+        for one in figure_variables(axes, question):
             variable = _variable(file, one, plan.chunk)
             for number in range(plan.chunks):
                 place = plan.place(number)

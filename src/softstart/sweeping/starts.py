@@ -12,12 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from softstart.chain.batch import prepared
+from softstart.chain.machines import Machine, two_masses, with_values
+from softstart.chain.model import Chain
+from softstart.chain.run import mean_torque_of
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive, Limits
 from softstart.errors import InputError
 from softstart.plant import layout as at
 from softstart.start import metrics
-from softstart.start.batch import array_starts, figures, limits_of_each
+from softstart.start.batch import Figures, array_starts, figures, limits_of_each
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
 from softstart.sweeping.maker import Maker
@@ -27,15 +31,21 @@ CODES = {status.name: code for code, status in enumerate(Status)}
 
 
 @cache
-def known_figures() -> dict[str, tuple[str, str]]:
-    """Names of the figures of a start, with unit and meaning.
+def known_figures(machine: Machine | None = None) -> dict[str, tuple[str, str]]:
+    """Names of the figures of a start, with unit and meaning; those of a chain tell each of its shafts.
 
     >>> known_figures()["start_time"]
     ('s', 'first instant at which the load has its target speed')
+    >>> known_figures(Chain.load("crane-4-mass"))["k_dyn_2"]
+    ('1', 'K_dyn of pinion - wheel shaft')
     """
-    notes = np.zeros((1, at.N_X))
-    notes[:, at.RELEASE_TIME] = np.nan
-    found = figures(notes, 1.0, limits=Limits(shaft_torque=1.0))
+    if isinstance(machine, Chain):
+        shafts = tuple(one.replace(permissible_torque=1.0) for one in machine.shafts)
+        found = prepared([replace(machine, shafts=shafts, position="mid-gap")]).named()
+    else:
+        notes = np.zeros((1, at.N_X))
+        notes[:, at.RELEASE_TIME] = np.nan
+        found = figures(notes, 1.0, limits=Limits(shaft_torque=1.0))
     return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
 
 
@@ -43,12 +53,12 @@ def known_figures() -> dict[str, tuple[str, str]]:
 class Question:
     """What is the same for all starts of a sweep. `fitted_to` and `base` as in `simulate`."""
 
-    drive: Drive
+    drive: Machine
     maker: Maker
     figures: tuple[str, ...]
     until: float | None = None
-    fitted_to: Drive | None = None
-    base: Drive | None = None
+    fitted_to: Machine | None = None
+    base: Machine | None = None
     time_limit: float | None = None
 
 
@@ -79,8 +89,7 @@ def cut(axes: tuple[Axis, ...], place: tuple[slice, ...]) -> tuple[Axis, ...]:
 def compute(task: Task) -> Block:
     """The figures of all starts of a chunk, the same bits wherever and beside whatever they are computed."""
     question, shape = task.question, task.shape
-    count = math.prod(shape)
-    changes: dict[str, Any] = {"gap": np.full(count, question.drive.gap)}  # every drive of a chunk is a batch
+    changes: dict[str, Any] = {}
     parameters: dict[str, Any] = {}
     controller = ""
     for column, values in _spread(task.axes, shape):
@@ -90,11 +99,8 @@ def compute(task: Task) -> Block:
             parameters[column.field] = values
         else:
             controller = values
-    swept = any(column.field == "gap" for axis in task.axes for column in axis.columns)
-    drive = question.drive.with_gap(**changes) if swept else question.drive.replace(**changes)
-    notes = _notes(question, drive, parameters, controller)
-    base = np.broadcast_to(metrics.base_torque(question.base or drive), (count,))
-    found = figures(notes, base, question.until, limits_of_each(drive))
+    make = _of_chains if isinstance(question.drive, Chain) else _of_drives
+    found = make(question, changes, parameters, controller, math.prod(shape))
     block: Block = {name: found[name][0].reshape(shape) for name in question.figures if name != "status"}
     names, which = np.unique(found["status"][0], return_inverse=True)
     codes = np.array([CODES[name] for name in names.tolist()], dtype=np.int8)
@@ -113,8 +119,24 @@ def _spread(axes: tuple[Axis, ...], shape: tuple[int, ...]) -> Iterator[tuple[Co
                 yield column, text
 
 
+def _of_drives(
+    question: Question, changes: Mapping[str, Any], parameters: Mapping[str, Any], controller: str, count: int
+) -> Figures:
+    assert isinstance(question.drive, Drive)
+    own = {"gap": np.full(count, question.drive.gap)}  # every drive of a chunk is a batch
+    change = question.drive.with_gap if "gap" in changes else question.drive.replace
+    drive = change(**{**own, **changes})
+    base = question.base if question.base is not None else drive
+    each = np.broadcast_to(
+        metrics.base_torque(base) if isinstance(base, Drive) else base.mean_torque, (count,)
+    )
+    notes = _notes(question, drive, parameters, controller)
+    return figures(notes, each, question.until, limits_of_each(drive))
+
+
 def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> at.Matrix:
-    maker, fitted_to = question.maker, question.fitted_to
+    maker = question.maker
+    fitted_to = None if question.fitted_to is None else two_masses(question.fitted_to)
     made = maker.make(parameters, controller)
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
     if not arrays or isinstance(made, CompiledController):
@@ -127,6 +149,34 @@ def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], cont
         made = maker.make({**parameters, **own}, controller)
         rows.append(array_starts(one, made, question.until, fitted_to, question.time_limit))
     return np.concatenate(rows)
+
+
+def _of_chains(
+    question: Question, changes: Mapping[str, Any], parameters: Mapping[str, Any], controller: str, count: int
+) -> Figures:
+    """One start after another where the controller's parameters differ, else one call for all."""
+    chains = [_chain_of(question.drive, changes, index) for index in range(count)]
+    starts = prepared(chains, question.time_limit)
+    base = np.array([mean_torque_of(question.base or question.fitted_to or chain) for chain in chains])
+    nominal = None if question.fitted_to is None else two_masses(question.fitted_to)
+    drives = [nominal or two_masses(chain) for chain in chains]
+    arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
+    made = [
+        question.maker.make({**parameters, **{n: float(v[i]) for n, v in arrays.items()}}, controller)
+        for i in range(count if arrays else 1)
+    ]
+    return starts.figures(np.arange(count), made, drives, base, until=question.until)
+
+
+def _chain_of(machine: Machine, changes: Mapping[str, Any], index: int) -> Chain:
+    """The chain of one place of a chunk."""
+    values = {
+        name: float(value[index]) if isinstance(value, np.ndarray) else value
+        for name, value in changes.items()
+    }
+    found = with_values(machine, values)
+    assert isinstance(found, Chain)
+    return found
 
 
 MOST_CORNERS = 4096
@@ -160,7 +210,9 @@ def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
             Axis(axis.name, tuple(_one(column, controller) for column in axis.columns)) for axis in axes
         )
         compute(Task(0, question, first, tuple(slice(0, 1) for _ in axes)))
-        ready, _ = question.maker.make({}, controller).set_up(question.fitted_to or question.drive)
+        ready, _ = question.maker.make({}, controller).set_up(
+            two_masses(question.fitted_to or question.drive)
+        )
         compiled = compiled and isinstance(ready, CompiledController)
     return compiled
 
@@ -180,13 +232,23 @@ def _ends(axis: Axis) -> list[tuple[tuple[Column, Any], ...]]:
     return [((column, value),) for value in dict.fromkeys((low, high))]
 
 
+def _possible(machine: Machine, values: Mapping[str, Any]) -> None:
+    """InputError for a drive or a chain that cannot be; samples of a chain are looked at one by one."""
+    if isinstance(machine, Drive):
+        machine.replace(**values)
+        return
+    arrays = [value.size for value in values.values() if isinstance(value, np.ndarray)]
+    for index in range(max(arrays, default=1)):
+        _chain_of(machine, values, index)
+
+
 def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
     drive: dict[str, Any] = {c.field: value for c, value in values if c.owner == "drive"}
     parameters = {c.field: value for c, value in values if c.owner == "parameter"}
     controller = next((value for c, value in values if c.owner == "controller"), "")
     sentences: list[str] = []
     attempts: tuple[Callable[[], object], ...] = (
-        lambda: question.drive.replace(**drive),
+        lambda: _possible(question.drive, drive),
         lambda: question.maker.make(parameters, controller),
     )
     for attempt in attempts:

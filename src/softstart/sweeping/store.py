@@ -300,7 +300,7 @@ def _fill(
     group = zarr.create_group(fresh, attributes=attributes)
     for one in coordinate_variables(axes):
         _array(group, one, one.values.shape, one.values.shape)[...] = one.values
-    for one in figure_variables(axes, question.figures):
+    for one in figure_variables(axes, question):
         _array(group, one, plan.shape, plan.chunk)
     with warnings.catch_warnings():
         # All metadata in one file is a convention that Zarr 3 has not adopted; xarray asks for it.

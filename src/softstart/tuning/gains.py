@@ -142,7 +142,7 @@ def _settled(workers: Workers, places: Vector, restart_costs: Vector) -> Schedul
     cells = list(range(len(question.cells)))
     defaults = trials.own_defaults
     values = own_values(trials, cells, places)
-    tuned, bound = trials.of_pairs(values, cells), yardstick.own_bound
+    tuned, bound = trials.to_the_end().of_pairs(values, cells), yardstick.own_bound
     ours = cost(tuned.metric, tuned.start_time, bound, question.quantile)
     before = cost(yardstick.own.metric, yardstick.own.start_time, bound, question.quantile)
     back = np.asarray((before < ours) & inside(question.ranges, defaults, defaults))
@@ -215,7 +215,7 @@ def _settled_set(trials: Trials, best: Found, restart_costs: Vector) -> SetFound
     """The gains with what they reach; the defaults if these are better, and allowed."""
     question, yardstick = trials.question, trials.yardstick
     values = {name: float(value[0]) for name, value in set_values(trials, best.place[None]).items()}
-    tuned = trials.of_set({name: np.array([value]) for name, value in values.items()})
+    tuned = trials.to_the_end().of_set({name: np.array([value]) for name, value in values.items()})
     judged = Judged(tuned.metric[0], tuned.start_time[0])
     ours, before = (
         float(

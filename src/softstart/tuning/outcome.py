@@ -31,7 +31,7 @@ from softstart.tuning.question import Question
 if TYPE_CHECKING:
     import xarray
 
-    from softstart.drive import Drive
+    from softstart.chain.machines import Machine
 
 views = late("softstart.views.tuning")
 
@@ -119,8 +119,8 @@ class Tuning:
     seconds: float
 
     @property
-    def drive(self) -> Drive:
-        """The nominal drive."""
+    def drive(self) -> Machine:
+        """The nominal drive or chain."""
         return self.question.drive
 
     @property
@@ -183,7 +183,7 @@ class Tuning:
         about = self._about()
         if what == "robust" or (what is None and self.schedule is None):
             one = self._robust()
-            saved = RobustFile(self._name(), one.parameters, self.drive)
+            saved = RobustFile(self._name(), one.parameters, one.controller.nominal)
             told = {"worst": one.worst, "worst_default": one.worst_default, "in_time": one.feasible}
             text = robust_text(saved, about | told)
         else:
@@ -227,7 +227,7 @@ class Tuning:
         q = self.question
         gains = gains_on_grid(q, {one.name: self.schedule[one.name].to_numpy() for one in q.ranges})
         given = {name: value for name, value in q.recipe.given.items() if name not in gains}
-        return ScheduleFile(q.recipe.name, q.gaps, q.load_inertias, gains, given)
+        return ScheduleFile(q.recipe.name, *q.declared(), gains, given)
 
     def _name(self) -> str:
         name = self.question.recipe.name

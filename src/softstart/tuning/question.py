@@ -13,6 +13,18 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from softstart import __version__
+from softstart.chain.machines import (
+    Knob,
+    Machine,
+    batch_of,
+    here,
+    knob,
+    knobs,
+    moved,
+    two_masses,
+    with_values,
+)
+from softstart.chain.model import Chain
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.controller.tuned import Tuned
@@ -47,7 +59,7 @@ class Bound(NamedTuple):
         return f"at most {self.value:g} s"
 
 
-def bound_of(start_time: object, drive: Drive | None = None, metric: object = "") -> Bound:
+def bound_of(start_time: object, drive: Machine | None = None, metric: object = "") -> Bound:
     """The bound asked for: None, seconds, or "1.2x" as a multiple of the start time of `direct`.
 
     >>> bound_of(None).kind, bound_of("1.2x"), bound_of("300 ms")
@@ -64,7 +76,7 @@ def bound_of(start_time: object, drive: Drive | None = None, metric: object = ""
 class Question:
     """Everything that the answer depends on. Cells go through the gaps, load inertias fastest."""
 
-    drive: Drive
+    drive: Machine
     recipe: Recipe
     gaps: tuple[float, ...]
     load_inertias: tuple[float, ...]
@@ -73,7 +85,7 @@ class Question:
     metric: Metric
     bound: Bound
     quantile: float
-    base: Drive | None
+    base: Machine | None
     seed: int
     restarts: int
     population: int
@@ -96,10 +108,30 @@ class Question:
             return "limit_share"
         return self.metric if isinstance(self.metric, str) else getattr(self.metric, "__name__", "metric")
 
-    def drive_of(self, cell: int) -> Drive:
-        """The drive of a cell, as it is."""
-        gap, inertia = self.cells[cell]
-        return self.drive.with_gap(gap, load_inertia=inertia)
+    def drive_of(self, cell: int) -> Machine:
+        """The drive or chain of a cell, as it is."""
+        return moved(self.drive, *self.cells[cell])
+
+    def value_in(self, cell: int, name: str) -> float:
+        """A quantity that has a tolerance, in a cell; of a chain each gap goes with all others."""
+        found = knob(self.drive_of(cell) if isinstance(self.drive, Chain) else self.drive, name)
+        assert found is not None
+        return float(found.value)
+
+    def fitted(self) -> Drive:
+        """The drives for which controllers are set up in the cells, as one batch."""
+        if isinstance(self.drive, Chain):
+            return batch_of([two_masses(self.drive_of(cell)) for cell in range(len(self.cells))])
+        gaps, inertias = (np.array(axis) for axis in zip(*self.cells, strict=True))
+        return self.drive.with_gap(gaps, load_inertia=inertias)
+
+    def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Gaps and load inertias as the drives declare them for which controllers are set up."""
+        if not isinstance(self.drive, Chain):
+            return self.gaps, self.load_inertias
+        rows = [two_masses(moved(self.drive, gap, self.load_inertias[0])) for gap in self.gaps]
+        columns = [two_masses(moved(self.drive, self.gaps[0], one)) for one in self.load_inertias]
+        return tuple(float(one.gap) for one in rows), tuple(float(one.load_inertia) for one in columns)
 
     def neighbours(self, cell: int) -> tuple[int, ...]:
         """The cells beside a cell on the grid."""
@@ -197,22 +229,27 @@ GAP_MULTIPLES = (0.5, 1.0, 2.0, 4.0)  # of the drive's own gap
 INERTIA_MULTIPLES = (0.4, 1.0, 2.0)  # of the drive's own load inertia
 
 
-def gaps_of(drive: Drive, given: Iterable[Any] | Any | None, name: str = "gaps") -> tuple[float, ...]:
+def gaps_of(drive: Machine, given: Iterable[Any] | Any | None, name: str = "gaps") -> tuple[float, ...]:
     """Gaps in rad, rising: numbers, texts with a unit, or multiples of the drive's own as "2x".
+
+    Those of a chain are the sum of all its gaps at the motor shaft, widened alike.
 
     >>> gaps_of(Drive.load("crane-4amtkf"), ["2x", 0.5, "30 deg"])
     (0.5, 0.5235987755982988, 1.0)
     """
+    own = here(drive)[0]
     if given is None:
-        if not drive.gap > 0.0:
+        if not own > 0.0:
             raise InputError(
                 f"{name}: the drive has no gap of which multiples could be taken; name the gaps."
             )
         given = [f"{multiple}x" for multiple in GAP_MULTIPLES]
-    return _axis(given, name, "rad", drive, {"x": float(drive.gap)})
+    return _axis(given, name, "rad", drive, {"x": own})
 
 
-def inertias_of(drive: Drive, given: Iterable[Any] | Any | None, name: str = "inertias") -> tuple[float, ...]:
+def inertias_of(
+    drive: Machine, given: Iterable[Any] | Any | None, name: str = "inertias"
+) -> tuple[float, ...]:
     """Load inertias in kg m2, rising; also multiples of the drive's own ("2x") or of the motor's ("5 J1").
 
     >>> [round(inertia, 3) for inertia in inertias_of(Drive.load("crane-4amtkf"), ["2 J1", "1x", 0.1])]
@@ -220,12 +257,19 @@ def inertias_of(drive: Drive, given: Iterable[Any] | Any | None, name: str = "in
     """
     if given is None:
         given = [f"{multiple}x" for multiple in INERTIA_MULTIPLES]
-    units = {"x": float(drive.load_inertia), "J1": float(drive.motor_inertia)}
+    motor = float(drive.motor_inertia) if isinstance(drive, Drive) else _motor_at_load(drive)
+    units = {"x": here(drive)[1], "J1": motor}
     return _axis(given, name, "kg*m^2", drive, units)
 
 
+def _motor_at_load(chain: Chain) -> float:
+    """The inertia of the motor's mass, brought to the shaft of the load."""
+    ratio = chain.speed_ratios("motor")[chain.load_index]
+    return chain.masses[chain.motor_index].inertia / ratio**2
+
+
 def _axis(
-    given: Iterable[Any] | Any, name: str, unit: str, drive: Drive, units: dict[str, float]
+    given: Iterable[Any] | Any, name: str, unit: str, drive: Machine, units: dict[str, float]
 ) -> tuple[float, ...]:
     """Values in SI, each once, rising."""
     listed = [given] if isinstance(given, str | Real) or not hasattr(given, "__iter__") else list(given)
@@ -238,11 +282,10 @@ def _axis(
             found.append(_value(value, name, unit, units))
         except InputError as error:
             wrong += error.sentences
-    key = "gap" if unit == "rad" else "load_inertia"
+    gap, inertia = here(drive)
     for value in found:
         try:
-            changed: Any = {key: value}
-            drive.replace(**changed)
+            moved(drive, *((value, inertia) if unit == "rad" else (gap, value)))
         except InputError as error:
             wrong += [f"{name}: {sentence}" for sentence in error.sentences]
     if wrong:
@@ -277,13 +320,14 @@ Scenario = dict[str, Level]
 
 
 def scenarios_of(
-    drive: Drive, tolerances: Mapping[str, Any] | None, seed: int = 0, most: int = MOST
+    drive: Machine, tolerances: Mapping[str, Any] | None, seed: int = 0, most: int = MOST
 ) -> tuple[Scenario, ...]:
     """The drive as it is, and its parameters off by their tolerances in all combinations.
 
     A tolerance is a share as "10 %" (the value 10 % lower and higher), a quantity as 0.5 or "0.2 ms" (so much
     lower and higher), or a list of the values to be met. Where there are more than `most` combinations, a
-    Latin hypercube of `most` within the tolerances stands for them, drawn with `seed`. Raises InputError.
+    Latin hypercube of `most` within the tolerances stands for them, drawn with `seed`. Of a chain also one
+    mass or shaft may be named, as "shaft[2].gap". Raises InputError.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> scenarios_of(crane, {"stiffness": "10 %"})
@@ -295,10 +339,10 @@ def scenarios_of(
     wrong: list[str] = []
     for name, given in (tolerances or {}).items():
         try:
-            levels[name] = _levels(name, given)
-            for level in levels[name]:
-                changed: Any = {name: level.of(getattr(drive, name))}
-                drive.replace(**changed)
+            varied = _varied(drive, name)
+            levels[varied.name] = _levels(varied, given)
+            for level in levels[varied.name]:
+                with_values(drive, {varied.name: level.of(varied.value)})
         except InputError as error:
             wrong += [s if s.startswith("tolerances") else f"tolerances: {s}" for s in error.sentences]
     if wrong:
@@ -336,12 +380,22 @@ def scenarios_drawn(drive: Drive, drawn: Drive, scenarios: Sequence[Scenario]) -
     return tuple(found)
 
 
-def _levels(name: str, given: Any) -> list[Level]:
-    parameter = PARAMETERS.get(name)
-    if parameter is None or not parameter.unit:
-        near = nearest(name, [p.name for p in PARAMETERS.values() if p.unit])
-        hint = f"did you mean {near}?" if near else "name a field of a Drive, as stiffness."
-        raise InputError(f"tolerances: {name} is no quantity of a drive; {hint}")
+def _varied(drive: Machine, name: str) -> Knob:
+    """The quantity of a drive or chain that has a tolerance."""
+    found = knob(drive, name)
+    if found is not None and found.parameter.unit:
+        return found
+    what, example = ("drive", "a field of a Drive, as stiffness")
+    near = nearest(name, [p.name for p in PARAMETERS.values() if p.unit])
+    if isinstance(drive, Chain):
+        what, example = "chain", "one of its file, as shaft[1].gap, or gap for all"
+        near = nearest(name, [*knobs(drive)])
+    hint = f"did you mean {near}?" if near else f"name {example}."
+    raise InputError(f"tolerances: {name} is no quantity of a {what}; {hint}")
+
+
+def _levels(varied: Knob, given: Any) -> list[Level]:
+    name, parameter = varied.name, varied.parameter
     if isinstance(given, list | tuple | np.ndarray):
         values = np.atleast_1d(to_si(list(given), parameter.unit, name=f"tolerances {name}"))
         return [Level(0.0, float(value)) for value in values]

@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from softstart.chain.machines import Machine, one_machine
+from softstart.chain.model import Chain
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.processes import Pool, checked_workers
+from softstart.start.batch import has_margin
 from softstart.start.comparison import Uncertain
 from softstart.store import Records, Target
 from softstart.tuning.gains import robust_set
@@ -46,7 +49,7 @@ SMALLEST_POPULATION, PLACES_A_PARAMETER = 20, 8
 
 
 def tune(
-    drive: Drive | Uncertain | str,
+    drive: Machine | Uncertain | str,
     controller: str | Controller,
     gaps: Iterable[Any] | Any | None = None,
     inertias: Iterable[Any] | Any | None = None,
@@ -59,8 +62,8 @@ def tune(
     quantile: float = 1.0,
     schedule: bool = True,
     robust: bool = True,
-    certified: bool = True,
-    base: Drive | None = None,
+    certified: bool | None = None,
+    base: Machine | None = None,
     seed: int = 0,
     restarts: int = 3,
     population: int | None = None,
@@ -80,19 +83,21 @@ def tune(
 
     Parameters
     ----------
-    drive : Drive, Identification or str
-        The nominal drive, or its name or file. With an identification every candidate is judged by the
-        drive found and by 100 drives that its logs leave possible, drawn from their joint distribution: by
-        the worst of them, or by a `quantile`. Gaps and inertias are then those of the drive, if none are
-        given.
+    drive : Drive, Chain, Identification or str
+        The nominal drive or chain, or its name or file. A chain starts itself, and its figures are those of
+        all its shafts; the controller is set up for its two masses. With an identification every candidate is
+        judged by the drive found and by 100 drives that its logs leave possible, drawn from their joint
+        distribution: by the worst of them, or by a `quantile`. Gaps and inertias are then those of the
+        drive, if none are given.
     controller : str or Controller
         A name, `path/to/file.py:ClassName`, or an object.
     gaps : iterable, optional
         Gaps in rad: numbers, texts with a unit, or multiples of the drive's own as "2x". By default 0.5, 1,
-        2 and 4 times its own.
+        2 and 4 times its own. Those of a chain are the sum of all its gaps at the motor shaft, widened
+        alike.
     inertias : iterable, optional
         Load inertias in kg m2, likewise, or multiples of the motor's as "5 J1". By default 0.4, 1 and 2 times
-        the drive's own.
+        the drive's own. Of a chain that of its load mass.
     parameters : mapping, optional
         Parameters of a controller given by name. What is given is not tuned, unless it is `free`.
     free : iterable or mapping, optional
@@ -100,9 +105,11 @@ def tune(
         of the default ("0.5x", "2x"). By default all that the controller says may be tuned, within the ranges
         that it names.
     metric : str or callable
-        What is minimised: a figure of a start, or a function of the mapping of all figures (arrays, one value
+        What is minimised: a figure of a start (of a chain also `k_dyn_2`, that of its second shaft), or a
+        function of the mapping of all figures (arrays, one value
         a start) that returns one number a start. "margin" is made large: the least share left of the limits
-        of the drive, shaft torque and start time; the tables have its complement `limit_share`, the largest
+        of the drive, shaft torque and start time (of a chain the permissible torque of each shaft); the
+        tables have its complement `limit_share`, the largest
         share of a limit that a start takes.
     start_time : float or str, optional
         Bound on the start time in s, or as a multiple of that of `direct` in the same cell ("1.2x"). By
@@ -110,14 +117,17 @@ def tune(
         permissible start time there is no other bound.
     tolerances : mapping, optional
         What drives may be off by, unknown to the controller: field of a Drive -> "10 %", a quantity, or a
-        list of values. Every candidate is judged by all of these scenarios.
+        list of values; of a chain also one mass or shaft ("shaft[2].gap"). Every candidate is judged by all
+        of these scenarios.
     quantile : float
         Share of the starts that metric and bound are judged by; 1 is the worst case.
     schedule, robust : bool
         Which of the two questions to answer.
-    certified : bool
-        Whether to compute each cell's certified optimum within the same time (metric `k_dyn` only).
-    base : Drive, optional
+    certified : bool, optional
+        Whether to compute each cell's certified optimum within the same time (metric `k_dyn` only). By
+        default that of drives. That of a chain is a local one, takes minutes a cell, and its lower bound is
+        that of momentum.
+    base : Drive or Chain, optional
         The drive to whose mean torque K_dyn refers. By default each cell refers to its own drive.
     seed, restarts, population, generations : int
         Of the search. The same ones give the same bits, whoever computes.
@@ -159,16 +169,14 @@ def tune(
     R. Storn, K. Price: Differential evolution - a simple and efficient heuristic for global optimization over
     continuous spaces, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
     """
-    if isinstance(drive, str):
-        drive = Drive.load(drive)
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws(DRAWN)
         drive = drive.drive
         gaps = [drive.gap] if gaps is None else gaps
         inertias = [drive.load_inertia] if inertias is None else inertias
-    if not isinstance(drive, Drive) or drive.shape != ():
-        raise InputError("drive: tune takes one Drive, the path of its file, or the name of a shipped one.")
+    drive = one_machine(drive)
+    certified = isinstance(drive, Drive) if certified is None else certified
     question = _question(
         drive, controller, gaps, inertias, parameters, free, metric, start_time, tolerances, quantile, base,
         seed, restarts, population, generations, drawn,
@@ -215,7 +223,7 @@ def _bounds(trials: Trials, schedule: bool, robust: bool) -> list[tuple[int, flo
 
 
 def _question(
-    drive: Drive,
+    drive: Machine,
     controller: str | Controller,
     gaps: Any,
     inertias: Any,
@@ -257,14 +265,16 @@ def _question(
     scenarios = read(scenarios_of, drive, tolerances, first or 0)
     if drawn is not None and scenarios is not None:
         scenarios = read(scenarios_drawn, drive, drawn, scenarios)
-    if base is not None and (not isinstance(base, Drive) or base.shape != ()):
+    if base is not None and not (isinstance(base, Chain) or (isinstance(base, Drive) and base.shape == ())):
         wrong.append(f"base = {base!r}: K_dyn refers to one single Drive; Drive.load reads one.")
     if not isinstance(metric, str) and not callable(metric):
         wrong.append(f"metric = {metric!r}: name a figure, as k_dyn, or give a function of the figures.")
-    if metric == MARGIN and drive.limits.shaft_torque is None and drive.limits.start_time is None:
+    if metric == MARGIN and not has_margin(drive.limits):
         wrong.append(
             "metric = margin: the drive has no limits; give limits.shaft_torque in its file, as "
             '"175 N*m", or limits.start_time.'
+            if isinstance(drive, Drive)
+            else "metric = margin: no shaft of the chain has a limit; give permissible_torque in its file."
         )
     if wrong or ranges is None or room is None:
         raise InputError(wrong)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from softstart.chain.machines import Machine, with_values
 from softstart.controller.tuned import GainSchedule, RobustGains
-from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
@@ -70,7 +70,7 @@ def robust_outcome(trials: Trials, found: SetFound) -> RobustSet:
     """The robust set with what it reaches."""
     question, yardstick = trials.question, trials.yardstick
     controller = single(trials.controller, found.values)
-    ready, own = controller.set_up(question.drive)
+    ready, own = controller.set_up(trials.nominal)
     near, apart = agreement(found.restart_costs, min(found.cost, found.restart_costs.min()))
     both = (found.judged, yardstick.nominal)
     worst, worst_default = (_quantile(one.metric.ravel(), question.quantile) for one in both)
@@ -104,11 +104,11 @@ def between_table(trials: Trials, found: ScheduleFound) -> xarray.Dataset | None
     halves = replace(question, gaps=_halves(question.gaps), load_inertias=_halves(question.load_inertias))
     there = Trials(halves)
     schedule = GainSchedule(
-        "schedule", trials.controller, question.gaps, question.load_inertias,
+        "schedule", trials.controller, *question.declared(),
         tuple((name, *gain) for name, gain in gains.items()),
     )  # fmt: skip
-    gaps, inertias = (np.array(axis) for axis in zip(*halves.cells, strict=True))
-    judged = there.of_pairs(schedule.gains_at(gaps, inertias), range(len(halves.cells)))
+    gains_there = schedule.gains_at(there.fitted.gap, there.fitted.load_inertia)
+    judged = there.to_the_end().of_pairs(gains_there, range(len(halves.cells)))
     return _dataset(there, _figures(there, judged, there.yardstick.own, there.yardstick.own_bound))
 
 
@@ -218,8 +218,8 @@ class Asked(NamedTuple):
 
     cell: int
     bound: float
-    drive: Drive
-    base: Drive | None
+    drive: Machine
+    base: Machine | None
 
 
 def optima(
@@ -247,11 +247,12 @@ def optima(
 
 
 def optimum_of(asked: Asked) -> dict[str, Any]:
-    """The optimum of a drive, its motor without torque lag and rate limit: the harder yardstick.
+    """The optimum of a drive or chain, its motor without torque lag and rate limit: the harder yardstick.
 
     Where the start position is unknown, that of the hardest one as if it were known: no gains beat it.
     """
-    ideal = asked.drive.replace(torque_lag=0.0, torque_rate=math.inf, computing_delay=0.0, torque_noise=0.0)
+    names = {"torque_lag": 0.0, "torque_rate": math.inf, "computing_delay": 0.0, "torque_noise": 0.0}
+    ideal = with_values(asked.drive, names)
     nothing = {"k_dyn": None, "k_dyn_lower_bound": None, "method": ""}
     try:
         each = [

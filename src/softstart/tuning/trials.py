@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import threading
 from collections.abc import Iterator, Mapping
@@ -14,18 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
+from softstart.chain.machines import Starts, starts_of, taken, two_masses
+from softstart.chain.model import Chain
+from softstart.chain.run import mean_torque_of
 from softstart.controller import Controller, PlainController, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.quantities import nearest
-from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import Figures
 from softstart.tuning.question import MARGIN, Question
 
 Cells = NDArray[np.int64]  # axes: candidate, cell
 Values = Mapping[str, Any]  # name -> one value a candidate
-
-AXES = ("gap", "load_inertia")
 
 PATIENCE = 3.0  # a start is given up at so many times the longest bound
 
@@ -65,12 +66,14 @@ class Trials:
         self.controller = question.recipe.make()
         gaps, inertias = (np.array(axis) for axis in zip(*question.cells, strict=True))
         self.gap, self.load_inertia = gaps, inertias
-        self.fields = self._fields()
-        bases = [metrics.base_torque(question.base or question.drive_of(i)) for i in range(len(gaps))]
+        self.starts = self._starts()
+        bases = [mean_torque_of(question.base or question.drive_of(i)) for i in range(len(gaps))]
         self.base_torque = np.array(bases, dtype=np.float64)
-        self.own_defaults = self._defaults(question.drive.with_gap(gaps, load_inertia=inertias), len(gaps))
+        self.fitted = question.fitted()
+        self.nominal = question.drive if isinstance(question.drive, Drive) else two_masses(question.drive)
+        self.own_defaults = self._defaults(self.fitted, len(gaps))
         self.nominal_defaults = {
-            name: float(value[0]) for name, value in self._defaults(question.drive, 1).items()
+            name: float(value[0]) for name, value in self._defaults(self.nominal, 1).items()
         }
         self.time_limit: float | None = None
         self.stopping: threading.Event | None = None  # set when nobody wants the answer any more
@@ -78,19 +81,18 @@ class Trials:
         self.yardstick = self._measured() if yardstick is None else yardstick
         self.time_limit = self.yardstick.time_limit
 
-    def _fields(self) -> dict[str, Vector]:
-        """The fields of the drives that start, axes cell and scenario."""
-        scenarios = self.question.scenarios
+    def _starts(self) -> Starts:
+        """The machines that start: of each cell, one after another, those of all scenarios."""
+        question = self.question
         own: dict[str, Any] = {"gap": self.gap, "load_inertia": self.load_inertia}
-        varied = {"gap", "load_inertia", *(name for one in scenarios for name in one)}
-        cells = self.gap.size
         found = {}
-        for name in sorted(varied):
-            value = own.get(name, np.full(cells, getattr(self.question.drive, name), dtype=np.float64))
-            columns = [one[name].of(value) if name in one else value for one in scenarios]
-            found[name] = np.stack(columns, axis=1)
-        _changed(self.question.drive, found)  # each of them is a drive
-        return found
+        for name in sorted({*own, *(name for one in question.scenarios for name in one)}):
+            value = own.get(name)
+            if value is None:
+                value = np.array([question.value_in(cell, name) for cell in range(self.gap.size)])
+            columns = [one[name].of(value) if name in one else value for one in question.scenarios]
+            found[name] = np.stack(columns, axis=1).ravel()
+        return starts_of(question.drive, found)
 
     def _defaults(self, drive: Drive, count: int) -> dict[str, Vector]:
         """The tuned parameters as derived from the drives of all cells, or of the nominal one."""
@@ -123,10 +125,11 @@ class Trials:
 
     def _direct(self) -> Vector:
         """Start time of `direct` in every cell and scenario."""
-        shape = self.fields["gap"].shape
-        drive = _changed(self.question.drive, {name: v.ravel() for name, v in self.fields.items()})
-        notes = array_starts(drive, make_controller("direct"))
-        found: Vector = figures(notes, 1.0)["start_time"][0].reshape(shape)
+        shape = (self.gap.size, len(self.question.scenarios))
+        every = np.arange(math.prod(shape))
+        fitted = taken(self.fitted, np.repeat(np.arange(shape[0]), shape[1]))
+        figured = self.starts.figures(every, make_controller("direct"), fitted, 1.0)
+        found: Vector = figured["start_time"][0].reshape(shape)
         if np.any(np.isnan(found)):
             gap, inertia = self.question.cells[int(np.argwhere(np.isnan(found))[0][0])]
             raise InputError(
@@ -136,6 +139,17 @@ class Trials:
         return found
 
     # candidates -------------------------------------------------------------------------------------------
+
+    def to_the_end(self) -> Trials:
+        """These trials for gains that are settled: their figures are those of `simulate` to the bit.
+
+        A chain flies through its gaps in spans that end with the time limit, and rounds by their length.
+        """
+        if not isinstance(self.question.drive, Chain):
+            return self
+        whole = copy.copy(self)
+        whole.time_limit = None
+        return whole
 
     def of_pairs(self, values: Values, cells: Any) -> Judged:
         """Candidates each for a cell of its own, and set up for it. Axes: candidate, scenario."""
@@ -177,7 +191,6 @@ class Trials:
         """All starts in one call: candidate k in the cells which[k] and all scenarios."""
         each = which.shape[1] * len(self.question.scenarios)
         fit_to = self._set_up_for(which, own)
-        starting = self._starting(which)
         with _candidate():
             ready, used = replace(self.controller, **values).set_up(fit_to)
             spread = {
@@ -185,37 +198,38 @@ class Trials:
                 for name, value in ready.parameters.items()
                 if isinstance(value, np.ndarray) and value.shape == fit_to.shape
             }
-            wide = _changed(used, {name: np.repeat(getattr(used, name), each) for name in AXES})
-            notes = array_starts(starting, replace(ready, **spread), None, wide, self.time_limit)
-        return self._read(notes, which)
+            wide = taken(used, np.repeat(np.arange(len(which)), each))
+            found = self._figures(which, replace(ready, **spread), wide)
+        return self._read(found, which)
 
     def _single(self, values: Values, which: Cells, own: bool) -> Judged:
         """One candidate after the other: for controllers whose parameters cannot be arrays."""
-        notes = []
+        judged = []
         for k, nominal in enumerate(self._set_up_for(which, own).elements()):
-            starting = self._starting(which[k : k + 1])
+            cells = which[k : k + 1]
             with _candidate():
                 controller = single(self.controller, {name: value[k] for name, value in values.items()})
-                notes.append(array_starts(starting, controller, None, nominal, self.time_limit))
-        return self._read(np.concatenate(notes), which)
+                found = self._figures(cells, controller, nominal)
+            judged.append(self._read(found, cells))
+        return Judged(*(np.concatenate(parts) for parts in zip(*judged, strict=True)))
 
     def _set_up_for(self, which: Cells, own: bool) -> Drive:
         """The drives that the candidates are set up for."""
-        drive = self.question.drive
-        gap, inertia = self.gap[which[:, 0]], self.load_inertia[which[:, 0]]
-        if not own:
-            gap, inertia = np.full_like(gap, drive.gap), np.full_like(inertia, drive.load_inertia)
-        return drive.with_gap(gap, load_inertia=inertia)
+        if own:
+            return taken(self.fitted, which[:, 0])
+        gap, inertia = (np.full(len(which), one) for one in (self.nominal.gap, self.nominal.load_inertia))
+        return self.nominal.with_gap(gap, load_inertia=inertia)
 
-    def _starting(self, which: Cells) -> Drive:
-        """The drives that start."""
-        return _changed(self.question.drive, {name: v[which].ravel() for name, v in self.fields.items()})
+    def _figures(self, which: Cells, controller: Controller, fitted: Drive) -> Figures:
+        """The figures of candidate k in the cells which[k] and all scenarios."""
+        scenarios = len(self.question.scenarios)
+        starts = (which[..., None] * scenarios + np.arange(scenarios)).ravel()
+        base = np.repeat(self.base_torque[which.ravel()], scenarios)
+        return self.starts.figures(starts, controller, fitted, base, self.time_limit)
 
-    def _read(self, notes: Vector, which: Cells) -> Judged:
+    def _read(self, figured: Figures, which: Cells) -> Judged:
         shape = (*which.shape, len(self.question.scenarios))
-        base = np.broadcast_to(self.base_torque[which][..., None], shape).ravel()
-        limits = self.question.drive.limits
-        found = {name: values for name, (values, _, _) in figures(notes, base, limits=limits).items()}
+        found = {name: values for name, (values, _, _) in figured.items()}
         metric = self.question.metric
         if metric == MARGIN:
             return Judged((1.0 - found[MARGIN]).reshape(shape), found["start_time"].reshape(shape))
@@ -225,9 +239,10 @@ class Trials:
             raise InputError(f'metric = "{metric}": a start has no such figure; {hint}')
         value = found[metric] if isinstance(metric, str) else metric(found)
         numbers = np.asarray(value)
-        if numbers.shape != notes.shape[:1] or numbers.dtype.kind not in "fiu":
+        count = math.prod(shape)
+        if numbers.shape != (count,) or numbers.dtype.kind not in "fiu":
             raise InputError(
-                f"metric = {self.question.metric_name}: for {notes.shape[0]} starts it gives {numbers.dtype} "
+                f"metric = {self.question.metric_name}: for {count} starts it gives {numbers.dtype} "
                 f"of shape {numbers.shape}; it has to be one number a start."
             )
         return Judged(numbers.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
@@ -256,10 +271,6 @@ def _candidate() -> Iterator[None]:
         yield
     except InputError as error:
         raise _RefusedError from error
-
-
-def _changed(drive: Drive, fields: Mapping[str, Any]) -> Drive:
-    return drive.with_gap(**fields) if "gap" in fields else drive.replace(**fields)
 
 
 def single(controller: Controller, values: Values) -> Controller:

@@ -191,7 +191,7 @@ def enough(found: TwoMassError) -> str:
             f"and {harder.chain_k_dyn:.3g}), on two masses it is the other way round "
             f"({gentler.drive.k_dyn:.3g} and {harder.drive.k_dyn:.3g})."
         )
-    return f"{text} Choose by the chain: simulate, compare, optimize, pareto and fatigue take it."
+    return f"{text} Choose by the chain: simulate, compare, optimize, tune, sweep, linear and others take it."
 
 
 def _percent(share: float) -> str:

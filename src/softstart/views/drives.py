@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from softstart.drive import LIMIT_TABLES, PARAMETERS, Drive
 from softstart.language import later
@@ -66,7 +67,7 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
     ]
 
 
-def controllers_set_up(drive: Drive | None, fitted_to: Drive) -> str:
+def controllers_set_up(drive: Drive | None, fitted_to: Any) -> str:
     """For which drive the controllers are set up, and by what that differs from the one that runs.
 
     >>> from softstart import Drive

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.linear.limit_cycles import Outside, frequency_grid
+from softstart.linear.sampled_plant import sizes_of
 from softstart.linear.systems import at_points, frequencies, poles
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
@@ -139,11 +140,17 @@ def _cycles(view: LinearView) -> Table:
 
 def tables(view: LinearView) -> list[Table]:
     """Modes, other drives and limit cycles."""
-    return [_modes(view), _variations(view), _cycles(view)]
+    return [_modes(view), _variations(view), *([_cycles(view)] if view.outside is not None else [])]
 
 
 def notes(view: LinearView) -> list[str]:
     """The mean torque of the limit cycles, then the notes of the view."""
+    if view.outside is None:
+        return [
+            "The loop is that of the whole chain with all gaps closed; limit cycles through several gaps are "
+            "not predicted: simulate shows them.",
+            *view.notes,
+        ]
     sentence = "No limit cycle through the gap is predicted by the describing function."
     if view.cycles:
         mean = view.cycles[0].cycle.mean_torque
@@ -169,19 +176,22 @@ def linear_figure(view: LinearView) -> Any:
     """Left the Bode diagram with the crossings marked; right the Nyquist diagrams of loop and gap."""
     assert view.own_loop is not None
     assert view.margins is not None
-    assert view.outside is not None
     loop, period = view.own_loop.broken, view.period
     w = frequencies(period, poles(loop))
-    w = w[w >= float(view.drive.Omega) * 10.0**-DECADES]
+    Omega = sizes_of(view.drive).Omega
+    w = w[w >= Omega * 10.0**-DECADES]
     L = at_points(loop, np.exp(1j * w * period))[:, 0, 0]
     with drawing():
         figure, panels = new_figure(2, 2, (10.5, 7.4))
         (size, plane), (phase, gap) = panels
         _magnitude(size, w, L, view.margins)
         _phase(phase, w, L, view.margins)
-        _mark_elastic((size, phase), float(view.drive.Omega))
+        _mark_elastic((size, phase), Omega)
         _nyquist(plane, L, view.margins)
-        _harmonic_balance(gap, view, view.outside)
+        if view.outside is not None:
+            _harmonic_balance(gap, view, view.outside)
+        else:
+            gap.set_axis_off()  # several gaps have no one describing function
         entitle(figure, f"{view.drive.name}: loop of {view.name} in contact")
     return figure
 

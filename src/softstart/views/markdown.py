@@ -227,7 +227,7 @@ def write_drive_report(
     parts: Sequence[str],
     drive: Any,
     command: str,
-    fitted_to: Drive | None = None,
+    fitted_to: Any = None,
     *,
     behind: Sequence[str] = (),
     one: bool = True,

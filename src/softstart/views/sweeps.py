@@ -24,7 +24,7 @@ from softstart.views.drawing import (
     plain_ticks,
     save_figure,
 )
-from softstart.views.drives import controllers_set_up, drive_lines
+from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import (
     markdown,
     table_sections,
@@ -33,6 +33,7 @@ from softstart.views.markdown import (
     write_table,
 )
 from softstart.views.numbers import Table, column_of, number
+from softstart.views.starts import machine_lines
 from softstart.views.terminal import (
     fits,
     print_conclusion,
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
 
-    from softstart.drive import Drive
+    from softstart.chain.machines import Machine
     from softstart.sweeping.entry import Progress
     from softstart.sweeping.summary import Summary
 else:
@@ -452,14 +453,14 @@ def pace(last: Progress | None) -> str:
 
 def show(
     to: Console,
-    drive: Drive,
-    fitted_to: Drive | None,
+    drive: Machine,
+    fitted_to: Machine | None,
     results: xarray.Dataset,
     summary: Summary,
     last: Progress | None,
 ) -> None:
     """Print everything."""
-    print_lines(to, drive_lines(drive))
+    print_lines(to, machine_lines(drive))
     if fitted_to is not None:
         sentence(to, f"  {controllers_set_up(None, fitted_to)}")
     print_tables(to, _tables(results, summary, to))
@@ -484,10 +485,10 @@ results = xarray.open_zarr("sweep.zarr")
 def write_sweep(
     results: xarray.Dataset,
     summary: Summary,
-    drive: Drive,
+    drive: Machine,
     folder: Path,
     command: str,
-    fitted_to: Drive | None,
+    fitted_to: Machine | None,
 ) -> None:
     """Everything that sums a sweep up."""
     drawn = {"sweep": summary.judged, "margin": "margin" if "margin" in results else ""}

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.views.drawing import drawing, entitle, new_figure, save_figure
-from softstart.views.drives import drive_lines
 from softstart.views.markdown import markdown, markdown_table, write_columns, write_drive_report
 from softstart.views.numbers import Table, column_of, first_of, short
+from softstart.views.starts import machine_lines
 from softstart.views.terminal import fits, print_conclusion, print_lines, print_tables, sentence
 
 if TYPE_CHECKING:
@@ -373,7 +374,7 @@ def notes(tuning: Tuning) -> list[str]:
 
 def show(to: Console, tuning: Tuning) -> None:
     """All of it on a terminal or in a pipe."""
-    print_lines(to, drive_lines(tuning.drive))
+    print_lines(to, machine_lines(tuning.drive))
     to.print()
     sentence(to, question(tuning))
     if tuning.schedule is not None:
@@ -418,7 +419,7 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
             "## Gains for each cell",
             "![gains](gains.svg)\n\n![metric](metric.svg)",
             markdown_table(cell_table(tuning)),
-            _play("schedule.toml", "with the gap and load inertia that the drive declares")
+            _play(tuning, "schedule.toml", "with the gap and load inertia that the drive declares")
             + "The same gains, with all figures of each cell: [schedule.csv](schedule.csv).",
         ]
         if tuning.between is not None:
@@ -433,7 +434,7 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
             "![robust](robust.svg)",
             markdown_table(set_table(tuning)),
             markdown_table(_set_map(tuning)),
-            _play("robust.toml", "set up for the nominal drive, whatever drive starts")
+            _play(tuning, "robust.toml", "set up for the nominal drive, whatever drive starts")
             + "Each cell: [robust-cells.csv](robust-cells.csv).",
         ]
     if tuning.price is not None:
@@ -448,10 +449,11 @@ def write_tuning(tuning: Tuning, folder: Path, command: str) -> None:
     write_drive_report(folder, parts, tuning.drive, command)
 
 
-def _play(file: str, how: str) -> str:
+def _play(tuning: Tuning, file: str, how: str) -> str:
+    what = "drive" if isinstance(tuning.drive, Drive) else "chain"
     return (
         f"[{file}]({file}) stands for a controller everywhere, {how}:\n\n```sh\n"
-        f"softstart simulate drive.toml --controller {file}\n```\n\n"
+        f"softstart simulate {what}.toml --controller {file}\n```\n\n"
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from softstart import Drive
 from softstart.chain import Chain, Mass, natural_vibration, reduce_chain
+from softstart.cli.options import read_drive
 
 
 def test_json_is_the_summary(run):
@@ -166,15 +167,30 @@ def test_a_command_for_drives_takes_a_chain_that_two_masses_stand_for(run, place
     stiff = two.shafts[0].replace(stiffness=300.0 * two.shafts[0].stiffness, gap=0.0, damping_ratio=0.02)
     near = replace(two, masses=(motor, light, load), shafts=(stiff, two.shafts[0]))
     (place / "near.toml").write_text(near.to_toml())
-    code, out, err = run("linear", "near.toml", "--controller", "ramp", "--json")
+    assert "reduced to two masses" in read_drive("near.toml", ()).name
+    code, out, err = run("identify", "--plan", "crane-4-mass")
+    assert (code, out) == (2, "")
+    assert "this command takes a drive. Two masses are not enough: " in err
+
+
+def test_commands_go_on_with_the_chain_itself(run, place):
+    code, out, err = run("linear", "crane-4-mass", "--controller", "ramp", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["drive"] == Chain.load("crane-4-mass").name
+    asked = ("crane-4-mass", "--controller", "s-curve")
+    axes = ("--axis", "shaft[2].gap=0.5x:2x:3", "--axis", "start.position=unknown")
+    code, out, err = run("sweep", *asked, *axes, "--json", "--out", "swept")
     assert code == 0
-    assert "reduced to two masses" in json.loads(out)["drive"]
-    assert err.startswith('"near.toml" is a chain. Two masses are enough')
-    for command in (("linear", "--controller", "ramp"), ("tune", "--controller", "ramp")):
-        code, out, err = run(*command, "crane-4-mass")
-        assert (code, out) == (2, "")
-        assert "this command takes a drive. Two masses are not enough: " in err
-        assert "simulate, compare, optimize, pareto and fatigue take it" in err
+    cells = json.loads(out)["cells"]
+    assert [cell["shaft_2_gap"] for cell in cells] == [0.1, 0.25, 0.4]
+    assert {"k_dyn_1", "k_dyn_2", "k_dyn_3"} <= set(cells[0])
+    assert (place / "swept" / "chain.toml").is_file()
+    few = ("--gaps", "1x", "--inertias", "1x", "--free", "time", "--restarts", "1", "--only", "robust")
+    code, out, err = run("tune", *asked, *few, "--out", "tuned", "--json")
+    assert code == 0
+    assert json.loads(out)["robust"]["worst"] <= json.loads(out)["robust"]["worst_default"]
+    code, out, err = run("simulate", "tuned/chain.toml", "--controller", "tuned/robust.toml", "--json")
+    assert json.loads(out)["controller"] == "s-curve (robust)"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI, loop_of
 
 from softstart import Command, Drive, InputError, PlainController, Sensor, SimulationError, linear_view
-from softstart.linear.operating_point import Smoothness, derivative, run_until_steady, shaft_torque
+from softstart.linear.operating_point import Smoothness, derivative, run_until_steady
 from softstart.linear.sampled_start import Sample, SampledStart
 from softstart.linear.systems import at_points
 from softstart.plant import layout as at
@@ -65,7 +65,7 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
 
     def torques(moves):
         rows = start.from_sample(sample.displaced(moves), sample.time + (count - 0.5) * h)
-        return np.array([shaft_torque(start, one) for one in rows])
+        return np.array([start.shaft_torque(one) for one in rows])
 
     response = (torques({at.THETA: twist}) - torques({at.THETA: -twist})) / (2.0 * twist)
     assert response.size == count
@@ -97,7 +97,7 @@ def test_the_least_damped_mode_is_what_rings_on():
     ends = []
     for side in (twist, -twist):
         rows = start.from_sample(sample.displaced({at.THETA: side}), sample.time + (count - 0.5) * h)
-        ends.append(np.array([shaft_torque(start, one) for one in rows]))
+        ends.append(np.array([start.shaft_torque(one) for one in rows]))
     ring = (ends[0] - ends[1]) / (2.0 * twist)
     assert ring.size == count
     # a sampled ring obeys y[k+2] = 2 Re z y[k+1] - |z|^2 y[k]; the slow turning is differenced away

@@ -13,22 +13,13 @@ from hypothesis import strategies as st
 
 from softstart import Drive, InputError, simulate
 from softstart.chain import Chain
+from softstart.chain.machines import here, moved, values_of
 from softstart.controller import make_controller
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen, channels_at, open_somewhere, traces_of
-from softstart.page.machines import (
-    GROUPS,
-    axes_about,
-    changed,
-    entries,
-    here,
-    k_dyn_row,
-    moved,
-    scales_about,
-    values_of,
-)  # fmt: skip
+from softstart.page.machines import GROUPS, axes_about, changed, entries, k_dyn_row, scales_about
 from softstart.page.sentences import changed_since, differences
 from softstart.page.session import Session
 

@@ -35,7 +35,7 @@ from softstart.page.curve_panel import StrategyPoint, against, csv_of, curve_svg
 from softstart.page.downloads import command_text, file_name
 from softstart.page.sentences import changed_since
 from softstart.page.tasks import label_of, player_of
-from softstart.page.tuning_panel import controller_of, tunable
+from softstart.page.tuning_panel import cell_table, controller_of, grid_of, tunable
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -181,21 +181,23 @@ def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
         assert not any(abs(y - v) < 11.4 and x < u + w and u < x + wide for u, v, w in places[k + 1 :])
 
 
-def test_tuned_gains_come_as_files() -> None:
+@pytest.mark.parametrize("machine", [CRANE, Chain.load("crane-4-mass")], ids=["drive", "chain"])
+def test_tuned_gains_come_as_files(machine: Drive | Chain) -> None:
     heard = Heard()
-    found = tasks.tuning(
-        CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, tell=heard  # type: ignore[arg-type]
-    )  # fmt: skip
-    same = tune(CRANE, "reduced-first-stage", ["1x"], ["1x"], certified=False, restarts=1, workers=1)
+    grid = grid_of(machine, "1x", "1x")
+    found = tasks.tuning(machine, "reduced-first-stage", *grid, certified=False, restarts=1, tell=heard)  # type: ignore[arg-type]
+    same = tune(machine, "reduced-first-stage", *grid, certified=False, restarts=1, workers=1)
     assert same.robust is not None
     assert found.summary["robust"]["gains"] == same.robust.gains
     for file, controller in (("robust.toml", same.robust.controller), ("schedule.csv", same.scheduled)):
         assert (
-            simulate(CRANE, controller_of(found.files[file], file)).k_dyn == simulate(CRANE, controller).k_dyn
+            simulate(machine, controller_of(found.files[file], file)).k_dyn
+            == simulate(machine, controller).k_dyn
         )
     shares = [share for share in heard.shares if share is not None]
     assert shares == sorted(shares)
     assert "reduced-first-stage" in tunable()
+    assert "by cell" in cell_table(found)
 
 
 @given(st.text(max_size=80), st.sampled_from([".csv", ".toml", ".c", ".html"]))

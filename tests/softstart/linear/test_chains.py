@@ -1,0 +1,123 @@
+"""The loop of a controller on a whole chain: equal to that of two masses, and to the exact start of many."""
+
+import math
+
+import numpy as np
+import pytest
+from tests.softstart.linear.speed_loops import SpeedPI
+
+from softstart import Drive, InputError, linear_view
+from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
+from softstart.linear.operating_point import operating_points, run_until_steady
+from softstart.linear.sampled_plant import in_contact, motor_side
+from softstart.linear.sampled_start import SampledStart
+
+CRANE = Drive.load("crane-4amtkf").replace(damping=0.5, torque_lag="2 ms")
+CHAIN = Chain.from_toml(
+    Chain.load("crane-4-mass").to_toml(), also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)}
+)
+
+
+@pytest.mark.parametrize(
+    ("drive", "controller"),
+    [
+        (CRANE, "current-limit-feedback"),
+        (CRANE.replace(encoder_lines=1024, computing_delay="0.4 ms"), SpeedPI(1.0, 3.0)),
+    ],
+)
+def test_two_masses_have_the_loop_of_their_drive(drive, controller):
+    chain = Chain.from_drive(drive)
+    few = {"inertias": (2.5,), "stiffnesses": (), "limit_cycles": False}
+    one = linear_view(drive, controller, **few)
+    two = linear_view(chain, controller, fitted_to=drive, **few)
+    assert two.kind == one.kind == "loop"
+    assert two.stable == one.stable
+    assert two.point.mismatch < 1e-6
+    for name in ("gain_margin", "phase_margin", "delay_margin", "modulus_margin"):
+        assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-6), name
+    for a, b in zip(two.variations, one.variations, strict=False):
+        assert (a.name, a.stable) == (b.name, b.stable)
+        assert a.margins.phase_margin == pytest.approx(b.margins.phase_margin, rel=1e-5)
+
+
+def random_chain(seed):
+    """Three to five masses, one or two rigid joints, dampings, gears with losses, the motor anywhere."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(3, 6))
+    masses = [
+        Mass(float(10.0 ** rng.uniform(-2.5, -0.7)), name=f"m{i}", damping=float(rng.choice([0.0, 0.002])))
+        for i in range(count)
+    ]
+    motor, load = ("m0", f"m{count - 1}") if rng.random() < 0.6 else ("m1", "m0" if count > 3 else "m2")
+    shafts = []
+    for k in range(count - 1):
+        beside = masses[k].name == motor or masses[k + 1].name == motor
+        if not beside and rng.random() < 0.2:
+            shafts.append(Shaft(math.inf))
+            continue
+        shafts.append(
+            Shaft(
+                float(10.0 ** rng.uniform(2.3, 3.5)), damping_ratio=float(rng.uniform(0.01, 0.06)),
+                gap=float(rng.choice([0.0, 0.05])), efficiency=float(rng.choice([1.0, 0.93])),
+                side=str(rng.choice(["before", "after"])), ratio=float(rng.choice([1.0, 2.0])),
+            )
+        )  # fmt: skip
+    torque = 1.0 if load == f"m{count - 1}" else 0.0
+    at = int(load[1:])
+    masses[at] = masses[at].replace(torque=torque)
+    lag = float(rng.choice([0.0, 0.002]))
+    return Chain(
+        masses, shafts, Motor(30.0, maximum_torque=90.0, minimum_torque=-90.0, mass=motor, torque_lag=lag),
+        load_mass=load, target_speed=60.0, position="driving-flank", name=f"chain {seed}",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [3, 4, 6, 11])
+def test_small_motions_of_the_whole_chain_are_those_of_the_loop(seed):
+    """After small displacements in each direction the exact plant, under the controller, follows the loop."""
+    start = SampledStart.of(random_chain(seed), SpeedPI(0.1, 0.5, 10.0), CRANE)
+    points = operating_points(start, run_until_steady(start))
+    assert points[0].mismatch < 1e-7
+
+
+@pytest.mark.parametrize("seed", range(12, 18))
+def test_the_plant_in_contact_swings_at_its_natural_frequencies(seed):
+    chain = random_chain(seed)
+    undamped = Chain(
+        [mass.replace(damping=0.0) for mass in chain.masses],
+        [s.replace(damping_ratio=None, efficiency=1.0) for s in chain.shafts],
+        chain.motor.replace(torque_lag=0.0), load_mass=chain.load_mass, target_speed=60.0,
+    )  # fmt: skip
+    found = np.sort(np.abs(np.linalg.eigvals(in_contact(undamped).A).imag))[::-2]
+    expected = np.sort(natural_vibration(undamped).Omega)[::-1]
+    assert found[: expected.size - 1] == pytest.approx(expected[:-1], rel=1e-6)
+
+
+def test_with_all_gaps_open_the_motor_turns_alone_or_with_what_is_joined_to_it():
+    assert motor_side(CHAIN).A.shape == (2, 2)
+    joined = Chain(CHAIN.masses, [CHAIN.shafts[0].replace(gap=0.0), *CHAIN.shafts[1:]], CHAIN.motor)
+    assert motor_side(joined).A.shape == (4, 4)
+    view = linear_view(CHAIN, "take-up", inertias=(), stiffnesses=())
+    assert view.stable
+    assert view.point.mismatch < 1e-6
+    alone = view.variations[-1]
+    assert (alone.name, alone.stable) == ("all gaps open", True)
+    assert alone.margins.phase_margin > view.phase_margin
+    assert "limit_cycles" in view.summary()
+
+
+def test_modes_of_the_closed_loop_hold_those_of_the_chain():
+    """A weak controller leaves the chain its own modes."""
+    view = linear_view(CHAIN, SpeedPI(1e-4), inertias=(), stiffnesses=())
+    own = natural_vibration(CHAIN).Omega[1:]
+    swinging = [mode.frequency for mode in view.modes if mode.value.imag > 0.0]
+    for Omega in own[own < math.pi / view.period]:
+        assert min(abs(one / Omega - 1.0) for one in swinging) < 1e-2
+
+
+def test_what_has_no_loop_is_refused():
+    rigid = Chain(CHAIN.masses, [Shaft(math.inf), *CHAIN.shafts[1:]], CHAIN.motor)
+    with pytest.raises(InputError, match="a shaft beside the motor is rigid"):
+        linear_view(rigid, "take-up")
+    with pytest.raises(InputError, match="no motor or no target speed"):
+        linear_view(Chain(CHAIN.masses, CHAIN.shafts), "take-up")

@@ -1,0 +1,126 @@
+"""Gains of chains: a candidate is the start that `simulate` makes, and files of gains play on the chain."""
+
+import json
+
+import numpy as np
+import pytest
+
+from softstart import InputError, simulate, tune
+from softstart.chain import Chain
+from softstart.chain.machines import knob, moved, two_masses, with_values
+from softstart.controller import make_controller
+from softstart.tuning.question import Question, bound_of, gaps_of, inertias_of, recipe_of, scenarios_of
+from softstart.tuning.ranges import ranges_of
+from softstart.tuning.trials import Trials
+
+CHAIN = Chain.load("crane-4-mass")
+DAMPED = Chain.from_toml(CHAIN.to_toml(), also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
+QUICK = {"restarts": 1, "generations": 3, "workers": 1}
+
+
+def trials(name, chain=CHAIN, tolerances=None, **change):
+    recipe = recipe_of(name)
+    asked = {
+        "drive": chain, "recipe": recipe, "gaps": (0.5, 1.0), "load_inertias": (40.0, 69.2),
+        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(chain, tolerances),
+        "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
+        "population": 8, "generations": 2,
+    }  # fmt: skip
+    return Trials(Question(**(asked | change)))
+
+
+@pytest.mark.parametrize("name", ["s-curve", "take-up", "acceleration-delay"])
+@pytest.mark.parametrize("position", ["mid-gap", "unknown"])
+def test_each_candidate_is_the_start_that_simulate_makes(name, position):
+    chain = with_values(CHAIN, {"start_position": position})
+    tried = trials(name, chain, {"shaft[2].gap": "20 %", "load_torque": "10 %"})
+    cells = np.array([0, 3])
+    places = np.random.default_rng(3).random((2, len(tried.question.ranges)))
+    values = {
+        one.name: one.value(places[:, k], tried.own_defaults[one.name][cells])
+        for k, one in enumerate(tried.question.ranges)
+    }
+    judged = tried.to_the_end().of_pairs(values, cells)
+    for k, cell in enumerate(cells):
+        one = tried.question.drive_of(int(cell))
+        controller = make_controller(name, {key: float(value[k]) for key, value in values.items()})
+        for s, scenario in enumerate(tried.question.scenarios):
+            off = with_values(one, {key: level.of(knob(one, key).value) for key, level in scenario.items()})
+            run = simulate(off, controller, fitted_to=one, base=one)
+            assert judged.metric[k, s] == run.k_dyn
+            assert judged.start_time[k, s] == run.start_time or np.isnan(run.start_time)
+
+
+def test_the_margin_is_that_of_the_shaft_with_the_least():
+    also = {"shaft[1].permissible_torque": "400", "shaft[3].permissible_torque": "1500 N*m"}
+    chain = Chain.from_toml(DAMPED.to_toml(), also=also)
+    found = tune(chain, "s-curve", ["1x"], ["1x"], metric="margin", free=["time"], **QUICK)
+    run = simulate(chain, found.scheduled)
+    assert float(found.schedule.limit_share[0, 0]) == pytest.approx(np.nanmax(run.utilisation), rel=1e-12)
+    assert found.robust.worst <= found.robust.worst_default
+    with pytest.raises(InputError, match="no shaft of the chain has a limit"):
+        tune(DAMPED, "s-curve", metric="margin")
+
+
+def test_the_torque_of_one_shaft_is_a_metric():
+    found = tune(DAMPED, "s-curve", ["1x"], ["1x"], metric="k_dyn_3", free=["time"], schedule=False, **QUICK)
+    run = simulate(DAMPED, found.robust.controller, base=DAMPED)
+    assert found.robust.worst == run.k_dyns[2]
+    with pytest.raises(InputError, match="did you mean k_dyn_3"):
+        tune(DAMPED, "s-curve", ["1x"], ["1x"], metric="k_dyn_4", **QUICK)
+
+
+def test_files_of_gains_play_on_the_chain_of_each_cell(tmp_path):
+    """Never worse than the defaults; the figures of each cell are those of `simulate` with the file."""
+    found = tune(DAMPED, "s-curve", ["1x", "4x"], ["0.4x", "1x"], **QUICK)
+    assert bool((found.schedule.k_dyn <= found.schedule.k_dyn_default).all())
+    assert bool(found.schedule.in_time.all())
+    assert found.robust.worst <= found.robust.worst_default
+    schedule, robust = tmp_path / "schedule.toml", tmp_path / "robust.toml"
+    found.to_toml(schedule)
+    found.to_toml(robust, "robust")
+    for cell in np.ndindex(2, 2):
+        chain = moved(DAMPED, found.question.gaps[cell[0]], found.question.load_inertias[cell[1]])
+        assert float(found.schedule.k_dyn[cell]) == simulate(chain, str(schedule)).k_dyn
+        assert float(found.robust.cells.k_dyn[cell]) == simulate(chain, str(robust), base=chain).k_dyn
+    assert found.price is not None
+    assert "schedule_optimum" not in found.price  # asked for a chain alone
+    json.dumps(found.summary())
+
+
+def test_an_interrupted_tuning_goes_on_to_the_same_bits(tmp_path):
+    def stopped(text):
+        if "neighbours" in text:
+            raise KeyboardInterrupt
+
+    asked = {"gaps": ["1x", "2x"], "inertias": ["1x"], "free": ["time"], "robust": False, **QUICK}
+    file = tmp_path / "tuning.jsonl"
+    with pytest.raises(KeyboardInterrupt):
+        tune(DAMPED, "s-curve", save_to=file, progress=stopped, **asked)
+    again, whole = tune(DAMPED, "s-curve", save_to=file, **asked), tune(DAMPED, "s-curve", **asked)
+    assert again.schedule.identical(whole.schedule)
+    assert again.starts < whole.starts
+
+
+def test_gaps_and_inertias_of_a_chain():
+    assert gaps_of(CHAIN, ["2x", "0.6"]) == (0.6, 1.0)
+    assert inertias_of(CHAIN, ["1x", "100 kg*m^2"]) == (69.2, 100.0)
+    # 0.031 kg m2 at the shaft of the crane, which turns twenty times slower
+    assert inertias_of(CHAIN, "5 J1") == (62.0,)
+    with pytest.raises(InputError, match="no gap that could be widened"):
+        gaps_of(CHAIN.changed(gaps=0.0), ["0.5"])
+    with pytest.raises(InputError, match=r"did you mean shaft\[2\].gap"):
+        scenarios_of(CHAIN, {"shaft[2].gaps": "10 %"})
+    two = two_masses(moved(CHAIN, 1.0, 69.2))
+    assert two.gap == 1.0
+
+
+def test_an_optimum_stands_beside_the_gains_where_it_is_asked_for():
+    short = with_values(DAMPED, {"target_speed": 20.0})
+    found = tune(
+        short, "s-curve", ["1x"], ["1x"], free=["time"], certified=True, schedule=False, start_time="1.3x",
+        **QUICK,
+    )  # fmt: skip
+    ratio = float(found.price.robust_over_optimum[0, 0])
+    assert ratio >= 1.0 - 1e-6
+    assert float(found.price.robust_lower_bound[0, 0]) <= float(found.price.robust_optimum[0, 0])
