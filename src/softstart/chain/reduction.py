@@ -137,6 +137,7 @@ class Reduction:
             **chain.motor.keywords(),
             name=f"{self.chain.name}, reduced to two masses ({self.method})",
             source=f"reduced from a chain of {len(self.chain.masses)} masses: {self.chain.source}{note}",
+            units=self.chain.units,
             motor_inertia=motor.inertia,
             load_inertia=load.inertia,
             load_torque=motor.torque + load.torque,

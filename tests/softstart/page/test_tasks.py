@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.softstart.test_identification_chains import stiff_behind_the_gap
 
 from softstart import (
     Chain,
@@ -28,6 +29,7 @@ from softstart import (
     tune,
 )  # fmt: skip
 from softstart.controller import make_controller
+from softstart.identification.chains import chain_log, reduced_drive
 from softstart.identification.planning import made_up_log
 from softstart.optimal.result import OptimumError
 from softstart.page import tasks
@@ -113,6 +115,20 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
         tasks.identified(b"a,b\n1,2\n", "rig.csv", drive, "demand", {}, tell=heard)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="write signal=name"):
         tasks.columns_of("torque")
+
+
+def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path) -> None:
+    chain = replace(stiff_behind_the_gap(), units="deg, rpm")
+    played = made_up_log(reduced_drive(chain), "two levels, then reverse", log_period=4e-3, ripple=1.0)
+    chain_log(chain, played, 4096.0).to_csv(tmp_path / "rig.csv")
+    content = (tmp_path / "rig.csv").read_bytes()
+    found = tasks.identified(content, "rig.csv", chain, "demand", {}, tell=Heard())  # type: ignore[arg-type]
+    alone = identify(tmp_path / "rig.csv", chain, torque_is="demand")
+    assert (found.drive.gap, found.drive.stiffness) == (alone.drive.gap, alone.drive.stiffness)
+    assert found.drive.units == chain.units
+    assert tuple(found.notes) == alone.notes
+    (gap,) = [row for row in found.rows if row[0] == "shaft.gap, deg"]
+    assert float(gap[1]) == pytest.approx(math.degrees(alone.drive.gap), rel=1e-3)
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
