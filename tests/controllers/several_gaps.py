@@ -1,18 +1,19 @@
 """Starts of chains with several gaps under `take-up`: the tables of docs/take-up.md.
 
-`python -m tests.controllers.several_gaps` prints them.
+`python -m tests.controllers.several_gaps` prints them; with `--optima` those that need optima instead.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from softstart import Controller
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chains
+from softstart import Controller, optimize
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_chains
 from softstart.chain.simulation import drive_of
 from softstart.controller import make_controller
 
@@ -160,9 +161,98 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     print()
 
 
+# what limits every feedback ---------------------------------------------------------------------------------
+
+SPEEDS = 0.3 * (2.0 / 0.3) ** np.linspace(0.0, 1.0, 41)  # of the take-up speed
+HARD = 1.3  # K_dyn from which on a start is looked at
+IDLE = 0.05  # of Ms
+
+
+def at_speeds(cells: Sequence[Chain], shares: Iterable[float]) -> Any:
+    """K_dyn of each start (columns) at shares of the take-up speed (rows), all else as it is."""
+    own = make_controller("take-up").fitted(drive_of(NOMINAL)).parameters
+    speed, impulse = own["take_up_speed"], own["contact_share"] * own["take_up_speed"]
+    made = [{"take_up_speed": x * speed, "contact_share": impulse / (x * speed)} for x in shares]
+    return np.array([played(cells, make_controller("take-up", one), NOMINAL)[0] for one in made])
+
+
+def idle_before_the_peak(chain: Chain) -> bool:
+    """Whether the motor gives less than 5 % of Ms, on the mean, from the first sign of the load to the peak.
+
+    The first sign is the first torque of the motor shaft after the first one of the load's shaft.
+    """
+    run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+    times = np.arange(0.0, run.peak_time, 1e-4)
+    T, u = (run.at(times)[name] for name in ("T", "u"))
+    met = np.logical_or.accumulate(T[:, -1] > 0.0)
+    sign = np.logical_or.accumulate(met & (T[:, 0] > 0.0))
+    assert chain.motor is not None
+    return not sign.any() or u[sign].mean() < IDLE * chain.motor.starting_torque
+
+
+def limits(groups: Mapping[str, Sequence[Chain]]) -> None:
+    """Print what the speed alone decides, and how far it can be chosen."""
+    rows = []
+    for name in ("gaps x0.5", "gaps x1", "gaps x2", "gaps x4"):
+        cells = groups[name]
+        K = at_speeds(cells, SPEEDS)
+        now, near = at_speeds(cells, [1.0])[0], at_speeds(cells, [0.998, 1.002])
+        common, moved = K[K.mean(axis=1).argmin()], near / now - 1.0
+        hard = [chain for chain, one in zip(cells, now, strict=True) if one > HARD]
+        rows.append([
+            name,
+            *(f"{one.mean():.2f}, {one.max():.2f}" for one in (now, common, K.min(axis=0))),
+            f"{100.0 * np.sqrt((moved**2).mean()):.0f}, {100.0 * np.abs(moved).max():.0f}",
+            f"{sum(idle_before_the_peak(chain) for chain in hard)} of {len(hard)}",
+        ])  # fmt: skip
+    heads = ["as it is", "best speed for all", "best speed for each", "speed 0.2 % off: rms, most, %", "idle"]
+    table(["starts", *heads], rows)
+
+
+def displaced(chain: Chain, most: float, rng: np.random.Generator) -> Chain:
+    """The chain with each of its start positions up to `most` off, in rad at the motor shaft."""
+    shafts = []
+    for shaft, gap in zip(chain.shafts, chain.at_motor_shaft().gap, strict=True):
+        half = 0.5 * float(shaft.gap)
+        to = shaft.start_position + rng.uniform(-most, most) * 2.0 * half / gap
+        shafts.append(shaft.replace(start_position=float(min(max(to, -half), half))))
+    return replace(chain, shafts=tuple(shafts))
+
+
+COUNT = 2.0 * np.pi / (4 * 4096)  # rad, of the encoder
+
+
+def optima(groups: Mapping[str, Sequence[Chain]]) -> None:
+    """Print K_dyn over that of the best start found for the same time, and what that start owes to foresight.
+
+    The load inertia is 0.4 times the nominal one. The torque of the best start is replayed on chains whose
+    positions are up to some counts of the encoder off.
+    """
+    rows = []
+    for place, i in (("opposite flanks", 0), ("random", 2)):
+        for name in ("gaps x0.5", "gaps x1", "gaps x2", "gaps x4"):
+            chain, rng = groups[name][i], np.random.default_rng(i)
+            K, time = played([chain], "take-up", NOMINAL)
+            t = float(time[0]) * rigid_time(chain)
+            best = optimize(chain, t, seeds=["take-up", "direct", "s-curve"])
+            again = []
+            for counts in (3, 10, 30):
+                near = [displaced(chain, counts * COUNT, rng) for _ in range(40)]
+                off_by = played(near, make_controller("profile", {"profile": best.profile}), NOMINAL)[0]
+                again.append(f"{np.nanmean(off_by):.2f}, {np.nanmax(off_by):.2f}")
+            figures = f"{t:.3f}", f"{K[0]:.2f}", f"{best.k_dyn:.2f}", f"{K[0] / best.k_dyn:.2f}"
+            rows.append([f"{name}, {place}", *figures, *again])
+            print(rows[-1], flush=True)
+    heads = ["time, s", "take-up", "best found", "ratio", "off by 3 counts", "10", "30"]
+    table(["start", *heads], rows)
+
+
 def main() -> None:
     """Print the tables."""
     groups = crane_cells(3, 8)
+    if "--optima" in sys.argv:
+        optima(groups)
+        return
     rows = []
     for group, cells in groups.items():
         found = [played(cells, name, NOMINAL) for name in STRATEGIES]
@@ -175,6 +265,7 @@ def main() -> None:
         worth = [played(cells, without(part), NOMINAL)[0] for cells in groups.values()]
         rows.append([part, *(f"{K.mean():.2f}, {K.max():.2f}" for K in worth)])
     table(["without", *groups], rows)
+    limits(groups)
     rows = []
     for chain in random_chains(1, 10):
         all_of_them = [played([chain], name) for name in STRATEGIES]
