@@ -77,7 +77,8 @@ BUDGET = {
     # 75: the torque-speed curve kept after t_f and by the exact start; a steady end without load torque
     # 30: the certificate stops where programs no longer raise it, and tries no more multipliers than it needs
     # 55: chains: searches around the best start, linear programs by the interior point method
-    "optimal": (11755, 35, 11, 0),
+    # 125 and a file: whole_dual.py, the curve before the contact, the exact minimum behind a limited rate
+    "optimal": (11880, 36, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet
