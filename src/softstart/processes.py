@@ -104,12 +104,12 @@ class Message(NamedTuple):
     content: Any
 
 
-class Tell:
+class Progress:
     """Given to a function that runs in a Worker, so that it can report its progress and parts of its result.
 
     >>> sent = []
-    >>> tell = Tell(sent.append)
-    >>> tell(0.25, "first point"); tell.part(7)
+    >>> progress = Progress(sent.append)
+    >>> progress(0.25, "first point"); progress.part(7)
     >>> [message.content for message in sent]
     [(0.25, 'first point'), 7]
     """
@@ -165,9 +165,11 @@ class Worker:
         """Whether the process has not ended."""
         return self._process.poll() is None
 
-    def submit(self, function: Callable[..., Any], *args: Any, tells: bool = False, **keywords: Any) -> None:
-        """Start `function(*args, **keywords)`, importable; with `tells` it is given a `tell`."""
-        frame = pickle.dumps((function, args, keywords, tells))
+    def submit(
+        self, function: Callable[..., Any], *args: Any, reports: bool = False, **keywords: Any
+    ) -> None:
+        """Start `function(*args, **keywords)`, importable; with `reports` it is given a `progress`."""
+        frame = pickle.dumps((function, args, keywords, reports))
         assert self._process.stdin is not None
         with suppress(OSError, ValueError):  # it has died or was ended: `receive` says so
             _write_frame(self._process.stdin, frame)
@@ -295,9 +297,9 @@ def _leave() -> None:
 def _answer(frame: bytes, send: Callable[[Message], None]) -> None:
     """Run one function and send its result, or what it raised."""
     try:
-        function, args, keywords, tells = pickle.loads(frame)
-        if tells:
-            keywords = {**keywords, "tell": Tell(send)}
+        function, args, keywords, reports = pickle.loads(frame)
+        if reports:
+            keywords = {**keywords, "progress": Progress(send)}
         send(Message("result", function(*args, **keywords)))
     except Exception as error:  # of any kind: it belongs to whoever asked
         text = "".join(traceback.format_exception(error))

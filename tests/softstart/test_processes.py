@@ -16,7 +16,7 @@ from tests.patience import patient
 
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.processes import DiedError, Pool, Tell, Worker, checked_workers, why_not_sendable
+from softstart.processes import DiedError, Pool, Progress, Worker, checked_workers, why_not_sendable
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
@@ -65,9 +65,9 @@ def sleeping(file: str) -> None:
     time.sleep(60)
 
 
-def reporting(*, tell: Tell) -> str:
-    tell(0.5, "half of it")
-    tell.part([1, 2])
+def reporting(*, progress: Progress) -> str:
+    progress(0.5, "half of it")
+    progress.part([1, 2])
     return "done"
 
 
@@ -100,7 +100,7 @@ def test_a_worker_runs_functions_one_after_another(importable: Any) -> None:
         assert worker.run(importable.printing, 4) == 4
         os.kill(pid, signal.SIGINT)  # Ctrl-C is for the parent
         assert worker.receive(0.05) is None
-        worker.submit(importable.reporting, tells=True)
+        worker.submit(importable.reporting, reports=True)
         found = [worker.receive() for _ in range(3)]
         assert [(one.kind, one.content) for one in found if one] == [
             ("progress", (0.5, "half of it")), ("part", [1, 2]), ("result", "done")

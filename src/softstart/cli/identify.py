@@ -195,7 +195,7 @@ def show_plan(drive: Drive, given: Mapping[str, Any], as_json: bool, out: str | 
         made = softstart.plan_experiments(
             drive, log_period=given["log_period"] or "4 ms", ripple=given["ripple"], free=given["free"],
             most_torque=given["most_torque"], most_travel=given["most_travel"],
-            optimise=not given["standard"], tell=progress, wanted=given["wanted"] or (),
+            optimise=not given["standard"], progress=progress, wanted=given["wanted"] or (),
         )  # fmt: skip
         if folder is not None:
             write_plan(made, folder, command_line())
@@ -220,7 +220,7 @@ def show_fit(
         found = softstart.identify(
             list(logs), given["drive"], free=given["free"], torque_is=given["torque_is"],
             columns=given["columns"] or {}, torque_constant=given["torque_constant"],
-            searches=given["searches"], tell=progress,
+            searches=given["searches"], progress=progress,
         )  # fmt: skip
         each = found.k_dyn(strategies)
         if folder is not None:

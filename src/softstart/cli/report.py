@@ -168,11 +168,11 @@ def _made(
     drawn: bool,
 ) -> tuple[reporting.Report | reporting.ChainReport, str]:
     """The report and, if it is `drawn`, its page."""
-    with working("starting the drive ...") as tell:
+    with working("starting the drive ...") as show:
         controllers = make_controllers(names, given, prefix=True)
 
         def progress(share: float, what: str) -> None:
-            tell(f"{100.0 * share:.0f} %: {what}")
+            show(f"{100.0 * share:.0f} %: {what}")
 
         asked |= {"controllers": controllers, "progress": progress, "command": command_line()}
         made: reporting.Report | reporting.ChainReport
@@ -181,7 +181,7 @@ def _made(
                 made = reporting.report_chain(drive, **asked)
             else:
                 made = reporting.report(drive, draw=drawn, **asked)
-        tell("drawing the figures")
+        show("drawing the figures")
         return made, made.to_html() if drawn else ""
 
 

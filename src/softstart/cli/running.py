@@ -29,11 +29,11 @@ EVERY = 30.0  # s between two lines of progress in a pipe
 COMPILING = "compiling the simulation kernel: this may take half a minute, once, and is kept on disk ..."
 
 
-Tell = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 @contextmanager
-def working(doing: str) -> Iterator[Tell]:
+def working(doing: str) -> Iterator[Progress]:
     """A status line on a terminal while something is done; what anyone prints goes to standard error.
 
     Gives what changes the line. In a pipe, where there is none, what is being done is a line of its own, at
@@ -49,17 +49,17 @@ def working(doing: str) -> Iterator[Tell]:
             yield lambda now: status.update(f"{now} ...")
 
 
-def _seldom() -> Tell:
+def _seldom() -> Progress:
     """Prints what is being done, and since when."""
     began = said = time.monotonic()
 
-    def tell(now: str) -> None:
+    def progress(now: str) -> None:
         nonlocal said
         if (at := time.monotonic()) - said >= EVERY:
             said = at
             print(f"softstart: {now} ... ({at - began:.0f} s)", file=sys.stderr, flush=True)
 
-    return tell
+    return progress
 
 
 @contextmanager

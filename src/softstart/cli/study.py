@@ -46,10 +46,10 @@ def study(name: str | None, only_list: bool, as_json: bool, out: str | None) -> 
         _list(as_json)
         return
     found = find_study(name)
-    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as tell:
+    with output_folder(out) as folder, working(f"{found.name}: beginning ...") as show:
 
         def progress(doing: str) -> None:
-            tell(f"{found.name}: {doing}")
+            show(f"{found.name}: {doing}")
 
         result = found.run(folder, progress)
         if folder is not None:

@@ -175,7 +175,7 @@ def _computed(
     to: Path | None,
 ) -> tuple[xarray.Dataset, Progress | None]:
     """The results, and how far it was at the end."""
-    with working("starting the first drive ...") as tell, Attributed():
+    with working("starting the first drive ...") as show, Attributed():
         grid = read_axes(axes, makers.Maker(controller or "", values, code_allowed()), drive)
         last: Progress | None = None
         shown = 0.0
@@ -185,7 +185,7 @@ def _computed(
             last = now
             if time.monotonic() - shown > 1.0 / AT_MOST:
                 shown = time.monotonic()
-                tell(str(now))
+                show(str(now))
 
         return softstart.sweep(
             drive,

@@ -55,7 +55,7 @@ MOST_FRICTION: Final = 3.0  # units; as far as a search goes
 LEAST_FRICTION: Final = 1e-8  # units; less is none, which the plant's events could not tell from rounding
 
 
-Tell = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -262,10 +262,10 @@ def _sawtooth(distance: Matrix, spread: Matrix) -> Matrix:
 class Fitter:
     """Logs, their models and which of their samples count."""
 
-    def __init__(self, models: Sequence[LogModel], space: Space, tell: Tell | None = None) -> None:
+    def __init__(self, models: Sequence[LogModel], space: Space, progress: Progress | None = None) -> None:
         self.models, self.space = list(models), space
         self.counts = [np.isfinite(one.log.values) for one in models]
-        self.tell = tell or (lambda _: None)
+        self.progress = progress or (lambda _: None)
 
     @property
     def largest_torque(self) -> float:
@@ -324,7 +324,7 @@ class Fitter:
             for i, draw in zip(free, draws[number - 1], strict=True) if number else ():
                 spread = math.log(FACTOR) if i < len(self.space.shared) else 1.0
                 start[i] = guess[i] + spread * (2.0 * draw - 1.0)
-            self.tell(f"search {number + 1}")
+            self.progress(f"search {number + 1}")
             try:
                 found.append(self._follow(np.clip(start, lower, upper), lower, upper))
             except (InputError, SimulationError):
@@ -480,7 +480,7 @@ class Fitter:
             noise, ripple = errors.noise, errors.ripple
             new = self.fit(x, errors, lower, upper)
             moved, x = float(np.max(np.abs(new - x))), new
-            self.tell("weights and fit")
+            self.progress("weights and fit")
             if moved < SETTLED:
                 break
             self.predict(x, errors)

@@ -182,7 +182,7 @@ def plan_experiments(
     most_torque: float | str | None = None,
     most_travel: float | str | None = None,
     optimise: bool = True,
-    tell: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Find what standard experiments would tell about a drive, and a torque that tells more.
 
@@ -221,8 +221,8 @@ def plan_experiments(
         How far the load may be moved, rad at the motor shaft; no limit by default.
     optimise : bool
         Whether to look for a better torque.
-    tell : callable, optional
-        Is told what is being done.
+    progress : callable, optional
+        Called with a text that says what is being done.
 
     Returns
     -------
@@ -269,7 +269,7 @@ def plan_experiments(
             near = nearest(name, asked)
             hint = f"did you mean {near}?" if near else f"those are {', '.join(asked)}."
             raise InputError(f"wanted = {show(name)}: it is no parameter that is to be found; {hint}")
-    bench = _Bench(drive, period, error, asked, signal, tuple(wanted), tell or (lambda _: None))
+    bench = _Bench(drive, period, error, asked, signal, tuple(wanted), progress or (lambda _: None))
     standard = [bench.experiment(name, *levels) for name, levels in _standard(drive, level).items()]
     usual = (
         max(one.peak for one in standard) if drive.permissible_torque is None else drive.permissible_torque
@@ -397,10 +397,10 @@ class _Bench:
         free: tuple[str, ...],
         signal: Kind,
         wanted: tuple[str, ...],
-        tell: Callable[[str], None],
+        progress: Callable[[str], None],
     ) -> None:
         self.drive, self.period, self.ripple, self.free = drive, period, ripple, free
-        self.signal, self.wanted, self.tell = signal, wanted, tell
+        self.signal, self.wanted, self.progress = signal, wanted, progress
         self.moving = _moving(drive) and float(drive.gap) > 0.0
         self.base = _at_rest(drive)
         self.count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
@@ -414,7 +414,7 @@ class _Bench:
 
     def experiment(self, name: str, durations: Vector, levels: Vector, rough: bool = False) -> Experiment:
         """What these levels would tell; roughly, for a design."""
-        self.tell(name)
+        self.progress(name)
         profile, end = _profile(durations, levels)
         samples, blocks = ROUGH if rough else (SAMPLES, SAMPLES)
         period = max(self.period, end / samples)

@@ -22,9 +22,9 @@ from softstart.identification.fitting import (
     MOST_FRICTION,
     STEP,
     Fitter,
+    Progress,
     Solution,
     Space,
-    Tell,
     chosen,
     covariance_of,
     quantile_of,
@@ -55,7 +55,7 @@ def identify(
     torque_constant: float | str | None = None,
     searches: int = 12,
     seed: int = 0,
-    tell: Tell | None = None,
+    progress: Progress | None = None,
 ) -> Identification:
     """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
 
@@ -88,8 +88,8 @@ def identify(
         At most so many searches.
     seed : int
         Of the points at which searches begin.
-    tell : callable, optional
-        Is told what is being done.
+    progress : callable, optional
+        Called with a text that says what is being done.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def identify(
         _check_inertia(one, drive)
     base = drive.replace(start_position="mid-gap") if moving else _standing(drive)
     space = Space.of(asked, drive, [moving for _ in read], [one.kind == "angle" for one in read])
-    fitter = Fitter([LogModel(one, base) for one in read], space, tell)
+    fitter = Fitter([LogModel(one, base) for one in read], space, progress)
     guess, lower, upper = _bounds(space, drive, read)
     found = fitter.search(guess, lower, upper, searches, seed)
     solution = fitter.refine(found[0][0], lower, upper)
@@ -146,7 +146,7 @@ def identify(
     best = found[0][1]
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
-        *([] if chain is None else _reduction(chain, drive, read[0], free, tell)),
+        *([] if chain is None else _reduction(chain, drive, read[0], free, progress)),
         *_advice(drive.replace(**changes), estimates, read),
         *_misfits(fitter, solution),
         *_other_scale(drive, drive.replace(**changes)),
@@ -169,7 +169,7 @@ def identify(
 
 
 def _reduction(
-    chain: Chain, drive: Drive, log: Log, free: Iterable[str] | None, tell: Tell | None
+    chain: Chain, drive: Drive, log: Log, free: Iterable[str] | None, progress: Progress | None
 ) -> list[str]:
     """What the reduction of a chain leaves out, and how far that moves what is found."""
     if len(chain.masses) == 2:
@@ -177,7 +177,10 @@ def _reduction(
     asked = None if free is None else list(free)
     return [
         reduction_note(
-            chain, drive, log, lambda one: identify(one, drive, free=asked, searches=1, tell=tell).shared
+            chain,
+            drive,
+            log,
+            lambda one: identify(one, drive, free=asked, searches=1, progress=progress).shared,
         )
     ]
 
@@ -274,7 +277,7 @@ def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[E
         position = i >= len(space.shared)
         middle = float(solution.x[i])
         half = quantile_of(solution.freedom[i]) * math.sqrt(float(covariance[i, i]))
-        fitter.tell(f"interval of {name}")
+        fitter.progress(f"interval of {name}")
         ends = [fitter.end(solution, i, sign, half) for sign in (-1.0, 1.0)]
         bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
         narrow = ends[1] - ends[0] < 1.0 if position else space.narrow(i, *ends)

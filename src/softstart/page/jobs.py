@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Any
 
 from softstart.errors import InputError, SimulationError
-from softstart.processes import DiedError, Tell, Worker
+from softstart.processes import DiedError, Progress, Worker
 
 NICENESS = 10  # the live page comes first
 STOP_CHECK = 0.1  # s between two checks whether a job is to stop
@@ -126,10 +126,10 @@ class Jobs:
         self._ended = False
 
     def begin(self, user: Hashable, title: str, work: Callable[..., Any], *args: Any, **keywords: Any) -> Job:
-        """Put `work(*args, tell=..., **keywords)` into the queue of `user`.
+        """Put `work(*args, progress=..., **keywords)` into the queue of `user`.
 
-        The function must be importable, its arguments and its result picklable; `tell` is a
-        `softstart.processes.Tell`. Raises InputError if too many jobs of this user wait already.
+        The function must be importable, its arguments and its result picklable; `progress` is a
+        `softstart.processes.Progress`. Raises InputError if too many jobs of this user wait already.
         """
         job = Job(self, user, title, pickle.dumps((work, args, keywords)))
         with self._lock:
@@ -245,7 +245,7 @@ class Jobs:
             worker = self._worker()
             try:
                 job.pid = worker.pid
-                worker.submit(_run, job._packed, tells=True)
+                worker.submit(_run, job._packed, reports=True)
                 state, sentences = _listen(job, worker)
             finally:
                 worker.end()
@@ -292,10 +292,10 @@ class Jobs:
         return Worker(self.modules, NICENESS)
 
 
-def _run(packed: bytes, *, tell: Tell) -> Any:
+def _run(packed: bytes, *, progress: Progress) -> Any:
     """What a job's process does."""
     work, arguments, keywords = pickle.loads(packed)
-    return work(*arguments, tell=tell, **keywords)
+    return work(*arguments, progress=progress, **keywords)
 
 
 def _conclude(job: Job, state: State, sentences: tuple[str, ...] = ()) -> None:

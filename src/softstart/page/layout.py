@@ -70,12 +70,12 @@ def build(drive: Machine) -> Session:
         if not client.is_deleted:
             element.run_method("frame", number, frame)
 
-    def tell(sentence: str) -> None:
+    def show(sentence: str) -> None:
         if not client.is_deleted:
             with client:
                 ui.notify(sentence, type="negative", position="bottom-left", close_button="close")
 
-    live = Live(screen, send, tell)
+    live = Live(screen, send, show)
     controls = Controls(session, screen, live.poke)
 
     def take(message: Any) -> None:
@@ -88,7 +88,7 @@ def build(drive: Machine) -> Session:
     session.on_change(live.poke)
     task = nicegui.background_tasks.create(live.run(), name=f"softstart live {client.id}")
     client.on_delete(lambda: _end(task, session))
-    client.on_exception(lambda error: tell(sentence_of(error)))
+    client.on_exception(lambda error: show(sentence_of(error)))
     return session
 
 

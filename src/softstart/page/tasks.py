@@ -1,6 +1,6 @@
 """What the page computes in the background: optimal start, curve of the least K_dyn, tuning, report.
 
-Each function runs in a process of its own (`softstart.page.jobs`), says how far it is through `tell`, and
+Each function runs in a process of its own (`softstart.page.jobs`), says how far it is through `progress`, and
 gives back plain data.
 """
 
@@ -28,7 +28,7 @@ from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
 from softstart.page.sentences import clipped
-from softstart.processes import Tell
+from softstart.processes import Progress
 from softstart.quantities import Units, show
 from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue
@@ -80,12 +80,12 @@ class Gentlest:
     files: dict[str, str]
 
 
-def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, tell: Tell) -> Gentlest:
+def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: Progress) -> Gentlest:
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
-    tell(None, "looking for the gentlest start")
+    progress(None, "looking for the gentlest start")
     with no_solution_as_sentence():
         best = solving.optimize(drive, start_time, terminal=terminal)
-    tell(None, "writing the profile")
+    progress(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     profile = best.profile
     files = {
@@ -110,7 +110,7 @@ def label_of(best: Optimum) -> str:
 
 
 def curve(
-    drive: Machine, start_times: Sequence[float], terminal: Terminal = "reached", *, tell: Tell
+    drive: Machine, start_times: Sequence[float], terminal: Terminal = "reached", *, progress: Progress
 ) -> list[FrontPoint]:
     """The least K_dyn over the start time: the easy long ones first, those of the strategies, the short ones.
 
@@ -129,10 +129,10 @@ def curve(
         done += 1
         if point.found:
             points.append(point)
-            tell.part(point)
+            progress.part(point)
 
     def doing(what: str) -> None:
-        tell(min(done / total, 1.0), f"start in {what.rpartition(': ')[2].removesuffix(f', {terminal}')}")
+        progress(min(done / total, 1.0), f"start in {what.rpartition(': ')[2].removesuffix(f', {terminal}')}")
 
     def through(times: Sequence[float]) -> None:
         if times:
@@ -142,7 +142,7 @@ def curve(
         through(long)
         least = math.inf  # of a chain nobody knows it
         if isinstance(drive, Drive):
-            tell(done / total, "the shortest start time")
+            progress(done / total, "the shortest start time")
             least = shortest.shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
         done += 1
         if math.isfinite(least):
@@ -188,14 +188,14 @@ def tuning(
     certified: bool = True,
     restarts: int = 3,
     *,
-    tell: Tell,
+    progress: Progress,
 ) -> Tuned:
     """Gains of a controller for each gap and load inertia, and one set for all."""
     found = tune(
         drive, controller, gaps, inertias, certified=certified, restarts=restarts, workers=1,
-        progress=_Throttled(tell),
+        progress=_Throttled(progress),
     )  # fmt: skip
-    tell(1.0, "writing the gains")
+    progress(1.0, "writing the gains")
     return Tuned(found.summary(), _files(found), found.seconds, found.starts)
 
 
@@ -210,8 +210,8 @@ def _files(found: Tuning) -> dict[str, str]:
 class _Throttled:
     """Reports the progress of a tuning at most ten times a second, with a share made of its parts."""
 
-    def __init__(self, tell: Tell) -> None:
-        self.tell = tell
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
         self.title, self.last = "", -math.inf
 
     def __call__(self, doing: str) -> None:
@@ -220,7 +220,7 @@ class _Throttled:
         if title == self.title and now < self.last + INTERVAL:
             return
         self.title, self.last = title, now
-        self.tell(tuning_share(doing), doing)
+        self.progress(tuning_share(doing), doing)
 
 
 def tuning_share(doing: str) -> float | None:
@@ -262,13 +262,19 @@ def columns_of(text: str) -> dict[str, str]:
 
 
 def identified(
-    content: bytes, name: str, guess: Machine, torque_is: TorqueIs, columns: Mapping[str, str], *, tell: Tell
+    content: bytes,
+    name: str,
+    guess: Machine,
+    torque_is: TorqueIs,
+    columns: Mapping[str, str],
+    *,
+    progress: Progress,
 ) -> Identified:
     """The drive from the log in these bytes, with its intervals, from this guess.
 
     Of a chain with one dominant gap it is the two masses that stand for it.
     """
-    tell(None, "reading the log")
+    progress(None, "reading the log")
     with tempfile.TemporaryDirectory(prefix="softstart-log-") as folder:
         path = Path(folder, "log.csv")
         path.write_bytes(content)
@@ -276,7 +282,7 @@ def identified(
             log = logs.Log.load(path, columns=columns, torque_is=torque_is)
         except InputError as error:
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
-    found = fits.identify(log, guess, tell=lambda doing: tell(None, doing))
+    found = fits.identify(log, guess, progress=lambda doing: progress(None, doing))
     table = shown.estimates_table(found)
     rows = [dict(zip([column.heading for column in table.columns], row, strict=True)) for row in table.rows]
     figures = ("found", "from", "to")  # the guess is in the fields of the page
@@ -297,9 +303,9 @@ def _seen(text: str, si: str, units: Units) -> str:
     return digits(units.shown(float(text), si), len(re.sub(r"e.*|^[-+0.]+|\.", "", text)) or 1)
 
 
-def code(profile: TorqueProfile, about: Mapping[str, object], *, tell: Tell) -> str:
+def code(profile: TorqueProfile, about: Mapping[str, object], *, progress: Progress) -> str:
     """C code that plays a torque profile."""
-    tell(None, "writing C code")
+    progress(None, "writing C code")
     return text_of(lambda path: profile.to_c(path, about=about), ".c")
 
 
@@ -322,17 +328,21 @@ class Checked:
     quickest: Optimum | None
 
 
-def checked(machine: Machine, controllers: Mapping[str, Controller], *, tell: Tell) -> Checked:
+def checked(machine: Machine, controllers: Mapping[str, Controller], *, progress: Progress) -> Checked:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     rows = {}
     for done, (label, controller) in enumerate(controllers.items()):
-        tell(0.3 * done / len(controllers), f"limits: {label}")
+        progress(0.3 * done / len(controllers), f"limits: {label}")
         with suppress(SimulationError):
             rows[label] = compare(machine, [controller]).rows[0]
-    parts = [_positions(machine, controllers, tell), _margins(machine, rows), _life(machine, rows, tell)]
+    parts = [
+        _positions(machine, controllers, progress),
+        _margins(machine, rows),
+        _life(machine, rows, progress),
+    ]
     quickest = None
     if isinstance(machine, Drive) and machine.limits:
-        tell(0.8, "the quickest start that keeps the limits")
+        progress(0.8, "the quickest start that keeps the limits")
         name, title = "quickest", "The quickest start within limits"
         try:
             with no_solution_as_sentence():
@@ -346,7 +356,7 @@ def checked(machine: Machine, controllers: Mapping[str, Controller], *, tell: Te
     return Checked(parts, quickest)
 
 
-def _positions(machine: Machine, controllers: Mapping[str, Controller], tell: Tell) -> Part:
+def _positions(machine: Machine, controllers: Mapping[str, Controller], progress: Progress) -> Part:
     """K_dyn from each position at which a start may begin."""
     name, title = "positions", "K_dyn by start position"
     try:
@@ -355,7 +365,7 @@ def _positions(machine: Machine, controllers: Mapping[str, Controller], tell: Te
         return Part(name, title, [], [], [f"It starts from one position alone. {' '.join(error.sentences)}"])
     cells = []
     for done, (label, controller) in enumerate(controllers.items()):
-        tell(0.3 + 0.3 * done / len(controllers), f"start positions: {label}")
+        progress(0.3 + 0.3 * done / len(controllers), f"start positions: {label}")
         with suppress(SimulationError):
             run = simulate(unknown, controller)
             each = [one.k_dyn for one in run.positions.values()]
@@ -380,10 +390,10 @@ def _margins(machine: Machine, rows: Mapping[str, Row]) -> Part:
     return Part(name, title, ["strategy", "limits"], cells, [recommend(machine, rows.values()).text])
 
 
-def _life(machine: Machine, rows: Mapping[str, Row], tell: Tell) -> Part:
+def _life(machine: Machine, rows: Mapping[str, Row], progress: Progress) -> Part:
     """The life of the shaft line beside that under direct, of a chain that of each shaft."""
     name, title = "life", "Life over that under direct"
-    tell(0.65, "life of the shaft line")
+    progress(0.65, "life of the shaft line")
     runs: Any = [row.run for row in rows.values()]
     try:
         if isinstance(machine, Chain):
@@ -400,18 +410,20 @@ def _life(machine: Machine, rows: Mapping[str, Row], tell: Tell) -> Part:
     return Part(name, title, headings, [list(row) for row in shown.rows], said)
 
 
-def ready(machine: Chain, *, tell: Tell) -> Chain:
+def ready(machine: Chain, *, progress: Progress) -> Chain:
     """The chain, once all strategies have started it: what must be compiled for that is compiled then."""
     names = ready_controller_names()
     for done, name in enumerate(names):
-        tell(done / len(names), f"starting it: {name}")
+        progress(done / len(names), f"starting it: {name}")
         with suppress(SimulationError):
             simulate(machine, name)
     return machine
 
 
-def report(drive: Machine, controllers: Sequence[str | Controller], command: str, *, tell: Tell) -> str:
+def report(
+    drive: Machine, controllers: Sequence[str | Controller], command: str, *, progress: Progress
+) -> str:
     """The report for a customer, as one HTML text."""
-    tell(0.0, "starting the drive")
+    progress(0.0, "starting the drive")
     made: Any = reporting.report_chain if isinstance(drive, Chain) else reporting.report
-    return str(made(drive, controllers=controllers, progress=tell, command=command).to_html())
+    return str(made(drive, controllers=controllers, progress=progress, command=command).to_html())

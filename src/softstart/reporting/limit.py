@@ -25,7 +25,7 @@ from softstart.optimal.pulse_coast_hold import applies
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.optimal.solving import optimize
 from softstart.processes import DiedError, Worker
-from softstart.processes import Tell as WorkerTell
+from softstart.processes import Progress as WorkerProgress
 from softstart.reporting.choice import Choice
 from softstart.reporting.gentle_starts import GentleStart, gentle_starts
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
@@ -51,7 +51,7 @@ GENTLER = 0.999  # times an optimum: what is no more than its last digits is not
 SEARCHED = 0.5  # of the budget, after which the search on a chain goes into no new demand
 QUICK_SHARE = 0.3  # of the budget is kept for starts that are good and not proved best
 
-Tell = Callable[[float, str], object]
+Progress = Callable[[float, str], object]
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def chain_limit(
     own: Sequence[float],
     asked: Sequence[float],
     budget: float,
-    tell: Tell,
+    progress: Progress,
     meanwhile: Callable[[], object] = lambda: None,
     seeds: Sequence[str] | None = None,
 ) -> Limit:
@@ -152,7 +152,7 @@ def chain_limit(
     curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
     points: list[FrontPoint] = []
     if asked and budget > 0.0:
-        points = _in_own_process(chain, asked, budget, tell, meanwhile, SEARCHED * budget, seeds)
+        points = _in_own_process(chain, asked, budget, progress, meanwhile, SEARCHED * budget, seeds)
     else:
         meanwhile()
     found = {p.start_time_bound for p in points if p.found}
@@ -170,7 +170,7 @@ def limit(
     own: Sequence[float],
     reference: float,
     budget: float,
-    tell: Tell,
+    progress: Progress,
     meanwhile: Callable[[], object] = lambda: None,
 ) -> Limit:
     """The limit for start times around those of the strategies, `own`, of which the first matter most.
@@ -199,8 +199,8 @@ def limit(
     known: list[GentleStart] = []
     if left and budget > 0.0:
         began = time.monotonic()
-        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, tell, meanwhile)
-        tell(1.0, "looking for gentle starts")
+        points += _in_own_process(drive, left, (1.0 - QUICK_SHARE) * budget, progress, meanwhile)
+        progress(1.0, "looking for gentle starts")
         best = {p.start_time_bound: p.k_dyn for p in points if p.k_dyn is not None}
         order = sorted(left, key=lambda t: t in best)  # those without an optimum first
         known = gentle_starts(drive, order, budget - (time.monotonic() - began))
@@ -233,7 +233,7 @@ def _in_own_process(
     drive: Drive | Chain,
     asked: Sequence[float],
     budget: float,
-    tell: Tell,
+    progress: Progress,
     meanwhile: Callable[[], object],
     time_limit: float = 0.0,
     seeds: Sequence[str] | None = None,
@@ -242,12 +242,12 @@ def _in_own_process(
     points: list[FrontPoint] = []
     worker = Worker(quiet=True)
     try:
-        worker.submit(optima, drive, asked, time_limit, seeds, tells=True)
+        worker.submit(optima, drive, asked, time_limit, seeds, reports=True)
         began = time.monotonic()
         meanwhile()
         while True:
             spent = time.monotonic() - began
-            tell(min(spent / budget, 1.0), f"looking for the optimum, at most {budget:g} s")
+            progress(min(spent / budget, 1.0), f"looking for the optimum, at most {budget:g} s")
             message = worker.receive(min(POLL, max(budget - spent, 0.0)))
             if message is None and spent >= budget:
                 break
@@ -268,7 +268,7 @@ def optima(
     time_limit: float = 0.0,
     seeds: Sequence[str] | None = None,
     *,
-    tell: WorkerTell,
+    progress: WorkerProgress,
 ) -> None:
     """Look for the optima of start times, one after the other, and send each at once."""
     for start_time in start_times:
@@ -281,7 +281,7 @@ def optima(
             point = FrontPoint.of_verdict(error.verdict, start_time, TERMINAL)
         except (OptimumError, NotConverged, InputError) as error:  # InputError: of no class it solves
             point = FrontPoint.not_found(str(error), start_time, TERMINAL)
-        tell.part(point)
+        progress.part(point)
 
 
 def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:

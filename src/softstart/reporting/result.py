@@ -296,7 +296,7 @@ def _report(
     steps = checked_steps(drive, resolution, budget)
     made = controllers_of(controllers, parameters or {})
 
-    def tell(share: float, what: str) -> None:
+    def show(share: float, what: str) -> None:
         if progress is not None:
             progress(share, what)
 
@@ -305,7 +305,7 @@ def _report(
     maps = []
     reference = simulate(drive, REFERENCE)
     for number, one in enumerate(made):
-        tell(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
+        show(0.4 * number / len(made), f"starting the drive under {label_of(one)}")
         try:
             row = compared(drive, one, reference, drawn=drawn)
             maps.append(robustness(drive, one))
@@ -320,14 +320,14 @@ def _report(
     sheets = []
     chosen = [one for one in (choice.chosen, choice.ordinary) if one is not None]
     for index, candidate in enumerate(dict.fromkeys(chosen)):
-        tell(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
+        show(0.4 + 0.05 * index, f"rounding the values of {candidate.name}")
         controller = used[rows.index(candidate.row)]
         row = candidate.row
         sheets.append(make_sheet(drive, controller, row.run, steps, row, drawn))
     times = [one.row.run.start_time for one in chosen]
     direct = next(row.run.start_time for row in rows if label_of(row.run.controller) == REFERENCE)
     reached = [row.run.start_time for row in rows if row.run.start_time == row.run.start_time]
-    tell(0.5, "looking for the limit")
+    show(0.5, "looking for the limit")
     pictures: dict[str, Html] = {}
 
     def meanwhile() -> None:
@@ -339,10 +339,10 @@ def _report(
         [*times, *reached],
         direct,
         budget,
-        lambda share, what: tell(0.5 + 0.5 * share, what),
+        lambda share, what: show(0.5 + 0.5 * share, what),
         meanwhile,
     )
-    tell(1.0, "done")
+    show(1.0, "done")
     return Report(
         drive, comparison, tuple(failed), found, choice, tuple(sheets), steps,
         provenance(drive, command), about, pictures,

@@ -61,7 +61,7 @@ def test_checks_are_those_of_compare_fatigue_and_optimize() -> None:
     drive = CRANE.with_settings(["limits.shaft_torque=70", "shaft.damping=0.3"])
     controllers = {name: make_controller(name) for name in ("direct", "shaped", "ramp")}
     heard = Heard()
-    found = tasks.checked(drive, controllers, tell=heard)  # type: ignore[arg-type]
+    found = tasks.checked(drive, controllers, progress=heard)  # type: ignore[arg-type]
     positions, limits, life, quickest = found.parts
     for label, *cells in positions.rows:
         unknown = simulate(drive.replace(start_position="unknown"), label)
@@ -86,7 +86,7 @@ def test_checks_are_those_of_compare_fatigue_and_optimize() -> None:
 def test_checks_say_why_a_part_is_missing() -> None:
     chain = Chain.load("crane-4-mass")
     controllers = {name: make_controller(name) for name in ("direct", "take-up")}
-    found = tasks.checked(chain, controllers, tell=Heard())  # type: ignore[arg-type]
+    found = tasks.checked(chain, controllers, progress=Heard())  # type: ignore[arg-type]
     assert found.quickest is None
     positions, limits, life = found.parts
     run = simulate(replace(chain, position="unknown"), "take-up")
@@ -102,7 +102,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     log.to_csv(tmp_path / "rig.csv")
     heard = Heard()
     content = (tmp_path / "rig.csv").read_bytes()
-    found = tasks.identified(content, "rig.csv", drive, "demand", {}, tell=heard)  # type: ignore[arg-type]
+    found = tasks.identified(content, "rig.csv", drive, "demand", {}, progress=heard)  # type: ignore[arg-type]
     alone = identify(tmp_path / "rig.csv", drive, torque_is="demand")
     assert {name: getattr(found.drive, name) for name in ("gap", "stiffness", "J1", "J2")} == {
         name: getattr(alone.drive, name) for name in ("gap", "stiffness", "J1", "J2")
@@ -112,7 +112,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     assert tuple(found.notes) == alone.notes
     assert len(heard.shares) > 2
     with pytest.raises(InputError, match=r"^log = rig.csv: its first line"):
-        tasks.identified(b"a,b\n1,2\n", "rig.csv", drive, "demand", {}, tell=heard)  # type: ignore[arg-type]
+        tasks.identified(b"a,b\n1,2\n", "rig.csv", drive, "demand", {}, progress=heard)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="write signal=name"):
         tasks.columns_of("torque")
 
@@ -122,7 +122,7 @@ def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path)
     played = made_up_log(reduced_drive(chain), "two levels, then reverse", log_period=4e-3, ripple=1.0)
     chain_log(chain, played, 4096.0).to_csv(tmp_path / "rig.csv")
     content = (tmp_path / "rig.csv").read_bytes()
-    found = tasks.identified(content, "rig.csv", chain, "demand", {}, tell=Heard())  # type: ignore[arg-type]
+    found = tasks.identified(content, "rig.csv", chain, "demand", {}, progress=Heard())  # type: ignore[arg-type]
     alone = identify(tmp_path / "rig.csv", chain, torque_is="demand")
     assert (found.drive.gap, found.drive.stiffness) == (alone.drive.gap, alone.drive.stiffness)
     assert found.drive.units == chain.units
@@ -132,7 +132,7 @@ def test_a_log_of_a_chain_gives_the_two_masses_that_stand_for_it(tmp_path: Path)
 
 
 def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
-    found = tasks.gentlest(CRANE, "1.2x", "reached", tell=Heard())  # type: ignore[arg-type]
+    found = tasks.gentlest(CRANE, "1.2x", "reached", progress=Heard())  # type: ignore[arg-type]
     best = optimize(CRANE, 1.2 * simulate(CRANE, "direct").start_time, terminal="reached")
     assert found.best.k_dyn == best.k_dyn
     assert simulate(CRANE, player_of(found.best)).k_dyn == best.k_dyn
@@ -144,7 +144,7 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="no way"), tasks.no_solution_as_sentence():
         raise OptimumError("no way")
     with pytest.raises(InputError, match="start_time"):
-        tasks.gentlest(CRANE, "-1", "reached", tell=Heard())  # type: ignore[arg-type]
+        tasks.gentlest(CRANE, "-1", "reached", progress=Heard())  # type: ignore[arg-type]
 
 
 def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +152,7 @@ def test_the_curve_comes_in_parts_and_holds_the_strategies(monkeypatch: pytest.M
     monkeypatch.setattr("softstart.optimal.shortest.shortest_start_time", lambda problem: math.inf)
     runs = {name: simulate(CRANE, name) for name in ("current-limit-feedback", "ramp")}
     heard = Heard()
-    points = tasks.curve(CRANE, [run.start_time for run in runs.values()], tell=heard)  # type: ignore[arg-type]
+    points = tasks.curve(CRANE, [run.start_time for run in runs.values()], progress=heard)  # type: ignore[arg-type]
     assert {p.start_time_bound for p in heard.parts} == {p.start_time_bound for p in points}
     times = [p.start_time_bound for p in points]
     assert times == sorted(times)
@@ -201,7 +201,7 @@ def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
 def test_tuned_gains_come_as_files(machine: Drive | Chain) -> None:
     heard = Heard()
     grid = grid_of(machine, "1x", "1x")
-    found = tasks.tuning(machine, "reduced-first-stage", *grid, certified=False, restarts=1, tell=heard)  # type: ignore[arg-type]
+    found = tasks.tuning(machine, "reduced-first-stage", *grid, certified=False, restarts=1, progress=heard)  # type: ignore[arg-type]
     same = tune(machine, "reduced-first-stage", *grid, certified=False, restarts=1, workers=1)
     assert same.robust is not None
     assert found.summary["robust"]["gains"] == same.robust.gains

@@ -13,27 +13,27 @@ from typing import Any
 from softstart.errors import InputError, SimulationError
 
 
-def noted(file: str, line: str, *, tell: Any) -> tuple[int, int, str]:
+def noted(file: str, line: str, *, progress: Any) -> tuple[int, int, str]:
     """Write a line; say the process's number, its niceness, and its limit on threads."""
-    tell(0.5, "half of it")
-    tell.part(line)
+    progress(0.5, "half of it")
+    progress.part(line)
     with Path(file).open("a", encoding="utf-8") as stream:
         stream.write(line + "\n")
     return os.getpid(), os.nice(0), os.environ["OPENBLAS_NUM_THREADS"]
 
 
-def endless(started: str, *, tell: Any) -> None:
+def endless(started: str, *, progress: Any) -> None:
     """Never ends, does not listen to requests to end, and has begun another process that does neither."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     other = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
-    tell(None, "without an end")
-    tell.part((os.getpid(), other.pid))
+    progress(None, "without an end")
+    progress.part((os.getpid(), other.pid))
     Path(started).write_text(f"{os.getpid()} {other.pid}", encoding="utf-8")
     while True:
         time.sleep(60)
 
 
-def failing(how: str, *, tell: Any) -> Any:
+def failing(how: str, *, progress: Any) -> Any:
     """Fails in one of the ways in which computations fail."""
     if how == "input":
         raise InputError(["gap = -1: a gap is 0 or more.", "load.inertia = 0: it must be above 0."])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, PlainController, simulate
-from softstart.processes import Tell
+from softstart.processes import Progress
 from softstart.reporting import report
 from softstart.reporting.choice import choice_section
 from softstart.reporting.document import answer
@@ -123,7 +123,7 @@ def test_search_for_optima_ends_when_its_time_is_up():
 def test_the_process_sends_each_optimum():
     crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     sent = []
-    optima(crane, [0.2883042], tell=Tell(sent.append))
+    optima(crane, [0.2883042], progress=Progress(sent.append))
     ((kind, point),) = sent
     assert kind == "part"
     assert point.found

@@ -6,7 +6,7 @@ import pytest
 
 from softstart import Drive, simulate
 from softstart.optimal.front import FrontPoint
-from softstart.processes import Tell
+from softstart.processes import Progress
 from softstart.reporting import report
 from softstart.reporting.document import answer
 from softstart.reporting.gentle_starts import gentle_starts
@@ -99,7 +99,7 @@ def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostil
 def test_a_drive_of_no_class_that_is_solved_is_an_answer_not_a_crash():
     drive = LAGGING.replace(load_kind="reactive", contact_law="modelica", damping=1.0)
     sent = []
-    optima(drive, [0.3, 0.4], tell=Tell(sent.append))
+    optima(drive, [0.3, 0.4], progress=Progress(sent.append))
     points = [message.content for message in sent]
     assert [p.status for p in points] == ["NOT_FOUND", "NOT_FOUND"]
     assert "modelica" in points[0].status_text
