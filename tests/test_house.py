@@ -21,7 +21,7 @@ BUDGET = {
     # folders of killed processes, the end of a process that does not stop
     # 40 and a file: the language of what is shown; 30: the collector of sentences, which cli had
     # 75: the units in which people see angles and speeds
-    "(top)": (2745, 12, 0, 0),
+    "(top)": (2750, 12, 0, 0),
     "balancing": (2020, 7, 0, 0),
     # 150 lines: damping ratios, mean torque and K_dyn of a chain, permissible torques; 180: where its start
     # begins, settled times, starts from an unknown position, as a drive has them; 370 and a file that

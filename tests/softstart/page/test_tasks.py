@@ -38,6 +38,7 @@ from softstart.page.downloads import command_text, file_name
 from softstart.page.sentences import changed_since
 from softstart.page.tasks import label_of, player_of
 from softstart.page.tuning_panel import cell_table, controller_of, grid_of, tunable
+from softstart.views.printed import units_of
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -213,7 +214,7 @@ def test_tuned_gains_come_as_files(machine: Drive | Chain) -> None:
     shares = [share for share in heard.shares if share is not None]
     assert shares == sorted(shares)
     assert "reduced-first-stage" in tunable()
-    assert "by cell" in cell_table(found)
+    assert "by cell" in cell_table(found, units_of(machine))
 
 
 @given(st.text(max_size=80), st.sampled_from([".csv", ".toml", ".c", ".html"]))
