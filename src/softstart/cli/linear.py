@@ -30,7 +30,6 @@ from softstart.views.markdown import (
     write_drive_report,
     write_table,
 )
-from softstart.views.starts import machine_lines
 from softstart.views.terminal import (
     present,
     print_conclusion,
@@ -45,8 +44,9 @@ if TYPE_CHECKING:
 
     from softstart.chain.machines import Machine
     from softstart.views import linear as views
+    from softstart.views import starts
 else:  # no numba for a help, a wrong option or the Tab key
-    views = late("softstart.views.linear")
+    views, starts = late("softstart.views.linear"), late("softstart.views.starts")
 
 
 @click.command(cls=Command)
@@ -89,7 +89,7 @@ def linear(
 
 
 def _show(to: Console, view: softstart.LinearView) -> None:
-    print_lines(to, machine_lines(view.drive))
+    print_lines(to, starts.machine_lines(view.drive))
     sentence(to, f"  under  {view.name}")
     to.print()
     if view.margins is None:

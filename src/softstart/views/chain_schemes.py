@@ -36,7 +36,7 @@ def scheme_svg(chain: Chain) -> str:
     """The scheme as the text of an SVG file.
 
     >>> scheme_svg(Chain.load("crane-4-mass"))[:28]
-    '<svg xmlns="http://www.w3.or'
+    '<svg class="scheme" xmlns="h'
     """
     arrays = chain.at_motor_shaft()
     vibration = natural_vibration(chain)

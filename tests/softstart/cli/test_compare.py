@@ -64,7 +64,7 @@ def test_table_says_all_and_fits(run, monkeypatch, width):
     assert not set("─│┃━") & set(out)
     for words in (
         "Crane travel drive", "J1 = 0.035 kg m2", "gap = 0.5 rad", "no-pull", "active", "strategy", "K_dyn",
-        "gap x4", "J2 x0.4", "stage 1", "stage 2", "contacts", "time", "lost %",
+        "gap x4", "J2 x0.4", "stage 1", "stage 2", "contacts", "time", "later %",
         "No other strategy beats", "52.86 N m",
     ):  # fmt: skip
         assert words in out
