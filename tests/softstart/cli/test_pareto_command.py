@@ -155,7 +155,7 @@ def test_an_interrupted_command_keeps_its_points_and_goes_on(command, place, run
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate()
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out) == (130, ""), err
     assert "finished points are kept in front/pareto.jsonl" in err
     assert "Traceback" not in err
     assert os.listdir(place / "front") == ["pareto.jsonl"]
