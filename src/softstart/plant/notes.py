@@ -10,7 +10,7 @@ import math
 from numba import from_dtype, types
 
 from softstart.plant.crossing import RISING, WATCH, first_crossing
-from softstart.plant.jit import apart, inlined, merged
+from softstart.plant.jit import apart, inlined
 from softstart.plant.layout import (
     ASK, EVENT, MOTION, NOT_LOCATED, SEGMENT, STAGE_ROW, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
@@ -66,7 +66,7 @@ def next_extreme(m: Motion, load: Septuple, begin: float, z: float, v: float, s:
     return at
 
 
-@merged
+@inlined
 def note_peak(p: Plant, x: State, m: Motion, load: Septuple, s: float) -> int:
     """Locate the extremes of T within the span that ends at s; nothing is read off a grid."""
     side = x.side

@@ -15,7 +15,7 @@ from softstart.plant.coupled import begin_coupled
 from softstart.plant.crossing import (
     LOST, NO_CROSSING, RISING, ROUNDING, WATCH, bounds, first_crossing,
 )  # fmt: skip
-from softstart.plant.jit import apart, inlined, merged
+from softstart.plant.jit import apart, inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND, LEFT_LOWER,
     LEFT_UPPER, LOWER, MODELICA, MOTION, MOTOR_BACKWARD, MOTOR_FORWARD, MOTOR_STOP, NO_EVENT, PLANT, REACHED,
@@ -26,7 +26,7 @@ from softstart.plant.layout import (
 from softstart.plant.motion import (
     COUPLED, derivatives, forcing_tail, motion, prepare, remainders, write_without_cancelling,
 )  # fmt: skip
-from softstart.plant.exchange import shaft_torque
+from softstart.plant.modes import shaft_torque
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 from softstart.plant.terms import MAX_STEPS
 
@@ -204,7 +204,7 @@ def time_to_flank(distance: float, v: float, a: float, just_left: bool, toleranc
     return (root - v) / a if a > 0.0 else math.inf
 
 
-@merged
+@inlined
 def flank_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The flank that is reached first while the gap is open."""
     half = 0.5 * p.gap
@@ -252,7 +252,7 @@ def flank_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -
     return (LOWER if lower else UPPER), s
 
 
-@merged
+@inlined
 def exit_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The instant at which the flanks part (or the damping regime of `modelica` changes)."""
     modelica = p.law == MODELICA and p.d > 0.0
@@ -281,7 +281,7 @@ def exit_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) ->
     return (EXIT, s) if s >= 0.0 else (NO_EVENT, horizon)
 
 
-@merged
+@inlined
 def load_event_open(p: Plant, x: State, load: Septuple) -> tuple[int, float]:
     """Stop of the load or target speed while the gap is open: the load speed is linear then."""
     slope = load[6]
@@ -296,7 +296,7 @@ def load_event_open(p: Plant, x: State, load: Septuple) -> tuple[int, float]:
     return NO_EVENT, math.inf
 
 
-@merged
+@inlined
 def load_event_contact(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """Breakaway, stop or target speed of the load while the gap is closed."""
     event = NO_EVENT
@@ -390,7 +390,7 @@ def release_event(p: Plant, x: State, m: Motion, sign: float, holds: float, end:
     return LOST
 
 
-@merged
+@inlined
 def next_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The event that ends this span and when, at most `horizon` from now."""
     event, s = event_of_the_shaft(p, x, m, load, horizon)
@@ -409,7 +409,7 @@ def next_event(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) ->
     return event, s
 
 
-@merged
+@inlined
 def friction_event(p: Plant, x: State, m: Motion, load: Septuple, end: float) -> tuple[int, float]:
     """The motor that its friction holds is moved, or one that slides stands still, if before `end`."""
     if x.held != 0.0:
@@ -434,7 +434,7 @@ def friction_event(p: Plant, x: State, m: Motion, load: Septuple, end: float) ->
     return (MOTOR_STOP, s) if s >= 0.0 else (NO_EVENT, end)
 
 
-@merged
+@inlined
 def event_of_the_shaft(p: Plant, x: State, m: Motion, load: Septuple, horizon: float) -> tuple[int, float]:
     """The earliest event of flanks and load."""
     if x.side == 0.0:

@@ -20,12 +20,11 @@ from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.controller.base import CompiledController, Sensor
 from softstart.drive import Drive
-from softstart.plant import exchange, record
 from softstart.plant import layout as at
+from softstart.plant import record
 from softstart.plant import start as kernel
-from softstart.plant.exchange import N_MEASURED, STEP_SIGNATURE
 from softstart.plant.jit import compiled_as
-from softstart.plant.start import run_native
+from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run_native
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
 from softstart.start.engine import Recorder
@@ -324,7 +323,7 @@ class Evaluator:
             kernel.run_many(
                 type(parameters.controller).kernel, p, numbers, int(sees), bool(sees & Sensor.STAGE),
                 np.array([math.inf]), results, np.zeros(at.N_X), np.zeros(at.N_M),
-                np.zeros(exchange.N_MEASURED), np.zeros(size), np.zeros(exchange.NEW_STATE + size),
+                np.zeros(kernel.N_MEASURED), np.zeros(size), np.zeros(kernel.NEW_STATE + size),
                 np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
             )  # fmt: skip
             good = results[:, at.STATUS] == at.ENDED
@@ -424,7 +423,7 @@ class _Recorder:
         self.p = p[0].copy()
         self.records = Recorder(self.p, int(parameters.controller.sensors))
         self.state = np.zeros(self.controller.state_size)
-        self.command = np.zeros(exchange.NEW_STATE + self.controller.state_size)
+        self.command = np.zeros(kernel.NEW_STATE + self.controller.state_size)
         self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
 
     def run(self, numbers: Vector, until: float) -> Vector:
