@@ -49,9 +49,9 @@ def facts(page: Any, name: str) -> dict[str, str]:
 
 
 def k_dyn(page: Any, strategy: str) -> str:
-    """That of a strategy in the table."""
+    """That of a strategy in the table; a new row is empty until the server has started its strategy."""
     cell = page.locator(f'tr[data-name="{strategy}"] td[data-key="k_dyn"]')
-    cell.wait_for()
+    until(lambda: bool(cell.inner_text()), LONG, page)
     return str(cell.inner_text())
 
 
