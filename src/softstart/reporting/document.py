@@ -290,7 +290,7 @@ def provenance_section(about: Provenance, project: Project, chain: bool = False)
             else said("The drive as a file for softstart, with all changes (drive.toml):"),
             class_="lead",
         ),
-        tag("pre", about.drive_toml),
+        tag("pre", about.drive_toml, class_="file"),
     )
 
 
