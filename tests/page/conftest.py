@@ -20,6 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from tests.patience import patient
 
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
@@ -99,6 +100,14 @@ def settled(page: Any, expression: str) -> Any:
     while value != (value := page.evaluate(expression)):
         page.wait_for_timeout(1000)
     return value
+
+
+def comes_to(read: Callable[[], Any], wanted: Any) -> None:
+    """Wait until this is read: figures, tables and notes are there a while after what was done."""
+    latest = time.monotonic() + patient(PATIENCE)
+    while (found := read()) != wanted and time.monotonic() < latest:
+        time.sleep(0.05)
+    assert found == wanted
 
 
 def wait_for_rows(page: Any) -> None:
@@ -211,7 +220,7 @@ def visit(browser: Any, server: Server) -> Iterator[Visit]:
         )  # fmt: skip
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(20_000)
+        page.set_default_timeout(1000.0 * PATIENCE)
         own = urlsplit(url or server.url).netloc
 
         def said(message: Any) -> None:

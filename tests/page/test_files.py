@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.page.conftest import SOFTSTART, settled
+from tests.page.conftest import SOFTSTART, comes_to, settled
 
 from softstart import Chain, DataSheet, Drive, InputError, compare, simulate
 from softstart.identification.planning import made_up_log
@@ -74,17 +74,17 @@ def test_a_broken_drive_file_shows_all_its_sentences_and_changes_nothing(files: 
         put(files, name, content)
         for sentence in sentences:
             trouble.get_by_text(sentence).wait_for()
-        assert "unchanged" in trouble.inner_text()
-    assert files.locator("#k-dyn").inner_text().strip() == own
-    assert files.locator(".drive-name").inner_text() == CRANE.name
+        trouble.get_by_text("unchanged").first.wait_for()
+    comes_to(lambda: files.locator("#k-dyn").inner_text().strip(), own)
+    comes_to(files.locator(".drive-name").inner_text, CRANE.name)
 
 
 def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
     own = CRANE.replace(name='../Мой "кран" <b>7</b>', gap=1.25, load_kind="reactive", damping=0.3)
     put(files, "mine.toml", own.to_toml().encode())
     k_dyn(files, f"{simulate(own, 'direct').k_dyn:.3f}")
-    assert files.locator(".drive-name").inner_text() == own.name
-    assert not files.get_by_test_id("drive-trouble").is_visible()
+    comes_to(files.locator(".drive-name").inner_text, own.name)
+    comes_to(files.get_by_test_id("drive-trouble").is_visible, False)
     name, content = saved(files, "drive-save")
     assert re.fullmatch(r"[a-z0-9-]+\.toml", name)
     (tmp_path / name).write_bytes(content)
@@ -100,12 +100,12 @@ def test_a_drive_with_limits_has_pass_or_fail_and_margin_of_each_strategy(files:
     put(files, "hoist.toml", own.to_toml().encode())
     for row in compare(own, ["direct", "shaped", "s-curve"]).rows:
         said = [row.against_limits.replace("exceeded -", "over "), *[flag.word for flag in row.flags]]
-        mark = files.locator(f'.strategies tr[data-name="{row.name}"] .flag')
         files.wait_for_function(
             "([name, said]) => document.querySelector(`tr[data-name='${name}'] .flag`).textContent === said",
             arg=[row.name, "\n".join(said)],
         )
-        assert ("kept" in mark.get_attribute("class")) == (row.name == "s-curve")
+        kept = files.locator(f'.strategies tr[data-name="{row.name}"] .flag.kept')
+        comes_to(kept.count, int(row.name == "s-curve"))
 
 
 def test_an_own_drive_is_given_its_own_name(files: Any, tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
         assert content == (tmp_path / "same.csv").read_bytes()
 
         files.get_by_role("tab", name="Optimum", exact=True).click()
-        assert files.get_by_test_id("optimum-go").is_enabled()
+        comes_to(files.get_by_test_id("optimum-go").is_enabled, True)
         files.get_by_role("tab", name="Files", exact=True).click()
         gap = files.locator('[data-path="shaft.gap"] input[type=text]')
         gap.fill("0.75")
@@ -171,7 +171,7 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     page.get_by_test_id("sheet-use").click()
     trouble = page.get_by_test_id("sheet-trouble")
     trouble.get_by_text("[motor] power is missing").wait_for()
-    assert page.locator(".drive-name").inner_text() == before
+    comes_to(page.locator(".drive-name").inner_text, before)
     assert page.get_by_test_id("sheet-load-reeving").is_hidden()
     written = {
         "motor.power": "3 kW", "motor.speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
@@ -183,8 +183,8 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     page.get_by_test_id("sheet-use").click()
     drive = DataSheet.from_settings(written | {"load.machine": "travel"}).drive
     k_dyn(page, f"{simulate(drive, 'direct').k_dyn:.3f}")
-    assert page.locator(".drive-name").inner_text() == "gantry"
-    assert trouble.is_hidden()
+    comes_to(page.locator(".drive-name").inner_text, "gantry")
+    comes_to(trouble.is_hidden, True)
     name, content = saved(page, "sheet-save")
     assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)
 
@@ -215,9 +215,7 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
     assert strip.evaluate("all => all.scrollWidth <= all.clientWidth")  # no tab is behind an arrow
     upload = page.locator('[data-testid="log-upload"] input[type="file"]')
     upload.set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": b"a,b\n1,2\n"})
-    page.get_by_test_id("log-trouble").get_by_text("names neither of angle and speed").wait_for(
-        timeout=30_000
-    )
+    page.get_by_test_id("log-trouble").get_by_text("names neither of angle and speed").wait_for()
     upload.set_input_files({"name": "y.csv", "mimeType": "text/csv", "buffer": b"1,2\n" * 300_000})
     page.get_by_test_id("log-trouble").get_by_text("more than 1000 kB; cut the log to the start").wait_for()
     content = (tmp_path / "rig.csv").read_bytes()
@@ -227,7 +225,7 @@ def test_a_log_gives_a_drive_with_intervals_that_can_be_used(page: Any, tmp_path
         "one => [one.scrollWidth, one.parentElement.clientWidth]"
     )
     assert wide[0] <= wide[1], wide
-    assert "shaft.gap, rad" in page.get_by_test_id("log-found").inner_text()
+    page.get_by_test_id("log-found").get_by_text("shaft.gap, rad").wait_for()
     name, saved_drive = saved(page, "log-save")
     assert name == "identified-drive.toml"
     found = Drive.from_toml(saved_drive.decode())

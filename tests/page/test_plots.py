@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.page.conftest import wait_for_rows
+from tests.page.conftest import comes_to, wait_for_rows
 
 from softstart import Drive, simulate
 
@@ -161,7 +161,7 @@ def test_the_scheme_stands_as_the_drive_does(page):
     contact = next(stage for stage in DIRECT.stages if stage.side != 0)
     hold(page, contact.start / DIRECT.end_time + 2e-3)
     assert scheme(page)["struck"] == "true"
-    assert page.locator(".scheme .front.struck").count() == 1
+    comes_to(page.locator(".scheme .front.struck").count, 1)
     hold(page, 0.5 * (contact.start + contact.end) / DIRECT.end_time)
     assert scheme(page)["struck"] == "false"
 
@@ -264,7 +264,7 @@ def test_maps_of_two_strategies_are_compared(page):
 def test_plots_fields_and_map_are_in_the_units_of_the_user(page):
     """Those in the head of the page: CSV of the plots, a field with its unit, facts; the scheme stays."""
     field = page.locator('[data-path="units"] input')
-    assert field.input_value() == "rad, rpm"
+    comes_to(field.input_value, "rad, rpm")
     field.fill("deg, rpm")
     field.press("Enter")
     page.wait_for_function("document.querySelector('[data-path=\"shaft.gap\"] .unit').textContent === 'deg'")
@@ -278,7 +278,7 @@ def test_plots_fields_and_map_are_in_the_units_of_the_user(page):
     instant = hold(page, 0.5)
     theta = float(DIRECT.at(instant)["theta"])
     assert float(scheme(page)["pin"]) == pytest.approx(np.clip(theta / HALF, -1.0, 1.0), abs=0.02)
-    assert page.locator(".figure dl").inner_text().count("rpm") == 1
+    comes_to(lambda: page.locator(".figure dl").inner_text().count("rpm"), 1)
     field.fill("furlongs")
     field.press("Enter")
     page.get_by_text("is no unit of an angle or a speed").wait_for()
