@@ -108,7 +108,7 @@ def terminal_option(usual: str, default: str | None = None) -> Decorator:
         default=default,
         help="Terminal condition: motor and load at the target speed (synchronous), with the shaft torque "
         "equal to the load torque as well (steady), or the load alone at the target speed (reached). "
-        "Default: {usual}.",
+        f"Default: {usual}.",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -89,14 +90,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Kept:
-    """How the quickest start that keeps the limits of a drive keeps them.
+    """How the quickest start keeps the limits of the drive, or the bound on K_dyn, and how quick any can be.
 
     Attributes
     ----------
     margins : tuple of Margin
-        The margin to each limit; that of the start time may be below 0.
+        The margin to each limit, or to the bound on K_dyn; that of the start time may be below 0.
     at_least : float
-        No start that keeps the permissible shaft torque takes less time than this, s.
+        No start that keeps the permissible shaft torque, or that K_dyn, takes less time than this, s.
     covers : str
         For which starts that is proved.
     unchecked : str
@@ -112,8 +113,8 @@ class Kept:
     def binding(self) -> str:
         """The limit that forbids a quicker start; "" where it is the motor torque that does."""
         used = [one for one in self.margins if one.name != "start time"]
-        tight = min(used, key=lambda one: one.share)
-        return tight.name if tight.share < BINDING else ""
+        tight = min(used, key=lambda one: one.share, default=None)
+        return tight.name if tight is not None and tight.share < BINDING else ""
 
     @property
     def kept(self) -> bool:
@@ -162,7 +163,7 @@ class Optimum:
     tried : tuple of Trial
         All searches in their order; the answer is that of the best one.
     kept : Kept or None
-        Where the quickest start that keeps the limits was asked for, how it keeps them.
+        Where the quickest start was asked for, how it keeps the limits, and the lower bound of its time.
 
     Examples
     --------
@@ -207,7 +208,10 @@ class Optimum:
 
     @property
     def gap_percent(self) -> float:
-        """How far K_dyn lies above its bound, in per cent."""
+        """How far K_dyn, or the start time if that was minimised, lies above its lower bound, in per cent."""
+        if self.kept is not None:
+            least = self.kept.at_least
+            return 100.0 * (self.end_time / least - 1.0) if least > 0.0 else math.inf
         return 100.0 * (self.k_dyn / self.bound.k_dyn - 1.0)
 
     @property
@@ -230,9 +234,11 @@ class Optimum:
         """All figures under the names used everywhere (JSON, tables, docs)."""
         problem = self.problem
         known = {at: one.k_dyn for at, one in self.alone.items()}
+        bounded = self.kept is not None or self.bound.kind != "none"
+        limits = self.kept is not None and problem.minimise == "k_dyn"
         return {
             "drive": problem.drive.name,
-            "minimise": problem.minimise if self.kept is None else "start_time",
+            "minimise": "start_time" if limits else problem.minimise,
             "terminal": problem.terminal,
             "start_time_bound": problem.start_time if self.kept is None else None,
             "k_dyn_bound": problem.k_dyn,
@@ -247,15 +253,16 @@ class Optimum:
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
             "bound_kind": self.bound.kind,
             "bound_covers": self.bound.covers,
-            "gap_percent": self.gap_percent if self.bound.kind != "none" else None,
+            "gap_percent": self.gap_percent if bounded and math.isfinite(self.gap_percent) else None,
             "peak_torque": self.run.peak_torque,
             "start_time": self.end_time,
+            "start_time_lower_bound": None if self.kept is None else self.kept.at_least,
             "heat": self.heat,
             "contacts": self.run.contacts,
             "first_contact": self.run.first_contact,
             "seconds": self.seconds,
             **({"k_dyn_if_position_known": known} if known else {}),
-            **({"limits": self.kept.summary()} if self.kept is not None else {}),
+            **({"limits": self.kept.summary()} if limits and self.kept is not None else {}),
             "profile": _knots(self.profile),
         }
 

@@ -44,6 +44,7 @@ chains = late("softstart.optimal.chains.solving")
 Choice = Literal["auto", "closed-form", "lp", "collocation"]
 METHODS = get_args(Choice)
 TIGHT = 1e-5  # a bound within this share needs no other one
+NEAR = 1e-4  # the claim of a coarse mesh is no nearer to a start time
 BOUNCING = 0.85  # of the shortest time of one contact, from which on several contacts are tried
 TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
@@ -89,7 +90,8 @@ def optimize(
         synchronous; reached, and nothing else, where the start position is unknown. On a chain all masses
         have the target speed, by default only its load (reached).
     minimise : {"k_dyn", "heat", "start_time"}
-        `heat` is the integral of (u/Ms)^2 from 0 to t_f, s.
+        `heat` is the integral of (u/Ms)^2 from 0 to t_f, s. The least start time is the first at which the
+        gentlest start has the K_dyn allowed; `kept` has its lower bound.
     k_dyn, heat : float, optional
         Bounds on those that are not minimised (1, s).
     torque_speed : sequence of (float, float)
@@ -224,6 +226,8 @@ def solve(
     began = time.perf_counter()
     if len(problem.drive.positions) > 1:
         return _over_positions(problem, method)
+    if problem.minimise == "start_time" and _by_roots(problem, method, warm):
+        return _least_start_time(problem, method, tolerance, time_limit, confirm)
     hold = hold_of(problem)
     may_bounce = method == "auto" and time_limit > 0.0 and hold.until == 0.0 and _may_bounce(problem)
     try:
@@ -264,6 +268,50 @@ def solve(
         best, others = _beside_shipped(hold, best, work)
         tried += others
     return replace(best, tried=tuple(tried), seconds=time.perf_counter() - began)
+
+
+def _by_roots(problem: Problem, method: Choice, warm: Any) -> bool:
+    """Whether the least start time is that of the gentlest starts: nothing but K_dyn and torque count."""
+    alone = problem.heat is None and problem.smoothness == 0.0
+    return alone and method != "collocation" and warm is None
+
+
+def _least_start_time(
+    problem: Problem, method: Choice, tolerance: float, time_limit: float, confirm: bool
+) -> Optimum:
+    """The first start time whose gentlest start has the K_dyn allowed; the shortest one if any is.
+
+    The CasADi problem is solved where that search fails, where collocation claimed less, and where it was not
+    asked and the answer is not proved within `tolerance`. Its start counts if it keeps the bound.
+    """
+    began = time.perf_counter()
+    try:
+        best = within_limits.quickest(
+            problem, lambda one: solve(one, method, certify=False), certified, time_limit
+        )
+    except (InfeasibleError, OptimumError, NotConverged) as failed:
+        if method != "auto":
+            raise
+        try:
+            return solve(problem, "collocation")
+        except (InfeasibleError, OptimumError, NotConverged) as error:
+            raise failed from error
+    claims = [one.value for one in best.tried if one.method == "collocation"]
+    beaten = any(one is not None and one < best.end_time * (1.0 - NEAR) for one in claims)
+    start = time.perf_counter()
+    goes_on = beaten or (not claims and best.gap_percent > 100.0 * tolerance and start - began < time_limit)
+    if not (confirm or (goes_on and method == "auto")):
+        return best
+    try:
+        other = solve(problem, "collocation")
+    except (InfeasibleError, OptimumError, NotConverged) as error:
+        trial = Trial("collocation", None, time.perf_counter() - start, str(error))
+    else:
+        trial = Trial("collocation", other.end_time, time.perf_counter() - start, "")
+        keeps = problem.k_dyn is None or other.k_dyn <= problem.k_dyn * (1.0 + TIGHT)
+        if keeps and other.end_time < best.end_time * (1.0 - TIGHT):
+            best = replace(other, kept=best.kept, tried=best.tried)
+    return replace(best, tried=(*best.tried, trial), seconds=time.perf_counter() - began)
 
 
 def _may_bounce(problem: Problem) -> bool:

@@ -1,9 +1,10 @@
-"""The quickest start that keeps the limits of a drive.
+"""The quickest start that keeps the limits of a drive, or a bound on K_dyn.
 
 The least K_dyn falls with the start time, so the quickest start that keeps a permissible shaft torque is the
 gentlest one of the first start time at which it does: a root, and each value on the way is an optimum by the
 method that is exact for it, with its lower bound. A life that is asked for joins in: what is looked for is
-the first of these gentlest starts that keeps all.
+the first of these gentlest starts that keeps all. Where no formula solves the problem, the search begins at
+the least start time that the CasADi problem finds.
 
 How good the answer is: where a lower bound of the peak lies above the permissible torque, no start of that
 time or less keeps it. The longest such time is a lower bound of the start time.
@@ -17,17 +18,32 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from softstart.drive import Drive, Limits
+from softstart.drive.limits import Limit
 from softstart.errors import InputError
+from softstart.late import late
+from softstart.optimal import pulse_coast_hold
+from softstart.optimal.exact import hold_of
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem
-from softstart.optimal.result import InfeasibleError, Kept, NotConverged, Optimum, OptimumError, Verdict
-from softstart.optimal.shortest import Bracket
+from softstart.optimal.result import (
+    InfeasibleError,
+    Kept,
+    NotConverged,
+    Optimum,
+    OptimumError,
+    Trial,
+    Verdict,
+)
+from softstart.optimal.shortest import Bracket, shortest_start_time
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
+
+collocation = late("softstart.optimal.collocation.search")
 
 AIM = 1.0 - 2e-6  # of a limit: an answer on the near side of it
 WITHIN = 1e-5  # of the start time
 WITHIN_SEVERAL = 1e-3  # the same where one profile serves several positions: each try takes long
 EDGE = 1e-4  # so much longer than the shortest start, its program is sure to find one
+EDGES = (1e-6, 1e-5, EDGE)  # which it often finds sooner
 LONGEST = 100.0  # times what the inertia alone takes at full torque: no longer start time is tried
 MOST_TRIALS = 30
 NO_TIME = 1e-3  # elastic periods: where momentum rules out nothing, the search begins there
@@ -55,7 +71,8 @@ def quickest(
     certified: Callable[[Optimum], Optimum],
     seconds: float = math.inf,
 ) -> Optimum:
-    """The quickest of the gentlest starts that keep the limits.
+    """The quickest of the gentlest starts that keep the limits; where a problem minimises the start time, its
+    bound on K_dyn, which it may leave out.
 
     `solve` finds the gentlest one of a time, `certified` proves its bound, which the search does not need.
     The start time of `problem` does not count. After `seconds` of the clock no further start time is tried
@@ -65,11 +82,18 @@ def quickest(
     search = _Search(problem, solve, certified)
     found = certified(search.first_that_keeps(began + seconds))
     at_least, covers = search.proved(found)
-    margins = search.margins(found, checked_limits(problem.drive))
+    own = problem.minimise == "start_time"
+    limits = search.limits if own else checked_limits(problem.drive)
+    what = "this K_dyn" if problem.k_dyn is not None else "the target speed" if own else "the limits"
+    answer = Trial(found.method, found.end_time, time.perf_counter() - began, "")
     return replace(
         found,
-        why=f"{found.why}; the first start time whose gentlest start keeps the limits",
-        kept=Kept(margins, at_least, covers, unchecked_life(problem.drive)),
+        problem=problem if own else found.problem,
+        why=f"{found.why}; the first start time whose gentlest start keeps {what}",
+        kept=Kept(
+            search.margins(found, limits), at_least, covers, "" if own else unchecked_life(problem.drive)
+        ),
+        tried=(*search.hints, answer) if own else (),
         seconds=time.perf_counter() - began,
     )
 
@@ -83,11 +107,14 @@ class _Search:
         solve: Callable[[Problem], Optimum],
         certified: Callable[[Optimum], Optimum],
     ) -> None:
-        self.problem, self.solve, self.certified = problem, solve, certified
-        self.limits = replace(checked_limits(problem.drive), start_time=None)
+        self.asked, self.solve, self.certified = problem, solve, certified
+        self.problem = replace(problem, start_time=1.0, minimise="k_dyn", k_dyn=None)  # any time
+        own = problem.minimise == "start_time"
+        self.limits = Limits() if own else replace(checked_limits(problem.drive), start_time=None)
         most = self.limits.shaft_torque
-        self.allowed = math.inf if most is None else most / problem.base_torque
+        self.allowed = problem.k_dyn or math.inf if most is None else most / problem.base_torque
         self.tried: list[Optimum] = []
+        self.hints: list[Trial] = []
         self.shortest = 0.0  # no start with one contact is quicker, as far as that is known, s
         drive = problem.drive
         alone = float(drive.J1 + drive.J2) * problem.target / problem.highest_torque
@@ -121,8 +148,11 @@ class _Search:
     def first_that_keeps(self, until: float) -> Optimum:
         """The gentlest start of the least start time that is found, by regula falsi."""
         within = WITHIN if len(self.problem.drive.positions) == 1 else WITHIN_SEVERAL
-        bracket, found, end = Bracket(), None, self.soonest * (1.0 + 1e-9)
-        bracket.low = self.soonest
+        if math.isinf(self.allowed) and self.limits.life is None:
+            return self._shortest()
+        bracket, found, end = Bracket(), None, max(self.soonest * (1.0 + 1e-9), self._hint())
+        if not self.hints:  # else the root is near: steps from one side find it, bisection from afar does not
+            bracket.low = self.soonest
         for _ in range(MOST_TRIALS):
             best = self._gentlest(end)
             share = math.inf if best is None else self._share(best)
@@ -135,12 +165,36 @@ class _Search:
             late = found is not None and time.perf_counter() > until
             if late or bracket.high - bracket.low <= within * end or end > self.longest:
                 break
-            end = bracket.next()
+            end = max(bracket.next(), self.soonest * (1.0 + 1e-9))
             if end <= self.shortest:
                 end = self.shortest * (1.0 + EDGE)
         if found is None:
             raise self._none(self._nearest())
         return found
+
+    def _shortest(self) -> Optimum:
+        """The shortest start, whatever its K_dyn."""
+        self.shortest = end = shortest_start_time(self.problem)
+        for edge in EDGES if math.isfinite(end) else ():
+            best = self._gentlest(end * (1.0 + edge))
+            if best is not None:
+                return best
+        raise self._none(self._nearest())
+
+    def _hint(self) -> float:
+        """The least start time that collocation claims, s; 0 where the formula is quick, or it finds none."""
+        if len(self.problem.drive.positions) > 1 or not pulse_coast_hold.applies(self.problem):
+            return 0.0
+        hold = hold_of(self.problem)
+        began = time.perf_counter()
+        bounded = replace(hold.free, start_time=None, minimise="start_time", k_dyn=self.allowed)
+        try:
+            end = hold.until + float(collocation.solve(bounded).end_time)
+        except NotConverged as failed:
+            self.hints.append(Trial("collocation", None, time.perf_counter() - began, str(failed)))
+            return 0.0
+        self.hints.append(Trial("collocation", end, time.perf_counter() - began, ""))
+        return end
 
     def _gentlest(self, end: float) -> Optimum | None:
         try:
@@ -157,11 +211,14 @@ class _Search:
 
     def margins(self, best: Optimum, limits: Limits) -> tuple[Margin, ...]:
         """Those of the start, by the rule of `compare`; of an unknown position the worst."""
-        return Row(best.run, None, worst_case=()).margins(limits)
+        found = Row(best.run, None, worst_case=()).margins(limits)
+        if self.asked.k_dyn is None:
+            return found
+        return (*found, Margin(Limit("K_dyn", "1", "k_dyn", self.asked.k_dyn), best.k_dyn, ""))
 
     def _share(self, best: Optimum) -> float:
         """The largest share of a limit that a start takes."""
-        return max(1.0 - one.share for one in self.margins(best, self.limits))
+        return max((1.0 - one.share for one in self.margins(best, self.limits)), default=0.0)
 
     def proved(self, found: Optimum) -> tuple[float, str]:
         """No start that keeps the permissible torque takes less time than this, s; what that covers."""
@@ -193,12 +250,18 @@ class _Search:
         if not self.tried:
             return f"no start of up to {self.longest:.4g} s was found at all"
         nearest = min(self.tried, key=self._share)
-        worst = min(self.margins(nearest, self.limits), key=lambda one: one.share)
+        worst = min(self.margins(nearest, self.limits), key=lambda one: one.share, default="")
         return f"the nearest start that was found takes {nearest.end_time:.4g} s, {worst}"
 
     def _none(self, reason: str) -> InfeasibleError:
+        name = self.problem.drive.name
+        if self.asked.minimise == "start_time":
+            bound = self.asked.k_dyn
+            most_k = "" if bound is None else f" with K_dyn of {bound:g} or less"
+            sentence = f"start_time: no start of {name}{most_k} was found: {reason}."
+            return InfeasibleError(Verdict(self.asked, math.inf, "the bound on K_dyn", sentence))
         most, life = self.limits.shaft_torque, self.limits.life
         asked = [] if most is None else [f"shaft torque {most:.4g} N m"]
         asked += [] if life is None else [f"life {life / 3600.0:.4g} h"]
-        sentence = f"limits: no start of {self.problem.drive.name} keeps them ({', '.join(asked)}): {reason}."
+        sentence = f"limits: no start of {name} keeps them ({', '.join(asked)}): {reason}."
         return InfeasibleError(Verdict(self.problem, math.inf, "the limits", sentence))

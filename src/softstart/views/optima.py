@@ -70,14 +70,15 @@ def figure_rows(best: Optimum) -> list[list[str]]:
     allowed = "" if latest is None else f", {short(latest)} s allowed"
     most = "" if problem.k_dyn is None else f", {short(problem.k_dyn)} allowed"
     hottest = "" if problem.heat is None else f", {short(problem.heat)} s allowed"
+    gap = ["gap between them", f"{best.gap_percent:.3g} %" if bounded or best.kept is not None else NOTHING]
     return [
         ["K_dyn", number(best.k_dyn, 6) + most],
         ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
-        ["gap between them", f"{best.gap_percent:.3g} %" if bounded else NOTHING],
+        *([] if best.kept is not None else [gap]),
         ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
         *_of_shafts(best),
         ["start time", f"{short(best.end_time)} s{allowed}"],
-        *([["least start time", f"{short(best.kept.at_least)} s"]] if best.kept is not None else []),
+        *([["its lower bound", f"{short(best.kept.at_least)} s"], gap] if best.kept is not None else []),
         ["I2t heat", f"{short(best.heat)} s of starting torque{hottest}"],
         ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
         ["contacts", str(run.contacts)],
@@ -108,7 +109,7 @@ def question(best: Optimum) -> str:
     """What was asked for."""
     problem = best.problem
     words = [f"least {AIMS[problem.minimise]}"]
-    if best.kept is not None:
+    if _by_limits(best) and best.kept is not None:
         limits = [f"{one.name} {short(one.limit)} {one.unit}" for one in best.kept.margins]
         words = [f"least start time that keeps the limits ({', '.join(limits)})"]
     elif problem.start_time is not None:
@@ -165,27 +166,40 @@ def position_sentences(best: Optimum) -> list[str]:
 
 def _within_limits(best: Optimum, kept: Kept, others: Sequence[Run]) -> str:
     """The quickest start that keeps the limits: margins, what forbids a quicker one, shipped strategies."""
-    margins = "; ".join(map(str, kept.margins))
-    least, which = "Least start time that keeps the", "limits" if kept.kept else "others"
-    text = "" if kept.kept else "No start keeps all limits. "
-    text += f"{least} {which}: {best.end_time:.4g} s. {margins[:1].upper()}{margins[1:]}."
-    if kept.binding:
+    if _by_limits(best):
+        margins = "; ".join(map(str, kept.margins))
+        least, which = "Least start time that keeps the", "limits" if kept.kept else "others"
+        text = "" if kept.kept else "No start keeps all limits. "
+        text += f"{least} {which}: {best.end_time:.4g} s. {margins[:1].upper()}{margins[1:]}."
+    else:
+        text = f"Least start time: {best.end_time:.4g} s, K_dyn {best.k_dyn:.3f}."
+    if kept.binding == "K_dyn":
+        text += " The bound of K_dyn forbids a quicker start."
+    elif kept.binding:
         text += f" The {kept.binding} forbids a quicker start."
     else:
         text += " No limit forbids a quicker start, but the motor torque and the gap, which may close once."
     less = 100.0 * (1.0 - kept.at_least / best.end_time)
     text += f" None takes less than {kept.at_least:.6g} s ({less:.2g} % less)."
-    passing = [run for run in others if _keeps(run)]
+    passing = [run for run in others if _keeps(run, best)]
+    keeps = "keeps them" if _by_limits(best) else "keeps it" if kept.margins else "reaches the target speed"
     if not passing:
-        return f"{text} No shipped strategy keeps them."
+        return f"{text} No shipped strategy {keeps}."
     first = min(passing, key=lambda run: run.start_time)
     taken = f"{first.controller_name}, takes {first.start_time:.4g} s"
     several = first.start_time < best.end_time and first.contacts > 1
     contacts = f", with {first.contacts} contacts" if several else ""
-    return f"{text} The quickest shipped strategy that keeps them, {taken}{contacts}."
+    return f"{text} The quickest shipped strategy that {keeps}, {taken}{contacts}."
 
 
-def _keeps(run: Run) -> bool:
+def _by_limits(best: Optimum) -> bool:
+    """Whether the quickest start within the limits of the drive was asked for."""
+    return best.kept is not None and best.problem.minimise == "k_dyn"
+
+
+def _keeps(run: Run, best: Optimum) -> bool:
+    if not _by_limits(best):
+        return not math.isnan(run.start_time) and run.k_dyn <= (best.problem.k_dyn or math.inf)
     margins = Row(run, None, worst_case=()).margins(checked_limits(run.drive))
     return all(one.kept for one in margins)
 
@@ -219,7 +233,7 @@ def optimum_figure(best: Optimum) -> Any:
         _twist(twist, best)
         twist.set_xlabel("time, s     (grey: gap open; dotted: end of the start)")
         twist.set_xlim(0.0, run.end_time)
-        aim = AIMS[best.problem.minimise] if best.kept is None else "start time within limits"
+        aim = "start time within limits" if _by_limits(best) else AIMS[best.problem.minimise]
         asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
     return figure
@@ -286,8 +300,9 @@ def _shaft_torque(axes: Axes, best: Optimum) -> None:
         least = best.bound.k_dyn * base
         axes.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
     axes.axhline(base, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
-    if best.kept is not None and best.problem.drive.limits.shaft_torque is not None:
-        most = best.problem.drive.limits.shaft_torque
+    limit = best.problem.drive.limits.shaft_torque if _by_limits(best) else None
+    most = limit if best.problem.k_dyn is None else best.problem.k_dyn * base
+    if most is not None:
         axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
     axes.plot([run.peak_time], [peak], "o", ms=4, color=COLOURS[0])
     if not math.isnan(run.first_contact):

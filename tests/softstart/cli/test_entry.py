@@ -122,6 +122,7 @@ def test_the_listed_help_of_each_command_is_its_own():
         command = cli.get_command(context, name)
         assert command.get_help_option(click.Context(command)).opts == ["-h", "--help"]
         assert (command.name, " ".join(command.help.split("\n\n")[0].split())) == (name, sentence)
+        assert "{" not in command.get_help(click.Context(command))  # no placeholder is left
 
 
 def test_streams_and_exit_codes_of_the_process(spawn):

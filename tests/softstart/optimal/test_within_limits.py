@@ -49,9 +49,60 @@ def test_it_is_the_least_start_time_that_collocation_finds() -> None:
     torque = 60.0
     best = quickest(CRANE.replace(permissible_torque=torque))
     k_dyn = torque / float(metrics.base_torque(CRANE))
-    other = optimize(CRANE, minimise="start_time", k_dyn=k_dyn)
+    other = optimize(CRANE, minimise="start_time", k_dyn=k_dyn, method="collocation")
     assert other.method == "collocation"
     assert best.end_time == pytest.approx(other.end_time, rel=2e-3)
+
+
+@pytest.mark.parametrize("k_dyn", [0.95, 1.0])
+def test_the_least_start_time_is_the_root_of_the_formula(k_dyn: float) -> None:
+    best = optimize(CRANE, minimise="start_time", k_dyn=k_dyn)
+    assert best.kept is not None
+    assert best.k_dyn <= k_dyn
+    assert best.kept.at_least <= best.end_time <= best.kept.at_least * (1.0 + 2e-5)
+    assert best.minimised == best.end_time == best.summary()["start_time"]
+    assert best.gap_percent == pytest.approx(100.0 * (best.end_time / best.kept.at_least - 1.0))
+    formula = PulseCoastHold.of(best.problem).least_peak_for(60.0, best.end_time)
+    assert formula == pytest.approx(k_dyn * float(metrics.base_torque(CRANE)), rel=2e-5)
+    assert momentum_bound(Problem(CRANE, 0.9999 * best.kept.at_least)).k_dyn > k_dyn
+
+
+@pytest.mark.parametrize(
+    ("drive", "k_dyn", "others"),
+    [
+        (CRANE.replace(torque_lag=0.005), 1.1, {}),
+        (CRANE.replace(damping=1.0), 1.05, {"torque_speed": ((0.0, 62.0), (60.0, 45.0))}),
+        (CRANE, None, {}),
+    ],
+)
+def test_the_least_start_time_is_that_of_the_casadi_problem(
+    drive: Drive, k_dyn: float | None, others: dict[str, Any]
+) -> None:
+    """No later, but for its mesh, and the K_dyn is kept, to which a mesh keeps within 0.1 % only."""
+    best = optimize(drive, minimise="start_time", k_dyn=k_dyn, **others)
+    other = optimize(drive, minimise="start_time", k_dyn=k_dyn, method="collocation", **others)
+    assert other.method == "collocation"
+    assert best.k_dyn <= (k_dyn or np.inf)
+    assert best.end_time == pytest.approx(other.end_time, rel=2e-4)
+    assert best.kept is not None
+    assert best.kept.at_least <= min(best.end_time, other.end_time)
+
+
+def test_a_least_start_time_where_collocation_does_not_converge() -> None:
+    """The hoist under its brake: the roots of the programs need no mesh."""
+    best = optimize("hoist-15kw", minimise="start_time", k_dyn=1.05)
+    assert [(one.method, one.value is None) for one in best.tried] == [("collocation", True), ("lp", False)]
+    assert best.k_dyn <= 1.05
+    assert 0.0 <= best.gap_percent < 0.05
+    assert question(best) == "least start time, K_dyn at most 1.05, terminal synchronous"
+    assert comparison(best, []).startswith(
+        "Least start time: 0.2019 s, K_dyn 1.050. The bound of K_dyn forbids"
+    )
+
+
+def test_a_k_dyn_that_no_start_has_is_refused() -> None:
+    with pytest.raises(InfeasibleError, match=r"no start of Crane .* with K_dyn of 0.1 or less was found"):
+        optimize(CRANE, minimise="start_time", k_dyn=0.1)
 
 
 @pytest.mark.slow
