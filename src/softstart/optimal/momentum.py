@@ -75,6 +75,40 @@ def momentum_bound(problem: Problem) -> LowerBound:
     return LowerBound(peak / problem.base_torque, "momentum", covers)
 
 
+def least_heat(problem: Problem) -> float:
+    """No start of a problem with a bound on its start time has less I2t heat than this, s.
+
+    Integrated over both masses, with H the momentum that they gain and L what the load torque takes,
+
+        integral u dt = H + L,    so that    integral u^2 dt >= (H + L)^2/t    (Cauchy and Schwarz)
+
+    at every end t. An active load takes L = Mc t; then the bound is least at t = H/Mc, or at t_f before that.
+    A reactive one takes Mc while it moves, no less than J2 (target - w2(0))/(P - Mc) s if no T is above P.
+    Lag, rate and curve of the torque, damping and number of contacts do not enter. Where only the load is to
+    reach its speed, or a brake takes part of the impulse, H + L is not known, and the bound is 0.
+
+    >>> from softstart import Drive
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    >>> round(least_heat(Problem(drive, 0.3, minimise="heat")), 4)
+    0.1886
+    """
+    drive, time = problem.drive, problem.start_time
+    if problem.terminal == "reached" or time is None or drive.brake != "none":
+        return 0.0
+    J1, J2, Mc = float(drive.J1), float(drive.J2), float(drive.Mc)
+    w1, w2 = float(drive.initial_motor_speed), float(drive.initial_load_speed)
+    gained = J1 * (problem.target - w1) + J2 * (problem.target - w2)
+    if _reactive(problem):
+        peak = math.inf if problem.k_dyn is None else problem.k_dyn * problem.base_torque
+        if w2 < 0.0 or peak <= Mc:
+            return 0.0
+        impulse = gained + Mc * J2 * (problem.target - w2) / (peak - Mc)
+    else:
+        time = min(time, gained / Mc) if Mc > 0.0 else time
+        impulse = gained + Mc * time
+    return float(max(impulse, 0.0) ** 2 / time / drive.Ms**2) * (1.0 - ROUNDING)
+
+
 def _released(problem: Problem) -> tuple[Problem, float]:
     """The problem from the release of a brake on, and that instant in s; as it is where nobody knows it."""
     try:

@@ -164,6 +164,8 @@ class Optimum:
         All searches in their order; the answer is that of the best one.
     kept : Kept or None
         Where the quickest start was asked for, how it keeps the limits, and the lower bound of its time.
+    heat_at_least : float
+        Where the heat is minimised: no start has less, s.
 
     Examples
     --------
@@ -190,6 +192,7 @@ class Optimum:
     alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
     tried: tuple[Trial, ...] = ()
     kept: Kept | None = None
+    heat_at_least: float = 0.0
 
     @property
     def k_dyn(self) -> float:
@@ -208,11 +211,13 @@ class Optimum:
 
     @property
     def gap_percent(self) -> float:
-        """How far K_dyn, or the start time if that was minimised, lies above its lower bound, in per cent."""
+        """How far K_dyn, or what was minimised instead, lies above its lower bound, in per cent."""
+        found, least = self.k_dyn, self.bound.k_dyn
         if self.kept is not None:
-            least = self.kept.at_least
-            return 100.0 * (self.end_time / least - 1.0) if least > 0.0 else math.inf
-        return 100.0 * (self.k_dyn / self.bound.k_dyn - 1.0)
+            found, least = self.end_time, self.kept.at_least
+        elif self.problem.minimise == "heat":
+            found, least = self.heat, self.heat_at_least
+        return 100.0 * (found / least - 1.0) if least > 0.0 else math.inf
 
     @property
     def heat(self) -> float:
@@ -258,6 +263,7 @@ class Optimum:
             "start_time": self.end_time,
             "start_time_lower_bound": None if self.kept is None else self.kept.at_least,
             "heat": self.heat,
+            "heat_lower_bound": self.heat_at_least or None,
             "contacts": self.run.contacts,
             "first_contact": self.run.first_contact,
             "seconds": self.seconds,

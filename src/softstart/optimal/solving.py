@@ -18,7 +18,7 @@ from softstart.optimal import pulse_coast_hold, within_limits
 from softstart.optimal.certificate import certified_bound, not_certified
 from softstart.optimal.exact import Hold, check, demand_of, hold_of, replay, with_tail
 from softstart.optimal.lp import ideal, whole_search
-from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
+from softstart.optimal.momentum import least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal, usual_terminal
 from softstart.optimal.result import (
     Candidate,
@@ -29,6 +29,7 @@ from softstart.optimal.result import (
     Optimum,
     OptimumError,
     Trial,
+    heat_of,
 )
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.optimal.whole_certificate import LITTLE_WORK, MOST_WORK, whole_bound
@@ -393,6 +394,9 @@ def _checked(
     else:
         bound = _bound(hold, candidate.end_time, replay(problem.drive, profile, end, problem.base), work)
     run = check(problem, profile, end, claimed, bound, bounces=bounces)
+    heat = heat_of(run, end)
+    if heat < (least := least_heat(problem) if problem.minimise == "heat" else 0.0) * (1.0 - TIGHT):
+        raise OptimumError(f"The heat is {heat:.8g} s, below its lower bound of {least:.8g} s.")
     return Optimum(
         problem=problem,
         profile=profile,
@@ -404,6 +408,7 @@ def _checked(
         end_time=end,
         seconds=time.perf_counter() - began,
         warm=candidate.warm,
+        heat_at_least=least,
     )
 
 

@@ -71,15 +71,19 @@ def figure_rows(best: Optimum) -> list[list[str]]:
     most = "" if problem.k_dyn is None else f", {short(problem.k_dyn)} allowed"
     hottest = "" if problem.heat is None else f", {short(problem.heat)} s allowed"
     gap = ["gap between them", f"{best.gap_percent:.3g} %" if bounded or best.kept is not None else NOTHING]
+    coolest = (
+        [["its lower bound", f"{short(best.heat_at_least)} s, momentum"], gap] if best.heat_at_least else []
+    )
     return [
         ["K_dyn", number(best.k_dyn, 6) + most],
         ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
-        *([] if best.kept is not None else [gap]),
+        *([gap] if problem.minimise == "k_dyn" and best.kept is None else []),
         ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
         *_of_shafts(best),
         ["start time", f"{short(best.end_time)} s{allowed}"],
         *([["its lower bound", f"{short(best.kept.at_least)} s"], gap] if best.kept is not None else []),
         ["I2t heat", f"{short(best.heat)} s of starting torque{hottest}"],
+        *coolest,
         ["first contact", NOTHING if math.isnan(run.first_contact) else f"{short(run.first_contact)} s"],
         ["contacts", str(run.contacts)],
         ["knots of the profile", str(best.profile.time.size)],

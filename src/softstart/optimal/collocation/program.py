@@ -227,10 +227,11 @@ class Numbers:
         return math.sqrt(self.c / self.J1 + self.c / self.J2)
 
 
-def numbers(problem: Problem, beyond: float = BEYOND, below: float = 0.0) -> Numbers:
+def numbers(problem: Problem, beyond: float = BEYOND, below: float = 0.0, inside: float = 0.0) -> Numbers:
     """The problem in units of Ms, of its target speed, and of its start time.
 
-    The target is higher by the share `beyond`, the torque-speed curve lower by `below` N m.
+    The target is higher by the share `beyond`, the torque-speed curve lower by `below` N m, the bounds on
+    K_dyn and heat are lower by the share `inside`.
     """
     drive: Any = problem.drive
     units = Units(time_unit(problem), float(drive.Ms), problem.target)
@@ -252,8 +253,11 @@ def numbers(problem: Problem, beyond: float = BEYOND, below: float = 0.0) -> Num
         "below": below / units.torque,
         "smoothness": problem.smoothness / units.time,
         "latest": (problem.start_time or 100.0 * units.time) / units.time,
-        "largest_peak": min(1e3, (problem.k_dyn or math.inf) * problem.base_torque / units.torque),
-        "most_heat": (problem.heat or 1e9 * units.time) / units.time,
+        "inside": inside,
+        "largest_peak": min(
+            1e3, (1.0 - inside) * (problem.k_dyn or math.inf) * problem.base_torque / units.torque
+        ),
+        "most_heat": (1.0 - inside) * (problem.heat or 1e9 * units.time) / units.time,
         "z_start": z0 / units.angle,
         "v_start": (drive.initial_motor_speed - drive.initial_load_speed) / units.speed,
         "w2_start": drive.initial_load_speed / units.speed,

@@ -185,6 +185,7 @@ class Replayed:
     parted: NDArray[np.bool_]  # intervals in which the flanks part before t_f
     overshoot: Vector  # largest T in each interval over the claimed peak, relative
     excess: float  # of the motor torque over the torque-speed curve up to t_f, N m; 0 or more
+    outside: float  # of K_dyn or heat over its bound where it is not minimised, relative
 
 
 def claim(problem: Problem, solution: Solution) -> Claim:
@@ -231,7 +232,9 @@ def replayed(problem: Problem, own: Claim) -> Replayed:
     parted = np.histogram(openings, own.edges)[0] > 0
     heat = heat_of(run, own.end_time)
     value = {"k_dyn": run.k_dyn, "heat": heat, "start_time": own.end_time}[problem.minimise]
-    return Replayed(float(value), shortfall, max(map(abs, errors)), parted, overshoot, excess)
+    bounded = ((run.k_dyn, problem.k_dyn), (heat, problem.heat))
+    outside = max((found / most - 1.0 for found, most in bounded if most is not None), default=0.0)
+    return Replayed(float(value), shortfall, max(map(abs, errors)), parted, overshoot, excess, outside)
 
 
 OTHERWISE = (1.6, 0.7)  # contact instants tried where the likely one fails, in units of that
@@ -242,6 +245,8 @@ WORSE = 1e-3  # relative: so much a finer mesh may cost
 CLEARLY = 1.02  # of the start time: a quickest start on the first mesh is known to about 1 %
 SIMILAR = 0.02  # relative: within this the mesh of a warm start may stay as it is
 BELOW_CURVE = 5e-7  # of the largest torque: how well the exact plant must keep the torque-speed curve
+AIMS = 4  # tries to end inside all bounds
+KEPT = 1e-6  # relative: how well the exact plant must keep bounds on what is not minimised
 LANDING = 1e-6  # of target speed and Ms: how well the exact plant must meet the terminal conditions
 CONTRADICTED = 2e-3  # relative: what the exact plant contradicts by more is no solution
 STRIDE = 0.35  # rad of the elastic oscillation an interval may span where the landing is to be exact
@@ -511,6 +516,14 @@ def _refine(
             break
         solution = finer
     _, solution, own, exact = best
+    for _ in range(AIMS):  # bounds on what is not minimised, once the mesh is fine
+        if exact.outside <= KEPT:
+            break
+        inside, cost = _aimed_inside(problem, solution, exact)
+        spent += cost
+        if (nearer := replayed(problem, claim(problem, inside))).outside >= exact.outside:
+            break
+        solution, own, exact = inside, claim(problem, inside), nearer
     off = max(abs(exact.value - own.value) / max(abs(own.value), 1e-300), exact.landing)
     if off > CONTRADICTED:
         raise NotConverged(f"the exact plant is off by {off:.2g} after {refinements} refinements", off)
@@ -534,15 +547,15 @@ def _refine(
 
 
 def _aimed_inside(problem: Problem, solution: Solution, exact: Replayed) -> tuple[Solution, int]:
-    """The exact start misses the target speed, or leaves the curve, by the error of the collocation: aim that
-    much beyond the target and below the curve.
+    """The exact start misses the target speed, the curve or a bound by the error of the collocation: aim that
+    much beyond the target, below the curve and below the bound.
     """
     program, mesh = solution.transcribed.program, solution.transcribed.mesh
     beyond = solution.p.target - 1.0
     if exact.shortfall > 0.0:
         beyond = beyond + 2.0 * exact.shortfall + BEYOND
     below = solution.p.below * solution.p.units.torque + 1.5 * exact.excess
-    p = numbers(problem, beyond, below)
+    p = numbers(problem, beyond, below, solution.p.inside + 1.5 * max(exact.outside, 0.0))
     multipliers = (solution.lam_x, solution.lam_g)
     better = run(transcribe(program, mesh), p, _parameters(program, p), solution.x, multipliers, 1e-8)
     return (better if better.found else solution), better.iterations
