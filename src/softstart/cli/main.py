@@ -28,6 +28,7 @@ REPEAT_AFTER = 0.5  # s until a stop signal that was lost is raised again
 PATIENCE = 1.3  # s from a stop signal until the process ends, whatever it is doing
 BUSY = 5.0  # times that at most, where processes queue for the processors
 STOP = "interrupted; no incomplete file was left behind."
+_STOPS: list[int] = []  # signals that this process was sent: however the command ends then, it was stopped
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,34 +61,38 @@ def _main(given: list[str]) -> int:
             _show_damage()
             code = _run(given)
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        return _interrupted()
-    except SystemError as error:
-        if _is_stop(error):  # raised while compiled code unpacked its arguments
-            return _interrupted()
-        raise
-    except click.UsageError as error:
-        return _fail([usage_sentence(error)], BAD_INPUT)
-    except InputError as error:
-        return _fail(error.sentences, BAD_INPUT)
-    except SimulationError as error:
-        return _fail([str(error)], NO_SOLUTION)
-    except BrokenPipeError:
-        _silence_stdout()
-        return PIPE_CLOSED
-    except OSError as error:
-        _silence_stdout()
-        return _fail([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
-    except MemoryError:
-        return _fail(["there is not enough memory for this."], NO_SOLUTION)
+        if code != DONE and _STOPS:
+            raise KeyboardInterrupt  # it was lost, and what should have ended has failed instead
+        return code
+    except BaseException as error:
+        if not _STOPS and not _is_stop(error):
+            return _failed(error)
+        _end_repetition()
+        if os.environ.get(DEBUG) and not isinstance(error, KeyboardInterrupt):
+            sys.__excepthook__(type(error), error, error.__traceback__)
+        return _fail([STOP], INTERRUPTED)  # whatever a library has made of it
     finally:
         _end_repetition()
-    return code
 
 
-def _interrupted() -> int:
-    _end_repetition()
-    return _fail([STOP], INTERRUPTED)
+def _failed(error: BaseException) -> int:
+    """Say what failed; an error that is a bug of softstart is raised again."""
+    match error:
+        case click.UsageError():
+            return _fail([usage_sentence(error)], BAD_INPUT)
+        case InputError():
+            return _fail(error.sentences, BAD_INPUT)
+        case SimulationError():
+            return _fail([str(error)], NO_SOLUTION)
+        case BrokenPipeError():
+            _silence_stdout()
+            return PIPE_CLOSED
+        case OSError():
+            _silence_stdout()
+            return _fail([f"the output could not be written: {error.strerror or error}."], BAD_INPUT)
+        case MemoryError():
+            return _fail(["there is not enough memory for this."], NO_SOLUTION)
+    raise error
 
 
 def _run(arguments: list[str]) -> int:
@@ -185,6 +190,7 @@ def _end_in_time(reader: int) -> None:
 
 def _stop(number: int, frame: FrameType | None) -> None:
     """Ctrl-C or TERM. Callbacks of compiled libraries lose the exception, so a timer raises it again."""
+    _STOPS.append(number)
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, _stop_again)
         signal.setitimer(signal.ITIMER_REAL, REPEAT_AFTER, REPEAT_AFTER)

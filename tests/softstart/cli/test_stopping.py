@@ -47,6 +47,29 @@ TURNED = """
     except KeyboardInterrupt as stop:
         raise SystemError("returned a result with an exception set") from stop
 """
+BECOMES_ANOTHER_ERROR = """
+    try:
+        os.kill(os.getpid(), signal.{name})
+        time.sleep(1)
+    except KeyboardInterrupt:
+        pass
+    raise {error}  # as a library that clears the error of a callback and raises its own
+"""
+ERRORS = (
+    "SystemError('NULL result without error')",
+    "TypeError('incompatible arguments')",
+    "ImportError('core failed to import')",
+    "OSError(4, 'interrupted')",
+    "__import__('softstart').errors.InputError('no drive')",
+)
+BECOMES_AN_ANSWER = """
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1)
+    except KeyboardInterrupt:
+        pass
+    click.get_current_context().exit(3)  # nothing was found: the search was cut off
+"""
 CLEANS_UP = """
     try:
         os.kill(os.getpid(), signal.{name})
@@ -85,7 +108,15 @@ def ended(work: str, name: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    ("work", "name"), [(LOST, "SIGINT"), (LOST, "SIGTERM"), (IN_A_CALLBACK, "SIGINT"), (TURNED, "SIGINT")]
+    ("work", "name"),
+    [
+        (LOST, "SIGINT"),
+        (LOST, "SIGTERM"),
+        (IN_A_CALLBACK, "SIGINT"),
+        (TURNED, "SIGINT"),
+        *((BECOMES_ANOTHER_ERROR.replace("{error}", error), "SIGTERM") for error in ERRORS),
+        (BECOMES_AN_ANSWER, "SIGINT"),
+    ],
 )
 def test_a_stop_that_was_lost_is_repeated(work: str, name: str) -> None:
     done = ended(work, name)
