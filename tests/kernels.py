@@ -12,13 +12,30 @@ import time
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 
 PATIENCE = 900.0  # s that a worker waits for another one which compiles
 
 
+def spans() -> None:
+    """A span of a start and how it ends, which drives and chains need."""
+    import_module("softstart.plant.span")
+
+
+def steps() -> None:
+    """The steps of all controllers."""
+    for one in iter_modules(import_module("softstart_controllers").__path__, "softstart_controllers."):
+        import_module(one.name)
+
+
 def drive() -> None:
-    """The loop of starts, which everything else needs."""
+    """The loop of starts."""
     import_module("softstart.plant.start")
+
+
+def series() -> None:
+    """The loop of starts of a chain."""
+    import_module("softstart.chain.kernel_start")
 
 
 def controllers() -> None:
@@ -71,11 +88,14 @@ def robust() -> None:
 
 # what must be compiled before, and what compiles it; the longest are taken first
 PARTS: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
-    "drive": ((), drive),
-    "chain": (("drive",), chain),
-    "controllers": (("drive",), controllers),
-    "robust": (("controllers",), robust),
+    "spans": ((), spans),
+    "series": (("spans",), series),
+    "drive": (("spans",), drive),
+    "steps": ((), steps),
+    "chain": (("series", "drive"), chain),
+    "controllers": (("drive", "steps"), controllers),
     "sensitivities": (("chain", "controllers"), sensitivities),
+    "robust": (("controllers",), robust),
     "plain": (("controllers",), plain),
 }
 

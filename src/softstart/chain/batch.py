@@ -22,7 +22,7 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.plant import layout
-from softstart.plant.start import N_MEASURED, NEW_STATE
+from softstart.plant.exchange import N_MEASURED, NEW_STATE
 from softstart.processes import Pool
 from softstart.start.batch import Figures, figures, margins
 from softstart.start.engine import MAX_EVENTS, check_limits, run_one, watched

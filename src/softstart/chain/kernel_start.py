@@ -28,7 +28,15 @@ from softstart.chain.kernel_records import (
     Start,
 )  # fmt: skip
 from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
-from softstart.plant.advance import next_in_queue, note_excess
+from softstart.plant.exchange import (
+    NEW_STATE,
+    SEES_SHAFT_TORQUE,
+    STEP_SIGNATURE,
+    next_in_queue,
+    note_excess,
+    sample,
+    take_answer,
+)  # fmt: skip
 from softstart.plant.jit import compiled, compiled_as, inlined
 from softstart.plant.layout import (
     ANSWER,
@@ -47,7 +55,6 @@ from softstart.plant.layout import (
     State,
 )
 from softstart.plant.span import lag_is_slow, torque_after, torque_course
-from softstart.plant.start import NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, sample, take_answer
 
 _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")

@@ -8,13 +8,13 @@ from typing import Any
 
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
-from softstart.plant import layout, start
+from softstart.plant import exchange, layout
+from softstart.plant.exchange import STEP_SIGNATURE
 from softstart.plant.jit import compiled_as, inlined
 from softstart.plant.layout import MEASURED, Answer, record, size
-from softstart.plant.start import STEP_SIGNATURE
 
 # indices of `measured`
-from softstart.plant.start import (  # isort: skip
+from softstart.plant.exchange import (  # isort: skip
     M_LOAD_SPEED as LOAD_SPEED,
     M_MOTOR_ANGLE as MOTOR_ANGLE,
     M_MOTOR_SPEED as MOTOR_SPEED,
@@ -25,7 +25,7 @@ from softstart.plant.start import (  # isort: skip
 )
 
 # indices of `command`; the new state follows from STATE on
-from softstart.plant.start import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
+from softstart.plant.exchange import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
 
 
 __all__ = [
@@ -59,7 +59,7 @@ def keep_state(state: Vector, command: Vector) -> None:
         command[STATE + i] = state[i]
 
 
-INTERFACE = (Path(start.__file__), Path(layout.__file__))
+INTERFACE = (Path(exchange.__file__), Path(layout.__file__))
 
 
 def _drop_if_stale(function: Callable[..., None], source: Path) -> None:

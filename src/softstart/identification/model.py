@@ -14,9 +14,8 @@ from softstart.controller import CompiledController, make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.identification.logs import Log
+from softstart.plant import exchange, record
 from softstart.plant import layout as at
-from softstart.plant import record
-from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
 from softstart.start.engine import Recorder
@@ -153,7 +152,7 @@ class LogModel:
         one.p = p
         one.m[:] = 0.0
         one.begin(float(self.times[-1]) * (1.0 + 1e-9))
-        memory, command = np.zeros(player.state_size), np.zeros(kernel.NEW_STATE + player.state_size)
+        memory, command = np.zeros(player.state_size), np.zeros(exchange.NEW_STATE + player.state_size)
         while (reason := one.run(type(player).kernel, numbers, memory, command)) == at.BUFFER_FULL:
             one.grow()
         if reason != at.ENDED:

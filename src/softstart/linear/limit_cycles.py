@@ -53,8 +53,7 @@ from softstart.linear.operating_point import OperatingPoint
 from softstart.linear.sampled_plant import SampledPlant, motor_alone, sampled
 from softstart.linear.sampled_start import Part, Sample, SampledStart
 from softstart.linear.systems import System, at_points, zeros_of
-from softstart.plant import layout, record
-from softstart.plant import start as kernel
+from softstart.plant import exchange, layout, record
 from softstart.start.engine import Recorder
 
 optimize = late("scipy.optimize")
@@ -176,11 +175,11 @@ class Outside:
         angle = -1.0 / (J1 * (s * (s + b1)))
         speed = (1.0 - np.exp(-s * self.period)) / self.period * angle if self.differencing else s * angle
         quantities = {
-            kernel.M_MOTOR_ANGLE: angle,
-            kernel.M_MOTOR_SPEED: speed,
-            kernel.M_MOTOR_TORQUE: 0.0 * s,
-            kernel.M_SHAFT_TORQUE: 1.0 + 0.0 * s,
-            kernel.M_LOAD_SPEED: 1.0 / (J2 * (s + b2)),
+            exchange.M_MOTOR_ANGLE: angle,
+            exchange.M_MOTOR_SPEED: speed,
+            exchange.M_MOTOR_TORQUE: 0.0 * s,
+            exchange.M_SHAFT_TORQUE: 1.0 + 0.0 * s,
+            exchange.M_LOAD_SPEED: 1.0 / (J2 * (s + b2)),
         }
         return np.array([quantities[index] for index in self.inputs])
 

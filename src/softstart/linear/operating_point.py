@@ -28,7 +28,7 @@ from softstart.chain.model import Chain
 from softstart.linear.sampled_plant import SampledPlant, in_contact, motor_of, sampled, sizes_of
 from softstart.linear.sampled_start import Part, Sample, SampledStart, Step
 from softstart.linear.systems import System, moved, part, shown
-from softstart.plant import start as kernel
+from softstart.plant import exchange
 
 LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
 MOST_SAMPLES = 20_000
@@ -316,9 +316,9 @@ def seen(sees: int) -> tuple[int, ...]:
     >>> seen(0)
     (1, 2, 3)
     """
-    found = [kernel.M_MOTOR_ANGLE, kernel.M_MOTOR_SPEED, kernel.M_MOTOR_TORQUE]
-    if sees & kernel.SEES_SHAFT_TORQUE:
-        found.append(kernel.M_SHAFT_TORQUE)
-    if sees & kernel.SEES_LOAD_SPEED:
-        found.append(kernel.M_LOAD_SPEED)
+    found = [exchange.M_MOTOR_ANGLE, exchange.M_MOTOR_SPEED, exchange.M_MOTOR_TORQUE]
+    if sees & exchange.SEES_SHAFT_TORQUE:
+        found.append(exchange.M_SHAFT_TORQUE)
+    if sees & exchange.SEES_LOAD_SPEED:
+        found.append(exchange.M_LOAD_SPEED)
     return tuple(found)

@@ -26,7 +26,7 @@ from softstart.chain.run import mean_torque_of
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.linear.systems import System
-from softstart.plant import start as kernel
+from softstart.plant import exchange
 
 TERMS = 18  # of the exponential's series: 2^-18/18! is below rounding
 
@@ -238,11 +238,11 @@ def sampled(
         A[-1:] = rows["phi1"]
         speed = (rows["phi1"] - _row(size, size - 1)) / period
     quantities = {
-        kernel.M_MOTOR_ANGLE: rows["phi1"],
-        kernel.M_MOTOR_SPEED: speed,
-        kernel.M_MOTOR_TORQUE: rows["u"],
-        kernel.M_SHAFT_TORQUE: rows["T"],
-        kernel.M_LOAD_SPEED: rows["w2"],
+        exchange.M_MOTOR_ANGLE: rows["phi1"],
+        exchange.M_MOTOR_SPEED: speed,
+        exchange.M_MOTOR_TORQUE: rows["u"],
+        exchange.M_SHAFT_TORQUE: rows["T"],
+        exchange.M_LOAD_SPEED: rows["w2"],
     }
     C = np.vstack([quantities[index] for index in inputs])
     return SampledPlant(System(A, B, C, np.zeros((C.shape[0], 1))), rows, period)

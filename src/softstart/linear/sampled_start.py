@@ -22,7 +22,7 @@ from softstart.controller.base import CompiledController, Controller, PlainContr
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.linear.sampled_plant import motor_of
-from softstart.plant import layout
+from softstart.plant import exchange, layout
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.start.engine import MAX_EVENTS, Recorder, plain_answer
@@ -217,9 +217,9 @@ class SampledStart:
         before, when = recorder.x[layout.SAMPLE_ANGLE], recorder.x[layout.SAMPLE_TIME]
         recorder.measure()
         measured = recorder.measured.copy()
-        now = measured[kernel.M_TIME]
+        now = measured[exchange.M_TIME]
         if self.differencing and recorder.x[layout.ASKED] != 0.0 and now > when:
-            measured[kernel.M_MOTOR_SPEED] = (measured[kernel.M_MOTOR_ANGLE] - before) / (now - when)
+            measured[exchange.M_MOTOR_SPEED] = (measured[exchange.M_MOTOR_ANGLE] - before) / (now - when)
         return measured
 
     @property
@@ -238,10 +238,10 @@ def _compiled(controller: CompiledController, own: Drive) -> Step:
     lines = type(controller).kernel
 
     def step(measured: Vector, state: Vector) -> Answer:
-        command = np.zeros(kernel.NEW_STATE + size)
+        command = np.zeros(exchange.NEW_STATE + size)
         lines(numbers, measured, state.copy(), command)
-        torque, ask_again, slope = command[: kernel.NEW_STATE].tolist()
-        return torque, ask_again, slope, command[kernel.NEW_STATE :]
+        torque, ask_again, slope = command[: exchange.NEW_STATE].tolist()
+        return torque, ask_again, slope, command[exchange.NEW_STATE :]
 
     return step
 

@@ -28,8 +28,7 @@ from softstart.linear.operating_point import (
 from softstart.linear.sampled_plant import sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
-from softstart.plant import layout
-from softstart.plant import start as kernel
+from softstart.plant import exchange, layout
 
 if TYPE_CHECKING:
     import control
@@ -42,11 +41,11 @@ INERTIAS = (0.4, 1.0, 2.5)
 STIFFNESSES = (0.9, 1.1)
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
 NAMES = {
-    kernel.M_MOTOR_ANGLE: "motor_angle",
-    kernel.M_MOTOR_SPEED: "motor_speed",
-    kernel.M_MOTOR_TORQUE: "motor_torque",
-    kernel.M_SHAFT_TORQUE: "shaft_torque",
-    kernel.M_LOAD_SPEED: "load_speed",
+    exchange.M_MOTOR_ANGLE: "motor_angle",
+    exchange.M_MOTOR_SPEED: "motor_speed",
+    exchange.M_MOTOR_TORQUE: "motor_torque",
+    exchange.M_SHAFT_TORQUE: "shaft_torque",
+    exchange.M_LOAD_SPEED: "load_speed",
 }
 
 

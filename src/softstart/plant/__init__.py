@@ -1,10 +1,11 @@
 """The two-mass drive with a gap, solved in closed form from event to event.
 
 The kernel's files, in the order in which they build on each other: `layout` (where each number stands),
-`coupled` (a span with viscous friction), `motion` (the closed forms of all others), `terms` and `crossing`
-(the certified first crossing), `span` (the next event), `notes` (what is noted), `modes` (what changes at an
-event), `advance` (span after span to the next control instant), `start` (one start, many starts), `record`
-(any instant of a recorded start), `vector` (a Drive as numbers).
+`exchange` (what is measured and answered at a control instant), `coupled` (a span with viscous friction),
+`motion` (the closed forms of all others), `terms` and `crossing` (the certified first crossing), `span` (the
+next event), `notes` (what is noted), `modes` (what changes at an event), `advance` (span after span to the
+next control instant), `start` (one start, many starts), `record` (any instant of a recorded start), `vector`
+(a Drive as numbers).
 """
 
 from __future__ import annotations

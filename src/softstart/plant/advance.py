@@ -6,12 +6,13 @@ import math
 
 from softstart.plant.coupled import coupled_travel
 from softstart.plant.crossing import load_speed
-from softstart.plant.jit import compiled, inlined, merged
+from softstart.plant.exchange import next_in_queue, note_excess, shaft_torque
+from softstart.plant.jit import inlined, merged
 from softstart.plant.layout import (
-    ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, MOST_PENDING, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT,
+    ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT,
     TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State,
 )  # fmt: skip
-from softstart.plant.modes import handle, reach_target, release_motor, shaft_torque, start_motor
+from softstart.plant.modes import handle, reach_target, release_motor, start_motor
 from softstart.plant.motion import COUPLED, SERIES, motion, remainders
 from softstart.plant.notes import end_stage, note_peak, note_segment
 from softstart.plant.span import (
@@ -21,98 +22,6 @@ from softstart.plant.steady import bounce, repeats
 
 # A contact that lasts is solved this many elastic periods at a time: the search for events is bounded
 LONGEST_SPAN = 16.0
-LIMIT_ROUNDING = 1e-13  # a demand that is beyond a limit by so much of itself is one at the limit
-SLOPE_ROUNDING = 1e-13  # a demand that goes on where a ramp has ended, but for so much, is no step
-
-
-@inlined
-def take_demand(x: State, demand: float, slope: float) -> None:
-    """From now on the demand is this line."""
-    if x.demand_slope != 0.0 and x.ref == x.demand:
-        rounding = SLOPE_ROUNDING * (abs(demand) + abs(x.demand_slope) * x.time)
-        if abs(demand - x.ref) <= rounding:
-            x.ref = demand
-    x.demand = demand
-    x.demand_slope = slope
-
-
-@inlined
-def next_in_queue(x: State, m: Motion) -> None:
-    """The answer that has waited longest takes effect."""
-    take_demand(x, m.due_demand[0], m.due_slope[0])
-    m.pending -= 1.0
-    for i in range(int(m.pending)):
-        m.due_time[i] = m.due_time[i + 1]
-        m.due_demand[i] = m.due_demand[i + 1]
-        m.due_slope[i] = m.due_slope[i + 1]
-
-
-@inlined
-def put(x: State, m: Motion, at: float, demand: float, slope: float) -> bool:
-    """A demand that takes effect at this instant, now or later; False if too many wait."""
-    if at <= x.time:
-        m.pending = 0.0
-        take_demand(x, demand, slope)
-        return True
-    waiting = int(m.pending)
-    while waiting > 0 and m.due_time[waiting - 1] > at:  # corners of a line that this answer replaces
-        waiting -= 1
-    if waiting == MOST_PENDING:
-        return False
-    m.due_time[waiting] = at
-    m.due_demand[waiting] = demand
-    m.due_slope[waiting] = slope
-    m.pending = waiting + 1.0
-    return True
-
-
-@compiled
-def put_cut(p: Plant, x: State, m: Motion, torque: float, slope: float, end: float, until: float) -> bool:
-    """A demand beyond the torque limits: a line from `torque` to `end`, cut off at them; False as `put`.
-
-    Up to three pieces: at the limit from which the line comes, along the line, at the limit to which it goes.
-    """
-    begin = x.time + p.dead_time
-    length = until - x.time
-    demand = min(max(torque, p.u_min), p.u_max)
-    within = min(max(end, p.u_min), p.u_max)
-    excess = max(abs(torque - demand), abs(end - within))
-    if excess < math.inf and excess <= LIMIT_ROUNDING * max(abs(torque), abs(end)):
-        return put(x, m, begin, demand, (within - demand) / length if slope != 0.0 else 0.0)
-    m.over = 1.0
-    m.over_since = x.time
-    m.over_torque = torque
-    m.over_slope = slope
-    if slope == 0.0:
-        return put(x, m, begin, demand, 0.0)
-    near, far = (p.u_min, p.u_max) if slope > 0.0 else (p.u_max, p.u_min)
-    enters, leaves = (near - torque) / slope, (far - torque) / slope
-    if enters >= length or leaves <= 0.0:
-        return put(x, m, begin, demand, 0.0)
-    room = put(x, m, begin, demand, slope if enters <= 0.0 else 0.0)
-    if enters > 0.0:
-        room = room and put(x, m, begin + enters, near, slope)
-    if leaves < length:
-        room = room and put(x, m, begin + leaves, far, 0.0)
-    return room
-
-
-@inlined
-def note_excess(p: Plant, x: State, m: Motion) -> None:
-    """Note how far and how long the last answer lay beyond the torque limits, up to now."""
-    if m.over == 0.0:
-        return
-    m.over = 0.0
-    length = x.time - m.over_since
-    if length <= 0.0:
-        return
-    torque, slope = m.over_torque, m.over_slope
-    end = torque if slope == 0.0 else torque + slope * length
-    x.excess = max(x.excess, torque - p.u_max, p.u_min - torque, end - p.u_max, p.u_min - end)
-    if slope != 0.0:
-        one, other = (p.u_min - torque) / slope, (p.u_max - torque) / slope
-        length -= max(0.0, min(length, max(one, other)) - max(0.0, min(one, other)))
-    x.excess_time += length
 
 
 @inlined

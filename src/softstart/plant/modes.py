@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from softstart.plant.exchange import shaft_torque
 from softstart.plant.jit import inlined
 from softstart.plant.layout import (
     BACK, BREAKAWAY, BROKE_AWAY, CLOSED, DEAD_ZONE, EXIT, GRAZE_LOWER, GRAZE_UPPER, LEFT_BEYOND,
@@ -12,18 +13,6 @@ from softstart.plant.layout import (
     REJOINED, RELEASE, RELEASED, STOP, SWITCH, SWITCHED, TARGET_REACHED, UPPER, Matrix, Motion, Plant, State,
 )  # fmt: skip
 from softstart.plant.notes import end_stage, note_event, note_event_at
-
-
-@inlined
-def shaft_torque(p: Plant, x: State) -> float:
-    """T of the present state."""
-    side = x.side
-    if side == 0.0:
-        return 0.0
-    z = side * x.theta - 0.5 * p.gap
-    if x.doubled != 0.0:
-        return side * 2.0 * p.c * z
-    return side * (p.c * z + p.d * side * x.v)
 
 
 @inlined

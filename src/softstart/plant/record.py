@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from softstart.plant.advance import move
 from softstart.plant.jit import compiled, inlined
 from softstart.plant.layout import MOTION, PLANT, SEGMENT, STATE, Motion, Plant, Segment, Septuple, State
-from softstart.plant.modes import shaft_torque
+from softstart.plant.exchange import shaft_torque
 from softstart.plant.motion import motion as motion_at
 from softstart.plant.notes import next_extreme
 from softstart.plant.span import begin_span, lag_is_slow

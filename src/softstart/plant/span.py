@@ -26,7 +26,7 @@ from softstart.plant.layout import (
 from softstart.plant.motion import (
     COUPLED, derivatives, forcing_tail, motion, prepare, remainders, write_without_cancelling,
 )  # fmt: skip
-from softstart.plant.modes import shaft_torque
+from softstart.plant.exchange import shaft_torque
 from softstart.plant.steady import GRAZE, largest_gain, steady_exit, steady_target
 from softstart.plant.terms import MAX_STEPS
 

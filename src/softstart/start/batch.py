@@ -16,6 +16,7 @@ from softstart.controller.base import CompiledController, Controller, PlainContr
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
 from softstart.late import late
+from softstart.plant import exchange
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
@@ -153,8 +154,8 @@ def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | Non
                 kernel.run_many(
                     type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
                     int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
-                    results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED),
-                    np.zeros(size), np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P),
+                    results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED),
+                    np.zeros(size), np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P),
                     np.zeros(numbers.shape[1]), np.zeros((0, 0)),
                 )  # fmt: skip
         return results

@@ -21,6 +21,7 @@ from softstart.controller.base import (
 )
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
+from softstart.plant import exchange
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.start.status import Status, status_of
@@ -84,7 +85,7 @@ class Recorder:
         rows = FIRST_ROWS if recording else 0
         self.x = np.zeros(at.N_X)
         self.m = np.zeros(at.N_M)
-        self.measured = np.zeros(kernel.N_MEASURED)
+        self.measured = np.zeros(exchange.N_MEASURED)
         self.segments = np.zeros((rows, at.N_SEGMENT))
         self.events = np.zeros((rows, at.N_EVENT))
         self.stages = np.zeros((rows, at.N_STAGE))
@@ -137,7 +138,7 @@ def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: flo
         # a copy: the kernel takes no read-only numbers
         numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
         size = controller.state_size
-        memory, command = np.zeros(size), np.zeros(kernel.NEW_STATE + size)
+        memory, command = np.zeros(size), np.zeros(exchange.NEW_STATE + size)
         with watched(controller):
             while (
                 reason := recorder.run(type(controller).kernel, numbers, memory, command)
@@ -174,7 +175,7 @@ def plain_answer(
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(
             f"The start was given up: the controller {type(controller).__name__} failed at "
-            f"t = {measured[kernel.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
+            f"t = {measured[exchange.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
             f"({type(error).__name__}: {error})."
         ) from error
     try:

@@ -10,6 +10,7 @@ from softstart import simulate
 from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor
 from softstart.drive import Drive
+from softstart.plant import exchange
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
@@ -32,8 +33,8 @@ class Kernel:
         return (
             type(controller).kernel, plant_vector(drive), own, int(controller.sensors),
             bool(controller.sensors & Sensor.STAGE), np.array([np.inf]), np.empty((len(gaps), at.N_X)),
-            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(kernel.N_MEASURED), np.zeros(size),
-            np.zeros(kernel.NEW_STATE + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
+            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED), np.zeros(size),
+            np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
         )  # fmt: skip
 
     def solve(self, work: tuple[Any, ...]) -> Vector:

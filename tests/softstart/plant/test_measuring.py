@@ -21,7 +21,7 @@ from softstart import (
     simulate,
 )
 from softstart.controller import make_controller
-from softstart.plant.noise import gauss
+from softstart.plant.exchange import gauss
 from softstart.plant.vector import encoder_count
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -20,11 +20,11 @@ from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.controller.base import CompiledController, Sensor
 from softstart.drive import Drive
+from softstart.plant import exchange, record
 from softstart.plant import layout as at
-from softstart.plant import record
 from softstart.plant import start as kernel
+from softstart.plant.exchange import N_MEASURED, STEP_SIGNATURE
 from softstart.plant.jit import compiled_as
-from softstart.plant.start import N_MEASURED, STEP_SIGNATURE, run_native
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
 from softstart.start.engine import Recorder
@@ -199,9 +199,8 @@ _A = types.Array(types.float64, 1, "C")
 _I = types.Array(types.int64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _STEP = types.FunctionType(STEP_SIGNATURE)
-_RUN_SIGNATURE = types.int64(_STEP, _A, _A, types.int64, _A, _A, _A, _A, _A, _M, _M, _M)
 _AT_SIGNATURE = types.void(_A, _M, _I, _A, _A, _A, _M)
-_RUN, _AT = types.FunctionType(_RUN_SIGNATURE), types.FunctionType(_AT_SIGNATURE)
+_STARTS, _AT = types.FunctionType(kernel.STARTS_SIGNATURE), types.FunctionType(_AT_SIGNATURE)
 
 # what `positions` holds
 SPANS, SPAN_START, FULL, FIRST_OUT, SECOND_OUT = range(5)
@@ -209,13 +208,13 @@ SPANS, SPAN_START, FULL, FIRST_OUT, SECOND_OUT = range(5)
 
 @compiled_as(
     types.boolean(
-        _RUN, _AT, _STEP, _A, _M, _A, types.int64, _A, _I, _A, _A, _A, _A, _A, _M, _M, _M, _A, _A, _M, _M, _M,
+        _STARTS, _AT, _STEP, _A, _M, _A, types.int64, _A, _I, *[_A] * 6, _M, _M, _M, _M, _A, _A, _M, _M, _M,
         _I,
     )
 )  # fmt: skip
 def _all_moved(  # type: ignore[no-untyped-def]
-    run_start, states_at, step, p, rows, begun, sees, times, index, x, m, measured, state, command, segments,
-    events, stages, scratch_x, scratch_m, out, first, second, positions,
+    starts, states_at, step, p, rows, begun, sees, times, index, no_times, x, m, measured, state, command,
+    ended, segments, events, stages, scratch_x, scratch_m, out, first, second, positions,
 ):  # fmt: skip
     for r in range(rows.shape[0]):
         for j in range(x.shape[0]):
@@ -224,7 +223,10 @@ def _all_moved(  # type: ignore[no-untyped-def]
             m[j] = 0.0
         for j in range(state.shape[0]):
             state[j] = 0.0
-        reason = run_start(step, p, rows[r], sees, x, m, measured, state, command, segments, events, stages)
+        reason = starts(
+            step, ended, ended, sees, False, no_times, ended, x, m, measured, state, command, p, rows[r],
+            segments, events, stages,
+        )  # fmt: skip
         if reason == positions[FULL]:
             return False
         count = int(x[positions[SPANS]])
@@ -258,10 +260,10 @@ def all_moved(
     while True:
         recorders = (np.zeros((records, n)) for n in (at.N_SEGMENT, at.N_EVENT, at.N_STAGE))
         if _all_moved(
-            run_native, record.states_at, step, p, rows, begun, sees, times,
-            np.zeros(times.size, dtype=np.int64),
-            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(N_MEASURED), np.zeros(state_size),
-            np.zeros(command_size), *recorders, np.zeros(at.N_X), np.zeros(at.N_M), out, T, w2, positions,
+            kernel.starts, record.states_at, step, p, rows, begun, sees, times,
+            np.zeros(times.size, dtype=np.int64), kernel.NO_TIMES, np.zeros(at.N_X), np.zeros(at.N_M),
+            np.zeros(N_MEASURED), np.zeros(state_size), np.zeros(command_size), np.zeros((1, at.N_X)),
+            *recorders, np.zeros(at.N_X), np.zeros(at.N_M), out, T, w2, positions,
         ):  # fmt: skip
             return T, w2
         records *= 2
@@ -323,7 +325,7 @@ class Evaluator:
             kernel.run_many(
                 type(parameters.controller).kernel, p, numbers, int(sees), bool(sees & Sensor.STAGE),
                 np.array([math.inf]), results, np.zeros(at.N_X), np.zeros(at.N_M),
-                np.zeros(kernel.N_MEASURED), np.zeros(size), np.zeros(kernel.NEW_STATE + size),
+                np.zeros(exchange.N_MEASURED), np.zeros(size), np.zeros(exchange.NEW_STATE + size),
                 np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
             )  # fmt: skip
             good = results[:, at.STATUS] == at.ENDED
@@ -423,7 +425,7 @@ class _Recorder:
         self.p = p[0].copy()
         self.records = Recorder(self.p, int(parameters.controller.sensors))
         self.state = np.zeros(self.controller.state_size)
-        self.command = np.zeros(kernel.NEW_STATE + self.controller.state_size)
+        self.command = np.zeros(exchange.NEW_STATE + self.controller.state_size)
         self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
 
     def run(self, numbers: Vector, until: float) -> Vector:
