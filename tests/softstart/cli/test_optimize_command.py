@@ -18,7 +18,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 @pytest.mark.slow
 def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, small_search):
     code, out, err = run(
-        "optimize", "crane-4amtkf", "--set", "start.position=unknown", "--start-time", "1.3x"
+        "optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x"
     )
     assert (code, err) == (0, "")
     assert "K_dyn if known to start at opposite-flank" in out
@@ -283,14 +283,14 @@ def test_a_gap_that_no_drive_has(run, nothing_left):
 @pytest.mark.slow
 def test_one_profile_for_two_gaps(run, place, small_search):
     code, out, err = run(
-        "optimize", *SIXTY, "--start-time", "0.32", "--gaps", "0.4 rad", "--json", "--out", "both"
+        "optimize", *SIXTY, "--start-time", "0.3", "--gaps", "0.4 rad", "--json", "--out", "both"
     )
     assert code == 0
     assert all(line.startswith("softstart: ") for line in err.splitlines())
     told = json.loads(out, parse_constant=pytest.fail)
     assert [one["gap"] for one in told["blind"]["scenarios"]] == [0.5, 0.4]
     assert told["k_dyn_blind"] == max(told["blind"]["k_dyn_each"])
-    assert max(told["reacting"]["start_times"]) <= 0.32
+    assert max(told["reacting"]["start_times"]) <= 0.3
     folder = place / "both"
     files = {path.name for path in folder.iterdir()}
     report = (folder / "report.md").read_text("utf-8")

@@ -238,15 +238,15 @@ def wrong_in(found: dict[str, float]) -> dict[str, float]:
 
 @pytest.mark.slow
 def test_unknown_is_the_robust_optimum_and_its_bound_the_largest(small_search: None) -> None:
-    drive = CRANE.replace(start_position="unknown")
-    best = optimize(drive, 0.35)
+    drive, time = CRANE.replace(start_position="unknown"), 0.3
+    best = optimize(drive, time)
     assert (best.method, best.problem.terminal) == ("robust", "reached")
     assert "driving-flank, mid-gap, opposite-flank" in best.why
-    each = [momentum_bound(Problem(one, 0.35, "reached")).k_dyn for one in drive.positions.values()]
+    each = [momentum_bound(Problem(one, time, "reached")).k_dyn for one in drive.positions.values()]
     assert best.bound.k_dyn == max(each)
     assert list(best.alone) == list(drive.positions)
     for where, alone in best.alone.items():
-        assert alone.k_dyn == optimize(drive.replace(start_position=where), 0.35, terminal="reached").k_dyn
+        assert alone.k_dyn == optimize(drive.replace(start_position=where), time, terminal="reached").k_dyn
         assert alone.k_dyn <= best.k_dyn
     assert best.summary()["k_dyn_if_position_known"] == {at: one.k_dyn for at, one in best.alone.items()}
     assert not wrong_in(compared(drive, best))
