@@ -17,9 +17,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 @pytest.mark.slow
 def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, small_search):
-    code, out, err = run(
-        "optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x"
-    )
+    code, out, err = run("optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x")
     assert (code, err) == (0, "")
     assert "K_dyn if known to start at opposite-flank" in out
     assert "With the position known" in " ".join(out.split())
