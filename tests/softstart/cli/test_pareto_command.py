@@ -13,8 +13,8 @@ from softstart import Drive, simulate
 from softstart.optimal.front import pareto
 
 SIXTY = ("--set", "start.target_speed=60 rad/s")
-TWO = ("pareto", *SIXTY, "--start-times", "0.28,0.3", "--controllers", "ramp")
-THREE = ("pareto", *SIXTY, "--start-times", "0.2,0.28,0.3", "--controllers", "ramp")
+TWO = ("pareto", *SIXTY, "--start-times", "0.2523,0.3", "--controllers", "ramp")
+THREE = ("pareto", *SIXTY, "--start-times", "0.2,0.2523,0.3", "--controllers", "ramp")
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
@@ -22,7 +22,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 def finished(tmp_path_factory):
     """A front and the file of its finished points."""
     path = tmp_path_factory.mktemp("finished") / "pareto.jsonl"
-    return pareto(CRANE, [0.2, 0.28, 0.3], controllers=["ramp"], save_to=path), path.read_bytes()
+    return pareto(CRANE, [0.2, 0.2523, 0.3], controllers=["ramp"], save_to=path), path.read_bytes()
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def test_the_files(run, place):
     assert [row["what"] for row in rows] == ["optimum", "optimum", "ramp"]
     report = (folder / "report.md").read_text("utf-8")
     assert {part.split(")")[0] for part in report.split("](")[1:]} <= FILES
-    assert "--start-times 0.28,0.3 --controllers ramp --out deep/front" in report
+    assert "--start-times 0.2523,0.3 --controllers ramp --out deep/front" in report
     assert "| ramp |" in report
 
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -111,6 +111,8 @@ def test_points_of_another_drive_are_refused(run, place, begun):
 
 
 def test_who_computes_changes_nothing(run, finished):
+    assert {point.method for point in finished[0].points if point.found} == {"closed-form", "lp"}
+
     def told(found):
         return [{**point, "seconds": None} for point in found["points"]], found["controllers"]
 

@@ -95,7 +95,7 @@ def test_where_constant_torque_is_quicker_with_several_contacts_it_says_so() -> 
         optimize(CRANE, 0.245, terminal="reached", time_limit=0.0)
 
 
-def test_where_one_contact_is_too_slow_several_are_found() -> None:
+def test_where_one_contact_is_too_slow_several_are_found(small_search: None) -> None:
     """Constant torque gets there in 0.2403 s, one contact in 0.2498 s."""
     best = optimize(CRANE, 0.245, terminal="reached")
     assert (best.method, best.bound.kind) == ("robust", "momentum")
