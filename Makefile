@@ -9,11 +9,13 @@
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': some of them
 #   make pictures              the pictures of the README (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
-#   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run
+#   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run, on WORKERS
+#                              cores (2)
 #   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
 #                              whole suite from both, each in an empty folder
 #   make benchmark             speed and optima beside other packages
 PYTHON ?= python3
+WORKERS ?= 2
 VENV := .venv
 FLOORS := .venv-floors
 BIN := $(VENV)/bin
@@ -70,7 +72,7 @@ docs: $(VENV)/.installed-docs
 	@echo "open docs/_build/html/index.html"
 
 docs-commands: $(VENV)/.installed-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n 2 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n $(WORKERS) --dist worksteal
 
 package: $(VENV)/.installed-package
 	rm -rf dist

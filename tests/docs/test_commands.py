@@ -11,9 +11,10 @@ from tests.docs.steps import pages, steps
 
 PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages(ROOT)}
 TO_DO = {name: found for name, page in PAGES.items() if (found := steps(page.read_text(encoding="utf-8")))}
+LONGEST_FIRST = sorted(TO_DO, key=lambda name: -len(TO_DO[name]))  # none is left for the end
 
 
-@pytest.mark.parametrize("name", TO_DO)
+@pytest.mark.parametrize("name", LONGEST_FIRST)
 def test_page(name: str, tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
     reader = Reader(tmp_path, name)
     for step in TO_DO[name]:
