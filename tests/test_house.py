@@ -80,7 +80,8 @@ BUDGET = {
     # 55: chains: searches around the best start, linear programs by the interior point method
     # 125 and a file: whole_dual.py, the curve before the contact, the exact minimum behind a limited rate
     # 110: the least start time of a K_dyn, by the search that keeps limits; 60: bounds kept, least heat
-    "optimal": (12060, 36, 11, 0),
+    # 25: torque above the linear one at its price, and the demand that holds a steady end
+    "optimal": (12085, 36, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet

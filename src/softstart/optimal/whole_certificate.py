@@ -339,6 +339,8 @@ class _Program:
         priced = np.r_[demands:sags, free : columns - 1]
         if s.rate < math.inf:
             bounds[0] = s.problem.first_demand / s.most
+            if math.isfinite(s.held):
+                bounds[after + inner] = s.held / s.most
         above, equations = (Sparse.dense(rows[:, :-1]) for rows in (ub, eq))
         found: Solution | None = None
         for price in self.prices:
@@ -467,9 +469,11 @@ def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float]
     open_at_first = problem.drive.theta0 < 0.5 * problem.drive.gap
     closing = "whose gap closes once and stays closed" if open_at_first else "whose gap stays closed"
     moving = ", the load moving on once it moves," if rests(problem) else ""
+    kept = problem.terminal == "steady" and math.isfinite(problem.drive.torque_rate)
+    held = ", which the demand holds from then on," if kept else ""
     covers = (
         f"every torque demand from {low:g} to {high:g} N m over time, by whatever controller, "
-        f"{closing}{moving} until {ENDINGS[problem.terminal]} and half an elastic period longer"
+        f"{closing}{moving} until {ENDINGS[problem.terminal]}{held} and half an elastic period longer"
     )
     peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near, work)
     return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers, near=False)

@@ -20,6 +20,10 @@ p'' over the whole cell: exact at nodes, carried on by exponentials of |A|, or b
 the wound shaft does not gain. Trapezoids of phi(q) are too high by at most max|q''| h^3/12 times the largest
 torque, means of q times means of r by max|q'| h^3/12 times the rate.
 
+Without load torque a damped shaft is steady only after c z + d z' was a little below 0, where T is 0: T may
+be up to `below` above the linear one there, at its price. Behind a limited rate the demand at a steady end is
+the load torque, as in the statement: V becomes steep on both sides of it.
+
 Left out, which can only lower the bound: the limits of twist and torque before the contact, and |T| <= P
 where the dead zone pulls.
 """
@@ -43,6 +47,7 @@ from softstart.optimal.problem import Problem
 from softstart.plant.jit import compiled
 
 FINER = 3  # each grid has so many times the steps of the one before
+STEEP = 1e4  # N m of P for each N m by which the demand misses the one that holds a steady end
 LAST = STATES  # place of what is gathered, beside the adjoint state
 
 
@@ -108,6 +113,8 @@ class Start:
         self.most = max(self.high, -self.low)
         self.rate = float(drive.torque_rate)
         self.limited = self.rate < math.inf
+        # a demand of limited rate is at te what holds the steady state from then on
+        self.held = self.Mc if self.limited and problem.terminal == "steady" else math.nan
         self.rests = rests(problem)
         self.open = bool(drive.theta0 < 0.5 * drive.gap)
         self.pulls = drive.contact_law == "dead-zone" and self.d > 0.0
@@ -207,10 +214,11 @@ class Dual:
         a1, a2 = np.abs(d1) @ phase.spread, np.abs(d2) @ phase.spread
         slope, bend = a1 @ np.abs(phase.b), a2 @ np.abs(phase.b)
         self.lost = (s.most * bend + (s.rate if s.limited else 0.0) * slope) * h**3 / 12.0
-        if s.below.any():  # T = max(0, c z + d z') may differ from the linear one by so much
-            by_T = np.array([0.0, 1.0 / s.J1 + 1.0 / s.J2, 1.0 / s.J2, 0.0, 0.0])
-            self.lost += s.below * h * (np.abs(starts) @ phase.spread @ by_T + np.abs(by.torque))
-            self.lost[s.tail] += s.below[s.tail] * abs(by.end_torque)
+        if s.below.any():  # T = max(0, c z + d z') may lie above the linear one by so much, not below it
+            on_T = np.array([0.0, -1.0 / s.J1 - 1.0 / s.J2, 1.0 / s.J2, 0.0, 0.0])
+            worth = np.minimum(starts @ on_T, ends @ on_T) - a2 @ np.abs(on_T) * (h**2 / 8.0)
+            self.lost += s.below * h * np.maximum(-by.torque - worth, 0.0)
+            self.lost[s.tail] += s.below[s.tail] * max(by.end_torque, 0.0)
         jumps = np.abs(np.diff(direct, prepend=0.0))
         jumps[s.tail] += abs(end @ phase.b)
         here = slice(s.tail, None)
@@ -249,7 +257,7 @@ class Dual:
             np.array(self.q), self.lost,
             early[0], self.winding.added, self.winding.sources, self.winding.direct,
             early[1], self.gap.added, self.gap.sources, self.gap.direct,
-            s.first, s.problem.first_demand, s.h, s.low, s.high, s.rate if s.limited else -1.0,
+            s.first, s.problem.first_demand, s.held, s.h, s.low, s.high, s.rate if s.limited else -1.0,
             kinks, counted, np.zeros((3, 2)), np.empty((4, LAST + 1)), out,
         )  # fmt: skip
         return out
@@ -509,6 +517,15 @@ def _value(r: float, rise: float, kinks: Any, count: Any, least: Any) -> float:
 
 
 @compiled
+def _fixed(at: float, half: float, kinks: Any, count: Any, least: Any) -> None:
+    """The demand is `at` between two steps: whatever it was after that, and steep on both sides before."""
+    least[1] = _value(at, half, kinks, count, least)
+    count[0], count[1], count[2], count[3] = 0, 1, 0, 1
+    kinks[0, 0], kinks[1, 0] = at + half + least[0], STEEP
+    kinks[2, 0], kinks[3, 0] = at - half - least[0], STEEP
+
+
+@compiled
 def _added(q0: float, q1: float, lost: float, h: float, low: float, high: float, rate: float, kinks: Any,
            count: Any, least: Any) -> None:  # fmt: skip
     """A step of h s with q at its ends; `rate` below 0: without limit."""
@@ -561,7 +578,7 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
           opened: bool, winds: bool, p: Any, joint: Any, mu: float, q: Any, lost: Any,
           stuck: Any, stuck_added: Any, stuck_sources: Any, stuck_direct: Any,
           gap: Any, gap_added: Any, gap_sources: Any, gap_direct: Any,
-          first: Any, first_demand: float, h: float, low: float, high: float, rate: float,
+          first: Any, first_demand: float, held: float, h: float, low: float, high: float, rate: float,
           kinks: Any, count: Any, least: Any, work: Any, out: Any) -> None:  # fmt: skip
     """Fill `out` with F at the nodes within `spans`; see `Dual.nodes`. Of what is known of the demand up to
     now, copy 0 is in contact, 1 winding up, 2 in the gap.
@@ -570,7 +587,11 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
     S, G, rates = work[0], work[1], work[2:4]
     half = 0.5 * rate * h
     for index in range(tail + i0):
+        if index == tail and math.isfinite(held):
+            _fixed(held, half, kinks[0], count[0], least[0])
         _added(q[0, index], q[1, index], lost[index], h, low, high, rate, kinks[0], count[0], least[0])
+    if i0 == 0 and math.isfinite(held):
+        _fixed(held, half, kinks[0], count[0], least[0])
     for row in range(out.shape[0]):
         i, begin, end = i0 + row, spans[row, 0], spans[row, 1]
         last = -1 if end < begin else n - i if winds and not opened else end if winds else 0

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from softstart import Drive, TorqueProfile, optimize
@@ -86,6 +87,7 @@ CLASSES: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({"torque_lag": 0.005}, {}),
     ({"torque_lag": 0.01, "damping": 1.5}, {"terminal": "reached"}),
     ({"torque_rate": 2000.0}, {"terminal": "steady"}),
+    ({"torque_rate": 2500.0, "torque_lag": 0.004, "damping": 1.0}, {"terminal": "steady"}),
     ({"torque_rate": 3000.0, "torque_lag": 0.004, "start_position": 0.25}, {}),
     ({"minimum_torque": -20.0, "torque_lag": 0.003, "damping": 0.5}, {"terminal": "reached"}),
     ({"damping": 1.0}, {"torque_speed": CURVE}),
@@ -118,6 +120,10 @@ def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[
         if problem.torque_speed:  # else few are below it
             profile = TorqueProfile(profile.time, profile.torque * rng.uniform(0.4, 1.0))
         te = 0.3 if start.rests else float(rng.uniform(0.12, 0.3))
+        if math.isfinite(start.held):
+            falling = (start.high - start.low) / start.rate
+            gentle = TorqueProfile(profile.time, profile.torque * rng.uniform(0.05, 0.4))  # T stays above 0
+            profile = gentle.followed_by(te - falling, TorqueProfile([0.0], [start.held]))
         run = replay(drive, profile, te + start.tail * start.h)
         if problem.torque_speed and not below_curve(run, te, problem):
             continue
@@ -214,6 +220,43 @@ def test_the_least_over_demands_of_limited_rate_is_exact() -> None:
             bounds=(low, high),
         ).fun  # fmt: skip
         assert found == pytest.approx(best, abs=1e-9 * max(np.abs(q).sum(), 1.0))
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.005])
+@pytest.mark.parametrize("damping", [0.5, 2.0])
+def test_what_is_taken_off_for_torque_above_the_linear_one_is_enough(lag: float, damping: float) -> None:
+    """A steady end without load torque: the change of the Lagrange function, whatever the demand."""
+    drive = CRANE.replace(load_torque=0.0, damping=damping, torque_lag=lag)
+    start = Start(Problem(drive, 0.3, "steady"), 300)
+    contact = 250
+    by = _Program(start, (40, 0, contact)).solve(math.inf)
+    assert by is not None
+    with_it, below = Dual(start, by).lost.sum(), start.below.copy()
+    start.below[:] = 0.0
+    dual = Dual(start, by)
+    taken = with_it - dual.lost.sum()
+    rates = np.zeros((6, 6))  # of z, z', w2, u, the integral of T, with the torque above
+    rates[:4, :4] = start.rates["contact"][:4, :4]
+    rates[4, :2], rates[4, 5] = (start.c, start.d), 1.0
+    rates[1, 5], rates[2, 5] = -1.0 / start.J1 - 1.0 / start.J2, 1.0 / start.J2
+    move = expm(rates * start.h)
+    rng = np.random.default_rng(15)
+    price = dual.p[:contact, 2] / start.J2 - dual.p[:contact, 1] * (1.0 / start.J1 + 1.0 / start.J2)
+    worst = np.append(np.zeros(start.tail), price + by.torque[start.tail : start.tail + contact] < 0.0)
+    costs = []
+    for trial in range(40):
+        share = worst if trial == 0 else rng.random(worst.size) ** rng.choice([0.0, 1.0, 9.0])
+        more = below[: worst.size] * share
+        y, L = np.zeros(6), 0.0
+        for k in range(worst.size - 1, -1, -1):
+            y[4:] = 0.0, more[k]
+            y = move @ y
+            L += by.torque[k] * y[4]
+            if k == start.tail:
+                L -= by.speed * y[2] + by.rate * y[1]
+                L -= by.end_torque * (start.c * y[0] + start.d * y[1] + more[k])
+        costs.append(-L)
+    assert 0.0 < max(costs) <= taken * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
