@@ -21,6 +21,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
+from softstart.errors import InputError
 from softstart.optimal.certificate import ENDINGS
 from softstart.optimal.lp.rows import Limits, Solution, Sparse, WarmStarts, no_linear_objective
 from softstart.optimal.lp.whole import ONE, SLOPE, STATES, W2, Kind, R, U, V, Z
@@ -477,6 +478,25 @@ def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float]
     )
     peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near, work)
     return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers, near=False)
+
+
+def dual_at(problem: Problem, instants: tuple[float, float, float], steps: int = 600) -> Dual:
+    """What the multipliers of the program with given instants (contact, breakaway, end; s) prove.
+
+    >>> from softstart import Drive
+    >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.005)
+    >>> dual = dual_at(Problem(drive, 0.2883042), (0.02667, 0.02667, 0.2883042))
+    >>> gap, _, contact = dual.by.durations
+    >>> bound = float(dual.nodes((contact, contact), (gap, gap), False)[0, 0])  # N m, at these instants
+    >>> round(bound / dual.start.problem.base_torque, 2)
+    0.93
+    """
+    start = Start(problem, steps)
+    durations = _Cells(start, start.rests).near(instants)
+    by = None if durations is None else _Program(start, durations).solve(math.inf)
+    if by is None:
+        raise InputError(f"instants = {instants!r}: no start has these.")
+    return Dual(start, by)
 
 
 # the search -------------------------------------------------------------------------------------------------

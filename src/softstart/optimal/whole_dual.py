@@ -226,6 +226,24 @@ class Dual:
         self.d1, self.d2, self.a1, self.a2 = d1[here], d2[here], a1[here], a2[here]
         self.turns = np.cumsum(h * slope + jumps)[here]  # of q, up to the end of each step
 
+    def weights(self, durations: tuple[int, int, int]) -> tuple[Vector, Vector]:
+        """Instants in s and q, the weight of the demand there, of a start with these durations in steps.
+
+        (In the gap, winding up, in contact), as in `Multipliers.durations`; to the end of the swing after te.
+        """
+        s, (open_steps, winding, contact) = self.start, durations
+        q = [*self.q[0][: s.tail + contact]]
+        at = self.p[contact].copy()
+        if winding:
+            at += self.by.breakaway * s.T
+        for early, steps in ((self.winding, winding), (self.gap, open_steps)):
+            if early is self.gap and s.open:
+                at[Z] = self.mu
+            for k in range(steps):
+                q.append(float(at @ early.phase.b) + early.direct[k])
+                at = at @ early.phase.E + early.added[k]
+        return np.asarray(s.h * (sum(durations) + s.tail - np.arange(len(q)))), np.array(q)
+
     # bounds at the nodes ---------------------------------------------------------------------------------
 
     def nodes(

@@ -17,7 +17,7 @@ from softstart import Drive, TorqueProfile, optimize
 from softstart.optimal.exact import replay
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
-from softstart.optimal.whole_certificate import _Cells, _Program, not_certified, whole_bound
+from softstart.optimal.whole_certificate import _Cells, _Program, dual_at, not_certified, whole_bound
 from softstart.optimal.whole_dual import Dual, Start, _take, _value
 from softstart.start.run import Run
 
@@ -86,7 +86,8 @@ def gentle_torque(rng: np.random.Generator, drive: Drive) -> TorqueProfile:
 CLASSES: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({"torque_lag": 0.005}, {}),
     ({"torque_lag": 0.01, "damping": 1.5}, {"terminal": "reached"}),
-    ({"torque_rate": 2000.0}, {"terminal": "steady"}),
+    ({"torque_rate": 2000.0}, {}),
+    ({"torque_rate": 2000.0, "damping": 0.5}, {"terminal": "steady"}),  # held: undamped, the gap opens again
     ({"torque_rate": 2500.0, "torque_lag": 0.004, "damping": 1.0}, {"terminal": "steady"}),
     ({"torque_rate": 3000.0, "torque_lag": 0.004, "start_position": 0.25}, {}),
     ({"minimum_torque": -20.0, "torque_lag": 0.003, "damping": 0.5}, {"terminal": "reached"}),
@@ -115,7 +116,8 @@ def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[
     rng = np.random.default_rng(15)
     starts, closest = 0, math.inf
     duals: list[tuple[Dual, Any]] = []
-    for trial in range(6 * TORQUES if problem.torque_speed == STEEP else TORQUES):
+    rare = problem.torque_speed == STEEP or math.isfinite(start.held)
+    for trial in range(6 * TORQUES if rare else TORQUES):
         profile = gentle_torque(rng, drive)
         if problem.torque_speed:  # else few are below it
             profile = TorqueProfile(profile.time, profile.torque * rng.uniform(0.4, 1.0))
@@ -257,6 +259,32 @@ def test_what_is_taken_off_for_torque_above_the_linear_one_is_enough(lag: float,
                 L -= by.end_torque * (start.c * y[0] + start.d * y[1] + more[k])
         costs.append(-L)
     assert 0.0 < max(costs) <= taken * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "instants"),
+    [
+        ({"torque_lag": 0.005}, (0.0267, 0.0267, 0.2883)),
+        ({"damping": 1.0, "start_position": 0.25}, (0.0, 0.0, 0.25)),
+        ({"load_kind": "reactive", "torque_lag": 0.005}, (0.027, 0.033, 0.2883)),
+    ],
+)
+def test_the_weight_of_the_demand_is_what_the_bound_gains_by_it(
+    given: dict[str, Any], instants: tuple[float, float, float]
+) -> None:
+    dual = dual_at(Problem(CRANE.replace(**given), 0.2883042), instants)
+    start, (gap, winding, contact) = dual.start, dual.by.durations
+
+    def bound() -> float:
+        k = winding if start.rests else gap
+        return float(dual.nodes((contact, contact), (k, k), start.rests)[0, 0])
+
+    times, q = dual.weights(dual.by.durations)
+    before = bound()
+    start.high += 0.01
+    assert (bound() - before) / 0.01 == pytest.approx(start.h * np.minimum(q, 0.0).sum(), rel=0.1)
+    assert times.min() == pytest.approx(start.h)
+    assert times.max() == pytest.approx(start.h * (gap + winding + contact + start.tail))
 
 
 @pytest.mark.slow
