@@ -2,13 +2,15 @@
 
     python -m tests.robustness.test_identification results.jsonl coverage --fits 200 --lines 64 --period 4e-3
     python -m tests.robustness.test_identification results.jsonl coverage --fits 50 --drive friction
+    python -m tests.robustness.test_identification results.jsonl table
     python -m tests.robustness.test_identification results.jsonl search --fits 200
     python -m tests.robustness.test_identification results.jsonl plan --fits 30
 
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
 every parameter). `--drive friction` has friction of motor and load, which is found too; `--experiment
-"reversed three times"` is twice as long as the standard reversal. `search` fits one log from 200 such
+"reversed three times"` is twice as long as the standard reversal. `table` sums up all coverage of the smooth
+drive that the file has. `search` fits one log from 200 such
 guesses. `plan` compares the planned experiment of random drives with the standard ones. What the file has
 already is not computed again.
 """
@@ -23,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 from tests.softstart.optimal.test_from_positions import random_unknown
 
 from softstart import Drive, Identification, identify, plan_experiments, simulate
@@ -194,6 +197,44 @@ def coverage_of(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def table_of(rows: list[dict[str, Any]]) -> str:
+    """A line for each cell: of so many logs that tell a parameter, how many intervals hold the truth."""
+    cells = defaultdict(list)
+    for row in rows:
+        if row["kind"] == "coverage" and row["factor"] == 1.0 and "drive" not in row and "estimates" in row:
+            cells[row["experiment"], row["lines"], row["period"]].append(row)
+    names = [*NAMES, "position 1"]
+    lines = [
+        "| log | logs | " + " | ".join(names) + " | unknown, held |",
+        "|---|" + "--:|" * (len(names) + 2),
+    ]
+    every: dict[str, list[bool]] = defaultdict(list)
+    for (experiment, count, period), fits in sorted(cells.items()):
+        held = defaultdict(list)
+        for row in fits:
+            truth = {name: float(getattr(DRIVE, name)) for name in NAMES} | row["truth"]
+            for name, distance in half_widths(row, truth).items():
+                held["unknown" if name.startswith("unknown") else name].append(distance <= 1.0)
+        for name, one in held.items():
+            every[name].extend(one)
+        told = " | ".join(
+            f"{sum(held[name])} of {len(held[name])}" if held[name] else "-" for name in [*names, "unknown"]
+        )
+        lines.append(f"| {experiment}, {count:g} lines, {1e3 * period:g} ms | {len(fits)} | {told} |")
+    for title, one in (
+        ("known", [held for name in names for held in every[name]]),
+        ("unknown", every["unknown"]),
+    ):
+        low, high = binomtest(sum(one), max(len(one), 1)).proportion_ci(0.95)
+        share = sum(one) / max(len(one), 1)
+        lines.append(
+            f"{title}: {sum(one)} of {len(one)} intervals hold the truth, "
+            f"{100.0 * share:.1f} % (binomial {100.0 * low:.1f} to {100.0 * high:.1f} %, as if those of one "
+            "log were independent)"
+        )
+    return "\n".join(lines)
+
+
 def searches_of(rows: list[dict[str, Any]]) -> str:
     """How many fits ended where the fit from the truth ends, and what they took."""
     first = next(row for row in rows if row["number"] == 0)["estimates"]
@@ -244,7 +285,7 @@ def main() -> None:
     """Compute what the file lacks, and sum up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
-    parser.add_argument("kind", choices=("coverage", "search", "plan"))
+    parser.add_argument("kind", choices=("coverage", "table", "search", "plan"))
     parser.add_argument("--experiment", default=REVERSE)
     parser.add_argument("--fits", type=int, default=200)
     parser.add_argument("--drive", choices=list(DRIVES), default="smooth")
@@ -253,6 +294,10 @@ def main() -> None:
     parser.add_argument("--factor", type=float)
     given = parser.parse_args()
     kind, lines, period = given.kind, given.lines, given.period
+    text = given.file.read_text(encoding="utf-8") if given.file.exists() else ""
+    if kind == "table":
+        print(table_of([json.loads(line) for line in text.splitlines()]))
+        return
     factor = given.factor or (1.0 if kind == "coverage" else 3.0)
     log = {"experiment": given.experiment, "lines": lines, "period": period, "factor": factor}
     keys = {
@@ -262,7 +307,6 @@ def main() -> None:
     }[kind]
     work = {"coverage": covered, "search": searched, "plan": planned}[kind]
     wanted = {"kind": kind, **keys}
-    text = given.file.read_text(encoding="utf-8") if given.file.exists() else ""
     rows = [
         row for row in map(json.loads, text.splitlines())
         if wanted.items() <= row.items() and ("drive" in row) == ("drive" in wanted)

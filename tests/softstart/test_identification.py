@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
-from scipy.stats import norm
+from scipy.stats import chi2
 
 from softstart import Drive, InputError, Log, Run, identify, plan_experiments, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.identification.fitting import Fitter, Space, rounding
+from softstart.identification.fitting import Errors, Fitter, Space, covariance_of, root_of, rounding
 from softstart.identification.model import FILTER, LogModel, filtered
 from softstart.identification.planning import Experiment, Plan, _Bench, _profile, made_up_log
 from softstart.plant import record
@@ -84,25 +84,69 @@ def test_a_torque_error_moves_the_signal_as_its_response_says(log: Log) -> None:
     assert np.all(np.triu(response, 1)[:-1] == 0.0)  # no error moves what came before it
 
 
-def test_rounding_errors_of_an_encoder_are_correlated_as_its_covariance_says() -> None:
-    angle = np.array([0.0, 0.1, 0.25, 0.9, 1.0, 2.35])
-    phases = (np.arange(200_000) + 0.5) / 200_000
-    errors = np.floor(angle[:, None] + phases) - (angle[:, None] + phases)  # the offset is fitted
-    sampled = np.cov(errors)
-    assert rounding(angle, np.zeros((6, 1)), 0.0, 1.0) - 0.0025 * np.eye(6) == pytest.approx(
-        sampled, abs=1e-4
-    )
-
-
-@pytest.mark.parametrize("distance", [0.0, 0.08, 0.5, 1.9])
-@pytest.mark.parametrize("spread", [0.01, 0.1, 0.349, 0.351, 0.8])
-def test_an_uncertain_distance_weakens_the_correlation_as_its_mean_says(
-    distance: float, spread: float
+@pytest.mark.parametrize(
+    ("counts", "exponent"),
+    [(3.0, 1.0), (12.0, 1.0), (40.0, 1.0), (3.0, 2.0), (12.0, 2.0), (40.0, 2.0), (97.0, 2.0), (700.0, 2.0)],
+)
+def test_a_fit_to_rounded_angles_scatters_no_more_than_its_weights_say(
+    counts: float, exponent: float
 ) -> None:
-    normal = norm.ppf((np.arange(400_000) + 0.5) / 400_000)
-    x = np.mod(distance + spread * normal, 1.0)
-    found = rounding(np.array([0.0, distance]), np.array([[0.0], [spread]]), 1.0, 1.0)[0, 1]
-    assert found == pytest.approx(np.mean(1.0 / 12.0 - 0.5 * x * (1.0 - x)), abs=2e-5)
+    """Of an offset and a speed or an acceleration, in 100 samples over this many counts.
+
+    Not so where each sample is just one count further than the last: the errors then are one slow sawtooth.
+    Only a constant speed keeps that up, and a torque error ends it.
+    """
+    time = np.linspace(0.0, 1.0, 100)
+    shapes = np.column_stack([np.ones(100), time**exponent])
+    generator, found, predicted = np.random.default_rng(0), [], []
+    for _ in range(400):
+        angle = counts * generator.uniform(0.97, 1.03) * shapes[:, 1]
+        phase = generator.uniform()
+        logged = np.floor(angle + phase)
+        root = np.sqrt(rounding(logged, 1.0))
+        weighted = shapes / root[:, None]
+        covariance = np.linalg.inv(weighted.T @ weighted)
+        found.append(covariance @ weighted.T @ ((logged - angle - phase + 0.5) / root))
+        predicted.append(np.diag(covariance))
+    scatter, mean = np.var(found, axis=0), np.mean(predicted, axis=0)
+    assert np.all(scatter < 1.2 * mean)  # of 400
+    if counts > 100.0:  # each sample has a count of its own: nothing is given away
+        assert np.all(scatter > 0.8 * mean)
+
+
+def test_samples_on_one_count_weigh_as_one_and_what_is_not_rounded_does_not_matter() -> None:
+    logged = np.array([0.0, 0.0, 0.0, 2.0, 3.0, 3.0, 2.0])
+    assert rounding(logged, 1.0) == pytest.approx(np.array([3.0, 3.0, 3.0, 1.0, 2.0, 2.0, 1.0]) / 12.0)
+    assert rounding(0.1 * logged, 0.1) == pytest.approx(0.01 * rounding(logged, 1.0))
+    noisy = logged + 0.2 * np.sin(np.arange(7.0))
+    assert rounding(noisy, 1.0) == pytest.approx(rounding(logged, 1.0))
+
+
+@pytest.mark.parametrize(("experiment", "lines"), [("start", 64.0), (REVERSE, 64.0), (REVERSE, 1024.0)])
+def test_the_truth_is_as_likely_as_the_covariance_says(experiment: str, lines: float) -> None:
+    """Of 16 logs of 4 ms: weighted squares, and what the best linear step takes off them, are chi-square."""
+    drive = TRUTH.replace(encoder_lines=lines)
+    squares, steps, sizes, numbers = [], [], [], []
+    for seed in range(16):
+        generator = np.random.default_rng([seed, 5])
+        position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
+        log = made_up_log(
+            drive, experiment, log_period=4e-3, ripple=1.0, position=position, phase=phase, seed=seed
+        )
+        space = Space.of(NAMES, drive, [True], [True])
+        fitter = Fitter([LogModel(log, drive.replace(start_position="mid-gap"))], space)
+        x = np.array([*space.point(drive), root_of(position), (phase - 0.5) * log.count])
+        for _ in range(2):  # the derivatives along the motion that was logged
+            fitter.predict(x, Errors(fitter.weights(x), 1.0, 1.0))
+        residual, jacobian = fitter.whitened(x, Errors(fitter.weights(x), 1.0, 1.0))
+        covariance, pull = covariance_of(jacobian, space), jacobian.T @ residual
+        squares.append(residual @ residual)
+        sizes.append(residual.size)
+        steps.append(pull @ covariance @ pull)
+        numbers.append(np.trace(covariance @ jacobian.T @ jacobian))
+    assert 0.8 < np.sum(squares) / np.sum(sizes) < 1.1
+    assert chi2.sf(np.sum(steps), np.sum(numbers)) > 1e-3
+    assert np.sum(steps) > 0.6 * np.sum(numbers)
 
 
 def test_a_filter_of_the_speed_is_exact_for_lines() -> None:
@@ -223,8 +267,8 @@ def test_the_ends_of_an_interval_are_where_the_fit_gets_worse(log: Log) -> None:
     """Against fits at fixed values: at each end the weighted squares are larger by the quantile's square."""
     space = Space.of(NAMES, TRUTH, [True], [True])
     fitter = Fitter([LogModel(log, TRUTH.replace(start_position="mid-gap"))], space)
-    x = np.array([*space.point(TRUTH), -0.6, 0.0])
-    reach = np.array([2.0] * len(NAMES) + [0.399, 0.1])
+    x = np.array([*space.point(TRUTH), root_of(-0.6), 0.0])
+    reach = np.array([2.0] * len(NAMES) + [0.1, 0.1])
     solution = fitter.refine(x, x - reach, x + reach)
     for name in ("gap", "damping", "position 1"):
         i = space.names.index(name)

@@ -46,12 +46,17 @@ SETTLED: Final = 5e-4  # in logarithms
 RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
 MOST_STEPS, HALVINGS = 20, 7  # towards an end of an interval
 ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
+SCANNED: Final = 5  # values of what the logs do not tell, at which all else is fitted
 LONGEST_STEP: Final = 0.7  # of a number of x, towards it
 CLOSE: Final = 0.04  # how far the root of the squares may be off there
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 WIDEST_FRICTION: Final = 1.0  # units of a friction, see `Space.of`; its interval is wider if it is unknown
 MOST_FRICTION: Final = 3.0  # units; as far as a search goes
 LEAST_FRICTION: Final = 1e-8  # units; less is none, which the plant's events could not tell from rounding
+# x = (value/unit)^power where a logarithm would stretch what is small until no derivative is left of it, and
+# the interval of all else would be that of a drive without it: a motion depends on torques of the load
+# linearly, and on the root of a gap, the time that the motor takes through it
+POWERS: Final = {"gap": 0.5, "load_torque": 1.0} | dict.fromkeys(FRICTIONS, 1.0)
 
 
 Progress = Callable[[str], None]
@@ -59,17 +64,17 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Space:
-    """The unknowns x: logarithms, frictions over their units, positions in the gap, offsets of angles.
+    """The unknowns x: logarithms, powers of gap, load torque and frictions, positions, offsets of angles.
 
     First come the parameters that all logs share, then for each log its position (where that is free) and its
-    offset (where it holds angles). Frictions may be 0, and a motion depends on them linearly: they have no
-    logarithms.
+    offset (where it holds angles). Frictions may be 0. See `POWERS`. A position is the root of the share of
+    the gap before the driving flank, `position_of`: with the root of the gap it makes the time to the flank.
     """
 
     shared: tuple[str, ...]
     positions: tuple[bool, ...]
     offsets: tuple[bool, ...]
-    units: tuple[float, ...]  # of the shared ones: sign of a logarithm, value of a friction at x = 1
+    units: tuple[float, ...]  # of the shared ones: sign of a logarithm, value of a power at x = 1
 
     @classmethod
     def of(
@@ -78,7 +83,7 @@ class Space:
         """The space of these parameters of a drive.
 
         The unit of a friction is the one that takes a tenth of the torque that accelerates, at the target
-        speed if it is viscous.
+        speed if it is viscous; that of gap and load torque is the drive's own.
 
         >>> crane = Drive.load("crane-4amtkf").replace(motor_friction=1.5)
         >>> space = Space.of(["gap", "motor_friction"], crane, [True], [False])
@@ -87,7 +92,8 @@ class Space:
         """
         torque = 0.1 * max(float(drive.Ms) - abs(float(drive.Mc)), 0.1 * float(drive.Ms))
         of_speed = torque / float(drive.target_speed)
-        units = {"motor_friction": torque} | dict.fromkeys(FRICTIONS[1:], of_speed)
+        own = {name: float(getattr(drive, name)) or 1.0 for name in ("gap", "load_torque")}
+        units = own | {"motor_friction": torque} | dict.fromkeys(FRICTIONS[1:], of_speed)
         sign = {name: math.copysign(1.0, float(getattr(drive, name, 1.0))) for name in shared}
         return cls(
             tuple(shared), tuple(positions), tuple(offsets), tuple(units.get(n, sign[n]) for n in shared)
@@ -95,21 +101,42 @@ class Space:
 
     def point(self, drive: Drive) -> list[float]:
         """The shared part of x at the parameters of a drive, none of which with a logarithm is 0."""
-        scaled = [
-            (name, float(getattr(drive, name)) / unit)
-            for name, unit in zip(self.shared, self.units, strict=True)
-        ]
-        return [value if name in FRICTIONS else math.log(value) for name, value in scaled]
+        return [self.number(i, float(getattr(drive, name))) for i, name in enumerate(self.shared)]
 
-    def narrow(self, i: int, lower: float, upper: float) -> bool:
-        """Whether an interval of x_i, of a shared parameter, tells what it is: within a factor of 3."""
-        return upper - lower < (WIDEST_FRICTION if self.shared[i] in FRICTIONS else math.log(WIDEST))
+    def number(self, i: int, value: float) -> float:
+        """x_i at a value of the shared parameter i, the inverse of `value`."""
+        scaled, power = value / self.units[i], POWERS.get(self.shared[i])
+        return math.log(scaled) if power is None else math.copysign(abs(scaled) ** power, scaled)
+
+    def share(self, i: int, x: float, half: float) -> float:
+        """Half an interval of x_i about x as a share of the value, to first order."""
+        power = POWERS.get(self.shared[i])
+        return half if power is None else half / max(power * x, 1e-300)
+
+    def known(self, i: int, x: float, half: float, guess: float | None = None) -> bool:
+        """Whether half an interval of x_i about x tells what it is: within a factor of 3, or half a gap.
+
+        The value found must not decide: the log tells a small load torque in N m, and where it comes out too
+        large by chance, its relative interval is narrow. So where x is above its guess, the interval is
+        compared with the guess (at most by the factor of 3 that a guess may be off).
+
+        >>> space = Space.of(["load_torque"], Drive.load("crane-4amtkf"), [True], [False])
+        >>> space.known(0, 1.0, 0.5), space.known(0, 1.5, 0.6, guess=1.0), space.known(1, 0.7, 0.2)
+        (True, False, True)
+        """
+        if i >= len(self.shared):
+            return half < 0.25
+        if self.shared[i] in FRICTIONS:
+            return 2.0 * half < WIDEST_FRICTION
+        over = 1.0 if guess is None else self.value(i, x) / self.value(i, guess)
+        return 2.0 * self.share(i, x, half) * min(max(over, 1.0), WIDEST) < math.log(WIDEST)
 
     def value(self, i: int, x: float) -> float:
         """The value of the shared parameter i at this x_i."""
-        if self.shared[i] not in FRICTIONS:
+        power = POWERS.get(self.shared[i])
+        if power is None:
             return self.units[i] * math.exp(x)
-        return self.units[i] * x if x > LEAST_FRICTION else 0.0
+        return self.units[i] * math.copysign(abs(x) ** (1.0 / power), x) if x > LEAST_FRICTION else 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -119,9 +146,9 @@ class Space:
 
     @property
     def weak(self) -> Vector:
-        """1/variance of each number of x beforehand: e^3, 3 units of a friction, 1/2 of a position."""
+        """1/variance of each number of x beforehand: e^3, 3 units of a power, 1/4 of a position."""
         shared, places = len(self.shared), sum(self.positions)
-        return np.array([1.0 / 9.0] * shared + [4.0] * places + [0.0] * sum(self.offsets)) + 1e-12
+        return np.array([1.0 / 9.0] * shared + [16.0] * places + [0.0] * sum(self.offsets)) + 1e-12
 
     def place(self, log: int) -> tuple[int | None, int | None]:
         """Where in x the position and the offset of a log stand."""
@@ -135,7 +162,21 @@ class Space:
         """The parameters of the model of one log."""
         found = {name: self.value(i, float(x[i])) for i, name in enumerate(self.shared)}
         position, _ = self.place(log)
-        return found if position is None else found | {POSITION: float(x[position])}
+        return found if position is None else found | {POSITION: position_of(float(x[position]))}
+
+
+def position_of(x: float) -> float:
+    """The position in the gap, 1 at the driving flank, where the root of the share before that flank is x.
+
+    >>> position_of(0.0), position_of(root_of(-0.6))
+    (1.0, -0.6)
+    """
+    return 1.0 - 2.0 * x * x
+
+
+def root_of(position: float) -> float:
+    """The inverse of `position_of`."""
+    return math.sqrt(max(0.5 * (1.0 - position), 0.0))
 
 
 def usual(drive: Drive, *, lag: bool) -> list[str]:
@@ -257,7 +298,7 @@ class Fitter:
         points = [space.values(x, log)]
         steps = []
         for i in moved if derivatives else ():
-            step = -STEP if i == position and x[i] > 0.0 else STEP
+            step = -STEP if i == position and x[i] > 0.5 else STEP
             other = x.copy()
             other[i] += step
             steps.append(step)
@@ -295,8 +336,13 @@ class Fitter:
         for number in range(most):
             start = guess.copy()
             for i, draw in zip(free, draws[number - 1], strict=True) if number else ():
-                spread = math.log(FACTOR) if i < len(self.space.shared) else 1.0
-                start[i] = guess[i] + spread * (2.0 * draw - 1.0)
+                move = 2.0 * draw - 1.0
+                if i >= len(self.space.shared):
+                    start[i] = math.sqrt(draw)
+                elif self.space.shared[i] in FRICTIONS:
+                    start[i] = guess[i] + move * math.log(FACTOR)
+                else:
+                    start[i] = self.space.number(i, self.space.value(i, guess[i]) * FACTOR**move)
             self.progress(f"search {number + 1}")
             try:
                 found.append(self._follow(np.clip(start, lower, upper), lower, upper))
@@ -477,14 +523,50 @@ class Fitter:
         )
         return np.asarray(found.x, dtype=np.float64)
 
-    def end(self, solution: Solution, i: int, sign: float, half: float) -> float:
+    def elsewhere(self, solution: Solution, unknown: Iterable[int]) -> list[tuple[Vector, Matrix, float]]:
+        """Where the logs are explained nearly as well, with a number that they do not tell set elsewhere.
+
+        A start that begins at the flank and one that crosses the gap first are two valleys; where the logs
+        do not say which, no step along one of them finds the other. Each shared number of `unknown` takes
+        values over its range, positions begin in mid-gap, and all else is fitted. Points, covariances with
+        that number fixed, and the weighted squares.
+        """
+        found = []
+        first, last = len(self.space.shared), len(self.space.shared) + sum(self.space.positions)
+        for i in (one for one in unknown if one < first):
+            least, most = (abs(self.space.value(i, float(x[i]))) for x in (solution.lower, solution.upper))
+            for value in np.geomspace(max(least, 1e-3 * most), most, SCANNED).tolist():
+                x, lower, upper = solution.x.copy(), solution.lower.copy(), solution.upper.copy()
+                x[i] = self.space.number(i, math.copysign(value, self.space.units[i]))
+                x[first:last] = root_of(0.0)
+                lower[i], upper[i] = x[i] - 1e-9, x[i] + 1e-9
+                try:
+                    x = self.fit(x, solution.errors, lower, upper)
+                    part = self.whitened(x, solution.errors)
+                except (InputError, SimulationError):
+                    continue
+                part.jacobian[:, i] = 0.0
+                covariance = covariance_of(part.jacobian, self.space)
+                covariance[i, i] = 0.0
+                found.append((x, covariance, float(part.residual @ part.residual)))
+        return found
+
+    def end(
+        self,
+        solution: Solution,
+        i: int,
+        sign: float,
+        half: float,
+        others: Sequence[tuple[Vector, Matrix, float]] = (),
+    ) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half the quadratic one.
 
         The largest x_i whose weighted squares are larger by at most the square of Student's quantile. All
         other numbers move along, until J' r = lambda e_i. Each step solves this for linear residuals, so it
         follows a bent valley, along which a fit at fixed x_i creeps (D. J. Venzon, S. H. Moolgavkar, Appl.
         Statist. 37 (1988) 87-94). The first step ends where a quadratic has its interval; where the squares
-        are right there, that is the end. So is a bound that they do not exclude.
+        are right there, that is the end. So is a bound that they do not exclude. The steps begin at that of
+        the `others` from which they get furthest, see `elsewhere`.
 
         A fit that went far along a valley has explained errors as motion: the deviations are found anew from
         what is left at the end, and hold for both places. The response to the torque error is that of the
@@ -493,7 +575,13 @@ class Fitter:
         bound = float((solution.upper if sign > 0.0 else solution.lower)[i])
         middle, errors, least = float(solution.x[i]), solution.errors, solution.least
         quantile = quantile_of(solution.freedom[i])
-        end, x, straight = self._traced(solution, i, sign, solution.x, errors, least, quantile)
+        begin, far = solution.x, middle + sign * half
+        for point, covariance, squares in others:
+            left = least + quantile**2 - squares
+            reach = float(point[i]) + sign * math.sqrt(max(left, 0.0) * float(covariance[i, i]))
+            if left > 0.0 and sign * (reach - far) > 0.0:
+                begin, far = point, reach
+        end, x, straight = self._traced(solution, i, sign, begin, errors, least, quantile)
         for _ in range(0 if straight else ROUNDS_OF_ENDS):
             errors, freedom = self.deviations(self.parts(x), errors)
             residual, jacobian = self.whitened(solution.x, errors)

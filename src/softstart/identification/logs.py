@@ -260,7 +260,8 @@ class Log:
         if fastest == 0.0:
             raise InputError(f"{name}: the {kind} never changes; log a start in which the motor moves.")
         first = speed[0] if kind == "speed" else (values[1] - values[0]) / (time[1] - time[0])
-        if abs(first) > 0.2 * fastest:
+        one = self.count if kind == "speed" else self.count / (time[1] - time[0])  # a motor at rest may be
+        if abs(first) - 1.01 * one > 0.2 * fastest:  # just below the next count
             raise InputError(
                 f"{name}: the motor turns at {first:.3g} rad/s where the log begins; begin the log at "
                 "standstill."
@@ -268,7 +269,8 @@ class Log:
         impulse = np.concatenate(
             [[0.0], np.cumsum(0.5 * (self.torque[1:] + self.torque[:-1]) * np.diff(self.time))]
         )
-        early = np.abs(impulse[seen]) <= 0.5 * np.max(np.abs(impulse))
+        # before half the impulse and half the speed: a motor that hits the flank of a load at rest flies back
+        early = (np.abs(impulse[seen]) <= 0.5 * np.max(np.abs(impulse))) & (np.abs(speed) <= 0.5 * fastest)
         share = slice(0, max(4, int(np.argmin(early)) if not early.all() else early.size))
         if float(np.sum(speed[share] * impulse[seen][share])) < 0.0:
             word = "rises" if float(speed[share][-1]) > 0.0 else "falls"

@@ -16,7 +16,7 @@ from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
-from softstart.identification.fitting import Fitter, Space, chosen, covariance_of, usual
+from softstart.identification.fitting import POWERS, Fitter, Space, chosen, covariance_of, root_of, usual
 from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE
@@ -35,7 +35,7 @@ CHECKED: Final = 65  # places in the gap from which an experiment is simulated; 
 COARSE: Final = 8  # of these only each eighth while a torque is designed
 PIECES: Final = 9  # levels of a designed torque at least
 ROUGH: Final = 150, 50  # samples, and blocks of the torque error, at most while a torque is designed
-DRAWS: Final = 40  # random torques, half of them steps from the best one
+DRAWS: Final = 30  # random torques before the programs, and as many steps from the best one behind them
 SPREAD: Final = 0.15  # of the largest level
 ITERATIONS: Final = 8
 STEP: Final = 2e-3  # of the largest level, for derivatives
@@ -424,7 +424,7 @@ class _Bench:
         space = Space.of(self.free, self.drive, [self.moving], [self.signal == "angle"])
         x = np.array(
             space.point(self.drive)
-            + ([-0.6] if self.moving else [])
+            + ([root_of(-0.6)] if self.moving else [])
             + ([0.0] if self.signal == "angle" else [])
         )
         states = model.states(space.values(x, 0))
@@ -438,12 +438,12 @@ class _Bench:
         half = np.minimum(self.quantile * sizes, 50.0)
         widths = np.array(
             [
-                one / x[i] if name in FRICTIONS else math.sinh(one)
+                space.share(i, x[i], one) if name in POWERS else math.sinh(one)
                 for i, (name, one) in enumerate(zip(self.free, half.tolist(), strict=True))
             ]
         )
         if not rough:  # a design needs their slope
-            widths[[not space.narrow(i, -one, one) for i, one in enumerate(half.tolist())]] = math.inf
+            widths[[not space.known(i, x[i], one) for i, one in enumerate(half.tolist())]] = math.inf
         peaks, travels = self.loads = self.load(profile, end, rough)
         told = dict(zip(self.free, widths.tolist(), strict=True))
         return Experiment(name, profile, end, told, float(peaks.max()), float(travels.max()), self.wanted)
@@ -499,8 +499,9 @@ class _Bench:
             tried.append((math.log(one.score), float(over.max()), shares))
             return np.concatenate([[tried[-1][0]], over])
 
-        first = levels / scale
-        rows = evaluated(first).size
+        rows = evaluated(levels / scale).size
+        self._wander(evaluated, tried, lower, upper, anywhere=True)
+        first = best_of(tried)[2]
         design = _Design(evaluated, first.size, rows)
         shares = ca.MX.sym("shares", first.size)
         found = design(shares)
@@ -510,7 +511,7 @@ class _Bench:
         pulled = self._pulled(tried, first, durations, scale, torque, travel)
         for point in pulled:
             evaluated(point)
-        self._wander(evaluated, tried, lower, upper)
+        self._wander(evaluated, tried, lower, upper, anywhere=False)
         within = sorted((one for one in tried if one[1] <= 0.0), key=lambda one: one[0])[:TRIED]
         exact = [self.experiment(name, durations, scale * point) for _, _, point in within]
         exact = [
@@ -562,19 +563,26 @@ class _Bench:
         tried: Sequence[tuple[float, float, Vector]],
         lower: float,
         upper: float,
+        *,
+        anywhere: bool,
     ) -> None:
-        """Random torques anywhere, then steps from the best: there are many optima, and kinks of peaks."""
+        """Random torques anywhere, or steps from the best: there are many optima, and kinks of peaks."""
         generator, spread = np.random.default_rng(0), SPREAD
-        for number in range(DRAWS):
-            best = min((one for one in tried if one[1] <= 0.0), key=lambda one: one[0], default=tried[0])
+        for _ in range(DRAWS):
+            best = best_of(tried)
             point = best[2] + spread * generator.standard_normal(best[2].size)
-            if anywhere := 2 * number < DRAWS:
+            if anywhere:
                 point = generator.uniform(lower, upper, best[2].size)
             found = evaluated(np.clip(point, lower, upper))
             if (over := float(found[1:].max())) > 0.0:
                 found = evaluated(tried[-1][2] * (1.0 - NEAR) / (1.0 + over))
             if not anywhere:
                 spread *= 1.5 if found[0] < best[0] and bool(np.all(found[1:] <= 0.0)) else 0.9
+
+
+def best_of(tried: Sequence[tuple[float, float, Vector]]) -> tuple[float, float, Vector]:
+    """The torque within the limits that tells most; the first one if none is within them."""
+    return min((one for one in tried if one[1] <= 0.0), key=lambda one: one[0], default=tried[0])
 
 
 class _Design(ca.Callback):

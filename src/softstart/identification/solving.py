@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +28,9 @@ from softstart.identification.fitting import (
     Space,
     chosen,
     covariance_of,
+    position_of,
     quantile_of,
+    root_of,
     usual,
 )  # fmt: skip
 from softstart.identification.logs import Log, TorqueIs
@@ -139,10 +142,11 @@ def identify(
     found = fitter.search(guess, lower, upper, searches, seed)
     solution = fitter.refine(found[0][0], lower, upper)
     covariance = covariance_of(solution.part.jacobian, space)
-    estimates = _estimates(fitter, solution, covariance)
+    estimates = _estimates(fitter, solution, covariance, guess)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     kept = len(estimates)
+    sizes[len(space.shared) : kept] *= -1.0  # the further forward a position, the smaller its root
     best = found[0][1]
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
@@ -243,24 +247,24 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
     guess: list[float] = []
     lower: list[float] = []
     upper: list[float] = []
-    for name, unit in zip(space.shared, space.units, strict=True):
-        value = abs(float(getattr(drive, name, 0.0)))
+    for i, name in enumerate(space.shared):
+        value = float(getattr(drive, name, 0.0))
         if name in FRICTIONS:
-            guess, lower, upper = [*guess, value / unit], [*lower, 0.0], [*upper, MOST_FRICTION]
+            guess, lower, upper = [*guess, space.number(i, value)], [*lower, 0.0], [*upper, MOST_FRICTION]
             continue
         if value == 0.0 and name == "damping":  # a damping ratio of 2 %
             reduced = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
             value = 0.04 * math.sqrt(float(drive.c * reduced))
         elif value == 0.0:
             value = typical
-        reach = math.log(3.0 * FACTOR)
+        reach = 3.0 * FACTOR
         if name in ("damping", "torque_lag", "computing_delay", FILTER):
-            reach = math.log(100.0)
-        guess.append(math.log(value))
-        lower.append(guess[-1] - reach)
-        upper.append(guess[-1] + reach)
+            reach = 100.0
+        guess.append(space.number(i, value))
+        lower.append(space.number(i, value / reach))
+        upper.append(space.number(i, value * reach))
     for _ in range(sum(space.positions)):
-        guess, lower, upper = [*guess, 0.0], [*lower, -1.0], [*upper, 1.0]
+        guess, lower, upper = [*guess, root_of(0.0)], [*lower, 0.0], [*upper, 1.0]
     for log in (one for one in logs if one.kind == "angle"):
         first = float(log.values[np.isfinite(log.values)][0])
         reach = max(20.0 * log.count, 100.0 * log.scale)
@@ -268,25 +272,33 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
     return np.array(guess), np.array(lower), np.array(upper)
 
 
-def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix) -> list[Estimate]:
+def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix, guess: Vector) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
     space, found, lost = fitter.space, [], set[str]()
-    for i, name in enumerate(space.names):
-        if name.startswith("offset"):
-            continue
+    sizes = [
+        quantile_of(freedom) * math.sqrt(float(variance))
+        for freedom, variance in zip(solution.freedom, np.diag(covariance), strict=True)
+    ]
+    told = [
+        space.known(i, float(solution.x[i]), sizes[i], float(guess[i]))
+        for i, name in enumerate(space.names)
+        if not name.startswith("offset")
+    ]
+    fitter.progress("other explanations")
+    others = fitter.elsewhere(solution, [i for i, known in enumerate(told) if not known])
+    for i, (name, tells) in enumerate(zip(space.names, told, strict=False)):
         position = i >= len(space.shared)
-        middle = float(solution.x[i])
-        half = quantile_of(solution.freedom[i]) * math.sqrt(float(covariance[i, i]))
+        middle, half = float(solution.x[i]), sizes[i]
         fitter.progress(f"interval of {name}")
-        ends = [fitter.end(solution, i, sign, half) for sign in (-1.0, 1.0)]
+        ends = [fitter.end(solution, i, sign, half, others) for sign in (-1.0, 1.0)]
         bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
-        narrow = ends[1] - ends[0] < 1.0 if position else space.narrow(i, *ends)
-        known = narrow and not (position and "gap" in lost)  # a share of the gap
+        known = tells and space.known(i, middle, 0.5 * (ends[1] - ends[0]))
+        known = known and not (position and "gap" in lost)  # a share of the gap
         reason = "" if known else _why(i, covariance, space)
         if not known:
             lost.add(name)
-        if not position:
-            middle, *ends = (space.value(i, one) for one in (middle, *ends))
+        of = position_of if position else partial(space.value, i)
+        middle, *ends = (of(one) for one in (middle, *ends))
         found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
     return found
 
