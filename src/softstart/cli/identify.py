@@ -293,7 +293,7 @@ def write_identification(
         "![the logs and the drive found](logs.svg)",
         *map(markdown, found.notes),
     ]
-    write_drive_report(folder, parts, found.drive, command)
+    write_drive_report(folder, parts, found.rounded().drive, command)
 
 
 def write_plan(made: Plan, folder: Path, command: str) -> None:

@@ -29,6 +29,7 @@ notebook = late("softstart.views.notebook")
 CONFIDENCE = 0.95
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file
+DIGITS = 3  # of half an interval, with which a value is written: it moves by 0.5 % of that at most
 FILE, DRIVE_FILE = "identification.json", "drive.toml"  # in the folder of an identification
 
 
@@ -73,6 +74,21 @@ class Estimate:
     def half_width(self) -> float:
         """Half the interval over the value, as a share; infinite if the value is 0."""
         return 0.5 * (self.upper - self.lower) / abs(self.value) if self.value else math.inf
+
+    def rounded(self) -> Estimate:
+        """Value and ends to three digits of half the interval, of themselves where they are smaller.
+
+        >>> one = Estimate("gap", 0.0796834172, 0.0781726453, 0.0812174625, known=True).rounded()
+        >>> one.value, one.lower, one.upper
+        (0.07968, 0.07817, 0.08122)
+        """
+        half = 0.5 * (self.upper - self.lower)
+        numbers = {
+            name: round(number, DIGITS - 1 - math.floor(math.log10(min(half, abs(number)))))
+            for name in ("value", "lower", "upper")
+            if (number := getattr(self, name)) and half > 0.0
+        }
+        return replace(self, **numbers)
 
     def moved(self, shares: ArrayLike) -> Vector:
         """Values so many half intervals away: 1 is the end further from 0, -1 the other end, by logarithms.
@@ -208,11 +224,18 @@ class Identification:
                     f"{DRIVE_FILE} alone, as a drive without intervals."
                 )
 
+    def rounded(self) -> Self:
+        """The identification as it is written, without digits that the logs do not tell."""
+        estimates = tuple(one.rounded() for one in self.estimates)
+        values = {one.name: one.value for one in estimates if one.name in PARAMETERS}
+        return replace(self, drive=self.drive.replace(**values), estimates=estimates)
+
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder."""
+        """Write `drive.toml` and `identification.json`, which `load` reads, into a folder: `rounded`."""
         Path(folder).mkdir(parents=True, exist_ok=True)
-        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | self.summary(), indent=2)
-        for name, content in ((DRIVE_FILE, self.drive.to_toml()), (FILE, text + "\n")):
+        kept = self.rounded()
+        text = json.dumps({"format": FORMAT, "guess": self.guess.to_toml()} | kept.summary(), indent=2)
+        for name, content in ((DRIVE_FILE, kept.drive.to_toml()), (FILE, text + "\n")):
             write_whole(Path(folder) / name, lambda stream, content=content: stream.write(content))  # type: ignore[misc]
 
     @classmethod

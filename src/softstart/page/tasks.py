@@ -289,7 +289,7 @@ def identified(
     units = units_of(guess)
     cells = [[one["parameter"] + ("" if one["unit"] == "1" else f", {unit(units.of(one['unit']))}"),
               *(_seen(one[each], one["unit"], units) for each in figures)] for one in rows]  # fmt: skip
-    return Identified(found.drive, ["parameter", *figures], cells, list(found.notes))
+    return Identified(found.rounded().drive, ["parameter", *figures], cells, list(found.notes))
 
 
 def _seen(text: str, si: str, units: Units) -> str:
