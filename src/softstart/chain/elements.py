@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind, Position
 from softstart.input.documents import Table
 from softstart.input.files import Library
-from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, like, parameter
+from softstart.input.parameter_set import (
+    MaybeNumber,
+    MaybeSeries,
+    Number,
+    ParameterSet,
+    like,
+    parameter,
+)
 from softstart.input.parameters import Parameter
 
 __all__ = [
@@ -31,6 +39,7 @@ Quantity = float | str  # a number in SI, or a string with a unit
 Side = Literal["before", "after"]
 
 LIBRARY = Library("softstart.chain", "a chain", "chains")
+MOST_POINTS = 16  # of a load curve
 
 
 class Mass(ParameterSet):
@@ -39,16 +48,22 @@ class Mass(ParameterSet):
     `torque` is the load torque, positive where it brakes a forward motion; `kind` "active" acts always,
     "reactive" opposes motion and holds the mass at rest up to its size. `damping` is that to the ground.
 
+    A mass at the end of a chain with an `inertia` of infinity stays at rest: ground, or what a brake holds.
+    `curve_torque` is a load torque that acts besides, always: at the speeds `curve_speed` of the mass, or at
+    its angles `curve_angle` (0 where the load mass begins), linear in between, constant beyond them.
+
     >>> Mass("350 kg*cm^2", name="rotor").inertia
     0.035
+    >>> fan = Mass(2.0, curve_speed=["0 rpm", "500 rpm", "1000 rpm"], curve_torque=[0.0, 10.0, 40.0])
     """
 
     WHAT: ClassVar[str] = "a mass"
 
     name: str = parameter("mass.name", "", "name of the mass", '"drum"', default="")
     inertia: Number = parameter(
-        "mass.inertia", "kg*m^2", "inertia on its own shaft", '"0.035 kg*m^2"', "above 0", kw_only=False
-    )
+        "mass.inertia", "kg*m^2", "inertia on its own shaft", '"0.035 kg*m^2"', "above 0",
+        infinite=True, kw_only=False,
+    )  # fmt: skip
     damping: Number = parameter(
         "mass.damping", "N*m*s/rad", "damping to the ground", '"0.01 N*m*s/rad"', "0 or more", default=0.0
     )
@@ -61,6 +76,21 @@ class Mass(ParameterSet):
     initial_speed: Number = parameter(
         "mass.initial_speed", "rad/s", "speed at the start", '"0 rad/s"', default=0.0
     )
+    curve_speed: MaybeSeries = parameter(
+        "mass.curve_speed",
+        "rad/s",
+        "rising speeds of its load curve",
+        "[0, 50, 100]",
+        default=None,
+        many=True,
+    )
+    curve_angle: MaybeSeries = parameter(
+        "mass.curve_angle", "rad", "rising angles of its load curve", "[0, 1.5, 3]", default=None, many=True
+    )
+    curve_torque: MaybeSeries = parameter(
+        "mass.curve_torque", "N*m", "load torques at these speeds or angles", "[0, 10, 40]",
+        default=None, many=True,
+    )  # fmt: skip
 
     def contradictions(self) -> Iterable[str]:
         """Sentences on values that contradict one another."""
@@ -69,6 +99,28 @@ class Mass(ParameterSet):
                 f"torque = {self.torque!r}: a reactive load torque is friction and must be 0 or more; write "
                 'its size, or kind "active".'
             )
+        if math.isinf(self.inertia) and self.initial_speed != 0.0:
+            yield f"initial_speed = {self.initial_speed!r}: a mass of infinite inertia stays at rest."
+        given = [one for one in (self.curve_speed, self.curve_angle) if one is not None]
+        if not given and self.curve_torque is None:
+            return
+        if len(given) != 1 or self.curve_torque is None:
+            yield "curve_torque: a load curve has torques and, at as many points, speeds or angles."
+        elif len(given[0]) != len(self.curve_torque) or not 2 <= len(given[0]) <= MOST_POINTS:
+            yield (
+                f"curve_torque: {len(self.curve_torque)} torques at {len(given[0])} points; give as many of "
+                f"both, 2 to {MOST_POINTS}."
+            )
+        elif any(b <= a for a, b in pairwise(given[0])):
+            yield "curve_speed, curve_angle: the points of a load curve rise; order them."
+
+    @property
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...], bool] | None:
+        """Its load curve: speeds or angles, torques there, and whether it is by angle; None without one."""
+        at = self.curve_speed or self.curve_angle
+        if at is None or self.curve_torque is None:
+            return None
+        return at, self.curve_torque, self.curve_angle is not None
 
 
 class Shaft(ParameterSet):
@@ -229,6 +281,10 @@ class Motor(ParameterSet):
     rated_torque: MaybeNumber = like(Drive, "rated_torque")
     torque_lag: Number = like(Drive, "torque_lag")
     torque_rate: Number = like(Drive, "torque_rate")
+    initial_torque: Number = parameter(
+        "motor.initial_torque", "N*m", "torque at t = 0, from which lag and rate limit begin", '"10 N*m"',
+        default=0.0,
+    )  # fmt: skip
     encoder_lines: Number = like(Drive, "encoder_lines")
     encoder_phase: Number = like(Drive, "encoder_phase")
     torque_noise: Number = like(Drive, "torque_noise")
@@ -242,10 +298,20 @@ class Motor(ParameterSet):
                 f"maximum_torque = {self.maximum_torque!r}: it must be at least the starting torque, "
                 f"{self.starting_torque!r} N*m."
             )
+        if not self.minimum_torque <= self.initial_torque <= self.maximum_torque:
+            yield (
+                f"initial_torque = {self.initial_torque!r}: it must lie between minimum_torque and "
+                "maximum_torque."
+            )
+        if self.initial_torque and not (self.torque_lag > 0.0 or self.torque_rate < math.inf):
+            yield (
+                f"initial_torque = {self.initial_torque!r}: without torque_lag and torque_rate the torque is "
+                "the demand from the start; leave it out."
+            )
 
     def keywords(self) -> dict[str, Any]:
-        """The motor as keywords of `Drive`."""
-        return {key: v for key, v in self.values().items() if key != "mass" and v is not None}
+        """The motor as keywords of `Drive`, which begins without torque."""
+        return {key: v for key, v in self.values().items() if key in Drive.PARAMETERS and v is not None}
 
 
 TOP = Table(

@@ -23,6 +23,8 @@ from softstart.chain.kernel_records import (
     LOWER,
     NO_EVENT,
     OPEN,
+    POINT_ABOVE,
+    POINT_BELOW,
     PRESSED,
     REACHED,
     REJOIN,
@@ -352,6 +354,38 @@ def friction(start: Start, i: int, h: float, n: int, end: float) -> tuple[int, f
 
 
 @inlined
+def next_point(start: Start, i: int, h: float, n: int, end: float) -> tuple[int, float]:
+    """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
+    mass = start.masses[i]
+    body = start.masses[mass.first]
+    faint = 1e-14 * h * body.influence
+    event = NO_EVENT
+    for which in range(2):
+        sign = 1.0 - 2.0 * which
+        piece = mass.piece if which == 0 else mass.piece - 1
+        if piece < 0 or piece >= mass.points:
+            continue
+        point = mass.at[piece]
+        if mass.by_angle != 0:
+            set_line(start.f, mass.turned, n, sign * point, -sign)
+        else:
+            set_line(start.f, mass.speed, n, sign * point, -sign)
+        zeros = 1 if mass.passed == -sign else 0
+        if zeros == 0 and cannot_change_by(start.f, n, start.f[0]):
+            continue
+        if mass.by_angle != 0:
+            s = first_root(start.f, n, end, zeros, ROUNDING * abs(point), faint * h)
+        else:
+            s = first_root(start.f, n, end, zeros, ROUNDING * abs(point), faint)
+        if s < NONE:
+            return UNSOLVED, 0.0
+        if s >= 0.0:
+            event = POINT_ABOVE if which == 0 else POINT_BELOW
+            end = s
+    return event, end
+
+
+@inlined
 def next_event(start: Start, h: float, n: int) -> tuple[int, int, float]:
     """The first event of the span, on which shaft or mass, and where on [0, 1]."""
     p = start.p.view(PLANT)[0]
@@ -385,6 +419,12 @@ def next_event(start: Start, h: float, n: int) -> tuple[int, int, float]:
     for i in range(masses.size):
         if masses[i].first == i:
             event, s = friction(start, i, h, n, end)
+            if event != NO_EVENT:
+                if event == UNSOLVED:
+                    return event, i, 0.0
+                found, where, end = event, i, s
+        if masses[i].points > 0:
+            event, s = next_point(start, i, h, n, end)
             if event != NO_EVENT:
                 if event == UNSOLVED:
                     return event, i, 0.0

@@ -25,6 +25,8 @@ from softstart.chain.kernel_records import (
     LOWER,
     OPEN,
     OPENED,
+    POINT_ABOVE,
+    POINT_BELOW,
     PRESSED,
     REACHED,
     REJOIN,
@@ -40,6 +42,7 @@ from softstart.chain.kernel_records import (
     Record,
     Start,
 )  # fmt: skip
+from softstart.chain.kernel_series import find_piece, set_piece
 from softstart.plant.jit import compiled
 from softstart.plant.layout import DEAD_ZONE, MODELICA, PLANT, STATE
 
@@ -173,12 +176,15 @@ def strike(start: Start, k: int, restitution: float, kind: int, time: float) -> 
     w_a = masses[k].w
     w_b = masses[k + 1].w
     v = w_a - w_b
-    reduced = J_a * J_b / (J_a + J_b)
+    walled = math.isinf(J_a + J_b)  # one of them stays at rest
+    reduced = min(J_a, J_b) if walled else J_a * J_b / (J_a + J_b)
     impulse = (1.0 + restitution) * reduced * v
     loss = 0.5 * (1.0 - restitution * restitution) * reduced * v * v
     note(start, time, kind, k, loss, impulse)
     shafts[k].impulse = max(shafts[k].impulse, abs(impulse))
-    if restitution == 0.0:
+    if restitution == 0.0 and walled:
+        w_a = w_b = 0.0
+    elif restitution == 0.0:
         w_a = w_b = (J_a * w_a + J_b * w_b) / (J_a + J_b)
     else:
         w_a -= impulse / J_a
@@ -186,6 +192,8 @@ def strike(start: Start, k: int, restitution: float, kind: int, time: float) -> 
     for i in range(a, b + 1):
         mass = masses[i]
         mass.w = w_a if i <= k else w_b
+        if mass.points > 0 and mass.by_angle == 0:
+            find_piece(mass)
         if mass.rubs != 0:
             direction = np.sign(mass.w)
             if direction != mass.direction:
@@ -283,6 +291,11 @@ def handle(start: Start, event: int, k: int, press: float, rest: float, h: float
         turn(start, k, 0.0)
     elif event in (BREAK_FORWARD, BREAK_BACK):
         turn(start, k, 1.0 if event == BREAK_FORWARD else -1.0)
+    elif event in (POINT_ABOVE, POINT_BELOW):
+        mass = start.masses[k]
+        x.events += 1.0
+        mass.passed = 1 if event == POINT_ABOVE else -1
+        set_piece(mass, mass.piece + mass.passed)
     elif event == REACHED:
         x.start_time = x.time
         note(start, x.time, TARGET_REACHED, start.place.load, start.masses[k].w, 0.0)

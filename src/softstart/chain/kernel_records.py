@@ -18,6 +18,7 @@ import numpy as np
 from softstart import plant
 from softstart.arrays import Vector
 from softstart.balancing.periodic_torque import PeriodicTorque
+from softstart.chain.elements import MOST_POINTS
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import natural_vibration
 from softstart.errors import InputError
@@ -44,8 +45,19 @@ MASS = record_type(
         ("rubs", int),  # 1 where friction acts: a reactive load, or a gear with losses
         ("mean", float),  # constant part of the exciting torques
         ("w0", float),
+        ("motor_torque0", float),  # at t = 0, of the motor that acts on it
+        # its load curve, linear between `points` rising speeds or angles and constant beyond them
+        ("points", int),
+        ("by_angle", int),
+        ("at", float, MOST_POINTS),
+        ("torque_at", float, MOST_POINTS),
         # state
         ("w", float),
+        ("angle", float),  # where the load curve is by angle
+        ("piece", int),  # of the load curve: how many of its points lie before
+        ("offset", float),  # the curve is offset + slope * (speed or angle) there
+        ("slope", float),
+        ("passed", int),  # +1 or -1: a point has just been passed upwards or downwards
         ("direction", float),  # 0 stuck, else the sign of the speed that friction opposes; 1 without friction
         # of the body, the masses that move as one: its first mass, and in the record of that mass the rest
         ("first", int),
@@ -59,6 +71,7 @@ MASS = record_type(
         ("used", float),  # share of what can hold it that holds it as a span begins, signed
         # Taylor coefficients over the span, whose length is 1
         ("speed", float, ORDERS),
+        ("turned", float, ORDERS),  # its angle, where the load curve is by angle
         ("outside", float, ORDERS),  # torques from outside
         ("held", float, ORDERS),  # what holds a stuck body
     ]
@@ -104,7 +117,7 @@ OPEN, CONTACT, DOUBLED, BEYOND, PRESSED, JOINED, WELDED = range(7)
 
 # a recorded span: time and motor; motion of each mass and shaft at its beginning
 SPAN = record_type([(name, float) for name in ("start", "end", "ua", "ub", "ue", "u", "ref", "phi")])
-SPAN_MASS = record_type([("w", float), ("direction", float)])
+SPAN_MASS = record_type([("w", float), ("direction", float), ("angle", float), ("piece", int)])
 SPAN_SHAFT = record_type([("theta", float), ("mode", int), ("side", float), ("sign", float)])
 
 # what is read back at an instant, and over the whole run: work in J of motor and exciting torques, against
@@ -121,8 +134,8 @@ CLOSED, OPENED, LOAD_STARTS, LOAD_STOPS, TARGET_REACHED, IMPACT, SETTLED, GEAR_L
 # what a span ends with
 (
     NO_EVENT, UPPER, LOWER, REJOIN, BACK, EXIT, SWITCH, SETTLE, RELEASE, BREAK_FORWARD, BREAK_BACK, STOP,
-    REACHED, UNSOLVED, TURNED,
-) = range(15)  # fmt: skip
+    REACHED, UNSOLVED, TURNED, POINT_ABOVE, POINT_BELOW,
+) = range(17)  # fmt: skip
 
 
 class Place(NamedTuple):
@@ -227,6 +240,13 @@ def numbers(
     geared = (masses["rubs"] != 0) & ~reactive
     masses["active"][geared], masses["Mc"][geared] = arrays.Mc[geared], 0.0
     masses["w0"] = arrays.w0
+    for mass, given, i in zip(masses, chain.masses, arrays.speed_ratio, strict=True):
+        if given.curve is not None:
+            at, torques, by_angle = given.curve
+            mass["points"], mass["by_angle"] = len(at), by_angle
+            mass["at"][: len(at)], mass["torque_at"][: len(at)] = np.array(at) / i, np.array(torques) * i
+    if chain.motor is not None:
+        masses["motor_torque0"][arrays.motor] = chain.motor.initial_torque
     for k in range(count - 1):
         if _welded(arrays, k):  # one body has one speed, not two that differ by rounding
             masses["w0"][k + 1] = masses["w0"][k]
@@ -295,7 +315,7 @@ def _motor(chain: Chain, arrays: ChainArrays, time_limit: float | None, max_even
         left = motor.starting_torque - float((arrays.Mc * heavier).sum())
         speeds = p.target + float(np.abs(arrays.w0).sum())
         if left > 0.0:
-            p.time_limit = 100.0 * (float((arrays.J * heavier).sum()) * speeds / left + period)
+            p.time_limit = 100.0 * (float((arrays.moving_J * heavier).sum()) * speeds / left + period)
     return row
 
 

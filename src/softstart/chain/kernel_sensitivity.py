@@ -68,7 +68,7 @@ def transition(start: Start, lag: float, h: float, n: int, series: Rows) -> None
             for i in range(count):
                 mass = masses[i]
                 w = series[joints + i, j, o]
-                total = -mass.ground * w
+                total = -(mass.ground + mass.slope) * w  # of load curves by speed; none is by angle here
                 if i == motor:
                     total += u
                 if i > 0:

@@ -34,7 +34,35 @@ TRUNCATION = 1e-18
 LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
 
 
-# bodies and gears -----------------------------------------------------------------------------------
+# load curves, bodies and gears ----------------------------------------------------------------------
+
+
+@compiled
+def set_piece(mass: Record, piece: int) -> None:
+    """The straight piece of the load curve on which the mass is: `piece` of the points lie before it."""
+    mass.piece = piece
+    mass.slope = 0.0
+    if piece == 0:
+        mass.offset = mass.torque_at[0]
+    elif piece == mass.points:
+        mass.offset = mass.torque_at[piece - 1]
+    else:
+        rise = mass.torque_at[piece] - mass.torque_at[piece - 1]
+        mass.slope = rise / (mass.at[piece] - mass.at[piece - 1])
+        mass.offset = mass.torque_at[piece - 1] - mass.slope * mass.at[piece - 1]
+
+
+@compiled
+def find_piece(mass: Record) -> None:
+    """The same by the present speed or angle, as at the start and where a blow has changed the speed."""
+    if mass.points == 0:
+        return
+    where = mass.angle if mass.by_angle != 0 else mass.w
+    piece = 0
+    while piece < mass.points and mass.at[piece] <= where:
+        piece += 1
+    mass.passed = 0
+    set_piece(mass, piece)
 
 
 @compiled
@@ -130,12 +158,13 @@ def fastest_rate(start: Start) -> float:
     """An upper bound of the rates of the chain in its present mode, 1/s.
 
     Gershgorin's theorem on the matrix of the shafts, c_k (1/J_a + 1/J_b) with sqrt(c_k c_l)/J beside it, and
-    the same of the dampings.
+    the same of the dampings; of load curves the largest slope over its inertia, whatever its sign.
     """
     masses, shafts = start.masses, start.shafts
     springs = 0.0
     dampers = 0.0
     ground = 0.0
+    held = 0.0
     before_c = 0.0
     before_d = 0.0
     before_row = 0.0
@@ -146,11 +175,18 @@ def fastest_rate(start: Start) -> float:
         if mass.first == i:
             shared = 0.0 if mass.stuck != 0 else 1.0 / mass.body_J
             to_ground = 0.0
+            curve = 0.0
             j = i
             while j < masses.size and masses[j].first == i:
                 to_ground += masses[j].ground
+                if masses[j].points > 0:
+                    if masses[j].by_angle != 0:
+                        curve += abs(masses[j].slope)
+                    else:
+                        to_ground += abs(masses[j].slope)
                 j += 1
             ground = max(ground, to_ground * shared)
+            held = max(held, curve * shared)
         if i + 1 == masses.size or masses[i + 1].first != i + 1:
             continue
         shaft = shafts[i]
@@ -173,7 +209,7 @@ def fastest_rate(start: Start) -> float:
         before_damping = d * (shared + after) + friction
         before_c = c
         before_d = d
-    springs = max(springs, before_row)
+    springs = max(springs, before_row) + held
     dampers = max(dampers, before_damping) + ground
     rate = 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
     for tone in start.tones:
@@ -255,6 +291,19 @@ def expand_torques(start: Start, h: float, n: int) -> None:
 
 
 @inlined
+def curve_torque(mass: Record, o: int, share: float) -> float:
+    """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
+    if mass.by_angle != 0:
+        torque = mass.slope * mass.turned[o]
+        mass.turned[o + 1] = share * mass.speed[o]
+    else:
+        torque = mass.slope * mass.speed[o]
+    if o == 0:
+        torque += mass.offset
+    return torque
+
+
+@inlined
 def each_alone(masses: Record, shafts: Record) -> bool:
     """Whether no masses move as one and no gear has losses."""
     alone = True
@@ -281,6 +330,8 @@ def expand_alone(start: Start, h: float, n: int) -> None:
                 q += u[o]
             if mass.ground != 0.0:
                 q -= mass.ground * w
+            if mass.points > 0:
+                q -= curve_torque(mass, o, share)
             if o == 0:
                 q -= mass.direction * mass.Mc + mass.active
             mass.outside[o] = q
@@ -327,6 +378,8 @@ def expand(start: Start, h: float, n: int) -> None:
     start.phi[0] = x.phi2
     for mass in masses:
         mass.speed[0] = mass.w
+        if mass.by_angle != 0:
+            mass.turned[0] = mass.angle
     for shaft in shafts:
         shaft.twist[0] = shaft.theta
     if each_alone(masses, shafts):
@@ -362,6 +415,8 @@ def expand(start: Start, h: float, n: int) -> None:
                     q += start.u[o]
                 if mass.ground != 0.0:
                     q -= mass.ground * mass.speed[o]
+                if mass.points > 0:
+                    q -= curve_torque(mass, o, share)
                 if o == 0:
                     q -= mass.direction * mass.Mc + mass.active
                     size += abs(q)
@@ -393,7 +448,7 @@ def expand(start: Start, h: float, n: int) -> None:
                 mass = masses[j]
                 mass.speed[o + 1] = rise * share
                 if j < last:  # the joint carries what the masses before it leave
-                    carried = mass.outside[o] - mass.J * rise
+                    carried = mass.outside[o] - (total if math.isinf(mass.J) else mass.J * rise)
                     if stuck and mass.rubs != 0:
                         carried -= held_by(masses, shafts, i, j, held, o)
                     if j > 0:

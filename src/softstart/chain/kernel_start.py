@@ -27,7 +27,15 @@ from softstart.chain.kernel_records import (
     Record,
     Start,
 )  # fmt: skip
-from softstart.chain.kernel_series import REACH, expand, fastest_rate, join_bodies, orders
+from softstart.chain.kernel_series import (
+    REACH,
+    expand,
+    fastest_rate,
+    find_piece,
+    join_bodies,
+    orders,
+    set_piece,
+)
 from softstart.plant.exchange import (
     NEW_STATE,
     SEES_SHAFT_TORQUE,
@@ -81,6 +89,16 @@ def begin(start: Start, until: float) -> None:
     for k in range(min(motor, load), max(motor, load)):  # the load mass begins at the angle 0
         theta = start.shafts[k].theta
         x.phi2 += theta if motor < load else -theta
+    for i in range(start.masses.size):
+        mass = start.masses[i]
+        mass.angle = 0.0
+        for k in range(min(i, load), max(i, load)):
+            theta = start.shafts[k].theta
+            mass.angle += theta if i < load else -theta
+        find_piece(mass)
+    x.u = start.masses[motor].motor_torque0
+    x.ref = x.u
+    x.demand = x.u
     x.stage = 2.0 if path_closed(start, -1) else 1.0
 
 
@@ -102,6 +120,8 @@ def record(start: Start, h: float) -> None:
         mass, kept = start.masses[i], start.span_masses[row, i]
         kept.w = mass.w
         kept.direction = mass.direction
+        kept.angle = mass.angle
+        kept.piece = mass.piece
     for k in range(start.shafts.size):
         shaft, noted = start.shafts[k], start.span_shafts[row, k]
         noted.theta = shaft.theta
@@ -130,6 +150,11 @@ def move_masses(start: Start, n: int, s: float) -> None:
             if shaft.mode not in (PRESSED, WELDED):
                 shaft.theta = shaft.theta * s + shaft.twist[o]
     x.phi2 = angle
+    for mass in masses:
+        if mass.points > 0:
+            mass.passed = 0
+            if mass.by_angle != 0:
+                mass.angle = value(mass.turned, n, s)
 
 
 @inlined
@@ -194,6 +219,9 @@ def advance(start: Start) -> int:
         cut = m.slew_end < h
         if cut:
             h = m.slew_end
+        if h > p.longest:
+            cut = True
+            h = p.longest
         rate = rate_of(start)
         if rate * h > REACH:
             cut = True
@@ -371,6 +399,9 @@ def restore(start: Start, row: int) -> int:
         mass, kept = start.masses[i], start.span_masses[row, i]
         mass.w = kept.w
         mass.direction = kept.direction
+        mass.angle = kept.angle
+        if mass.points > 0:
+            set_piece(mass, kept.piece)
     for k in range(start.shafts.size):
         shaft, noted = start.shafts[k], start.span_shafts[row, k]
         shaft.theta = noted.theta
@@ -438,6 +469,9 @@ def work_of(start: Start, works: Record) -> None:
             for o in range(1, n + 1):
                 turned += speed[o] / (o + 1.0)
             load = h * mass.direction * mass.Mc * turned + h * mass.active * turned
+            if mass.points > 0:
+                course = mass.turned if mass.by_angle != 0 else speed
+                load += h * (mass.offset * turned + mass.slope * product(course, speed, n))
             work.ground += ground
             work.load += load
             exciting += h * product(mass.outside, speed, n) + ground + load

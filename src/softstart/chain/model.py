@@ -61,7 +61,7 @@ class Chain:
     motor : Motor, optional
         Acts on the mass it names, else on the first. None for a chain that is only analysed.
     load_mass : str, optional
-        Name of the mass that is to reach `target_speed`; by default the last.
+        Name of the mass that is to reach `target_speed`; by default the last that can move.
     target_speed : float or str, optional
         Speed of the load, rad/s *at the motor shaft*, as in a `Drive`; by default the rated speed of the
         motor.
@@ -125,9 +125,10 @@ class Chain:
         elif motor is not None:
             target_speed = motor.rated_speed
         if masses:
-            load_mass = load_mass or masses[-1].name
+            moving = [mass.name for mass in masses if not math.isinf(mass.inertia)] or [masses[0].name]
+            load_mass = load_mass or moving[-1]
             if motor is not None and not motor.mass:
-                motor = motor.replace(mass=masses[0].name)
+                motor = motor.replace(mass=moving[0])
         wrong = _mistakes(masses, shafts, motor, load_mass)
         wrong += wrong_units({"units": units}, Drive.PARAMETERS["units"], Wording())
         if wrong:
@@ -203,7 +204,7 @@ class Chain:
         unknown = len(drive.positions) > 1
         where = None if unknown else of.theta0 or None
         shaft = Shaft(of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=where)
-        motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key != "mass"})
+        motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key in Drive.PARAMETERS})
         return cls(
             (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source,
             position="unknown" if unknown else "mid-gap", units=of.units,
@@ -332,6 +333,18 @@ class Chain:
         ]
         return replace(self, masses=tuple(masses), shafts=tuple(one.widened(gaps) for one in self.shafts))
 
+    @property
+    def freed(self) -> Self:
+        """The chain without a mass that stays at rest, and its shaft."""
+        kept = [i for i, mass in enumerate(self.masses) if not math.isinf(mass.inertia)]
+        if len(kept) == len(self.masses):
+            return self
+        return replace(
+            self,
+            masses=tuple(self.masses[i] for i in kept),
+            shafts=self.shafts[kept[0] : kept[-1]],
+        )
+
     # ---- the chain at one shaft --------------------------------------------------------------------------
 
     def brought_to(self, reference: str | int = "motor") -> Self:
@@ -350,10 +363,20 @@ class Chain:
         """
         at = arrays_at(self, self.index(reference))
         placed = self.position in ("mid-gap", "unknown")
-        columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, strict=True)
+        columns = zip(self.masses, at.J, at.d_ground, at.Mc, at.w0, at.speed_ratio.tolist(), strict=True)
         masses = [
-            m.replace(inertia=float(J), damping=float(d), torque=float(Mc), initial_speed=float(w0))
-            for m, J, d, Mc, w0 in columns
+            m.replace(
+                inertia=float(J),
+                damping=float(d),
+                torque=float(Mc),
+                initial_speed=float(w0),
+                **{
+                    key: [x * (i if key == "curve_torque" else 1.0 / i) for x in vars(m)[key]]
+                    for key in ("curve_speed", "curve_angle", "curve_torque")
+                    if vars(m)[key] is not None
+                },
+            )
+            for m, J, d, Mc, w0, i in columns
         ]
         rows = zip(self.shafts, at.c, at.d, at.gap, at.permissible, at.theta0, strict=True)
         shafts = [
@@ -423,6 +446,17 @@ def _mistakes(
         wrong.append(f"load = {show(load_mass)}: {_no_such(load_mass, names)}")
     if names and motor is not None and motor.mass not in names:
         wrong.append(f"[motor] mass = {show(motor.mass)}: {_no_such(motor.mass, names)}")
+    held = [i for i, mass in enumerate(masses) if math.isinf(mass.inertia)]
+    if not held or wrong:
+        return wrong
+    at_end = held == [0] or held == [len(masses) - 1]
+    joint = shafts[0 if held[0] == 0 else -1]
+    if not at_end:
+        wrong.append("inertia = inf: one mass may stay at rest, the first or the last of the chain.")
+    elif joint.rigid and joint.gap == 0.0:
+        wrong.append("inertia = inf: a rigid joint without a gap holds its other mass too; leave that out.")
+    if names[held[0]] == load_mass or (motor is not None and names[held[0]] == motor.mass):
+        wrong.append(f"{show(names[held[0]])}: motor and load are on masses that move.")
     return wrong
 
 
@@ -469,6 +503,17 @@ class ChainArrays:
                 value.setflags(write=False)
 
     @property
+    def held(self) -> int | None:
+        """The mass that stays at rest, of infinite inertia."""
+        found = np.flatnonzero(np.isinf(self.J))
+        return int(found[0]) if found.size else None
+
+    @property
+    def moving_J(self) -> Vector:
+        """The inertias of the masses that move, 0 for the one that does not."""
+        return self.J if self.held is None else np.where(np.isinf(self.J), 0.0, self.J)
+
+    @property
     def path(self) -> range:
         """The shafts that lead from the motor to the load; all of them where both are on one mass."""
         low, high = sorted((self.motor, self.load))
@@ -481,8 +526,11 @@ class ChainArrays:
         weighted by compliance: it is then M12avg = (u J2 + J1 Mc)/(J1 + J2) of [G](16) with J1 and J2 by the
         lever rule, where the load torque is on the load mass.
         """
-        whole, load = float(self.J.sum()), float(self.Mc.sum())
-        needed = self.J * (motor_torque - load) / whole + self.Mc
+        J, load = self.moving_J, float(self.Mc.sum())
+        if self.held is None:
+            needed = J * (motor_torque - load) / float(J.sum()) + self.Mc
+        else:  # nothing speeds up: what the loads leave is held
+            needed = self.Mc + np.where(np.isinf(self.J), motor_torque - load, 0.0)
         torques = np.cumsum(needed)[:-1]
         torques[self.motor :] = np.cumsum(needed[::-1])[::-1][1 + self.motor :]
         path = list(self.path)
@@ -554,7 +602,8 @@ def _from_ratios(shafts: tuple[Shaft, ...], J: Vector, c: Vector) -> Vector:
             while last < len(shafts) and welded[last]:
                 last += 1
             before, after = float(J[first : k + 1].sum()), float(J[k + 1 : last + 1].sum())
-            found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * before * after / (before + after))
+            both = before * after / (before + after) if math.isfinite(before + after) else min(before, after)
+            found[k] = 2.0 * shaft.damping_ratio * math.sqrt(c[k] * both)
     return found
 
 

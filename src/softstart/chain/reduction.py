@@ -365,6 +365,7 @@ def reduce_chain(
     ----------
     [R]; the lever rule with its proved error, and the modal reduction: docs/theory/reduction.md.
     """
+    given, chain = chain, chain.freed
     to = _checked(chain, to, up_to, method, factor)
     whole = natural_vibration(chain).Omega[1:]
     if up_to is None:
@@ -408,7 +409,7 @@ def reduce_chain(
         least < factor,
         tuple(steps),
         frequencies,
-        tuple(_notes(chain, reduced)),
+        tuple(_notes(given, reduced)),
     )
 
 
@@ -532,6 +533,10 @@ def _refusals(chain: Chain, steps: list[Step], two: bool, wanted: Vector, factor
 
 def _notes(chain: Chain, reduced: Chain) -> Iterator[str]:
     """What the reduced chain leaves out."""
+    if (held := chain.at_motor_shaft().held) is not None:
+        yield f"{chain.masses[held].name} stays at rest and is left out, with its shaft; the chain has both"
+    if curved := [mass.name for mass in chain.masses if mass.curve is not None]:
+        yield f"the load curves of {', '.join(curved)} are left out of the drive; the chain has them"
     torques = [mass for mass in chain.masses if mass.torque]
     if len({mass.kind for mass in torques}) > 1:
         kinds = ", ".join(f"{mass.name} {mass.kind}" for mass in torques)

@@ -377,17 +377,19 @@ class ChainRun(BaseRun):
         works = np.zeros(1, WORK)
         kernel.work_of(self._replayed(), works)
         motor, exciting, load, ground, shafts, gears = works[0].tolist()
-        kinetic = 0.5 * float(given.masses["J"] @ (run.masses["w"] ** 2 - given.masses["w0"] ** 2))
+        moves = np.isfinite(given.masses["J"])
+        before, after = given.masses[moves], run.masses[moves]
+        kinetic = 0.5 * float(before["J"] @ (after["w"] ** 2 - before["w0"] ** 2))
         rows = run.span_shafts
         final = np.empty((1, rows.shape[1]), rows.dtype)
         for name in rows.dtype.names:
             final[name] = run.shafts[name]
         elastic = _stored(given, final) - _stored(given, rows[:1])
         # flanks may part while the spring is still loaded, and meet again: that energy goes, or comes
-        after = np.concatenate([rows[1:], final])
-        before = rows.copy()
-        before["theta"] = after["theta"]
-        shafts += _stored(given, before) - _stored(given, after)
+        later = np.concatenate([rows[1:], final])
+        earlier = rows.copy()
+        earlier["theta"] = later["theta"]
+        shafts += _stored(given, earlier) - _stored(given, later)
         struck = np.isin(run.events["kind"], [IMPACT, SETTLED])
         impacts = float(run.events["value"][struck].sum())
         residual = motor + exciting - kinetic - elastic - load - ground - shafts - gears - impacts

@@ -185,7 +185,7 @@ def natural_vibration(chain: Chain) -> Vibration:
 
 def _torque_of_joints(chain: Chain, body: Closed, Omega: Vector, shape: Vector, of_body: Vector) -> Vector:
     """The torque in every shaft; one that is rigid carries what the masses of its body before it leave."""
-    J = chain.at_motor_shaft().J
+    J = _all_finite(chain.at_motor_shaft())
     torque = np.empty((Omega.size, J.size - 1))
     for k in range(J.size - 1):
         b = body.body[k]
@@ -233,10 +233,16 @@ def closed(arrays: ChainArrays) -> Closed:
     if shaft.size == 0:
         raise InputError("shaft: every joint of the chain is rigid, so nothing vibrates; give a stiffness.")
     J = np.zeros(shaft.size + 1)
-    np.add.at(J, body, arrays.J)
+    np.add.at(J, body, _all_finite(arrays))
     return Closed(J, arrays.c[shaft], body, shaft)
 
 
+def _all_finite(arrays: ChainArrays) -> Vector:
+    """The inertias; that of a mass at rest is so large that its motion is below rounding."""
+    return np.where(np.isinf(arrays.J), AT_REST * arrays.moving_J.sum(), arrays.J)
+
+
+AT_REST = 1e18  # times the inertia of all others
 Kind = Literal["mass", "pair"]
 
 

@@ -105,7 +105,7 @@ def _stiff(machine: Machine) -> float:
         assert machine.motor is not None
         arrays, Ms = machine.at_motor_shaft(), machine.motor.starting_torque
         left = Ms - float((arrays.Mc / arrays.efficiency_from_motor).sum())
-        return float(arrays.J.sum()) * float(machine.target_speed or 0.0) / max(left, 0.01 * Ms)
+        return float(arrays.moving_J.sum()) * float(machine.target_speed or 0.0) / max(left, 0.01 * Ms)
     drive = machine
     friction, b1, b2 = drive.frictions
     net = max(drive.Ms - drive.Mc - (friction + (b1 + b2) * drive.target_speed), 0.01 * (drive.Ms - drive.Mc))

@@ -47,6 +47,8 @@ class Given:
     load: int = -1
     efficiency: np.ndarray | None = None
     gear: np.ndarray | None = None  # the mass at which the gear of each shaft sits
+    # of some masses points and torques of a load curve, and whether it is by angle, 0 where the load begins
+    curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] = field(default_factory=dict)
 
 
 class ChainOracle:
@@ -56,7 +58,7 @@ class ChainOracle:
         self.g, self.path, self.target, self.rtol = given, path, target, rtol
         self.n = given.J.size
         self.t, self.leaps = 0.0, 0
-        self.y = np.concatenate([given.theta0, given.w0]).astype(float)
+        self.y = np.concatenate([given.theta0, given.w0, [0.0]]).astype(float)  # and the load's angle
         self.side = np.zeros(self.n - 1)
         self.form = ["joined" if gap == 0 else "open" for gap in given.gap]
         self.rigid = np.zeros(self.n - 1, bool) if given.restitution is None else ~np.isnan(given.restitution)
@@ -73,7 +75,8 @@ class ChainOracle:
         rate = max([rate, *(tone[1] for tone in given.tones)])
         self.period = 2 * math.pi / rate if rate > 0 else path.t_end
         twist = max(np.abs(given.gap).max(), np.abs(given.theta0).max(), 1e-6)
-        self.size = np.concatenate([np.full(self.n - 1, twist), np.full(self.n, max(twist * rate, 1e-6))])
+        speed = max(twist * rate, 1e-6)
+        self.size = np.concatenate([np.full(self.n - 1, twist), np.full(self.n, speed), [twist]])
         for k in range(self.n - 1):
             if self.form[k] == "open" and abs(self.y[k]) > 0.5 * given.gap[k]:
                 self.touch(k, math.copysign(1.0, self.y[k]), overlap=True)
@@ -85,7 +88,7 @@ class ChainOracle:
         return self.side * y[: self.n - 1] - 0.5 * self.g.gap
 
     def torques(self, y: np.ndarray) -> np.ndarray:
-        theta, w = y[: self.n - 1], y[self.n - 1 :]
+        theta, w = y[: self.n - 1], y[self.n - 1 : 2 * self.n - 1]
         v = w[:-1] - w[1:]
         T = np.zeros(self.n - 1)
         for k, form in enumerate(self.form):
@@ -99,11 +102,25 @@ class ChainOracle:
     def pushed(self, t: float, y: np.ndarray) -> np.ndarray:
         """The torque on each mass without friction of a reactive load or of gears."""
         T = self.torques(y)
-        q = np.append(0.0, T) - np.append(T, 0.0) - self.g.ground * y[self.n - 1 :] + self.g.mean
+        q = (
+            np.append(0.0, T)
+            - np.append(T, 0.0)
+            - self.g.ground * y[self.n - 1 : 2 * self.n - 1]
+            + self.g.mean
+        )
         q[self.g.motor] += self.path.torque(t, self.span)[0]
         for i, omega, cosine, sine in self.g.tones:
             q[i] += cosine * math.cos(omega * t) + sine * math.sin(omega * t)
+        for i, (points, torques, _) in self.g.curves.items():
+            q[i] -= np.interp(self.along(y, i), points, torques)
         return q - np.where(self.rubs & ~self.g.reactive, self.g.Mc, 0.0)
+
+    def along(self, y: np.ndarray, i: int) -> float:
+        """The speed or the angle of mass i, on which its load curve depends."""
+        if not self.g.curves[i][2]:
+            return float(y[self.n - 1 + i])
+        load = self.g.load % self.n
+        return float(y[-1] + (y[i:load].sum() if i < load else -y[load:i].sum()))
 
     def rubbing(self, y: np.ndarray, i: int, direction: float) -> float:
         """The friction on mass i if it moves in this direction; the load torque where nothing rubs."""
@@ -118,12 +135,12 @@ class ChainOracle:
         return R
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
-        w = y[self.n - 1 :]
+        w = y[self.n - 1 : 2 * self.n - 1]
         a = self.pushed(t, y) / self.g.J
         for i in np.flatnonzero(self.rubs | (self.g.Mc != 0)):
             a[i] -= self.direction[i] * self.rubbing(y, int(i), self.direction[i]) / self.g.J[i]
         a[self.direction == 0] = 0.0
-        return np.concatenate([w[:-1] - w[1:], a])
+        return np.concatenate([w[:-1] - w[1:], a, [w[self.g.load]]])
 
     # ---- events: functions that rise through zero ----
 
@@ -163,6 +180,10 @@ class ChainOracle:
                 add("back", i, lambda t, y, i=i: -self.pushed(t, y)[i] - self.rubbing(y, i, -1.0))
             elif self.rubs[i]:
                 add("stop", i, lambda t, y, i=i, s=self.direction[i]: -s * y[n - 1 + i])
+        for i, (points, _, _) in g.curves.items():  # where the curve bends the integration starts again
+            for point in points:
+                add("bend", i, lambda t, y, i=i, x=point: self.along(y, i) - x)
+                add("bend", i, lambda t, y, i=i, x=point: x - self.along(y, i))
         if self.target < math.inf:
             load = g.load % n
             add("target", load, lambda t, y: y[n - 1 + load] - self.target)
@@ -224,6 +245,8 @@ class ChainOracle:
         elif name in ("forward", "back"):
             self.direction[k] = 1.0 if name == "forward" else -1.0
             self.events.append((self.t, "load-starts" if self.g.reactive[k] else "gear-lets-go", k))
+        elif name == "bend":
+            return
         elif name == "turn":
             self.sign[k] = -self.sign[k]
         else:
@@ -240,7 +263,11 @@ class ChainOracle:
                 self.leaps += 1
                 if len(self.events) > EVENT_CAP or self.leaps > 4 * EVENT_CAP:
                     raise RuntimeError("too many events")
-        self.theta, self.w, self.T = self.y[: self.n - 1], self.y[self.n - 1 :], self.torques(self.y)
+        self.theta, self.w, self.T = (
+            self.y[: self.n - 1],
+            self.y[self.n - 1 : 2 * self.n - 1],
+            self.torques(self.y),
+        )
         return self
 
     def note(self, y: np.ndarray) -> None:
@@ -254,7 +281,8 @@ class ChainOracle:
         self.note(self.y)
         before = np.array([f(self.t, self.y) for _, _, f in functions])
         sizes = np.array([self.magnitude(name, place) for name, place, _ in functions])
-        over = [i for i in range(len(functions)) if before[i] > 1e-11 * sizes[i]]
+        bends = np.array([name == "bend" for name, _, _ in functions], bool)  # begin positive without harm
+        over = [i for i in range(len(functions)) if before[i] > 1e-11 * sizes[i] and not bends[i]]
         if over:  # as friction overcome by a torque that has jumped
             self.apply(*functions[over[0]][:2])
             return
@@ -279,7 +307,7 @@ class ChainOracle:
             )
             values = values.reshape(len(functions), times.size)
             if fractions is FIRST_STEP:
-                at_once = np.flatnonzero(waiting & np.all(values >= 0, axis=1) & (values[:, -1] > 0))
+                at_once = np.flatnonzero(waiting & ~bends & np.all(values >= 0, axis=1) & (values[:, -1] > 0))
                 if at_once.size:
                     self.apply(*functions[int(at_once[0])][:2])
                     return
@@ -310,15 +338,17 @@ class ChainOracle:
         """What is not zero among the numbers of which an event function is made."""
         if name in ("upper", "lower", "leave", "pass"):
             return float(self.g.gap[place]) * (self.g.c[place] if name in ("leave", "pass") else 1.0)
+        if name == "bend":
+            return float(self.size[-1] if self.g.curves[place][2] else self.size[self.n])
         if name in ("stop", "target"):
-            return float(np.abs(self.y[self.n - 1 :]).max()) + 1e-300
+            return float(np.abs(self.y[self.n - 1 : 2 * self.n - 1]).max()) + 1e-300
         if name in ("forward", "back"):
             return float(self.g.Mc[place]) + float(
                 np.abs(self.torques(self.y))[max(place - 1, 0) : place + 1].sum()
             )
         spring = float(self.g.c[place] * (abs(self.y[place]) + self.g.gap[place]))
         if name == "turn":  # its twist is near 0
-            damper = float(self.g.d[place] * np.abs(self.y[self.n - 1 :]).max())
+            damper = float(self.g.d[place] * np.abs(self.y[self.n - 1 : 2 * self.n - 1]).max())
             return float(np.abs(self.peaks).max()) + damper + 1e-300
         return spring
 

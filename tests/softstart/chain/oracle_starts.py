@@ -82,23 +82,32 @@ def with_losses(rng: np.random.Generator, drawn: dict[str, Any]) -> dict[str, An
     return drawn | {"efficiency": efficiency, "gear": np.arange(count) + rng.integers(0, 2, count)}
 
 
+def of_curve(curve: tuple[np.ndarray, np.ndarray, bool] | None) -> dict[str, Any]:
+    """Keywords of a `Mass` for its load curve."""
+    if curve is None:
+        return {}
+    points, torques, by_angle = curve
+    return {"curve_angle" if by_angle else "curve_speed": list(points), "curve_torque": list(torques)}
+
+
 def both(
     J: np.ndarray, c: np.ndarray, d: np.ndarray, gap: np.ndarray, law: list[str], restitution: np.ndarray,
     theta0: np.ndarray, w0: np.ndarray, Mc: np.ndarray, reactive: np.ndarray, ground: np.ndarray,
     tones: list[tuple[int, float, float, float]], pieces: list[tuple[float, float]], lag: float, rate: float,
     motor: int, t_end: float, target: float, rtol: float = 1e-12, efficiency: np.ndarray | None = None,
-    gear: np.ndarray | None = None, check: bool = True,
+    gear: np.ndarray | None = None, check: bool = True, u0: float = 0.0,
+    curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] | None = None, load: int = -1,
 ) -> tuple[ChainRun, ChainOracle]:  # fmt: skip
     """The same start by the kernel and, to `check` it, by the oracle."""
     reactive = reactive & (Mc > 0)
-    target = max(target, float(w0[-1]) + 1e-2)
+    target = max(target, float(w0[load]) + 1e-2)
     eta = np.ones(c.size) if efficiency is None else efficiency
     after = np.zeros(c.size, bool) if gear is None else gear == np.arange(c.size)
     largest = max(*(abs(u) for _, u in pieces), 1.0)
     chain = Chain(
         [
             Mass(float(J[i]), torque=float(Mc[i]), kind="reactive" if reactive[i] else "active",
-                 damping=float(ground[i]), initial_speed=float(w0[i]))
+                 damping=float(ground[i]), initial_speed=float(w0[i]), **of_curve((curves or {}).get(i)))
             for i in range(J.size)
         ],
         [
@@ -109,8 +118,9 @@ def both(
                        side="after" if after[k] else "before")
             for k in range(c.size)
         ],
-        Motor(largest, mass=f"mass {motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate),
-        target_speed=target,
+        Motor(largest, mass=f"mass {motor + 1}", minimum_torque=-largest, torque_lag=lag, torque_rate=rate,
+              initial_torque=u0),
+        target_speed=target, load_mass=f"mass {load % J.size + 1}",
     )  # fmt: skip
     excitation: dict[str | int, PeriodicTorque] = {
         i: PeriodicTorque(0.0, [1.0], [cosine], [sine], speed=omega)  # type: ignore[arg-type]
@@ -133,10 +143,12 @@ def both(
         tones,
         restitution,
         motor,
+        load,
         efficiency=eta,
         gear=gear,
+        curves=curves or {},
     )
-    path = TorquePath(list(pieces), lag, rate, 0.0, t_end)
+    path = TorquePath(list(pieces), lag, rate, u0, t_end)
     oracle = ChainOracle(given, path, target, rtol)
     return run, oracle.go() if check else oracle
 

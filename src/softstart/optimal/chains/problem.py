@@ -108,6 +108,12 @@ class ChainProblem(Problem):
                     f"[shaft] {k + 1} is rigid: its torque in an impact is infinite, and no start has a "
                     "least peak; give it a stiffness."
                 )
+        if arrays.held is not None and self.terminal != "reached":
+            yield f"terminal = {self.terminal}: a mass of the chain stays at rest; ask for reached."
+        if any(mass.curve_angle is not None for mass in chain.masses):
+            yield "curve_angle: an optimum is not found where load torques depend on angles; give speeds."
+        if self.terminal == "steady" and any(mass.curve is not None for mass in chain.masses):
+            yield "terminal = steady: load curves leave no steady torque; ask for reached or synchronous."
         if (arrays.Mc < 0.0).any():
             yield "torque: a load torque below 0 drives instead of braking; an optimum needs 0 or more."
 
@@ -183,6 +189,8 @@ def momentum_bound(problem: ChainProblem) -> LowerBound:
     )
     if load == arrays.motor or (arrays.efficiency != 1.0).any():
         return LowerBound(0.0, "none", "no bound is known where the motor or a gear with losses adds to T")
+    if problem.drive.masses[load].curve is not None:
+        return LowerBound(0.0, "none", "no bound is known where the load torque follows a curve")
     if left <= 0.0:
         return LowerBound(math.inf, "momentum", covers)
     gained, taken = J * (problem.target - w0), Mc
@@ -202,6 +210,7 @@ def earliest_pull(problem: ChainProblem) -> float:
     open_gaps = np.abs(arrays.theta0) <= 0.5 * arrays.gap
     others = np.delete(arrays.Mc, last)
     quiet = not arrays.w0.any() and not others.any() and bool(open_gaps.all())
+    quiet = quiet and arrays.held is None and all(mass.curve is None for mass in problem.drive.masses)
     if not alone or not quiet or (arrays.efficiency != 1.0).any():
         return 0.0
     U = max(problem.highest_torque, -problem.lowest_torque)

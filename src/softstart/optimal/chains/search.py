@@ -77,6 +77,7 @@ class Search:
         self.step = min(2.0 * math.pi / math.sqrt(float(stiff.max())) / INSTANTS, float(self.knots[1]))
         self.low, self.high = problem.lowest_torque, problem.highest_torque
         self.rate = float(p.rate)
+        self.initial = float(player.given.masses["motor_torque0"].sum())
         self.load = problem.drive.load_index
         self.penalty = PENALTY
 
@@ -98,7 +99,7 @@ class Search:
         u = np.clip(torques, self.low, self.high)
         if math.isfinite(self.rate):
             most = self.rate * np.diff(self.knots)
-            u[0] = 0.0
+            u[0] = self.initial
             for i, rise in enumerate(most):
                 u[i + 1] = np.clip(u[i + 1], u[i] - rise, u[i] + rise)
         return u
