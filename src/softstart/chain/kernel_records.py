@@ -295,7 +295,8 @@ def _motor(chain: Chain, arrays: ChainArrays, time_limit: float | None, max_even
     period = elastic_period(chain)
     p.period = period
     p.event_cap = max_events
-    p.longest = math.inf
+    # no span is longer: in free flight it would reach to the time limit, and rounding depended on that
+    p.longest = period if period > 0.0 else math.inf
     p.rate = math.inf
     p.target = math.inf if chain.target_speed is None else chain.target_speed
     p.time_limit = math.inf if time_limit is None else time_limit

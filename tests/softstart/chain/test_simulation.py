@@ -63,6 +63,13 @@ def test_two_masses_are_the_two_mass_plant(kind, controller):
     assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
 
 
+def test_no_bit_depends_on_the_time_limit():
+    """Undamped, the crane rattles and all its masses fly at times: a span lasts an elastic period at most."""
+    starts = [simulate_chain("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
+    assert len({start.k_dyn for start in starts}) == 1
+    assert len({start.start_time for start in starts}) == 1
+
+
 def test_the_shaft_torque_the_load_speed_and_the_stage_are_seen():
     class Seeing(PlainController):
         name = "seeing"
