@@ -207,6 +207,7 @@ class Search:
                 np.vstack([1e4 * rows[:, free], 1e-6 * np.eye(int(free.sum())) / self.high]),
                 np.concatenate([1e4 * missing, np.zeros(int(free.sum()))]),
                 bounds=(np.minimum(low[free], -1e-12), np.maximum(high[free], 1e-12)),
+                method="bvls",  # an interior method pushes torques off their limits before it begins
             )
             change = np.zeros(found.torques.size)
             change[free] = room.x
