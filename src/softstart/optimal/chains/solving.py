@@ -76,7 +76,7 @@ def optimize_chain(
     for k, (name, found) in enumerate(first):
         if time_limit <= 0.0 and k > 0 and name != SIMILAR:
             continue
-        if tasted and time.perf_counter() > until:
+        if len(tasted) >= FINISHED and time.perf_counter() > until:
             break
         down = search.descended(found.torques, TASTE, least)
         tasted.append((name, found if down is None else down))
