@@ -20,7 +20,7 @@ from softstart.arrays import Vector
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.elements import MOST_POINTS
 from softstart.chain.model import Chain, ChainArrays
-from softstart.chain.vibration import natural_vibration
+from softstart.chain.vibration import closed, elastic_frequencies
 from softstart.errors import InputError
 from softstart.plant import layout
 from softstart.plant.vector import COUNTS_PER_LINE, LAWS
@@ -216,9 +216,11 @@ def elastic_period(chain: Chain) -> float:
     >>> round(elastic_period(Chain.load("crane-4-mass")), 4)
     0.0548
     """
-    if chain.at_motor_shaft().rigid.all():
+    arrays = chain.at_motor_shaft()
+    if arrays.rigid.all():
         return 0.0
-    return 2.0 * math.pi / float(natural_vibration(chain).Omega[1])
+    body = closed(arrays)
+    return 2.0 * math.pi / float(elastic_frequencies(body.J, body.c)[0])
 
 
 def numbers(
