@@ -6,7 +6,14 @@ import pytest
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.study import Verdict
 from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
-from softstart_studies.benchmarks.chains.study import BenchmarkChains, Case, cases, long_chain
+from softstart_studies.benchmarks.chains.study import (
+    BatchCase,
+    BenchmarkChains,
+    Case,
+    batch_cases,
+    cases,
+    long_chain,
+)
 
 SHORT = Chain(
     [Mass(0.03), Mass(0.01), Mass(0.1, torque=5.0)],
@@ -34,10 +41,17 @@ def test_the_torque_is_held_between_samples():
 
 
 def test_the_study_measures_and_judges():
-    result = BenchmarkChains((Case(SHORT),), passes=1).run(None, lambda text: None)
+    batches = (BatchCase(side=2), BatchCase(damped=True, feedback="take-up", side=2))
+    result = BenchmarkChains((Case(SHORT),), 1, batches).run(None, lambda text: None)
     row = result.tables[0].rows[0]
     assert row[1:4] == (3, 2, "direct")
     assert row[9] < 1e-7
     assert result.claims[1].verdict is Verdict.CONFIRMED
+    alone, fed_back = result.tables[1].rows
+    assert alone[1:3] == ("direct", 4)
+    assert alone[8] < 0.02  # LSODA at 1e-8; 70 undamped contacts let its errors grow
+    assert fed_back[1:4] == ("take-up", 4, "")
+    assert all(float(row[4]) > 0.0 and float(row[6]) > 0.0 for row in (alone, fed_back))
+    assert [case.goal for case in batch_cases()] == [2000.0, 300.0, 2000.0, 300.0]
     assert [case.strategy for case in cases()] == ["direct", "ramp, 1 kHz", "direct"]
     assert float(long_chain().at_motor_shaft().gap.sum()) == pytest.approx(0.35)

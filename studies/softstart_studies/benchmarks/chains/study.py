@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import ClassVar, NamedTuple
@@ -12,10 +13,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chains
+from softstart.chain.batch import prepared
 from softstart.chain.kernel_records import elastic_period
 from softstart.chain.run import ChainRun
-from softstart.chain.simulation import simulate_chain
+from softstart.chain.simulation import drive_of, simulate_chain
+from softstart.controller import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
@@ -23,7 +26,7 @@ from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
 from softstart_studies.benchmarks.contenders import condition_table
 from softstart_studies.benchmarks.contest import rounded
 
-__all__ = ["BenchmarkChains", "Case", "cases"]
+__all__ = ["BatchCase", "BenchmarkChains", "Case", "batch_cases", "cases"]
 
 PASSES = 5
 WANTED = 30.0
@@ -31,6 +34,13 @@ TIGHT = 1e-12  # the tolerance at which LSODA shows who is right
 COLUMNS = (
     "chain", "masses", "gaps", "strategy", "contacts", "lsoda, ms", "softstart, ms", "ratio",
     "peak diff.", "peak diff. at 1e-12",
+)  # fmt: skip
+SIDE = 15  # of the batch: so many gaps times so many inertias of the load
+PEER_STARTS = 3
+AT_ONCE, SAMPLED = 2000.0, 300.0  # starts/s that were asked for: constant torque, and a controller at 1 kHz
+BATCH_COLUMNS = (
+    "chain", "strategy", "starts", "lsoda, starts/s", "softstart, starts/s", "goal", "with preparation",
+    "ratio", "peak diff.",
 )  # fmt: skip
 
 
@@ -46,14 +56,9 @@ class Case:
         """In a word."""
         return "ramp, 1 kHz" if self.ramp > 0.0 else "direct"
 
-    def problem(self) -> Problem:
-        """For LSODA."""
-        motor = self.chain.motor
-        assert motor is not None
-        return Problem(self.chain, motor.starting_torque, elastic_period(self.chain), self.ramp)
-
-    def ours(self) -> ChainRun:
-        """By softstart, with everything that a run notes."""
+    @property
+    def controller(self) -> Controller:
+        """What starts the chain."""
         motor = self.chain.motor
         assert motor is not None
         parameters: dict[str, object] = {"torque": motor.starting_torque}
@@ -66,7 +71,45 @@ class Case:
                 "time": self.ramp,
                 "period": 1e-3,
             }
-        return simulate_chain(self.chain, make_controller(name, parameters), fitted_to=ANY_DRIVE)
+        return make_controller(name, parameters)
+
+    def problem(self) -> Problem:
+        """For LSODA."""
+        motor = self.chain.motor
+        assert motor is not None
+        return Problem(self.chain, motor.starting_torque, elastic_period(self.chain), self.ramp)
+
+    def ours(self) -> ChainRun:
+        """By softstart, with everything that a run notes."""
+        return simulate_chain(self.chain, self.controller, fitted_to=ANY_DRIVE)
+
+
+@dataclass(frozen=True)
+class BatchCase:
+    """Chains that differ in gaps and in the inertia of the load, started in one compiled call.
+
+    `damped` chains have a damping ratio of 2 % in each shaft; LSODA, which here knows no damping, starts the
+    others one by one. `feedback` names a controller instead of direct and ramp.
+    """
+
+    ramp: float = 0.0
+    damped: bool = False
+    feedback: str = ""
+    side: int = SIDE
+
+    @property
+    def goal(self) -> float:
+        """Starts/s on one core that were asked for."""
+        return SAMPLED if self.ramp > 0.0 or self.feedback else AT_ONCE
+
+    def chains(self) -> list[Chain]:
+        """What is started."""
+        chain = Chain.load("crane-4-mass")
+        if self.damped:
+            shafts = tuple(shaft.replace(damping_ratio=0.02) for shaft in chain.shafts)
+            chain = replace(chain, shafts=shafts, name=f"{chain.name}, 2 % damping")
+        shares = np.linspace(0.9, 1.1, self.side).tolist()
+        return [chain.changed(gaps=gap, load_inertia=inertia) for gap in shares for inertia in shares]
 
 
 class Measured(NamedTuple):
@@ -84,6 +127,7 @@ class Measured(NamedTuple):
         return self.lsoda / self.softstart
 
 
+ANY_CHAIN = Chain.load("crane-4-mass")
 ANY_DRIVE = Drive.load("crane-4amtkf")  # direct and ramp are told everything; nothing is derived from it
 
 
@@ -101,8 +145,20 @@ def cases() -> tuple[Case, ...]:
     return Case(crane), Case(crane, ramp=0.5), Case(long_chain())
 
 
+def batch_cases() -> tuple[BatchCase, ...]:
+    """What is measured in batches."""
+    return (
+        BatchCase(),
+        BatchCase(ramp=0.5),
+        BatchCase(damped=True),
+        BatchCase(damped=True, feedback="take-up"),
+    )
+
+
 class BenchmarkChains(Study):
     """Starts of chains with several gaps: one `simulate_chain` call against LSODA with located events.
+
+    Then batches of chains in one compiled call on one core, with the starts/s that were asked for.
 
     In turns, in one process and thread; times are of the processor. The differences of the peaks say how good
     the answer of LSODA is: they shrink with its tolerance.
@@ -114,8 +170,13 @@ class BenchmarkChains(Study):
     name: ClassVar[str] = "benchmark-chains"
     title: ClassVar[str] = "Whole chains beside scipy's LSODA, as ratios of one run"
 
-    def __init__(self, chosen: Sequence[Case] | None = None, passes: int = PASSES) -> None:
-        self.chosen, self.passes = chosen, passes
+    def __init__(
+        self,
+        chosen: Sequence[Case] | None = None,
+        passes: int = PASSES,
+        batches: Sequence[BatchCase] | None = None,
+    ) -> None:
+        self.chosen, self.passes, self.batches = chosen, passes, batches
 
     def run(self, out: Path | None, progress: Progress) -> StudyResult:
         """All cases, about half a minute; nothing is written to `out`."""
@@ -133,7 +194,12 @@ class BenchmarkChains(Study):
                     float(f"{one.difference:.1e}"), float(f"{one.tight:.1e}"),
                 )
             )  # fmt: skip
+        several = []
+        for batch in batch_cases() if self.batches is None else self.batches:
+            progress(f"a batch, {batch.feedback or Case(ANY_CHAIN, batch.ramp).strategy}")
+            several.append(measured_batch(batch, self.passes))
         least = min(one.ratio for one in found)
+        slowest = min(float(row[4]) / float(row[5]) for row in several)
         closer = max(one.tight for one in found)
         conditions: list[tuple[str, object]] = [
             (
@@ -146,6 +212,7 @@ class BenchmarkChains(Study):
         return StudyResult(
             tables=(
                 Table("One start of a chain, processor time", COLUMNS, rows),
+                Table("Batches of chains: starts/s of processor time on one core", BATCH_COLUMNS, several),
                 condition_table(conditions, ("numpy", "scipy", "numba")),
             ),
             claims=(
@@ -158,6 +225,12 @@ class BenchmarkChains(Study):
                     "At its tightest tolerance LSODA comes to softstart's peaks.",
                     Verdict.CONFIRMED if closer < 1e-6 else Verdict.REFUTED,
                     f"Largest difference: {closer:.1e} of the peak.",
+                ),
+                Claim(
+                    f"A batch makes {AT_ONCE:,.0f} starts/s a core under constant torque, {SAMPLED:.0f} with "
+                    "a controller at 1 kHz.",
+                    Verdict.CONFIRMED if slowest >= 1.0 else Verdict.REFUTED,
+                    f"Least share of that: {slowest:.2f}.",
                 ),
             ),
         )
@@ -184,3 +257,35 @@ def measured(case: Case, passes: int) -> Measured:
         for other in (theirs, tight)
     )
     return Measured(median(of_lsoda), median(of_ours), contacts, apart, apart_tight)
+
+
+def measured_batch(case: BatchCase, passes: int) -> tuple[object, ...]:
+    """A row: the best of several compiled calls, and of one call that prepares its chains too."""
+    chains = case.chains()
+    nominal = Case(chains[len(chains) // 2], case.ramp)
+    controller = make_controller(case.feedback) if case.feedback else nominal.controller
+    batch, told = prepared(chains), drive_of(nominal.chain)
+    which, means = np.arange(len(chains)), np.array([chain.mean_torque for chain in chains])
+    batch.figures(which[:1], controller, told, means[:1])
+    ours, theirs = [], []
+    for _ in range(passes):
+        begin = time.process_time()
+        found = batch.figures(which, controller, told, means)
+        ours.append(len(chains) / (time.process_time() - begin))
+    fresh = case.chains()
+    begin = time.process_time()
+    simulate_chains(fresh, controller, fitted_to=told, workers=1)
+    prepared_too = len(chains) / (time.process_time() - begin)
+    apart: list[float] = []
+    for i, chain in enumerate([] if case.damped else chains[:PEER_STARTS]):
+        begin = time.process_time()
+        other = lsoda_start(Case(chain, case.ramp).problem())
+        theirs.append(1.0 / (time.process_time() - begin))
+        peaks = np.array([found[f"peak_torque_{k + 1}"][0][i] for k in range(len(chain.shafts))])
+        apart.append(float(np.max(np.abs(other.peaks / peaks - 1.0))))
+    rate, peer = max(ours), median(theirs) if theirs else math.nan
+    return (
+        nominal.chain.name, case.feedback or nominal.strategy, len(chains),
+        "" if case.damped else rounded(peer), rounded(rate), case.goal, rounded(prepared_too),
+        "" if case.damped else rounded(rate / peer), "" if case.damped else float(f"{max(apart):.1e}"),
+    )  # fmt: skip
