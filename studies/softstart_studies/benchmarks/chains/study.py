@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -199,7 +199,7 @@ class BenchmarkChains(Study):
             progress(f"a batch, {batch.feedback or Case(ANY_CHAIN, batch.ramp).strategy}")
             several.append(measured_batch(batch, self.passes))
         least = min(one.ratio for one in found)
-        slowest = min(float(row[4]) / float(row[5]) for row in several)
+        slowest = min(row[4] / row[5] for row in several)
         closer = max(one.tight for one in found)
         conditions: list[tuple[str, object]] = [
             (
@@ -259,7 +259,7 @@ def measured(case: Case, passes: int) -> Measured:
     return Measured(median(of_lsoda), median(of_ours), contacts, apart, apart_tight)
 
 
-def measured_batch(case: BatchCase, passes: int) -> tuple[object, ...]:
+def measured_batch(case: BatchCase, passes: int) -> tuple[Any, ...]:
     """A row: the best of several compiled calls, and of one call that prepares its chains too."""
     chains = case.chains()
     nominal = Case(chains[len(chains) // 2], case.ramp)
@@ -273,6 +273,7 @@ def measured_batch(case: BatchCase, passes: int) -> tuple[object, ...]:
         found = batch.figures(which, controller, told, means)
         ours.append(len(chains) / (time.process_time() - begin))
     fresh = case.chains()
+    simulate_chains(case.chains()[:1], controller, fitted_to=told, workers=1)
     begin = time.process_time()
     simulate_chains(fresh, controller, fitted_to=told, workers=1)
     prepared_too = len(chains) / (time.process_time() - begin)
