@@ -84,6 +84,9 @@ class Backbone:
         return figure
 
 
+HELD = "inertia = inf: vibrations with gaps are those of masses that all move; leave ground out."
+
+
 def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60) -> Backbone:
     """The free vibration of the chain with its gaps, released from rest with the shaft torques of a mode.
 
@@ -105,6 +108,8 @@ def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60
     arrays = chain.at_motor_shaft()
     if arrays.rigid.any():
         raise InputError("chain: a free vibration with gaps needs a spring in every shaft; one is rigid.")
+    if arrays.held is not None:
+        raise InputError(HELD)
     share = vibration.torque[mode] / np.abs(vibration.torque[mode]).max()
     Omega = float(vibration.Omega[mode])
     found = [_main_line(chain, size * share, vibration.shape[mode], Omega, periods, mode) for size in torques]
@@ -256,6 +261,8 @@ def _wrong(arrays: ChainArrays, speeds: Vector, locking: float, settle: float | 
         wrong.append(f"settle = {settle}: give the time in s after which the vibration is measured.")
     if arrays.rigid.any():
         wrong.append("chain: a forced vibration with gaps needs a spring in every shaft; one is rigid.")
+    if arrays.held is not None:
+        wrong.append(HELD)
     if not (arrays.d.any() or arrays.d_ground.any()):
         wrong.append("chain: without damping nothing settles; give a shaft or a mass some.")
     return wrong

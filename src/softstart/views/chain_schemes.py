@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
 
+import numpy as np
+
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import Vibration, natural_vibration
 from softstart.language import later, said
@@ -40,7 +42,8 @@ def scheme_svg(chain: Chain) -> str:
     """
     arrays = chain.at_motor_shaft()
     vibration = natural_vibration(chain)
-    tall = _TALLEST * (arrays.J / arrays.J.max()) ** 0.25
+    tall = _TALLEST * (arrays.moving_J / arrays.moving_J.max()) ** 0.25
+    tall[np.isinf(arrays.J)] = _TALLEST  # ground
     parts: list[str] = []
     x = 70.0
     middles = []

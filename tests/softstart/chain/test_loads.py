@@ -13,9 +13,14 @@ from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import both, differences, random_chain
 
 from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_chains
+from softstart.chain.reduction import reduce_chain
 from softstart.chain.simulation import drive_of
 from softstart.chain.vibration import natural_vibration
+from softstart.chain.vibration_with_gaps import chain_backbone
 from softstart.errors import InputError
+from softstart.linear.view import linear_view
+from softstart.optimal.chains.problem import ChainProblem, momentum_bound
+from softstart.views.chain_schemes import scheme_svg
 
 SEEDS = settings(
     max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
@@ -177,6 +182,23 @@ def test_a_file_with_all_of_them():
     assert batch.peak_torques[0].values.tolist() == batch.peak_torques[2].values.tolist()
     assert batch.peak_torques[0].values.tolist() == run.peak_torques.tolist()
     assert drive_of(chain).load_inertia == pytest.approx(0.2)
+
+
+def test_ground_is_drawn_and_the_rest_is_said():
+    """The scheme draws it; what has no place for it, or for load curves, says so."""
+    chain = Chain.from_toml(FILE)
+    assert "nan" not in scheme_svg(chain)
+    notes = " ".join(reduce_chain(chain, 2, method="modal", force=True).notes)
+    assert "stays at rest" in notes
+    assert "load curves of mass 2" in notes
+    with pytest.raises(InputError, match="leave ground out"):
+        chain_backbone(chain, 10.0)
+    with pytest.raises(InputError, match="linear view"):
+        linear_view(chain, "direct")
+    problem = ChainProblem(chain, 1.0)
+    assert momentum_bound(problem).k_dyn == 0.0
+    with pytest.raises(InputError, match="leave no steady torque"):
+        ChainProblem(chain, 1.0, "steady")
 
 
 def test_what_is_refused():
