@@ -466,7 +466,8 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     written = stripped[match.end() :].strip()
     if "," in written:
         raise RefusedError(_doubtful_comma(stripped, unit))
-    number = _checked(float(match.group()), unit, infinite)
+    named = infinite and "inf" in match.group().lower()  # infinity is written, not a number with many digits
+    number = _checked(float(match.group()), unit, named)
     if not written:
         return number
     factor = _factor(written, match.group(), unit)
@@ -475,7 +476,7 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     scaled = number / divisor if divisor and abs(divisor * factor - 1.0) < 1e-14 else number * factor
     if scaled == 0.0 != number:
         raise RefusedError(f"the number is too small; {_remedy(unit)}")
-    return _checked(scaled, unit, infinite)
+    return _checked(scaled, unit, named)
 
 
 def _doubtful_comma(text: str, unit: str) -> str:

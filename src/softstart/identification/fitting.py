@@ -168,7 +168,7 @@ class Space:
 def position_of(x: float) -> float:
     """The position in the gap, 1 at the driving flank, where the root of the share before that flank is x.
 
-    >>> position_of(0.0), position_of(root_of(-0.6))
+    >>> position_of(0.0), round(position_of(root_of(-0.6)), 12)
     (1.0, -0.6)
     """
     return 1.0 - 2.0 * x * x
