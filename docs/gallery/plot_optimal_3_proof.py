@@ -1,5 +1,5 @@
 """From the statement to the proof, on one drive
-============================================
+=============================================
 
 How does a computed optimum become a proved one? The walk goes from the statement through the best torque to
 the multipliers that show that no other torque is gentler. All symbols are those of :doc:`/theory/optimum`.
