@@ -423,7 +423,8 @@ def next_event(start: Start, h: float, n: int) -> tuple[int, int, float]:
                 if event == UNSOLVED:
                     return event, i, 0.0
                 found, where, end = event, i, s
-        if masses[i].points > 0:
+    if masses[0].curves != 0:
+        for i in range(masses.size):
             event, s = next_point(start, i, h, n, end)
             if event != NO_EVENT:
                 if event == UNSOLVED:

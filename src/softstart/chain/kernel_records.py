@@ -46,18 +46,8 @@ MASS = record_type(
         ("mean", float),  # constant part of the exciting torques
         ("w0", float),
         ("motor_torque0", float),  # at t = 0, of the motor that acts on it
-        # its load curve, linear between `points` rising speeds or angles and constant beyond them
-        ("points", int),
-        ("by_angle", int),
-        ("at", float, MOST_POINTS),
-        ("torque_at", float, MOST_POINTS),
         # state
         ("w", float),
-        ("angle", float),  # where the load curve is by angle
-        ("piece", int),  # of the load curve: how many of its points lie before
-        ("offset", float),  # the curve is offset + slope * (speed or angle) there
-        ("slope", float),
-        ("passed", int),  # +1 or -1: a point has just been passed upwards or downwards
         ("direction", float),  # 0 stuck, else the sign of the speed that friction opposes; 1 without friction
         # of the body, the masses that move as one: its first mass, and in the record of that mass the rest
         ("first", int),
@@ -71,9 +61,21 @@ MASS = record_type(
         ("used", float),  # share of what can hold it that holds it as a span begins, signed
         # Taylor coefficients over the span, whose length is 1
         ("speed", float, ORDERS),
-        ("turned", float, ORDERS),  # its angle, where the load curve is by angle
         ("outside", float, ORDERS),  # torques from outside
         ("held", float, ORDERS),  # what holds a stuck body
+        # load curves, apart from what every span reads: how many masses have one, in the first record;
+        # linear between `points` rising speeds or angles, constant beyond them
+        ("curves", int),
+        ("points", int),
+        ("by_angle", int),
+        ("at", float, MOST_POINTS),
+        ("torque_at", float, MOST_POINTS),
+        ("piece", int),  # how many of the points lie before
+        ("offset", float),  # the curve is offset + slope * (speed or angle) there
+        ("slope", float),
+        ("passed", int),  # +1 or -1: a point has just been passed upwards or downwards
+        ("angle", float),
+        ("turned", float, ORDERS),
     ]
 )
 
@@ -242,8 +244,10 @@ def numbers(
     geared = (masses["rubs"] != 0) & ~reactive
     masses["active"][geared], masses["Mc"][geared] = arrays.Mc[geared], 0.0
     masses["w0"] = arrays.w0
-    for mass, given, i in zip(masses, chain.masses, arrays.speed_ratio, strict=True):
+    for place, (given, i) in enumerate(zip(chain.masses, arrays.speed_ratio.tolist(), strict=True)):
         if given.curve is not None:
+            mass = masses[place]
+            masses["curves"][0] += 1
             at, torques, by_angle = given.curve
             mass["points"], mass["by_angle"] = len(at), by_angle
             mass["at"][: len(at)], mass["torque_at"][: len(at)] = np.array(at) / i, np.array(torques) * i

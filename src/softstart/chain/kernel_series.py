@@ -165,6 +165,7 @@ def fastest_rate(start: Start) -> float:
     dampers = 0.0
     ground = 0.0
     held = 0.0
+    curved = masses[0].curves != 0
     before_c = 0.0
     before_d = 0.0
     before_row = 0.0
@@ -179,14 +180,15 @@ def fastest_rate(start: Start) -> float:
             j = i
             while j < masses.size and masses[j].first == i:
                 to_ground += masses[j].ground
-                if masses[j].points > 0:
+                if curved:
                     if masses[j].by_angle != 0:
                         curve += abs(masses[j].slope)
                     else:
                         to_ground += abs(masses[j].slope)
                 j += 1
             ground = max(ground, to_ground * shared)
-            held = max(held, curve * shared)
+            if curved:
+                held = max(held, curve * shared)
         if i + 1 == masses.size or masses[i + 1].first != i + 1:
             continue
         shaft = shafts[i]
@@ -294,6 +296,8 @@ def expand_torques(start: Start, h: float, n: int) -> None:
 def curve_torque(mass: Record, o: int, share: float) -> float:
     """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
     if mass.by_angle != 0:
+        if o == 0:
+            mass.turned[0] = mass.angle
         torque = mass.slope * mass.turned[o]
         mass.turned[o + 1] = share * mass.speed[o]
     else:
@@ -305,8 +309,8 @@ def curve_torque(mass: Record, o: int, share: float) -> float:
 
 @inlined
 def each_alone(masses: Record, shafts: Record) -> bool:
-    """Whether no masses move as one and no gear has losses."""
-    alone = True
+    """Whether no masses move as one, no gear has losses, and no load follows a curve."""
+    alone = masses[0].curves == 0
     for i in range(1, masses.size):
         if masses[i].first != i or shafts[i - 1].eta != 1.0:
             alone = False
@@ -315,7 +319,7 @@ def each_alone(masses: Record, shafts: Record) -> bool:
 
 @inlined
 def expand_alone(start: Start, h: float, n: int) -> None:
-    """As `expand` where each mass moves alone: the same operations, without those for bodies and gears."""
+    """As `expand` where each mass moves alone: the same operations without bodies, gears and load curves."""
     masses, shafts, u = start.masses, start.shafts, start.u
     count = masses.size
     motor = start.place.motor
@@ -330,8 +334,6 @@ def expand_alone(start: Start, h: float, n: int) -> None:
                 q += u[o]
             if mass.ground != 0.0:
                 q -= mass.ground * w
-            if mass.points > 0:
-                q -= curve_torque(mass, o, share)
             if o == 0:
                 q -= mass.direction * mass.Mc + mass.active
             mass.outside[o] = q
@@ -378,8 +380,6 @@ def expand(start: Start, h: float, n: int) -> None:
     start.phi[0] = x.phi2
     for mass in masses:
         mass.speed[0] = mass.w
-        if mass.by_angle != 0:
-            mass.turned[0] = mass.angle
     for shaft in shafts:
         shaft.twist[0] = shaft.theta
     if each_alone(masses, shafts):

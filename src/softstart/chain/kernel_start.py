@@ -120,8 +120,9 @@ def record(start: Start, h: float) -> None:
         mass, kept = start.masses[i], start.span_masses[row, i]
         kept.w = mass.w
         kept.direction = mass.direction
-        kept.angle = mass.angle
-        kept.piece = mass.piece
+        if mass.points > 0:
+            kept.angle = mass.angle
+            kept.piece = mass.piece
     for k in range(start.shafts.size):
         shaft, noted = start.shafts[k], start.span_shafts[row, k]
         noted.theta = shaft.theta
@@ -150,8 +151,8 @@ def move_masses(start: Start, n: int, s: float) -> None:
             if shaft.mode not in (PRESSED, WELDED):
                 shaft.theta = shaft.theta * s + shaft.twist[o]
     x.phi2 = angle
-    for mass in masses:
-        if mass.points > 0:
+    if masses[0].curves != 0:
+        for mass in masses:
             mass.passed = 0
             if mass.by_angle != 0:
                 mass.angle = value(mass.turned, n, s)
@@ -399,8 +400,8 @@ def restore(start: Start, row: int) -> int:
         mass, kept = start.masses[i], start.span_masses[row, i]
         mass.w = kept.w
         mass.direction = kept.direction
-        mass.angle = kept.angle
         if mass.points > 0:
+            mass.angle = kept.angle
             set_piece(mass, kept.piece)
     for k in range(start.shafts.size):
         shaft, noted = start.shafts[k], start.span_shafts[row, k]
