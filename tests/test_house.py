@@ -33,8 +33,8 @@ BUDGET = {
     # 440 and a file: drives and chains by the same words (`machines`, 65 lines from the page), and batches
     # of chains that are written once for many calls, for tuning and sweeps
     # 6: names of the exchange between plant and controller, one a line
-    # 300: load curves by speed or angle, ground, torque at t = 0
-    "chain": (6827, 18, 4, 0),
+    # 307: load curves by speed or angle, ground, torque at t = 0
+    "chain": (6834, 18, 4, 0),
     # 140 and a file: `init`; 30: `fatigue` of a chain
     # 60: a report is printed to A4
     # 250 and a file: `identify`; 40: optima of chains

@@ -244,9 +244,9 @@ def numbers(
     geared = (masses["rubs"] != 0) & ~reactive
     masses["active"][geared], masses["Mc"][geared] = arrays.Mc[geared], 0.0
     masses["w0"] = arrays.w0
-    for place, (given, i) in enumerate(zip(chain.masses, arrays.speed_ratio.tolist(), strict=True)):
+    for j, (given, i) in enumerate(zip(chain.masses, arrays.speed_ratio.tolist(), strict=True)):
         if given.curve is not None:
-            mass = masses[place]
+            mass = masses[j]
             masses["curves"][0] += 1
             at, torques, by_angle = given.curve
             mass["points"], mass["by_angle"] = len(at), by_angle
