@@ -150,8 +150,9 @@ class _Search:
         within = WITHIN if len(self.problem.drive.positions) == 1 else WITHIN_SEVERAL
         if math.isinf(self.allowed) and self.limits.life is None:
             return self._shortest()
-        bracket, found, end = Bracket(), None, max(self.soonest * (1.0 + 1e-9), self._hint())
-        if not self.hints:  # else the root is near: steps from one side find it, bisection from afar does not
+        hint = self._hint()
+        bracket, found, end = Bracket(), None, max(self.soonest * (1.0 + 1e-9), hint)
+        if hint == 0.0:  # else the root is near: steps from one side find it, bisection from afar does not
             bracket.low = self.soonest
         for _ in range(MOST_TRIALS):
             best = self._gentlest(end)
@@ -187,10 +188,11 @@ class _Search:
             return 0.0
         hold = hold_of(self.problem)
         began = time.perf_counter()
-        bounded = replace(hold.free, start_time=None, minimise="start_time", k_dyn=self.allowed)
+        most = self.allowed if math.isfinite(self.allowed) else None  # a life bounds no K_dyn
+        bounded = replace(hold.free, start_time=None, minimise="start_time", k_dyn=most)
         try:
             end = hold.until + float(collocation.solve(bounded).end_time)
-        except NotConverged as failed:
+        except (NotConverged, InputError) as failed:
             self.hints.append(Trial("collocation", None, time.perf_counter() - began, str(failed)))
             return 0.0
         self.hints.append(Trial("collocation", end, time.perf_counter() - began, ""))

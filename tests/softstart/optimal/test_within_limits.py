@@ -152,6 +152,10 @@ def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
     assert used["used life"] <= 100.0
     assert used["shaft torque"] < 170.0
     assert best.end_time > quickest(IN_TIME).end_time
+    alone = optimize(drive.replace(permissible_torque=None), limits=True)  # nothing bounds its K_dyn
+    assert alone.kept is not None
+    assert [one.name for one in alone.kept.margins] == ["used life"]
+    assert alone.end_time == pytest.approx(best.end_time, rel=1e-4)
 
 
 @pytest.mark.slow
