@@ -85,7 +85,6 @@ class Screen:
         self._origin = session.origin
         self._next = 0  # whose turn it is among the other strategies
         self._map_of: tuple[Machine, Controller, bool, Axes] | None = None  # of what the browser has all rows
-        self._map_seen = False  # it has some rows, of whatever
         self._bench_kept: Bench | None = None  # by its tab
         self.strategy_scales: Mapping[str, Scale] = {}  # sliders of the selected strategy
         self._strategy_of: tuple[object, ...] = ()  # what these and the rows in the browser are for
@@ -121,7 +120,6 @@ class Screen:
     def forget(self) -> None:
         """The browser has lost what it had: send the map again."""
         self._map_of = None
-        self._map_seen = False
         self._strategy_of = self._reference_of = self._groups_of = ()
         self._bench_kept = None
 
@@ -279,7 +277,7 @@ class Screen:
             "reference": self._reference(),
             "mapped": self.axes is not None,
             "here": self._here(),
-            "map_is_old": self._map_seen and not self._map_is_right(),
+            "map_is_old": not self._map_is_right(),
         }
 
     def _reference(self) -> Frame | None:
@@ -352,10 +350,7 @@ class Screen:
         cells = 4  # computed in one slice; as many as fit into it
         head = self._map_head(axes)
         order = from_middle(len(axes.inertias), axes.nearest(*here(machine))[1])
-        self._map_of, self._map_seen = (
-            None,
-            True,
-        )  # from here on it has rows of both, if this is left half-way
+        self._map_of = None  # from here on it has rows of both, if this is left half-way
         for index in order:
             k: list[float | None] = []
             while len(k) < len(axes.gaps):

@@ -94,6 +94,7 @@ export class GapMap {
     if (old !== undefined && this.rows && old !== this.old) {
       this.old = old;
       this.fresh = new Set(old ? [] : this.rows.keys());
+      this.hold();
       this.fade();
     }
     if (!frame.map_row) return;
@@ -107,23 +108,31 @@ export class GapMap {
     this.rows[frame.map_row.index] = frame.map_row.k;
     this.fresh.add(frame.map_row.index);
     this.old = undefined;
+    this.hold();
     this.fade();
   }
 
   // the map of this strategy is kept, to show that of another one as a difference to it
   pin() {
-    this.pinned = this.other.checked && this.rows?.every(Boolean) ? { head: this.head, rows: [...this.rows] } : null;
-    this.other.checked = Boolean(this.pinned);
+    this.pinned = null;
+    this.hold();
     this.fade();
     this.redraw();
+  }
+
+  // ticked before all rows have come, the first map that is whole is kept
+  hold() {
+    if (this.other.checked && !this.pinned && this.fresh?.size === this.rows?.length) this.pinned = { head: this.head, rows: [...this.rows] };
   }
 
   // numbers of the map, as they are drawn
   shown() {
     const { pinned, head } = this;
-    if (pinned && (pinned.head.of !== head.of || String(pinned.head.gaps) !== String(head.gaps))) this.pinned = null; // another drive
+    if (pinned && (pinned.head.of !== head.of || String(pinned.head.gaps) !== String(head.gaps))) {
+      this.pinned = null; // another drive
+      this.other.checked = false;
+    }
     const against = this.pinned && this.pinned.head.strategy !== head.strategy;
-    this.other.checked = Boolean(this.pinned);
     this.otherName.textContent = this.pinned ? `less ${this.pinned.head.strategy}` : "difference";
     if (!against) return [this.rows, K];
     const rows = this.rows.map((row, j) => row?.map((k, i) => (k === null || this.pinned.rows[j][i] === null ? null : k - this.pinned.rows[j][i])));
