@@ -11,12 +11,25 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 from tests import kernels
 
 # the suite draws the same examples every time; `make fuzz` draws new ones (--hypothesis-profile=fuzz)
 settings.register_profile("suite", derandomize=True, database=None, deadline=None)
 settings.register_profile("fuzz", deadline=None, print_blob=True)
 settings.load_profile("suite")
+
+
+def local_constants(found: Any = providers._get_local_constants) -> Any:
+    """Constants that hypothesis tries as examples: in the suite none of the modules that happen to be loaded.
+
+    Derandomised as it may be, hypothesis tries numbers out of all local modules loaded so far, and so a test
+    would get other examples alone than after others (`test_the_suite_draws_the_same_examples`).
+    """
+    return providers.Constants() if settings().derandomize else found()
+
+
+providers._get_local_constants = local_constants
 
 PAGE = Path(__file__).parent / "page"
 DOCS = Path(__file__).parent / "docs"

@@ -1,0 +1,36 @@
+"""The suite draws the same examples every time, whatever ran before in the same process."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+
+def drawn() -> list[tuple[int, float]]:
+    """Examples of one test, as the suite draws them."""
+    found: list[tuple[int, float]] = []
+
+    @settings(max_examples=200, derandomize=True, database=None)
+    @given(st.integers(0, 10**6), st.floats(0.0, 1.0))
+    def one(number: int, share: float) -> None:
+        found.append((number, share))
+
+    one()
+    return found
+
+
+def test_the_suite_draws_the_same_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a module with other numbers was loaded in between, which hypothesis would try on its own."""
+    before = drawn()
+    path = tmp_path / "numbers_beside.py"
+    path.write_text(f"NUMBERS = {list(range(1000, 1400))}\nSHARES = {[k / 1024 for k in range(1, 400)]}\n")
+    spec = importlib.util.spec_from_file_location("numbers_beside", path)
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "numbers_beside", module)
+    spec.loader.exec_module(module)
+    assert drawn() == before
