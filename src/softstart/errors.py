@@ -60,10 +60,10 @@ class Mistakes:
         except InputError as error:
             self.sentences.extend(before + sentence for sentence in error.sentences)
 
-    def settle(self) -> None:
-        """Raise what was noted, if anything was."""
+    def settle(self, before: str = "") -> None:
+        """Raise what was noted, if anything was, each with `before` in front of it."""
         if self.sentences:
-            raise InputError(self.sentences)
+            raise InputError([before + sentence for sentence in self.sentences])
 
 
 def _readable(sentence: str) -> str:

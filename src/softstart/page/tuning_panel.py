@@ -12,7 +12,7 @@ from nicegui import ui
 from softstart.chain.machines import Machine
 from softstart.controller.finding import controller_class, controller_names, make_controller
 from softstart.controller.tuned import RobustFile, RobustGains, Tuned, read_gains, scheduled
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
@@ -157,24 +157,21 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
     >>> grid_of(Drive.load("crane-4amtkf"), "0.5x, 1", "5J1; 0,35")
     ([0.25, 1.0], [0.175, 0.35])
     """
-    wrong: list[str] = []
+    wrong = Mistakes()
     found: list[list[float]] = []
     units = units_of(drive)
     for text, name, read, si in (
         (gaps, "Gaps", gaps_of, "rad"),
         (inertias, "Load inertias", inertias_of, "kg*m^2"),
     ):
-        try:
+        with wrong.noted():
             found.append(list(read(drive, [units.typed(one, si) for one in values_in(text, name)], name)))
-        except InputError as error:
-            wrong.extend(error.sentences)
-    if not wrong and len(found[0]) * len(found[1]) > MOST_CELLS:
-        wrong.append(
+    wrong.settle()
+    if len(found[0]) * len(found[1]) > MOST_CELLS:
+        raise InputError(
             f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
             f"{MOST_CELLS}; take fewer, or softstart tune in a terminal."
         )
-    if wrong:
-        raise InputError(wrong)
     return found[0], found[1]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
 from softstart.drive import PARAMETERS
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.input.documents import Table, read_document
 from softstart.input.files import text_of
 from softstart.input.parameters import REQUIRED, Parameter
@@ -132,25 +132,20 @@ class Project:
             sources=tuple(Source(**row) for row in found["source"]),
         )
         paths = [one.path for one in PARAMETERS.values()]
-        wrong = []
+        wrong = Mistakes()
         for number, source in enumerate(made.sources, start=1):
             if source.parameter not in paths:
                 hint = nearest(source.parameter, paths)
-                wrong.append(
+                wrong.sentences.append(
                     f'[source] {number}, parameter = "{source.parameter}": a drive has no such parameter; '
                     + (f"did you mean {hint}?" if hint else "write it as --set does, as shaft.gap.")
                 )
-        try:
+        with wrong.noted():
             made = replace(made, logo=_picture(made.logo, folder))
-        except InputError as error:
-            wrong += error.sentences
         if language:
-            try:
+            with wrong.noted(f'[project] language = "{language}": '):
                 made = replace(made, language=Translation.load(folder / language))
-            except InputError as error:
-                wrong += [f'[project] language = "{language}": {one}' for one in error.sentences]
-        if wrong:
-            raise InputError([f"{where}: {one}" if where else one for one in wrong])
+        wrong.settle(f"{where}: " if where else "")
         return made
 
     def source_of(self, path: str) -> str:

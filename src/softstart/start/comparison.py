@@ -14,7 +14,7 @@ import numpy as np
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
-from softstart.errors import InputError, SimulationError
+from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
@@ -231,20 +231,17 @@ def make_controllers(
     asked = list(controllers) if controllers is not None else list(ready_controller_names(parameters))
     if not asked:
         raise InputError("controllers: name at least one; `softstart controllers` lists them.")
-    wrong: list[str] = []
+    wrong = Mistakes()
     unused = set(parameters) - {one for one in asked if isinstance(one, str)}
     if unused:
-        wrong.append(
+        wrong.sentences.append(
             f"parameters for {', '.join(sorted(unused))}: that controller is not among those compared."
         )
     made: list[Controller] = []
     for one in asked:
-        try:
+        with wrong.noted():
             made.append(make_controller(one, parameters.get(one) if isinstance(one, str) else None))
-        except InputError as error:
-            wrong.extend(error.sentences)
-    if wrong:
-        raise InputError(wrong)
+    wrong.settle()
     return made
 
 

@@ -15,7 +15,7 @@ from softstart.controller.base import Controller
 from softstart.controller.finding import GAIN_FILES, controller_class, make_controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.processes import why_not_sendable
 from softstart.quantities import show
 
@@ -68,15 +68,12 @@ class Maker:
 
     def common_parameters(self, names: Sequence[str]) -> Parameters:
         """Those that all controllers of these names have."""
-        wrong: list[str] = []
+        wrong = Mistakes()
         tables = []
         for name in names:
-            try:
+            with wrong.noted():
                 tables.append(_parameters_of(self._class_of(name), name))
-            except InputError as error:
-                wrong.extend(error.sentences)
-        if wrong:
-            raise InputError(wrong)
+        wrong.settle()
         shared = Parameters(
             {
                 name: known

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice, product
@@ -18,7 +18,7 @@ from softstart.chain.model import Chain
 from softstart.chain.run import mean_torque_of
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive, Limits
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.plant import layout as at
 from softstart.start import metrics
 from softstart.start.batch import Figures, array_starts, figures, limits_of_each
@@ -246,15 +246,9 @@ def _make(question: Question, values: list[tuple[Column, Any]]) -> None:
     drive: dict[str, Any] = {c.field: value for c, value in values if c.owner == "drive"}
     parameters = {c.field: value for c, value in values if c.owner == "parameter"}
     controller = next((value for c, value in values if c.owner == "controller"), "")
-    sentences: list[str] = []
-    attempts: tuple[Callable[[], object], ...] = (
-        lambda: _possible(question.drive, drive),
-        lambda: question.maker.make(parameters, controller),
-    )
-    for attempt in attempts:
-        try:
-            attempt()
-        except InputError as error:
-            sentences += error.sentences
-    if sentences:
-        raise InputError(sentences)
+    wrong = Mistakes()
+    with wrong.noted():
+        _possible(question.drive, drive)
+    with wrong.noted():
+        question.maker.make(parameters, controller)
+    wrong.settle()

@@ -29,7 +29,7 @@ from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.controller.tuned import Tuned
 from softstart.drive import PARAMETERS, Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import nearest, to_si
@@ -276,20 +276,15 @@ def _axis(
     if not listed:
         raise InputError(f"{name}: the list is empty; give at least one value, or leave it out.")
     found: list[float] = []
-    wrong: list[str] = []
+    wrong = Mistakes()
     for value in listed:
-        try:
+        with wrong.noted():
             found.append(_value(value, name, unit, units))
-        except InputError as error:
-            wrong += error.sentences
     gap, inertia = here(drive)
     for value in found:
-        try:
+        with wrong.noted(f"{name}: "):
             moved(drive, *((value, inertia) if unit == "rad" else (gap, value)))
-        except InputError as error:
-            wrong += [f"{name}: {sentence}" for sentence in error.sentences]
-    if wrong:
-        raise InputError(wrong)
+    wrong.settle()
     return tuple(sorted(set(found)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.controller.base import Controller, label_of
-from softstart.errors import InputError
+from softstart.errors import InputError, Mistakes
 from softstart.quantities import nearest, to_si
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
@@ -122,14 +122,11 @@ def ranges_of(controller: Controller, free: Free) -> tuple[Range, ...]:
     if not asked:
         raise InputError("free: it names no parameter; leave it out to tune all that the controller offers.")
     found: list[Range] = []
-    wrong: list[str] = []
+    wrong = Mistakes()
     for name, ends in asked.items():
-        try:
+        with wrong.noted():
             found.append(_range(what, name, ends, known))
-        except InputError as error:
-            wrong += error.sentences
-    if wrong:
-        raise InputError(wrong)
+    wrong.settle()
     return tuple(found)
 
 
