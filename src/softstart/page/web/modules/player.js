@@ -62,10 +62,14 @@ export class Player {
     const [from, to] = this.span();
     const held = this.plots.held;
     this.plots.hold(held === null || held < from || held >= to ? from : held);
-    this.button.textContent = "\u23f8\ufe0e";
-    this.button.title = "Pause";
+    this.name("\u23f8\ufe0e", "Pause");
     this.last = performance.now();
     this.playing = requestAnimationFrame((now) => this.step(now));
+  }
+
+  name(sign, title) {
+    this.button.textContent = sign;
+    this.button.title = this.button.ariaLabel = title;
   }
 
   step(now) {
@@ -82,8 +86,7 @@ export class Player {
   stop() {
     cancelAnimationFrame(this.playing);
     this.playing = 0;
-    this.button.textContent = "\u25b6\ufe0e";
-    this.button.title = "Play";
+    this.name("\u25b6\ufe0e", "Play");
   }
 
   save(ending, kind, text) {
