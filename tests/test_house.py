@@ -86,7 +86,8 @@ BUDGET = {
     # 25: torque above the linear one at its price, and the demand that holds a steady end
     # 42: multipliers and weights of the demand of one start, for the page from the statement to the proof
     # 10: what load curves and ground leave of bounds and terminal conditions
-    "optimal": (12137, 36, 11, 0),
+    # 505 and a file: chains by collocation, an independent check of their linear programs
+    "optimal": (12640, 37, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet

@@ -113,8 +113,7 @@ def _check_chain(chain: Chain, several: bool, bounds: Mapping[str, Any]) -> None
             "--gaps, --inertias and --load-torques are for drives: on a chain one profile for several is not "
             "found; leave them out, or reduce the chain to a drive."
         )
-    given = {"method": "auto", "confirm": False, "limits": False, **bounds}
-    solving.refuse_for_chain(given["method"], given["confirm"], given["limits"])
+    solving.refuse_for_chain(bounds.get("method", "auto"), bounds.get("limits", False))
     chains.ChainProblem(chain, 1.0, **{name: value for name, value in bounds.items() if name not in SEARCH})
 
 

@@ -345,7 +345,7 @@ def pareto(
     """
     about: Any = Problem
     if isinstance(drive, Chain):
-        refuse_for_chain(method, False, False)
+        refuse_for_chain(method, False)
         about = chains.ChainProblem
     about(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
     times = None if start_times is None else _checked(start_times)

@@ -82,7 +82,7 @@ def optimize(
     ----------
     drive : Drive, Chain or str
         The drive or the chain, or the name or file of one. On a chain start_time, terminal, base, warm,
-        tolerance, time_limit and seeds count.
+        tolerance, time_limit, confirm and seeds count.
     start_time : float or str, optional
         Bound on t_f: in s, with a unit ("300 ms"), or as a multiple of the start time of `direct`
         ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
@@ -115,7 +115,8 @@ def optimize(
         limit, so that the answer does not depend on the machine; 0 takes the first answer, and a bound that
         is quick to compute and may lie lower.
     confirm : bool
-        Solve the CasADi problem in any case, from its own guess; `tried` has both answers.
+        Solve the CasADi problem in any case, from its own guess; `tried` has both answers, and the better one
+        is returned. On a chain in the order of contacts of the answer.
     limits : bool
         Find instead the least start time at which the gentlest start keeps the limits of the drive: the
         permissible shaft torque and the life, from whichever position. `kept` has the margin to each limit,
@@ -162,14 +163,15 @@ def optimize(
             raise InputError(f"{name} = {number:g}: give a number that is 0 or more.")
     corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
     if isinstance(drive, Chain):
-        refuse_for_chain(method, confirm, limits)
+        refuse_for_chain(method, limits)
         asked, why = chains.asked_of_chain(
             drive, start_time, terminal, base, minimise=minimise, k_dyn=k_dyn, heat=heat,
             torque_speed=corners, smoothness=smoothness,
         )  # fmt: skip
         found: Optimum = chains.optimize_chain(
-            asked, tolerance=tolerance, time_limit=time_limit, seeds=seeds, warm=warm, why=why
-        )
+            asked, tolerance=tolerance, time_limit=time_limit, seeds=seeds, warm=warm, why=why,
+            confirm=confirm,
+        )  # fmt: skip
         return found
     if seeds is not None:
         raise InputError(
@@ -199,7 +201,7 @@ def optimize(
     return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
 
 
-def refuse_for_chain(method: str, confirm: bool, limits: bool) -> None:
+def refuse_for_chain(method: str, limits: bool) -> None:
     """What cannot be asked of an optimum of a chain."""
     wrong = []
     if method != "auto":
@@ -207,9 +209,8 @@ def refuse_for_chain(method: str, confirm: bool, limits: bool) -> None:
             f"method = {method}: on a chain the optimum is found by successive linear programs on its exact "
             "start; use method = auto."
         )
-    for name, given in (("confirm", confirm), ("limits", limits)):
-        if given:
-            wrong.append(f"{name}: this is for drives; leave it out, or reduce the chain to a drive.")
+    if limits:
+        wrong.append("limits: this is for drives; leave it out, or reduce the chain to a drive.")
     if wrong:
         raise InputError(wrong)
 

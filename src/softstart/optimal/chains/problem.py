@@ -47,9 +47,13 @@ from softstart.chain.model import Chain
 from softstart.chain.run import ChainRun, mean_torque_of
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.late import late
 from softstart.optimal.problem import TERMINALS, Problem, Terminal
 from softstart.optimal.result import LowerBound, Optimum, OptimumError
 from softstart.profile import TorqueProfile
+
+_collocation = late("softstart.optimal.chains.collocation")
+_solving = late("softstart.optimal.chains.solving")
 
 SHORT = 1e-6  # of the target speed and of P: by so much a terminal condition may be missed
 SAME = 1e-6  # a claim and its exact replay differ by no more than this share
@@ -140,6 +144,29 @@ class ChainProblem(Problem):
     def base_torque(self) -> float:
         """The mean torque to which K_dyn refers, N m."""
         return mean_torque_of(self.base or self.drive)
+
+    def casadi(self, run: ChainRun | None = None) -> Any:
+        """The problem in one order of contacts as a nonlinear program of CasADi: `Problem.casadi` of a chain.
+
+        The order is that of `run`, a start of this chain that lasts to one elastic period after the start
+        time; by default that of the first answer of the linear programs. The first guess has straight lines
+        between the ends of its phases. InputError for gears with losses, load curves, contact_law
+        modelica, and starts of more than 120 phases.
+
+        >>> import casadi
+        >>> from softstart.chain import Mass, Motor, Shaft
+        >>> shafts = [Shaft(3000.0, damping_ratio=0.02, gap=0.05)]
+        >>> chain = Chain([Mass(0.1), Mass(0.4, torque=20.0)], shafts, Motor(100.0), target_speed=20.0)
+        >>> nlp = ChainProblem(chain, 0.2).casadi()
+        >>> quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-7}
+        >>> solver = casadi.nlpsol("s", "ipopt", nlp.nlp, quiet)
+        >>> out = solver(x0=nlp.x0, p=nlp.p, lbx=nlp.lbx, ubx=nlp.ubx, lbg=nlp.lbg, ubg=nlp.ubg)
+        >>> bool(nlp.k_dyn(out["x"]) < 1.0)
+        True
+        """
+        if run is None:
+            run = _solving.optimize_chain(self, time_limit=0.0).run
+        return _collocation.as_casadi(self, run, straight=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,6 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
+from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
 from softstart.controller import make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
@@ -27,9 +28,18 @@ from softstart.optimal.chains.problem import (
 from softstart.optimal.chains.search import PROMISE, TASTE, Found, Search
 from softstart.optimal.chains.starts import Player
 from softstart.optimal.problem import USUAL, StartTime
-from softstart.optimal.result import InfeasibleError, OptimumError, Trial, Verdict
+from softstart.optimal.result import (
+    InfeasibleError,
+    LowerBound,
+    NotConverged,
+    OptimumError,
+    Trial,
+    Verdict,
+)
 from softstart.optimal.shortest import start_time_of_direct
+from softstart.profile import TorqueProfile
 
+collocation = late("softstart.optimal.chains.collocation")
 global_search = late("softstart.optimal.chains.global_search")
 
 CMA = "cma"
@@ -38,6 +48,9 @@ RUNS = 4  # of the global search
 FINISHED = 2
 DAMPED = (0.02, 0.01, 0.004)  # damping ratios through which an undamped chain is approached
 SIMILAR = "the demand of a similar problem"
+ORDERS = 3  # of contacts, in which the collocation is solved until its replay has the same
+NEAR = 0.01  # of K_dyn: so much above the answer a collocation is content
+AGREED = 2e-3  # of K_dyn: the collocation and its replay
 METHOD = "successive linear programs on the exact start, from {}"
 
 
@@ -58,6 +71,7 @@ def optimize_chain(
     seeds: Sequence[str] | None = None,
     warm: Any = None,
     why: str = "",
+    confirm: bool = False,
 ) -> ChainOptimum:
     """The start of a chain with the least largest torque of all its shafts; see `softstart.optimize`."""
     began = time.perf_counter()
@@ -109,16 +123,16 @@ def optimize_chain(
                 Trial("slp", around.played.peak / problem.base_torque, time.perf_counter() - since, "")
             )
             best = min(best, (best[0], around), key=lambda one: _rank(one[1]))
-    return _checked(search, *best, bound, tried, began, why)
+    answer = _checked(search, best[1], bound, began, METHOD.format(best[0]) + why)
+    answer = replace(answer, tried=tuple(tried))
+    return _confirmed(search, answer, began) if confirm else answer
 
 
 def _rank(found: Found) -> tuple[bool, float]:
     return found.miss.max() > SHORT, found.merit
 
 
-def _checked(
-    search: Search, name: str, found: Found, bound: Any, tried: list[Trial], began: float, why: str
-) -> ChainOptimum:
+def _checked(search: Search, found: Found, bound: LowerBound, began: float, why: str) -> ChainOptimum:
     """The answer as the exact chain runs it under the `profile` controller."""
     problem = search.problem
     profile = search.profile(found.torques).simplified()
@@ -135,13 +149,59 @@ def _checked(
         run=run,
         bound=bound,
         method="slp",
-        why=METHOD.format(name) + why,
+        why=why,
         claimed=claimed,
         end_time=end,
         seconds=time.perf_counter() - began,
         warm=Warm(search.end, search.knots, found.torques),
-        tried=tuple(tried),
     )
+
+
+def _confirmed(search: Search, best: ChainOptimum, began: float) -> ChainOptimum:
+    """The better of an answer and that of the collocation, which has only the order of contacts from it."""
+    problem, since = best.problem, time.perf_counter()
+    run, other, failure = best.run, None, ""
+    for _ in range(ORDERS):
+        try:
+            profile, claimed = _collocated(problem, run, best.k_dyn)
+            fine = Search(problem, search.player)
+            fine.knots = profile.time
+            played = fine.play(fine.allowed(profile.torque))
+            found = None if played is None else fine.finished(played)
+            if found is None:
+                failure = "its demand could not be simulated"
+                break
+            other = _checked(fine, found, best.bound, since, f"gentler than that of {best.method}")
+        except (InputError, NotConverged, OptimumError) as stopped:
+            failure = str(stopped)
+            break
+        run = other.run
+        if abs(claimed / other.k_dyn - 1.0) <= AGREED:
+            break
+    else:
+        failure = f"K_dyn {claimed:.4f} was claimed: the contacts of its replay come in another order"
+    value = None if other is None else other.k_dyn
+    tried = (*best.tried, Trial("collocation", value, time.perf_counter() - since, failure))
+    if other is not None and other.k_dyn < best.k_dyn:
+        best = replace(other, method="collocation")
+    return replace(best, tried=tried, seconds=time.perf_counter() - began)
+
+
+def _collocated(problem: ChainProblem, run: ChainRun, known: float) -> tuple[TorqueProfile, float]:
+    """From straight lines between the contacts; where that leads to no start as gentle, from `run` itself."""
+    found, failed = [], None
+    for straight in (True, False):
+        try:
+            found.append(collocation.solve(problem, run, straight))
+        except NotConverged as stopped:
+            failed = stopped
+            continue
+        if found[-1][1] <= known * (1.0 + NEAR):
+            break
+    if not found:
+        assert failed is not None
+        raise failed
+    return min(found, key=lambda one: one[1])
 
 
 # first demands ---------------------------------------------------------------------------------------------
@@ -241,10 +301,14 @@ def _too_short(problem: ChainProblem) -> Verdict:
 
 
 def _none_found(problem: ChainProblem) -> str:
-    direct = start_time_of_direct(problem.drive)
+    text = f"No start within {problem.start_time:g} s with terminal {problem.terminal} was found. "
+    try:
+        direct = start_time_of_direct(problem.drive)
+    except SimulationError:
+        return text + "The constant starting torque (direct) never reaches the target speed."
     return (
-        f"No start within {problem.start_time:g} s with terminal {problem.terminal} was found. The constant "
-        f"starting torque (direct) reaches the target speed after {direct:.6g} s; give more time."
+        text + f"The constant starting torque (direct) reaches the target speed after {direct:.6g} s; "
+        "give more time."
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -351,29 +352,22 @@ class CasadiProblem:
     ubx: Vector
     lbg: Vector
     ubg: Vector
-    _transcribed: Transcribed
-    _numbers: Numbers
+    slots: tuple[Slot, ...]
+    _read: Callable[[Vector], tuple[TorqueProfile, float]]  # demand and peak torque, N m
 
-    @property
-    def slots(self) -> tuple[Slot, ...]:
-        """What each variable stands for: kind, arc, share of its duration, component of the state."""
-        return self._transcribed.slots
-
-    def _claim(self, x: Any) -> Claim:
+    def _of(self, x: Any) -> tuple[TorqueProfile, float]:
         at = np.array(x, dtype=float).ravel()
         if at.shape != self.x0.shape:
             raise InputError(f"x: {at.size} numbers; give the {self.x0.size} of nlpsol's out['x'].")
-        none = np.zeros(0)
-        end = Solution(self._transcribed, self._numbers, self.p, at, none, none, np.nan, "", np.nan, 0)
-        return claim(self.problem, end)
+        return self._read(at)
 
     def profile(self, x: Any) -> TorqueProfile:
         """The torque demand of a solution x (n,): N m over s, up to t_f."""
-        return self._claim(x).profile
+        return self._of(x)[0]
 
     def k_dyn(self, x: Any) -> float:
         """K_dyn of a solution x (n,) by its own collocation; `replay` of the profile is exact."""
-        return self._claim(x).peak / self.problem.base_torque
+        return self._of(x)[1] / self.problem.base_torque
 
 
 def as_casadi(problem: Problem) -> CasadiProblem:
@@ -384,7 +378,16 @@ def as_casadi(problem: Problem) -> CasadiProblem:
     parameters = _parameters(program, p)
     lbx, ubx, lbg, ubg = (np.array(one).ravel() for one in transcribed.limits(parameters))
     x0 = trajectory.values(program, p, transcribed.slots)
-    return CasadiProblem(problem, transcribed.nlp, x0, parameters, lbx, ubx, lbg, ubg, transcribed, p)
+    none = np.zeros(0)
+
+    def read(x: Vector) -> tuple[TorqueProfile, float]:
+        end = Solution(transcribed, p, parameters, x, none, none, np.nan, "", np.nan, 0)
+        own = claim(problem, end)
+        return own.profile, own.peak
+
+    return CasadiProblem(
+        problem, transcribed.nlp, x0, parameters, lbx, ubx, lbg, ubg, transcribed.slots, read
+    )
 
 
 # ---- first solutions -------------------------------------------------------------------------------------
