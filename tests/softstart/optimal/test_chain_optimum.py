@@ -246,3 +246,52 @@ def test_a_front_over_start_times_falls():
     assert values == sorted(values, reverse=True)
     assert all(point.k_dyn >= point.k_dyn_lower_bound for point in front.points)
     assert front.controllers[0].ratio is None or front.controllers[0].ratio >= 1.0 - 1e-3
+
+
+def loaded(*, held=False, **load):
+    """Three masses with two gaps; `load` is that of the last, which `held` ties to ground by a soft shaft."""
+    masses = [Mass(0.1), Mass(0.02), Mass(0.4, **load)]
+    shafts = [Shaft(3000.0, damping_ratio=0.02, gap=0.05), Shaft(2000.0, damping_ratio=0.02, gap=0.05)]
+    if held:
+        masses, shafts = [*masses, Mass("inf", name="ground")], [*shafts, Shaft(5.0, damping=0.05)]
+    return Chain(masses, shafts, Motor(100.0), target_speed=10.0 if held else 20.0)
+
+
+@pytest.mark.parametrize(
+    "chain",
+    [
+        loaded(torque=5.0, curve_speed=[0.0, 8.0, 30.0], curve_torque=[0.0, 10.0, 40.0]),
+        loaded(curve_speed=[-1.0, 1.0, 5.0, 30.0], curve_torque=[-30.0, 30.0, 15.0, 20.0]),
+        loaded(held=True),
+    ],
+    ids=["fan", "falling", "ground"],
+)
+def test_load_curves_and_ground(chain):
+    """K_dyn replays exactly, no strategy as quick is gentler, and the bound says what it covers."""
+    best = optimize(chain, 0.25, time_limit=0.0)
+    until = 0.25 + best.run.elastic_period
+    again = simulate_chain(chain, "profile", until, parameters={"profile": best.profile})
+    assert again.k_dyn == pytest.approx(best.claimed, rel=1e-6)
+    assert float(again.at(best.end_time)["w"][chain.load_index]) >= chain.target_speed * (1.0 - 1e-6)
+    for name in ("direct", "s-curve", "ramp", "take-up"):
+        run = simulate_chain(chain, name)
+        assert not run.start_time <= best.end_time or run.k_dyn > best.k_dyn
+    if chain.masses[2].curve is None:
+        assert best.bound.kind == "momentum"
+        assert 0.0 < best.bound.k_dyn < best.k_dyn
+    else:
+        assert (best.bound.kind, best.bound.k_dyn) == ("none", 0.0)
+        assert "follows a curve" in best.bound.covers
+        assert best.summary()["k_dyn_lower_bound"] is None
+
+
+def test_load_curves_over_angles_are_refused():
+    with pytest.raises(InputError, match="curve_angle: an optimum is not found"):
+        optimize(loaded(curve_angle=[0.0, 1.0], curve_torque=[0.0, 10.0]), 0.25)
+
+
+def test_a_chain_that_never_reaches_its_speed_is_told():
+    """Tied to ground by a stiff shaft: neither the search nor full torque gets there."""
+    chain = dataclasses.replace(loaded(held=True), shafts=(*loaded(held=True).shafts[:2], Shaft(1e6)))
+    with pytest.raises(OptimumError, match="never reaches the target speed"):
+        optimize(chain, 0.25, time_limit=0.0, seeds=["direct"])
