@@ -49,6 +49,9 @@ ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
 SCANNED: Final = 5  # values of what the logs do not tell, at which all else is fitted
 LONGEST_STEP: Final = 0.7  # of a number of x, towards it
 CLOSE: Final = 0.04  # how far the root of the squares may be off there
+MOST_RIPPLE: Final = 0.25  # of the largest torque: more is no small error, see `Fitter.bias`
+SEEN: Final = 0.1  # variance by the torque error over that by rounding, below which a pattern is not seen
+APART: Final = 0.02  # of x, or half a standard error if that is less: for derivatives of covariances
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 WIDEST_FRICTION: Final = 1.0  # units of a friction, see `Space.of`; its interval is wider if it is unknown
 MOST_FRICTION: Final = 3.0  # units; as far as a search goes
@@ -223,14 +226,17 @@ class Part(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """The covariance of one log, diagonal where it is seen through a matrix: noise^2 + ripple^2 "
-    "eigenvalues.
+    """The covariance of one log, diagonal where it is seen through a matrix: noise^2 + ripple^2 eigenvalues.
+
+    It holds for small errors beside the torque error `error`, which the model has (`Fitter.about`).
     """
 
     rotation: Matrix
     eigenvalues: Vector
     response: Matrix  # to the torque error
     root: Vector  # deviation of the measurement, B = diag(root^2)
+    error: Vector | None  # of the torque, one for each block
+    shift: Vector | None  # what the linear response to it adds to the signal
 
 
 class Errors(NamedTuple):
@@ -279,6 +285,7 @@ class Fitter:
     def __init__(self, models: Sequence[LogModel], space: Space, progress: Progress | None = None) -> None:
         self.models, self.space = list(models), space
         self.counts = [np.isfinite(one.log.values) for one in models]
+        self.biases: list[Vector] | None = None  # see `bias`
         self.progress = progress or (lambda _: None)
 
     @property
@@ -314,7 +321,8 @@ class Fitter:
             jacobian[:, i] = ((column - signals[0]) / step)[rows]
         if offset is not None:
             jacobian[:, offset] = 1.0
-        return Part(base[rows], jacobian)
+        residual = base[rows] if self.biases is None or short is not model else base[rows] - self.biases[log]
+        return Part(residual, jacobian)
 
     def parts(self, x: Vector, share: float = 1.0, derivatives: bool = True) -> list[Part]:
         """Residuals and derivatives of every log."""
@@ -381,7 +389,7 @@ class Fitter:
     # ---- weights -----------------------------------------------------------------------------------------
 
     def weights(self, x: Vector) -> list[Weights]:
-        """The shape of each log's covariance at x."""
+        """The shape of each log's covariance at x, about the torque error that its model has."""
         made = []
         for i, model in enumerate(self.models):
             rows = self.counts[i]
@@ -392,8 +400,13 @@ class Fitter:
             vectors, singular, _ = np.linalg.svd(response / root[:, None], full_matrices=True)
             eigenvalues = np.zeros(vectors.shape[0])
             eigenvalues[: singular.size] = singular**2
-            made.append(Weights(vectors.T / root, eigenvalues, response, root))
+            made.append(Weights(vectors.T / root, eigenvalues, response, root, model.error, model.shift))
         return made
+
+    def about(self, weights: Sequence[Weights]) -> None:
+        """Give each model the torque error about which its weights hold."""
+        for model, one in zip(self.models, weights, strict=True):
+            model.error, model.shift = one.error, one.shift
 
     def _measurement(self, log: int, angle: Vector) -> Vector:
         """Variance of what encoder or log round, in the samples that count."""
@@ -474,6 +487,7 @@ class Fitter:
     def whitened(self, x: Vector, errors: Errors, derivatives: bool = True) -> Part:
         """Residual and derivatives of all logs, independent and of unit size."""
         residuals, jacobians = [], []
+        self.about(errors.weights)
         parts = self.parts(x, derivatives=derivatives)
         for part, weights in zip(parts, errors.weights, strict=True):
             size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
@@ -488,7 +502,7 @@ class Fitter:
         the torque of the model, and its linear response taken off again: so the derivatives are those along
         the motion that was logged, with its own contacts, and not along that of the ideal torque.
         """
-        noise, ripple = 1.0, RIPPLE * self.largest_torque
+        noise, ripple, self.biases = 1.0, RIPPLE * self.largest_torque, None
         for _ in range(ROUNDS):
             weights = self.weights(x)  # before the parts, which it shifts
             errors, freedom = self.deviations(self.parts(x), Errors(weights, noise, ripple))
@@ -499,7 +513,54 @@ class Fitter:
             if moved < SETTLED:
                 break
             self.predict(x, errors)
+        self.biases = self.bias(x, errors)
+        x = self.fit(x, errors, lower, upper)
         return Solution(x, errors, freedom, self.whitened(x, errors), lower, upper)
+
+    def bias(self, x: Vector, errors: Errors) -> list[Vector]:
+        """What the torque error does to the signals on average, through parameters that are fitted with it.
+
+        The motion follows the errors, so the derivatives do, and they go together: sum(u w)/sum(w^2), with
+        w = (u + e)/J, is on average J too small by the share ripple^2/u^2. The likelihood has no such bias:
+        r' V^-1 r + ln|V| -> min, V about the most likely error, which moves x by -1/2 C grad ln|V|. The
+        derivative of ln|V| is a sum over the patterns of the torque error that the log sees.
+        """
+        if errors.ripple > MOST_RIPPLE * self.largest_torque:
+            return [np.zeros(1) for _ in self.models]
+        covariance = covariance_of(self.whitened(x, errors).jacobian, self.space)
+        deviations, slope, parts = np.sqrt(np.diag(covariance)), np.zeros(x.size), self.parts(x)
+        for log, (one, part) in enumerate(zip(errors.weights, parts, strict=True)):
+            ripple, size = errors.ripple, errors.noise**2 + errors.ripple**2 * one.eigenvalues
+            known = np.zeros(one.response.shape[1]) if one.error is None else one.error
+            before = self._spread(x, log, errors, known)
+            position, _ = self.space.place(log)
+            for i in [*range(len(self.space.shared)), *([] if position is None else [position])]:
+                move = min(APART, 0.5 * float(deviations[i]))
+                move *= -1.0 if i == position and x[i] > 0.5 else 1.0
+                other = x.copy()
+                other[i] += move
+                pull = one.rotation.T @ ((one.rotation @ part.jacobian[:, i]) / size)
+                error = known - move * ripple**2 * (one.response.T @ pull)
+                slope[i] += (self._spread(other, log, errors, error) - before) / move
+        self.about(errors.weights)
+        step = -0.5 * covariance @ slope
+        step /= max(1.0, float(np.max(np.abs(step) / deviations)))  # more is no longer of first order
+        return [part.jacobian @ step for part in parts]
+
+    def _spread(self, x: Vector, log: int, errors: Errors, error: Vector) -> float:
+        """ln|V| of a log about this torque error, but for a constant and what is not of first order."""
+        model, one = self.models[log], errors.weights[log]
+        seen = np.flatnonzero(errors.ripple**2 * one.eigenvalues > SEEN * errors.noise**2)
+        if seen.size == 0:
+            return 0.0
+        eigenvalues, rotation = one.eigenvalues[seen], one.rotation[seen]
+        patterns = (rotation @ one.response) / np.sqrt(eigenvalues)[:, None]
+        model.error = error
+        answers = model.torque_responses(self.space.values(x, log), patterns)[self.counts[log]]
+        along = np.sqrt(eigenvalues) * np.sum(rotation * answers.T, axis=1)
+        return float(
+            np.sum(2.0 * errors.ripple**2 * along / (errors.noise**2 + errors.ripple**2 * eigenvalues))
+        )
 
     def predict(self, x: Vector, errors: Errors) -> None:
         """Take the most likely torque error of each log into its model."""
@@ -569,8 +630,9 @@ class Fitter:
         the `others` from which they get furthest, see `elsewhere`.
 
         A fit that went far along a valley has explained errors as motion: the deviations are found anew from
-        what is left at the end, and hold for both places. The response to the torque error is that of the
-        solution; were it to follow, squares could only be smaller, so no end lies nearer than the quadratic.
+        what is left at the end, and hold for both places. So is the response to the torque error, about the
+        error that is most likely there: contacts come at other times, and by the response of the solution
+        the squares at the end are too large, by a factor of up to 5. No end lies nearer than the quadratic.
         """
         bound = float((solution.upper if sign > 0.0 else solution.lower)[i])
         middle, errors, least = float(solution.x[i]), solution.errors, solution.least
@@ -582,12 +644,18 @@ class Fitter:
             if left > 0.0 and sign * (reach - far) > 0.0:
                 begin, far = point, reach
         end, x, straight = self._traced(solution, i, sign, begin, errors, least, quantile)
-        for _ in range(0 if straight else ROUNDS_OF_ENDS):
-            errors, freedom = self.deviations(self.parts(x), errors)
-            residual, jacobian = self.whitened(solution.x, errors)
-            pull = jacobian.T @ residual
-            least = float(residual @ residual - pull @ covariance_of(jacobian, self.space) @ pull)
-            quantile, last = quantile_of(freedom[i]), end
+        for _ in range(ROUNDS_OF_ENDS):
+            self.about(errors.weights)
+            self.predict(x, errors)
+            errors, last = errors._replace(weights=self.weights(x)), end
+            if not straight:
+                errors, freedom = self.deviations(self.parts(x), errors)
+                residual, jacobian = self.whitened(
+                    solution.x, errors._replace(weights=solution.errors.weights)
+                )
+                pull = jacobian.T @ residual
+                least = float(residual @ residual - pull @ covariance_of(jacobian, self.space) @ pull)
+                quantile = quantile_of(freedom[i])
             end, x, _ = self._traced(solution, i, sign, x, errors, least, quantile)
             if abs(end - last) < CLOSE * abs(end - middle):
                 break

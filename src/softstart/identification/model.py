@@ -106,8 +106,10 @@ class LogModel:
             out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers[delays[i]], row.get(FILTER, 0.0))
         return out
 
-    def torque_responses(self, values: Mapping[str, float]) -> Matrix:
+    def torque_responses(self, values: Mapping[str, float], patterns: Matrix | None = None) -> Matrix:
         """How the signal moves, a column for each block of samples, per N m of error in the torque there.
+
+        Or a column for each of the patterns, rows with a factor for each block.
 
         Scaled by 1/sqrt(samples in a block): with independent errors of the samples, the covariance of the
         signal is their variance times this matrix and its transpose.
@@ -123,11 +125,13 @@ class LogModel:
         # the torques begin behind period, numbers of knots, room and the times; with a dead time one more
         first = 4 + int(numbers[3]) + (1 if dead_time > 0.0 else 0)
         step = 1e-3 * max(float(np.max(np.abs(self.log.torque))), 1e-300)
+        patterns = np.eye(math.ceil(self.times.size / self.block)) if patterns is None else patterns
         columns = []
-        for begin in range(first, first + per_sample * self.times.size, per_sample * self.block):
-            changed = numbers.copy()
-            changed[begin : begin + per_sample * self.block] += step
-            columns.append((self._signal(p, changed, lag) - base) / step)
+        for pattern in patterns:
+            changed, scale = numbers.copy(), step / float(np.max(np.abs(pattern)))
+            torques = changed[first : first + per_sample * self.times.size]
+            torques += scale * np.repeat(pattern, per_sample * self.block)[: torques.size]
+            columns.append((self._signal(p, changed, lag) - base) / scale)
         return np.column_stack(columns) / math.sqrt(self.block)
 
     def states(self, values: Mapping[str, float]) -> Matrix:

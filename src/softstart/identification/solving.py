@@ -40,6 +40,7 @@ from softstart.identification.result import Estimate, Identification
 from softstart.quantities import show
 
 CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
+MOST_LOAD: Final = 0.99  # of the starting torque
 SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
@@ -262,7 +263,10 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
             reach = 100.0
         guess.append(space.number(i, value))
         lower.append(space.number(i, value / reach))
-        upper.append(space.number(i, value * reach))
+        most = value * reach
+        if name == "load_torque":  # more is no drive: it could not start
+            most = math.copysign(min(abs(most), MOST_LOAD * float(drive.Ms)), value)
+        upper.append(space.number(i, most))
     for _ in range(sum(space.positions)):
         guess, lower, upper = [*guess, root_of(0.0)], [*lower, 0.0], [*upper, 1.0]
     for log in (one for one in logs if one.kind == "angle"):
@@ -300,6 +304,7 @@ def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix, guess: Ve
         of = position_of if position else partial(space.value, i)
         middle, *ends = (of(one) for one in (middle, *ends))
         found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
+    fitter.about(solution.errors.weights)
     return found
 
 
