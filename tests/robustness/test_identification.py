@@ -8,11 +8,9 @@
 
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
-every parameter). `--drive friction` has friction of motor and load, which is found too; `--experiment
-"reversed three times"` is twice as long as the standard reversal. `table` sums up all coverage of the smooth
-drive that the file has. `search` fits one log from 200 such
-guesses. `plan` compares the planned experiment of random drives with the standard ones. What the file has
-already is not computed again.
+every parameter). `--drive friction` has friction of motor and load, which is found too. `table` sums up all
+coverage of the smooth drive that the file has. `search` fits one log from 200 such guesses. `plan` compares the
+planned experiment of random drives with the standard ones. What the file has already is not computed again.
 """
 
 from __future__ import annotations
@@ -37,9 +35,6 @@ from softstart.identification.planning import (
     Experiment,
     _Bench,
     _edges,
-    _level,
-    _profile,
-    _standard,
     made_up_log,
 )  # fmt: skip
 
@@ -73,15 +68,6 @@ def told(found: Identification) -> dict[str, Any]:
     return {"estimates": estimates, "seconds": found.seconds, "ripple": found.ripple, "agreed": found.agreed}
 
 
-def reversed_three_times(drive: Drive) -> Experiment:
-    """The standard reversal, and two more of the same torque and length."""
-    level = _level(drive)
-    durations, levels = _standard(drive, level)[REVERSE]
-    last = float(levels[-1])
-    profile, end = _profile(np.append(durations, durations[[2, 2]]), np.append(levels, [-last, last]))
-    return Experiment(LONGER, profile, end, {}, math.nan, math.nan)
-
-
 def bounds_of(drive: Drive, one: Experiment, period: float) -> dict[str, float]:
     """The Cramer-Rao bound of the relative rms error of each parameter, for a torque error that is known."""
     bench = _Bench(drive, period, RIPPLE, tuple(usual(drive, lag=True)), "angle", (), lambda _: None)
@@ -97,9 +83,8 @@ def covered(
     generator = np.random.default_rng([number, round(1e6 * period), round(lines)])
     truth = DRIVES[drive].replace(encoder_lines=lines)
     position, phase = generator.uniform(-1.0, 1.0), generator.uniform()
-    demand = reversed_three_times(truth) if experiment == LONGER else experiment
     log = made_up_log(
-        truth, demand, log_period=period, ripple=RIPPLE, position=position, phase=phase,
+        truth, experiment, log_period=period, ripple=RIPPLE, position=position, phase=phase,
         seed=int(generator.integers(2**31)),
     )  # fmt: skip
     guess = off_by(truth, factor, generator)
@@ -126,9 +111,9 @@ def planned(number: int) -> dict[str, Any]:
         drive = drive.replace(load_torque=0.2 * float(drive.Ms))
     period = float(drive.elastic_period) / generator.uniform(8.0, 25.0)
     plan = plan_experiments(drive, log_period=period)
-    limit = max(one.peak for one in plan.experiments[:4])
+    limit = max(one.peak for one in plan.experiments if one.found_by == "standard")
     runs = {}
-    for one in plan.experiments[4:]:
+    for one in (one for one in plan.experiments if one.name.startswith("planned")):
         wide = drive.replace(maximum_torque=10.0 * float(drive.Ms), minimum_torque=-10.0 * float(drive.Ms))
         play = make_controller("profile", {"profile": one.profile})
         half = 0.5 * float(drive.gap)
@@ -272,11 +257,11 @@ def test_intervals_hold_the_truth() -> None:
 def test_what_a_gap_within_1_percent_takes() -> None:
     """At 1024 lines and 4 ms, where no estimator without bias gets below the bound."""
     drive = DRIVE.replace(encoder_lines=1024.0)
-    once = plan_experiments(drive, log_period=4e-3, ripple=RIPPLE, optimise=False)[REVERSE]
-    bound = bounds_of(drive, once, 4e-3)
+    plan = plan_experiments(drive, log_period=4e-3, ripple=RIPPLE, optimise=False)
+    bound = bounds_of(drive, plan[REVERSE], 4e-3)
     assert 0.010 < bound["gap"] < 0.011
     assert 0.006 < bound["stiffness"] < 0.007
-    longer = bounds_of(drive, reversed_three_times(drive), 4e-3)
+    longer = bounds_of(drive, plan[LONGER], 4e-3)
     assert longer["gap"] < 0.009
     assert longer["stiffness"] < 0.005
 

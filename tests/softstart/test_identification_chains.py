@@ -7,7 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from softstart import Chain, Drive, InputError, Log, identify, natural_vibration
+from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
+from softstart.chain.simulation import simulate_chain
 from softstart.identification.chains import chain_log, reduced_drive, reduction_note
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
@@ -23,6 +24,15 @@ def stiff_behind_the_gap(widest: str = "0.08 rad", others: float = 0.0) -> Chain
         "shaft[2].gap": others, "shaft[3].gap": 0.0,
     }  # fmt: skip
     return Chain.load("crane-4-mass", also=also)
+
+
+def logged(chain: Chain, drive: Drive) -> Log:
+    """A reversal planned for a drive, played on the whole chain with a torque error of 1 N m."""
+    plan = made_up_log(drive, REVERSE, log_period=4e-3)
+    error = np.random.default_rng(5).standard_normal(plan.time.size)
+    played = Log(plan.time, plan.torque + error, angle=plan.values, torque_is="demand")
+    real = chain_log(chain, played, 4096.0)
+    return Log(plan.time, plan.torque, angle=real.values, torque_is="demand", name="rig")
 
 
 def moved_by(note: str) -> dict[str, str]:
@@ -49,17 +59,7 @@ def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: 
 def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None:
     chain = stiff_behind_the_gap()
     drive = reduced_drive(chain)
-    plan = made_up_log(drive, REVERSE, log_period=4e-3)
-    generator = np.random.default_rng(5)
-    played = Log(
-        plan.time,
-        plan.torque + generator.standard_normal(plan.time.size),
-        angle=plan.values,
-        torque_is="demand",
-    )
-    real = chain_log(chain, played, 4096.0)
-    log = Log(plan.time, plan.torque, angle=real.values, torque_is="demand", name="rig")
-    found = identify(log, chain, searches=1)
+    found = identify(logged(chain, drive), chain, searches=1)
     (note,) = [note for note in found.notes if "has 4 masses" in note]
     first, second = natural_vibration(chain).Omega[1:3] / (2.0 * np.pi)
     assert f"Natural frequencies from {second:.4g} Hz on are left out" in note
@@ -72,6 +72,28 @@ def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None
         expected = float(getattr(drive, one.name)) * (1.0 + 0.01 * float(moved[one.name]))
         assert abs(one.value - expected) < one.upper - one.lower, one.name
     assert found.drive.name.endswith("reduced to two masses (lever)")
+
+
+@pytest.mark.parametrize("second", [0.005, 0.02, 0.04])
+def test_a_second_gap_at_a_light_mass_adds_to_the_first_and_does_no_harm_at_the_motor(second: float) -> None:
+    """Shafts behind the second gap have peaks of their own, up to 8 % larger."""
+    chain, drive = stiff_behind_the_gap(others=second), reduced_drive(stiff_behind_the_gap())
+    found = identify(logged(chain, drive), drive, searches=1)
+    assert found["gap"].value == pytest.approx(0.08 + second, rel=0.04)
+    for strategy in ("direct", "s-curve"):
+        of_motor = float(simulate_chain(chain, strategy).k_dyns[0])
+        assert float(simulate(found.drive.assumed, strategy).k_dyn) == pytest.approx(of_motor, rel=0.02)
+
+
+def test_a_second_gap_between_heavy_masses_is_noticed() -> None:
+    also = {
+        "mass[4].kind": "reactive", "start.position": "mid-gap", "shaft[1].stiffness": 400.0,
+        "shaft[2].stiffness": 12000.0, "shaft[3].stiffness": 3.3e6, "shaft[1].gap": 0.08, "shaft[2].gap": 0.0,
+        "shaft[3].gap": 0.04,
+    } | {f"shaft[{k}].damping_ratio": 0.05 for k in (1, 2, 3)}  # fmt: skip
+    drive = reduced_drive(stiff_behind_the_gap())
+    notes = identify(logged(Chain.load("crane-4-mass", also=also), drive), drive, searches=1).notes
+    assert any("something else moves this drive (a second gap" in note for note in notes)
 
 
 @pytest.mark.slow  # a fit of two masses to a chain that rattles

@@ -123,7 +123,7 @@ class Plan:
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
     >>> plan = plan_experiments(crane, log_period="4 ms", optimise=False)
     >>> [one.name for one in plan.experiments]
-    ['start', 'two levels', 'two levels, then reverse', 'shaking']
+    ['start', 'two levels', 'two levels, then reverse', 'reversed three times', 'shaking']
     >>> plan["start"].widths["gap"] > plan["two levels, then reverse"].widths["gap"]
     True
 
@@ -238,7 +238,7 @@ def plan_experiments(
     --------
     >>> crane = Drive.load("crane-4amtkf").replace(load_kind="reactive", gap=0.08, damping=0.3)
     >>> plan_experiments(crane, optimise=False).best.name
-    'two levels, then reverse'
+    'reversed three times'
 
     References
     ----------
@@ -375,7 +375,9 @@ def _standard(drive: Drive, level: float) -> dict[str, tuple[Vector, Vector]]:
         "two levels": ([part, part], [level, lower]),
     }
     if drive.load_kind == "reactive":
-        found["two levels, then reverse"] = ([part, part, 2.0 * part], [level, lower, -LEVEL * level])
+        back = LEVEL * level
+        found["two levels, then reverse"] = ([part, part, 2.0 * part], [level, lower, -back])
+        found["reversed three times"] = ([part] * 2 + [2.0 * part] * 3, [level, lower, -back, back, -back])
         if Mc > 0.0:
             found["shaking"] = ([part] * 4, [0.8 * Mc, -0.8 * Mc, 0.8 * Mc, -0.8 * Mc])
     return {name: (np.array(times), np.array(levels)) for name, (times, levels) in found.items()}
