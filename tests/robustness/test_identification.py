@@ -9,8 +9,8 @@
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
 every parameter). `--drive friction` has friction of motor and load, which is found too. `table` sums up all
-coverage of the smooth drive that the file has. `search` fits one log from 200 such guesses. `plan` compares the
-planned experiment of random drives with the standard ones. What the file has already is not computed again.
+coverage of the smooth drive that the file has. `search` fits one log from 200 such guesses. `plan` compares
+the planned experiment of random drives with the standard ones. What the file has is not computed again.
 """
 
 from __future__ import annotations
