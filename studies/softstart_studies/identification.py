@@ -65,7 +65,7 @@ def drive() -> Drive:
 class Extent:
     """What is computed: so many logs, fitted from guesses that are off by up to each of these factors."""
 
-    logs: int = 30  # parameters of a log err together: ten logs are too few for a share
+    logs: int = 10
     factors: tuple[float, ...] = (1.5, 1.0)
 
 
