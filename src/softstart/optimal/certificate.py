@@ -25,7 +25,9 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +48,7 @@ PRICE = 40.0  # of missing the terminal condition by as much as the target speed
 MOST_PROGRAMS = 60
 FEW, LITTLE = 4, 1e-5  # the work ends when so many programs raise the bound by less than this share
 MOST_CELLS = 3000
+KEPT = 4  # sets of multipliers that another start time begins with
 NARROWEST = 1e-6  # cell of tau, as a share of the longest
 
 
@@ -81,12 +84,18 @@ def _covers(problem: Problem, entry: Entry) -> str:
 
 
 def certified_bound(
-    problem: Problem, k_dyn: float, *, entry_near: float | None = None, within: float = 5e-4
+    problem: Problem,
+    k_dyn: float,
+    *,
+    entry_near: float | None = None,
+    within: float = 5e-4,
+    proof: Sequence[Any] = (),
 ) -> LowerBound:
     """The largest lower bound found on K_dyn of a problem for which `not_certified` has nothing to say.
 
     `k_dyn` is what is to be judged: the work ends once the bound is within that share of it. `entry_near` in
-    s, the instant at which both masses begin to move in contact in the best start known, makes it quicker.
+    s, the instant at which both masses begin to move in contact in the best start known, makes it quicker;
+    so does the `proof` of another start time of the drive.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -95,11 +104,15 @@ def certified_bound(
     True
     """
     goal = k_dyn * problem.base_torque * (1.0 - within)
-    peak = _Search(problem, goal, entry_near).bound()
+    search = _Search(problem, goal, entry_near)
+    known = [one for one in proof if isinstance(one, tuple)]
+    peak = search.bound(known)
+    duals = sorted(search.duals, key=lambda dual: -dual.worth)[:KEPT]
     return LowerBound(
         peak / problem.base_torque,
         "certificate",
         _covers(problem, entry_of(problem)),
+        proof=tuple((dual.by, dual.tau) for dual in duals),
     )
 
 
@@ -170,6 +183,7 @@ class _Dual:
     ) -> None:
         self.problem, self.entry, self.by, self.envelope = problem, entry, by, envelope
         self.tau = tau  # that they are best for
+        self.worth = 0  # cells whose bound they raised
         self.contact = envelope.contact
         self.v = v
         self.pulls = problem.drive.contact_law == "dead-zone" and problem.drive.d > 0.0
@@ -328,13 +342,17 @@ class _Search:
         worst = np.max(self.low[:, None] * a_v[None, :] + rest[None, :], axis=1)
         return np.asarray(worst)
 
-    def bound(self) -> float:
-        """The least bound over all cells, N m."""
+    def bound(self, known: Sequence[tuple[Multipliers, float]] = ()) -> float:
+        """The least bound over all cells, N m; it begins with `known` multipliers, with their contacts."""
         if self.first >= self.end:
             return math.inf
         longest = self.end - self.first
         near = self.near if self.near is not None else self.first + 0.1 * longest
-        self._program(near, self.end - near)
+        self.duals = [
+            _Dual(self.problem, self.entry, by, self.envelope, self.fastest, tau) for by, tau in known
+        ]
+        if not known:
+            self._program(near, self.end - near)
         heap: list[tuple[float, float, float]] = []
         for a, b in zip(*self._cells(longest), strict=True):
             self._push(heap, a, b)
@@ -404,7 +422,9 @@ class _Search:
             for k in sorted(left, key=lambda k: abs(self.duals[k].tau - b)):
                 if not all_of_them and float(best.min()) >= self.goal:
                     break
-                best = np.maximum(best, self._dual(self.duals[k], a, b, count))
+                found = self._dual(self.duals[k], a, b, count)
+                self.duals[k].worth += bool(np.any(found > best))
+                best = np.maximum(best, found)
                 tried.add(k)
         self.seen[a, b] = best, tried
         k = int(np.argmin(best))

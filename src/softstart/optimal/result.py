@@ -69,13 +69,15 @@ class Candidate:
 class LowerBound:
     """No torque profile of the class in `covers` has a smaller K_dyn than `k_dyn`.
 
-    `near`: whether the optimum lies near a certificate of this kind, so that what is far above is none.
+    `near`: whether the optimum lies near a certificate of this kind, so that what is far above is none;
+    `proof`: what proves it, with which the bound of another start time of the drive may begin.
     """
 
     k_dyn: float
     kind: BoundKind
     covers: str
     near: bool = True
+    proof: tuple[Any, ...] = field(default=(), repr=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from softstart.chain.model import Chain, load_machine
@@ -47,6 +47,9 @@ METHODS = get_args(Choice)
 TIGHT = 1e-5  # a bound within this share needs no other one
 NEAR = 1e-4  # the claim of a coarse mesh is no nearer to a start time
 BOUNCING = 0.85  # of the shortest time of one contact, from which on several contacts are tried
+# from one start time to the next: share of the work of a bound; the gap that is no reason to begin anew, as a
+# multiple of the one before and beside that, relative
+SHARED, MORE_LOOSE, DRIFT = 0.25, 1.3, 5e-4
 TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
 
@@ -104,7 +107,7 @@ def optimize(
     base : Drive or Chain, optional
         To whose mean shaft torque K_dyn refers, if not `drive`.
     warm : object, optional
-        `warm` of the optimum of a similar problem, from which the collocation starts.
+        `warm` of the optimum of a similar problem, from which the search and the proof start.
     tolerance : float
         `auto` ends when the answer is within this share of its lower bound (0.5 % by default); else it solves
         the CasADi problem too, from its own guess and from the answer; if the load need only reach its speed,
@@ -231,6 +234,15 @@ def solve(
     if problem.minimise == "start_time" and _by_roots(problem, method, warm):
         return _least_start_time(problem, method, tolerance, time_limit, confirm)
     hold = hold_of(problem)
+    known = isinstance(warm, _Near) and warm.about == replace(problem, start_time=1.0)
+    near = warm if known and certify and hold.until == 0.0 and method in ("auto", "lp") else None
+    beside = None
+    if near is not None:
+        with suppress(InfeasibleError, OptimumError):
+            beside = _beside_known(hold, near, method, began)
+        content = math.inf if time_limit == 0.0 else tolerance
+        if beside is not None and not confirm and beside.gap_percent <= 100.0 * min(near.allowed, content):
+            return beside
     may_bounce = method == "auto" and time_limit > 0.0 and hold.until == 0.0 and _may_bounce(problem)
     try:
         candidate, why = (
@@ -246,7 +258,7 @@ def solve(
             return replace(found, tried=(_trial(found),))
         raise
     work = 0.0 if not certify else MOST_WORK if time_limit > 0.0 else LITTLE_WORK
-    best = _checked(hold, candidate, why, began, work)
+    best = _checked(hold, candidate, why, began, work, proof=near.proof if near else ())
     tried = [_trial(best)]
     goes_on = method == "auto" and best.method == "lp" and best.gap_percent > 100.0 * tolerance
     until = time.perf_counter() + time_limit
@@ -269,7 +281,56 @@ def solve(
     if may_bounce and time.perf_counter() < until and best.gap_percent > 100.0 * tolerance:
         best, others = _beside_shipped(hold, best, work)
         tried += others
+    more = MORE_LOOSE
+    if beside is not None and near is not None:
+        if beside.gap_percent < 1.05 * best.gap_percent + 100.0 * DRIFT:
+            more = 2.0 * near.more - 1.0  # beginning anew gained nothing
+        tried.append(_trial(beside))
+        bound = max(best.bound, beside.bound, key=lambda one: one.k_dyn)
+        best = replace(min(best, beside, key=lambda one: one.minimised), bound=bound)
+    if best.method == "lp":
+        answer = best.warm.answer if isinstance(best.warm, _Near) else best.warm
+        about = replace(problem, start_time=1.0)
+        left = _Near(about, answer, best.bound.proof, best.gap_percent / 100.0, more)
+        best = replace(best, warm=left)
     return replace(best, tried=tuple(tried), seconds=time.perf_counter() - began)
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """What an optimum of linear programs leaves for another start time of its drive.
+
+    Its answer, the proof of its bound, the gap between them, relative, and how many times as large that of
+    an answer found from it may be.
+    """
+
+    about: Problem  # with any start time
+    answer: Any
+    proof: tuple[Any, ...]
+    gap: float
+    more: float
+
+    @property
+    def allowed(self) -> float:
+        """The gap up to which an answer found from this one needs no search of its own."""
+        return self.more * self.gap + DRIFT
+
+
+def _beside_known(hold: Hold, near: _Near, method: Choice, began: float) -> Optimum | None:
+    """The optimum from that of another start time, its proof first; None where there is none."""
+    problem = hold.free
+    linear = [one for one in (ideal, whole_search) if not one.not_linear(problem)]
+    if not linear or (method == "auto" and not pulse_coast_hold.applies(problem)):
+        return None
+    found = linear[0].solve(problem, near=near.answer, loose=near.allowed > TOLERANCE)
+    if found is None:
+        return None
+    best = _checked(
+        hold, found, "from the optimum of another start time", began, SHARED * LITTLE_WORK, proof=near.proof,
+        within=0.5 * (near.gap + near.allowed),
+    )  # fmt: skip
+    left = replace(near, answer=found.warm, proof=best.bound.proof or near.proof)
+    return replace(best, warm=left, tried=(_trial(best),))
 
 
 def _by_roots(problem: Problem, method: Choice, warm: Any) -> bool:
@@ -384,16 +445,21 @@ def _trial(found: Optimum) -> Trial:
 
 
 def _checked(
-    hold: Hold, candidate: Candidate, why: str, began: float, work: float, bounces: bool = False
-) -> Optimum:
-    """A candidate that has passed the exact plant, with its bound for so much work."""
+    hold: Hold, candidate: Candidate, why: str, began: float, work: float, bounces: bool = False,
+    proof: tuple[Any, ...] = (), within: float = 0.0,
+) -> Optimum:  # fmt: skip
+    """A candidate that has passed the exact plant, with its bound for so much work.
+
+    The bound may begin with the proof of another start time, and need not come nearer than `within`.
+    """
     problem = hold.problem
     end, claimed = hold.until + candidate.end_time, hold.claimed(candidate)
     profile = with_tail(problem, hold.before(candidate.profile), end)
     if bounces or work == 0.0:  # the certificates are about one contact
         bound = momentum_bound(problem)
     else:
-        bound = _bound(hold, candidate.end_time, replay(problem.drive, profile, end, problem.base), work)
+        start = replay(problem.drive, profile, end, problem.base)
+        bound = _bound(hold, candidate.end_time, start, work, proof, within)
     run = check(problem, profile, end, claimed, bound, bounces=bounces)
     heat = heat_of(run, end)
     if heat < (least := least_heat(problem) if problem.minimise == "heat" else 0.0) * (1.0 - TIGHT):
@@ -517,7 +583,9 @@ def _refusal(problem: Problem) -> InfeasibleError | OptimumError:
     return InfeasibleError(verdict)
 
 
-def _bound(hold: Hold, end_time: float, run: Run, work: float) -> LowerBound:
+def _bound(
+    hold: Hold, end_time: float, run: Run, work: float, proof: tuple[Any, ...] = (), within: float = 0.0
+) -> LowerBound:
     """The certificate where there is one for this class of problems, else the bound by momentum.
 
     It is that of the motor without its brake, in the time that is left after the earliest release.
@@ -534,15 +602,17 @@ def _bound(hold: Hold, end_time: float, run: Run, work: float) -> LowerBound:
         entry = _entry_of(run, hold.until)
         contact = run.first_contact - hold.until if problem.drive.theta0 < 0.5 * problem.drive.gap else 0.0
         near = contact, max(entry, contact), end_time
-        known.append(whole_bound(problem, run.k_dyn, near, work=work))
+        known.append(whole_bound(problem, run.k_dyn, near, max(within, 1e-3), work, proof))
     best = max(known, key=lambda one: one.k_dyn)
     far = run.k_dyn > best.k_dyn * (1.0 + TOLERANCE) and (work == MOST_WORK or len(known) == 1)
     if not not_certified(problem) and (problem.ideal_torque or far):
         k_dyn, start = (
             (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
         )
-        within = 5e-4 if problem.ideal_torque else 2e-3  # what a lag costs it does not know anyway
-        known.append(certified_bound(problem, k_dyn, entry_near=start, within=within))
+        within = max(
+            within, 5e-4 if problem.ideal_torque else 2e-3
+        )  # what a lag costs it does not know anyway
+        known.append(certified_bound(problem, k_dyn, entry_near=start, within=within, proof=proof))
     return max(known, key=lambda one: one.k_dyn)
 
 

@@ -15,6 +15,7 @@ torque there.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -176,16 +177,22 @@ class _Cells:
         contact = math.floor(te / s.h + 1e-9) - gap - winding
         return (gap, winding, contact) if contact > 0 else None
 
-    def raise_by(self, dual: Dual, goal: float) -> None:
-        """Take the larger one of what is known of the cells below `goal` and what a dual proves."""
+    def raise_by(self, dual: Dual, goal: float) -> bool:
+        """Take the larger one of what is known of the cells below `goal` and what a dual proves.
+
+        True if the dual raised one of them.
+        """
         box = self.open_box(goal)
         if box is None:
-            return
+            return False
         i0, i1, k0, k1 = box
         i, k = self.first
         known = self.lowest[i0 - i : i1 - i, k0 - k : k1 - k]
         found = dual.cells((i0, i1), (k0, k1), self.winds, known < goal)
-        np.maximum(known, np.where(np.isfinite(found), found, -math.inf), out=known)
+        proved = np.where(np.isfinite(found), found, -math.inf)
+        raised = bool(np.any((proved > known) & (known < goal)))
+        np.maximum(known, proved, out=known)
+        return raised
 
     def work(self, goal: float) -> float:
         """How many numbers a set of multipliers takes."""
@@ -425,7 +432,7 @@ class _Program:
         value = {name: names.get(name, 0.0) * unit / total for name, unit in units.items()}
         return Multipliers(
             torque, closed, curve, early.get("winding", none), early.get("gap", none), value["speed"],
-            value["rate"], value["torque"], -value["contact"], -value["breakaway"], self.durations,
+            value["rate"], value["torque"], -value["contact"], -value["breakaway"], self.durations, s.end,
         )  # fmt: skip
 
 
@@ -454,11 +461,13 @@ def _with_means(start: Start, kind: Kind, dt: float) -> Matrix:
 
 
 def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float] | None = None,
-                within: float = 1e-3, work: float = MOST_WORK) -> LowerBound:  # fmt: skip
+                within: float = 1e-3, work: float = MOST_WORK,
+                proof: Sequence[Any] = ()) -> LowerBound:  # fmt: skip
     """The largest lower bound found on K_dyn of a problem for which `not_certified` has nothing to say.
 
     `k_dyn` is what is to be judged: the work ends once the bound is within that share of it. `near`, the
-    instants of contact, breakaway and end in s of the best start known, make it quicker. `work` limits it.
+    instants of contact, breakaway and end in s of the best start known, make it quicker, and so does the
+    `proof` of another start time of the drive. `work` limits it.
 
     >>> from softstart import Drive
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.005)
@@ -476,8 +485,11 @@ def whole_bound(problem: Problem, k_dyn: float, near: tuple[float, float, float]
         f"every torque demand from {low:g} to {high:g} N m over time, by whatever controller, "
         f"{closing}{moving} until {ENDINGS[problem.terminal]}{held} and half an elastic period longer"
     )
-    peak = certified_peak(problem, k_dyn * problem.base_torque * (1.0 - within), near, work)
-    return LowerBound(peak * (1.0 - ROUNDING) / problem.base_torque, "certificate", covers, near=False)
+    goal = k_dyn * problem.base_torque * (1.0 - within)
+    used = [one for one in proof if isinstance(one, Multipliers)]
+    peak = certified_peak(problem, goal, near, work, used=used)
+    k_dyn = peak * (1.0 - ROUNDING) / problem.base_torque
+    return LowerBound(k_dyn, "certificate", covers, near=False, proof=tuple(used))
 
 
 def dual_at(problem: Problem, instants: tuple[float, float, float], steps: int = 600) -> Dual:
@@ -503,17 +515,22 @@ def dual_at(problem: Problem, instants: tuple[float, float, float], steps: int =
 
 
 def certified_peak(problem: Problem, goal: float, near: tuple[float, float, float] | None = None,
-                   work: float = MOST_WORK, report: Any = None) -> float:  # fmt: skip
+                   work: float = MOST_WORK, report: Any = None,
+                   used: list[Multipliers] | None = None) -> float:  # fmt: skip
     """The least bound over all cells, N m; the search ends at `goal`.
 
-    `near`, the instants of contact, breakaway and end in s of the best start known, make it quicker.
+    `near`, the instants of contact, breakaway and end in s of the best start known, make it quicker; so do
+    the multipliers `used` for another start time; those that proved something here are in it afterwards.
     """
+    used = [] if used is None else used
     start = Start(problem, first_steps(problem, goal))
     if start.earliest >= start.end:
         return math.inf
-    least = _least(start, goal, near, work, report, start.rests)
+    known = list(used)
+    used.clear()
+    least = _least(start, goal, near, work, report, start.rests, known, used)
     if start.rests and start.open and len(list(phase_orders(problem))) > 1:
-        least = min(least, _least(start, goal, near, work, report, False))
+        least = min(least, _least(start, goal, near, work, report, False, known, used))
     return least
 
 
@@ -535,41 +552,53 @@ def first_steps(problem: Problem, goal: float = math.inf) -> int:
 
 
 def _least(start: Start, goal: float, near: tuple[float, float, float] | None, left: float, report: Any,
-           winds: bool) -> float:  # fmt: skip
-    """The least bound over the cells, each raised by multipliers found among them, on finer grids."""
+           winds: bool, known: list[Multipliers], proof: list[Multipliers]) -> float:  # fmt: skip
+    """The least bound over the cells, each raised by multipliers found among them, on finer grids.
+
+    It begins with the multipliers `known`; those that raised cells on the last grid are added to `proof`.
+    """
     cells, before = _Cells(start, winds), 0.0
-    used: list[Multipliers] = []
+    used = list(known)
     for finer in range(GRIDS):
         if finer:
             start = Start(start.problem, FINER * start.n)
             cells = _Cells(start, winds, cells, goal)
-            used = [by.finer(start) for by in used[-KEPT:]]
-        known = cells.near(near) if near else None
+        used = [by.on(start) for by in used]
+        instants = cells.near(near) if near else None
         failures: list[tuple[int, int]] = []
-        for level in LEVELS:
-            left = _raise(cells, level * goal, goal, known, left, used, failures, report)
-            known = None
+        for level in LEVELS[2 if known else 0 :]:
+            left, used = _raise(cells, level * goal, goal, instants, left, used, failures, report)
+            instants = None
         near_enough = cells.least >= goal * (1.0 - GAINED) or cells.least < before * (1.0 + GAINED)
         if near_enough or left < 3.0 * FINER**2 * cells.work(goal):
             break
         before = cells.least if finer else 0.0
+    proof += used
     return cells.least
 
 
-def _raise(cells: _Cells, level: float, goal: float, known: tuple[int, int, int] | None, left: float,
-           used: list[Multipliers], failures: list[tuple[int, int]], report: Any) -> float:  # fmt: skip
-    """On one grid, until all cells are at the level or programs close few; what is left of the work."""
+def _raise(cells: _Cells, level: float, goal: float, near: tuple[int, int, int] | None, left: float,
+           used: list[Multipliers], failures: list[tuple[int, int]],
+           report: Any) -> tuple[float, list[Multipliers]]:  # fmt: skip
+    """On one grid, until all cells are at the level or programs close few: what is left of the work, and
+    multipliers that raised cells, as far as they are kept.
+    """
     start, warm = cells.start, WarmStarts()
+    raised: list[Multipliers] = []
     for by in used[-KEPT:]:
+        if cells.count(level) == 0:
+            raised.append(by)
+            continue
         left -= cells.work(level)
-        cells.raise_by(Dual(start, by), level)
+        if cells.raise_by(Dual(start, by), level):
+            raised.append(by)
     begun = len(failures)
     solved: list[tuple[int, int, int]] = []
     for _ in range(PROGRAMS):
         cell = cells.middle(level, failures)
         if cell is None or left < 0.0:
             break
-        durations, open_before = known or cells.instants(cell), cells.count(level)
+        durations, open_before = near or cells.instants(cell), cells.count(level)
         if durations in solved:
             failures.append(cell)
             continue
@@ -579,12 +608,12 @@ def _raise(cells: _Cells, level: float, goal: float, known: tuple[int, int, int]
         left -= cells.work(level) + 20.0 * float(sum(edges.size for _, edges in program.parts)) ** 2
         if found is not None:
             cells.raise_by(Dual(start, found), level)
-            used.append(found)
+            raised.append(found)
         if report:
             report(start.n, level, durations, program.P, open_before, cells.count(level), cells.least, left)
-        if known is None and cells.count(level) > (1.0 - CLOSED) * open_before:
+        if near is None and cells.count(level) > (1.0 - CLOSED) * open_before:
             failures.append(cell)
             if len(failures) > begun + FAILURES:
                 break
-        known = None
-    return left
+        near = None
+    return left, raised[-KEPT:]

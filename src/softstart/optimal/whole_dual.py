@@ -66,21 +66,45 @@ class Multipliers:
     contact: float  # of z = 0, beside what the contact makes of z
     breakaway: float
     durations: tuple[int, int, int]  # of the program: in the gap, winding up, in contact, in steps
+    end: float  # start time, s
 
-    def finer(self, start: Start) -> Multipliers:
-        """The same on a grid with FINER times the steps."""
-        wide = start.tail + start.n - FINER * self.torque.size  # at the end of the swing
+    def on(self, start: Start) -> Multipliers:
+        """The same on the grid of a start of this drive; in another start time stretched in the contact.
 
-        def cut(values: Any) -> Any:
-            fine = np.repeat(values, FINER, axis=-1)
-            return np.concatenate([np.zeros((*fine.shape[:-1], wide)), fine], axis=-1)
+        Any multipliers prove something. What of them is beyond the grid is moved to its ends, so that those
+        of T <= P still have the integral 1; none passes te, up to which T >= 0.
+        """
+        steps = self.gap.shape[1]
+        stretch = 1.0 if math.isclose(self.end, start.end, rel_tol=1e-12) else self._stretch(start.end)
+        h = self.end / steps
 
-        gap, winding, contact = (FINER * steps for steps in self.durations)
+        def cut(values: Any, tail: int, wide: int, by: float) -> Any:
+            """Densities over `tail` steps before and all after 0 on `wide` + n steps."""
+            rows = np.atleast_2d(values)
+            edges = by * h * (np.arange(values.shape[-1] + 1) - tail)
+            new = start.h * (np.arange(wide + start.n + 1) - wide)
+            found = np.zeros((rows.shape[0], new.size))
+            for row, into in zip(np.cumsum(rows, axis=1), found, strict=True):
+                into[:] = np.interp(new, edges, np.append(0.0, row))
+                into[0], into[-1] = 0.0, row[-1]
+            moved = np.diff(found, axis=1) * (h / start.h)
+            return moved.reshape(*values.shape[:-1], new.size - 1)
+
+        tail = self.torque.size - steps
+        durations = (round(one * h / start.h) for one in self.durations)
+        gap, winding, contact = durations
         return replace(
-            self, torque=cut(self.torque), closed=cut(self.closed), curve=cut(self.curve),
-            winding=np.repeat(self.winding, FINER, axis=-1), gap=np.repeat(self.gap, FINER, axis=-1),
-            durations=(gap, winding, contact),
+            self, end=start.end, torque=cut(self.torque, tail, start.tail, stretch),
+            closed=cut(self.closed, tail, start.tail, stretch),
+            curve=cut(self.curve, tail, start.tail, stretch),
+            winding=cut(self.winding, 0, 0, 1.0), gap=cut(self.gap, 0, 0, 1.0),
+            durations=(gap, winding, max(round(contact * stretch), 1)),
         )  # fmt: skip
+
+    def _stretch(self, end: float) -> float:
+        """By how much longer the contact is where the time before it is the same."""
+        before = (self.durations[0] + self.durations[1]) * self.end / self.gap.shape[1]
+        return max((end - before) / max(self.end - before, 1e-300), 0.1)
 
 
 class Phase:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -108,11 +109,11 @@ CLASSES: list[tuple[dict[str, Any], dict[str, Any]]] = [
 
 @pytest.mark.parametrize(("given", "options"), CLASSES)
 def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[str, Any]) -> None:
-    """Equations that a start misses are paid for with their multipliers."""
+    """Equations that a start misses are paid for with their multipliers, half of them of another time."""
     drive = CRANE.replace(gap=0.5, **given)
     problem = Problem(drive, 0.3, **options)
     assert not not_certified(problem)
-    start = Start(problem, 600)
+    start, longer = Start(problem, 600), Start(replace(problem, start_time=0.32), 500)
     rng = np.random.default_rng(15)
     starts, closest = 0, math.inf
     duals: list[tuple[Dual, Any]] = []
@@ -135,13 +136,16 @@ def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[
         gap, winding, contact = found
         winds = start.rests and (winding > 1e-6 or not start.open)
         if trial % 25 == 0 or not duals:  # good multipliers for another start than most
-            by = _Program(start, counted(start, gap, winding, contact)).solve(math.inf)
+            source = longer if trial // 25 % 2 else start
+            steps = counted(source, *(start.h / source.h * one for one in found))
+            by = _Program(source, steps).solve(math.inf)
             assert by is not None
+            by = by.on(start)
             cells = _Cells(start, winds)
             cells.lowest[:] = np.where(np.isfinite(cells.lowest), -math.inf, math.inf)
             dual = Dual(start, by)
             cells.raise_by(dual, math.inf)
-            duals = [*duals[-6:], (dual, cells)]
+            duals = [*duals[-5:], (dual, cells)]
         end = run.at(te)
         T = float(end["T"])
         for dual, cells in duals:

@@ -22,9 +22,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.optimize import minimize_scalar
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
@@ -62,6 +64,8 @@ EXCESS = 1e-4  # relative: T above P between the checks by more counts
 SCANNED, LOCAL_MINIMA = 20, 3
 SOONER = (0.985, 0.95, 0.9, 0.83, 0.75, 0.66, 0.56, 0.46, 0.36, 0.27, 0.19, 0.13, 0.09, 0.06)  # of the end
 LESS = 0.95  # of the time
+MOST_INHERITED = 300  # edges of a grid that another start time begins with
+FEW = 8  # entries that are tried near that of another start time
 RISING, STEEP = 2, 1.03  # so many ends in a row with P so many times the least: no shorter one is tried
 NEAR = (0.0, 0.3, 0.6, 0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of te of another end, from the earliest on
 SHARES = (0.0, 0.002, 0.006, 0.012, 0.02, 0.035, 0.05, 0.08, 0.12, 0.2, 0.4, 0.7, 1.0)  # of te, a first scan
@@ -379,19 +383,81 @@ class ContactProgram:
 # the search for the entry ----------------------------------------------------------------------------------
 
 
-def solve(problem: Problem) -> Candidate | None:
+def solve(problem: Problem, near: Any = None, loose: bool = False) -> Candidate | None:
     """The optimum of a problem with an ideal torque; None where no torque meets the terms.
+
+    With `near`, what the answer of another start time leaves, it is looked for near that one on its grid, and
+    if no bound will tell whether it is as good (`loose`), on a grid of its own.
 
     Raises InputError where the problem is not linear from the contact on (see `no_ideal`).
     """
     reason = not_linear(problem)
     if reason:
         raise InputError(f"method = lp: {reason}; use method = collocation.")
-    best = search(problem)
+    best = search(problem) if near is None else _beside(problem, near, loose)
     if best is None:
         return None
-    profile = assemble(problem, best)
-    return Candidate(profile, best.end_time, best.P / problem.base_torque, "lp", f"{best.levels.size} steps")
+    assert problem.start_time is not None
+    slope, latest = 0.0, float(problem.start_time)
+    if isinstance(near, _Known) and latest != near.latest:
+        slope = (best.te - near.te) / (latest - near.latest)
+    known = _Known(best.te, best.end_time, best.edges / best.edges[-1], latest, slope)
+    return Candidate(
+        assemble(problem, best), best.end_time, best.P / problem.base_torque, "lp",
+        f"{best.levels.size} steps", known,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """An answer from which that of another start time is found: its entry, end, start time (s), grid."""
+
+    te: float
+    end: float
+    grid: Vector
+    latest: float
+    slope: float  # of the entry over the start time
+
+
+def _beside(problem: Problem, near: Any, loose: bool) -> Answer | None:
+    """The answer for another start time, from the entry known and on its grid."""
+    assert problem.start_time is not None
+    if not isinstance(near, _Known) or near.grid.size > MOST_INHERITED:
+        return None
+    entry, end = entry_of(problem), min(near.end, problem.start_time)
+    if near.end > near.latest * (1.0 - 1e-9):
+        end = float(problem.start_time)
+    shift = near.slope * (problem.start_time - near.latest)
+    te = min(max(near.te + shift, entry.earliest), entry.latest, 0.999 * end)
+    answers: dict[float, Answer | None] = {}
+    warm = WarmStarts()
+
+    def peak_at(te: float) -> float:
+        if te not in answers:
+            answers[te] = ContactProgram(problem, end - te, near.grid, warm=warm).solve(te)
+        return min(_peak(answers[te]), 1e300)
+
+    peak_at(te)
+    for width, few in (
+        (0.2 * abs(shift) + 2e-4 * end, FEW),
+        (0.02 * end, 2 * FEW),
+    ):
+        low, high = max(te - width, entry.earliest), min(te + width, entry.latest, 0.999 * end)
+        if high > low:
+            options = {"xatol": 2e-3 * (high - low), "maxiter": few}
+            minimize_scalar(peak_at, bounds=(low, high), method="bounded", options=options)
+            peak_at(low)
+            te = min(answers, key=lambda te: _peak(answers[te]))
+        if not high > low or min(te - low, high - te) > 0.02 * (high - low) or te == entry.earliest:
+            break
+    best = answers[min(answers, key=lambda te: _peak(answers[te]))]
+    if best is None:
+        return None
+    if loose:
+        return min(_refined(problem, entry, best), best, key=_peak)
+    if best.broken.any():
+        best = _moved(problem, entry, best, best.finer(best.broken), 1e-5 * end, 2e-6 * end)
+    return best
 
 
 def not_linear(problem: Problem) -> str:

@@ -59,6 +59,7 @@ SETTLED = 8.0  # lags, after which the torque follows its demand to 0.03 %
 YIELDING, YIELDING_POINTS = 0.1, 16  # of the time in which U falls to 0, in which the curve is kept after t_f
 BELOW_CURVE = 3e-5  # of U, by which the torque stays below its curve where it is checked
 EXCESS = 1e-4  # relative: T above P between the checks by more counts
+BROKEN = 2e-7  # of U: T off the flank by more counts; HiGHS itself keeps its rows to 1e-7
 
 Kind = Literal["gap", "resting", "stuck", "contact"]  # resting: a gap with the load at rest; stuck: wound up
 Grid = tuple[tuple[Kind, Vector], ...]  # phases in order, each with the edges of its steps as shares of it
@@ -561,7 +562,7 @@ class WholeProgram:
         kept = rows.csr(self.columns) @ found + constant if self.pulls else T
         contact = np.array(self.kinds)[step] == "contact"
         over = np.abs(T) if self.pulls else T
-        least = np.minimum(self._least_torque(step, s), 0.0) - 1e-9
+        least = np.minimum(self._least_torque(step, s), 0.0) - BROKEN
         bad = contact & ((over > P * (1.0 + EXCESS)) | ((kept < least) & (step < self.steps)))
         for rows, right in self._under_curve(SIXTEENTHS):
             bad[step < self.steps] |= rows.csr(self.columns) @ found > right

@@ -37,6 +37,9 @@ SOONER = (0.93, 0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # shares of
 TRIALS = 25  # of better instants
 FINEST = 1e-7  # of t_f, to which they are found
 LOCAL_MINIMA = 3
+MOST_INHERITED = 400  # edges of a grid that another start time begins with
+DRIFT = 1e-4  # relative: an answer on a grid of its own that is so much gentler is worth its time
+MENDED = (1e-3, 1e-4)  # of t_f: how far instants may move where its steps exceed a limit
 EARLIEST = 1.0 + 1e-7  # just later than under full torque: the grid cannot do better
 
 
@@ -112,16 +115,48 @@ def _under_full_torque(problem: Problem) -> tuple[float, float]:
 # the search ------------------------------------------------------------------------------------------------
 
 
-def solve(problem: Problem, start: tuple[PhaseOrder, Timing] | None = None) -> Candidate | None:
+def solve(
+    problem: Problem, start: tuple[PhaseOrder, Timing] | None = None, near: Any = None, loose: bool = False
+) -> Candidate | None:
     """The optimum of a problem that `not_linear` has nothing against; None if no torque meets the terms.
 
-    With `start` it is looked for from these instants on, instead of by a scan.
+    With `start` it is looked for from these instants on, with `near`, what the answer of another start time
+    leaves, from its instants on and on its grid, instead of by a scan. If that is `loose`, no bound will tell
+    that a grid of its own would be better, and this is tried, ever more rarely while it gains nothing.
     """
-    best = search(problem) if start is None else _from(problem, *start)
+    assert problem.start_time is not None
+    wait = pause = 0
+    if near is not None:
+        known = near if isinstance(near, _Known) else None
+        best = None if known is None else _beside(problem, known)
+        if best is not None and known is not None and loose:
+            wait, pause = known.wait - 1, known.pause
+            if wait < 0:
+                own = _refined(problem, _order_of(problem, best.grid), best)
+                pause = 2 * pause + 1 if own.P > best.P * (1.0 - DRIFT) else 0
+                best, wait = min(own, best, key=lambda one: one.P), pause
+    else:
+        best = search(problem) if start is None else _from(problem, *start)
     if best is None:
         return None
+    left = _Known(best.at, best.grid, best.beyond, float(problem.start_time), wait, pause)
     note = f"{best.edges.size - 1} steps"
-    return Candidate(best.profile(problem), best.at.end, best.P / problem.base_torque, "lp", note)
+    return Candidate(best.profile(problem), best.at.end, best.P / problem.base_torque, "lp", note, left)
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """An answer from which that of another start time is found: its instants, grid and start time in s.
+
+    `wait`: so many such answers pass before one gets a grid of its own; `pause`: how many waited last.
+    """
+
+    at: Instants
+    grid: Grid
+    beyond: bool
+    latest: float
+    wait: int
+    pause: int
 
 
 def search(problem: Problem) -> WholeAnswer | None:
@@ -143,6 +178,37 @@ def _from(problem: Problem, order: PhaseOrder, at: Timing) -> WholeAnswer | None
     assert problem.start_time is not None
     best = _Timings(problem, order, float(problem.start_time), MIDDLE).moved(at, 0.1 * at[2])
     return None if best is None else _refined(problem, order, best)
+
+
+def _order_of(problem: Problem, grid: Grid) -> PhaseOrder:
+    """The order of phases of a grid."""
+    kinds = tuple(kind for kind, _ in grid)
+    return next(one for one in phase_orders(problem) if one.kinds == kinds)
+
+
+def _beside(problem: Problem, near: _Known) -> WholeAnswer | None:
+    """The answer for another start time, from the instants known and on their grid, mended if need be."""
+    assert problem.start_time is not None
+    latest = float(problem.start_time)
+    if sum(edges.size for _, edges in near.grid) > MOST_INHERITED:
+        return None
+    order = _order_of(problem, near.grid)
+    timings = _Timings(problem, order, latest, 0, near.grid, near.beyond)
+    winding = near.at.tb - near.at.tc if timings.winds else 0.0
+    end = min(near.at.end * latest / near.latest, latest)
+    later = near.at.tb + end - near.at.end  # with as much time in contact
+    for x in (near.at.tb, near.at.tb * end / near.at.end, later):
+        start = timings.timing(x, winding, end)
+        if math.isfinite(timings.peak(start)):
+            best = timings.moved(start, 0.1 * end)
+            break
+    else:
+        return None
+    for width in MENDED:
+        if best is None or not best.broken.any():
+            break
+        best = _moved(problem, order, best, best.finer(best.broken), width * end)
+    return best
 
 
 def _coarse(problem: Problem, order: PhaseOrder, latest: float) -> WholeAnswer | None:
