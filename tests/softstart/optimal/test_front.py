@@ -256,7 +256,7 @@ def test_a_controller_that_never_starts_has_no_ratio():
     ids=["lag", "servo"],
 )
 def test_a_front_of_20_points_takes_few_programs(drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Points share answers and proofs: in numbers solved, not in seconds, 20 of them are six of one."""
+    """Points share answers and proofs: in numbers solved, not in seconds, 20 of them are eight of one."""
     solved, numbers = Limits.solved, [0]
 
     def counted(self: Limits, *given: Any, **options: Any) -> Any:
@@ -269,13 +269,14 @@ def test_a_front_of_20_points_takes_few_programs(drive: Drive, monkeypatch: pyte
     front = pareto(drive, times, controllers=[])
     of_front, numbers[0] = numbers[0], 0
     one = pareto(drive, times[10:11], controllers=[]).points[0]
-    assert of_front < 6.0 * numbers[0]
+    assert of_front < 8.0 * numbers[0], of_front / numbers[0]
     assert all(point.found for point in front.points)
     again = front.points[10]
     assert again.k_dyn == pytest.approx(one.k_dyn, rel=3e-4)
     k_dyn = [point.k_dyn or math.inf for point in front.points]
     assert all(b <= a for a, b in pairwise(k_dyn))
     for point in front.points:
-        assert point.k_dyn_lower_bound is not None and point.k_dyn is not None
+        assert point.k_dyn_lower_bound is not None
+        assert point.k_dyn is not None
         assert point.k_dyn_lower_bound <= point.k_dyn * (1.0 + 1e-9)
     assert (again.gap_percent or 0.0) < 1.5 * (one.gap_percent or 0.0) + 0.1
