@@ -88,7 +88,8 @@ BUDGET = {
     # 42: multipliers and weights of the demand of one start, for the page from the statement to the proof
     # 10: what load curves and ground leave of bounds and terminal conditions
     # 505 and a file: chains by collocation, an independent check of their linear programs
-    "optimal": (12650, 37, 11, 0),
+    # 277: points of a front share answers and proofs
+    "optimal": (12930, 37, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet
