@@ -139,7 +139,7 @@ def reason(best: Optimum) -> str:
     if best.bound.kind == "momentum":
         return "momentum only" + (": several contacts" if best.run.contacts > 1 else "")
     if best.problem.drive.load_kind == "reactive":
-        return "the load winds up at rest: cells stay coarse within MOST_WORK (16 times it: drive 43 from 61 to 5 %)"
+        return "the load winds up at rest: its cells stay coarse within MOST_WORK"
     return "cells too coarse"
 
 
