@@ -89,7 +89,8 @@ BUDGET = {
     # 10: what load curves and ground leave of bounds and terminal conditions
     # 505 and a file: chains by collocation, an independent check of their linear programs
     # 277: points of a front share answers and proofs
-    "optimal": (12930, 37, 11, 0),
+    # 60: the gap of a load at rest in closed form
+    "optimal": (12990, 37, 11, 0),
     # undo and redo; parameters of strategies; `links`: the bench in the address; 60: settled, flags, limits
     # 10: the window of the plots
     # 110 and a file: the form of the data sheet

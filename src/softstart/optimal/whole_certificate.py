@@ -46,7 +46,8 @@ KICKED = 0.02  # of a price: for a kick where phases meet
 PROGRAMS = 24  # on a grid
 FAILURES, APART = 3, 2  # programs on a grid that may close few cells; others are tried so many cells away
 KEPT = 8  # sets of multipliers that the next grid begins with
-MOST_WORK, LITTLE_WORK = 2.4e8, 3e7  # numbers computed in all; a drive is judged alike on every machine
+CLOSED_FORM = 6  # steps that take as long as the closed form of a gap
+MOST_WORK, LITTLE_WORK = 2.8e8, 3e7  # numbers computed in all; a drive is judged alike on every machine
 ROUNDING = 1e-9
 GAINED = 1e-4  # relative: what is left of the goal, or gained by a grid, that ends the work
 CLOSED = 0.1  # of the open cells: a program that closes fewer is a failure
@@ -194,14 +195,15 @@ class _Cells:
         np.maximum(known, proved, out=known)
         return raised
 
-    def work(self, goal: float) -> float:
-        """How many numbers a set of multipliers takes."""
+    def work(self, goal: float, walked: int) -> float:
+        """How many numbers a set of multipliers takes, with so many steps in the gap (`Start.walked`)."""
         first, last = spans_of(self.lowest < goal).T
         n, i = self.start.n, np.arange(first.size) + self.first[0]
         steps = last + self.first[1]
         if self.start.rests:
-            steps = (last - first + 1) * np.maximum(n - i, 0) if self.winds == self.start.open else n - i
-        return 5.0 * float(np.sum(steps, where=last >= first)) + 10.0 * n
+            gap = np.minimum(np.maximum(n - i, 0), walked + CLOSED_FORM)
+            steps = (last - first + 1) * gap + last if self.winds == self.start.open else n - i
+        return 5.0 * float(np.sum(steps, where=last >= first)) + 60.0 * n
 
 
 # the linear program ----------------------------------------------------------------------------------------
@@ -570,7 +572,8 @@ def _least(start: Start, goal: float, near: tuple[float, float, float] | None, l
             left, used = _raise(cells, level * goal, goal, instants, left, used, failures, report)
             instants = None
         near_enough = cells.least >= goal * (1.0 - GAINED) or cells.least < before * (1.0 + GAINED)
-        if near_enough or left < 3.0 * FINER**2 * cells.work(goal):
+        walked = start.walked(used[-1]) if used else start.n
+        if near_enough or left < 3.0 * FINER**2 * cells.work(goal, walked):
             break
         before = cells.least if finer else 0.0
     proof += used
@@ -589,7 +592,7 @@ def _raise(cells: _Cells, level: float, goal: float, near: tuple[int, int, int] 
         if cells.count(level) == 0:
             raised.append(by)
             continue
-        left -= cells.work(level)
+        left -= cells.work(level, start.walked(by))
         if cells.raise_by(Dual(start, by), level):
             raised.append(by)
     begun = len(failures)
@@ -605,8 +608,9 @@ def _raise(cells: _Cells, level: float, goal: float, near: tuple[int, int, int] 
         solved.append(durations)
         program = _Program(start, durations, level < goal, warm)
         found = program.solve(goal)
-        left -= cells.work(level) + 20.0 * float(sum(edges.size for _, edges in program.parts)) ** 2
+        left -= 5.0 * float(sum(edges.size for _, edges in program.parts)) ** 2
         if found is not None:
+            left -= cells.work(level, start.walked(found))
             cells.raise_by(Dual(start, found), level)
             raised.append(found)
         if report:

@@ -24,6 +24,10 @@ Without load torque a damped shaft is steady only after c z + d z' was a little 
 be up to `below` above the linear one there, at its price. Behind a limited rate the demand at a steady end is
 the load torque, as in the statement: V becomes steep on both sides of it.
 
+Where a load rests, each cell has a gap of its own. There q is a constant, a multiple of x and, behind a lag,
+one of exp(-x/lag) together: the integral of phi(q) is known in closed form (`_freely`), unless the rate is
+limited or the curve has multipliers there.
+
 Left out, which can only lower the bound: the limits of twist and torque before the contact, and |T| <= P
 where the dead zone pulls.
 """
@@ -44,7 +48,7 @@ from softstart.optimal.lp.rows import MARGIN
 from softstart.optimal.lp.whole import ONE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
-from softstart.plant.jit import compiled
+from softstart.plant.jit import compiled, inlined
 
 FINER = 3  # each grid has so many times the steps of the one before
 STEEP = 1e4  # N m of P for each N m by which the demand misses the one that holds a steady end
@@ -169,6 +173,16 @@ class Start:
             half = math.pi / self.Omega
             last = max(half, -math.log(MARGIN) * self.d / self.c)
             self.below[: self.tail + math.ceil(last / self.h)] = MARGIN * self.high * half / last
+
+    def walked(self, by: Multipliers) -> int:
+        """Steps in the gap, back from the contact, that are computed one by one; the rest is in closed form.
+
+        Where the load rests, the rate is not limited and the curve has no multipliers (`_freely`).
+        """
+        if not self.rests or self.limited:
+            return self.n
+        some = np.flatnonzero(by.gap.any(axis=0))
+        return int(some[-1]) + 1 if some.size else 0
 
     def curve_sources(self, density: Matrix) -> Matrix:
         """What a density (lines, steps) over the lines of the curve adds to the adjoint state."""
@@ -299,6 +313,7 @@ class Dual:
             np.array(self.q), self.lost,
             early[0], self.winding.added, self.winding.sources, self.winding.direct,
             early[1], self.gap.added, self.gap.sources, self.gap.direct,
+            s.walked(self.by), s.J1, s.lag,
             s.first, s.problem.first_demand, s.held, s.h, s.low, s.high, s.rate if s.limited else -1.0,
             kinks, counted, np.zeros((3, 2)), np.empty((4, LAST + 1)), out,
         )  # fmt: skip
@@ -616,10 +631,53 @@ def _back(X: Any, flow: Any, added: Any, sources: Any, direct: float, h: float, 
 
 
 @compiled
+def _freely(X: Any, g: float, J1: float, lag: float, low: float, high: float) -> float:
+    """The integral of phi(q) over g s in the gap, the load at rest and nothing added; X moves.
+
+    q = a + b x + e exp(-x/lag), the last part behind a lag only, has at most one turn and two zeros.
+    """
+    a, b, e = (X[1] - lag * X[0]) / J1, X[0] / J1, 0.0
+    turn = g
+    if lag > 0.0:
+        e = X[3] / lag - a
+        if 0.0 < b * lag < e or e < b * lag < 0.0:
+            turn = min(lag * math.log(e / (b * lag)), g)
+    total = 0.0
+    begin = 0.0
+    for end in (turn, g):
+        q0, q1 = _swept(begin, a, b, e, lag), _swept(end, a, b, e, lag)
+        lower, upper = begin, end
+        if q0 * q1 < 0.0:
+            while upper - lower > 1e-12 * g:
+                middle = 0.5 * (lower + upper)
+                if (_swept(middle, a, b, e, lag) < 0.0) == (q0 < 0.0):
+                    lower = middle
+                else:
+                    upper = middle
+        else:
+            lower = end
+        for first, last in ((begin, lower), (lower, end)):
+            area = (a + 0.5 * b * (first + last)) * (last - first)
+            if lag > 0.0:
+                area += e * lag * (math.exp(-first / lag) - math.exp(-last / lag))
+            total += min(area * low, area * high)
+        begin = end
+    X[1] += X[0] * g
+    if lag > 0.0:
+        X[3] = lag * _swept(g, a, b, e, lag)
+    return total
+
+
+@inlined
+def _swept(x: float, a: float, b: float, e: float, lag: float) -> float:
+    return a + b * x + (e * math.exp(-x / lag) if lag > 0.0 else 0.0)
+
+
+@compiled
 def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
           opened: bool, winds: bool, p: Any, joint: Any, mu: float, q: Any, lost: Any,
           stuck: Any, stuck_added: Any, stuck_sources: Any, stuck_direct: Any,
-          gap: Any, gap_added: Any, gap_sources: Any, gap_direct: Any,
+          gap: Any, gap_added: Any, gap_sources: Any, gap_direct: Any, walked: int, J1: float, lag: float,
           first: Any, first_demand: float, held: float, h: float, low: float, high: float, rate: float,
           kinks: Any, count: Any, least: Any, work: Any, out: Any) -> None:  # fmt: skip
     """Fill `out` with F at the nodes within `spans`; see `Dual.nodes`. Of what is known of the demand up to
@@ -647,10 +705,13 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
                     G[a] = S[a]
                 if opened:
                     G[0] = mu
-                until = 0 if not opened else n - i - k if rests else end
+                beyond = 0 if not opened else n - i - k if rests else end
+                until = min(beyond, walked) if rests else beyond
                 for j in range(until + 1):
                     if j == until or (j >= begin and not rests):
                         total = least[2, 1]
+                        if beyond > until:
+                            total += _freely(G, (beyond - until) * h, J1, lag, low, high)
                         if rate >= 0.0:
                             total = _value(first_demand, half, kinks[2], count[2], least[2])
                         for a in range(size):
@@ -660,7 +721,7 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
                     if j < until:
                         _back(G, gap, gap_added[j], gap_sources[j], gap_direct[j], h, low, high, rate,
                               kinks[2], count[2], least[2], rates)  # fmt: skip
-                if until < 0:
+                if beyond < 0:
                     out[row, k - base] = np.inf
             if k < last:
                 _back(S, stuck, stuck_added[k], stuck_sources[k], stuck_direct[k], h, low, high, rate,

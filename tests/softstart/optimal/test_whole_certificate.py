@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.optimize import linprog
+from scipy.optimize import brentq, linprog
 
 from softstart import Drive, TorqueProfile, optimize
 from softstart.optimal.exact import replay
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
 from softstart.optimal.whole_certificate import _Cells, _Program, dual_at, not_certified, whole_bound
-from softstart.optimal.whole_dual import Dual, Start, _take, _value
+from softstart.optimal.whole_dual import Dual, Start, _freely, _take, _value
 from softstart.start.run import Run
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
@@ -226,6 +226,40 @@ def test_the_least_over_demands_of_limited_rate_is_exact() -> None:
             bounds=(low, high),
         ).fun  # fmt: skip
         assert found == pytest.approx(best, abs=1e-9 * max(np.abs(q).sum(), 1.0))
+
+
+def test_the_gap_in_closed_form_is_the_integral() -> None:
+    """Against matrix exponentials: q between its zeros, its integral, and the adjoint state at the end."""
+    rng = np.random.default_rng(15)
+    J1, high, twice = 0.035, 62.0, 0
+    for trial in range(150):
+        g, low = float(rng.uniform(0.001, 0.1)), -float(rng.choice([0.0, 20.0]))
+        lag = float(rng.choice([0.0, 10 ** rng.uniform(-4, -1)]))
+        X = rng.normal(size=5) * (1.0, 0.1 * g, 1.0, 0.1 * g * lag / J1, 1.0)
+        if trial % 3 == 0:
+            X[1] = -X[0] * g * rng.random()
+        A = np.zeros((6, 6))  # of p, and the integral of q
+        A[0, 1] = 1.0
+        if lag > 0.0:
+            A[1, 3], A[3, 3], A[3, 5] = 1.0 / J1, -1.0 / lag, 1.0 / lag
+        else:
+            A[1, 5] = 1.0 / J1
+        begin, q_of = np.append(X, 0.0), A[:, 5]
+
+        def weight(x: float, begin: Any = begin, A: Any = A) -> float:
+            return float(begin @ expm(A * x) @ A[:, 5])
+
+        times = np.linspace(0.0, g, 40)
+        q = np.array([begin @ expm(A * x) @ q_of for x in times])
+        zeros = [brentq(weight, times[k], times[k + 1]) for k in np.flatnonzero(q[1:] * q[:-1] < 0.0)]
+        twice += len(zeros) > 1
+        swept = np.diff([float((begin @ expm(A * x))[5]) for x in (0.0, *zeros, g)])
+        end = (begin @ expm(A * g))[:5]
+        found = _freely(X, g, J1, lag, low, high)
+        wanted = np.minimum(swept * low, swept * high).sum()
+        assert found == pytest.approx(wanted, abs=1e-9 * g * high * np.abs(q).max())
+        assert end == pytest.approx(X, abs=1e-12 * np.abs(end).max())
+    assert twice > 5
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.005])
