@@ -5,13 +5,13 @@ from __future__ import annotations
 import signal
 import tempfile
 from collections.abc import Iterator
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
-from hypothesis.internal.conjecture import providers
 from tests import kernels
 
 # the suite draws the same examples every time; `make fuzz` draws new ones (--hypothesis-profile=fuzz)
@@ -20,16 +20,23 @@ settings.register_profile("fuzz", deadline=None, print_blob=True)
 settings.load_profile("suite")
 
 
-def local_constants(found: Any = providers._get_local_constants) -> Any:
-    """Constants that hypothesis tries as examples: in the suite none of the modules that happen to be loaded.
+def without_local_constants() -> None:
+    """In the suite hypothesis tries no constants of the modules that happen to be loaded as examples.
 
-    Derandomised as it may be, hypothesis tries numbers out of all local modules loaded so far, and so a test
-    would get other examples alone than after others (`test_the_suite_draws_the_same_examples`).
+    Derandomised as it may be, it takes them out of all local modules loaded so far, and so a test would get
+    other examples alone than after others (`tests/test_examples.py`). Older versions take none.
     """
-    return providers.Constants() if settings().derandomize else found()
+    try:
+        providers = import_module("hypothesis.internal.conjecture.providers")
+        found = providers._get_local_constants
+    except (ImportError, AttributeError):
+        return
+    vars(providers)["_get_local_constants"] = lambda: (
+        providers.Constants() if settings().derandomize else found()
+    )
 
 
-providers._get_local_constants = local_constants
+without_local_constants()
 
 PAGE = Path(__file__).parent / "page"
 DOCS = Path(__file__).parent / "docs"
