@@ -609,9 +609,8 @@ def _bound(
         k_dyn, start = (
             (run.k_dyn, _entry_of(run, hold.until)) if problem.ideal_torque else _ideal(problem, run)
         )
-        within = max(
-            within, 5e-4 if problem.ideal_torque else 2e-3
-        )  # what a lag costs it does not know anyway
+        # what a lag costs it does not know anyway
+        within = max(within, 5e-4 if problem.ideal_torque else 2e-3)
         known.append(certified_bound(problem, k_dyn, entry_near=start, within=within, proof=proof))
     return max(known, key=lambda one: one.k_dyn)
 
