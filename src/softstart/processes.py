@@ -25,18 +25,23 @@ import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import partial, wraps
 from importlib import import_module
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import IO, Any, Literal, NamedTuple, NoReturn, Self, TypeVar
+from typing import IO, Any, Literal, NamedTuple, NoReturn, ParamSpec, Self, TypeVar
 
 from softstart import __version__
 from softstart.errors import InputError, SimulationError
+from softstart.late import late
 
+P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
 
+threadpoolctl = late("threadpoolctl")
+
+# libraries of linear algebra spin on small matrices: several threads each take more time than one
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -48,6 +53,24 @@ CLUSTER_TIMEOUT = 30.0  # s, for the scheduler to answer and for the first worke
 ALONE = 300.0  # s, that a computation waits for new workers when all are lost
 CLUSTER_CHECK = 2.0  # s, between two checks of the cluster
 AHEAD = 2  # tasks under way for each thread of the cluster
+
+
+def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
+    """Make libraries of linear algebra compute on one thread while `function` runs; then as before.
+
+    In processes whose environment is not softstart's own: see ONE_THREAD.
+
+    >>> on_one_thread(math.hypot)(3.0, 4.0)
+    5.0
+    """
+
+    @wraps(function)
+    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        with threadpoolctl.threadpool_limits(limits=1, user_api="blas"):
+            return function(*args, **kwargs)
+
+    return limited
+
 
 # what must not be left behind ----------------------------------------------------------------------------
 

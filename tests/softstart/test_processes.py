@@ -13,10 +13,19 @@ from typing import Any
 
 import pytest
 from tests.patience import patient
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.processes import DiedError, Pool, Progress, Worker, checked_workers, why_not_sendable
+from softstart.processes import (
+    DiedError,
+    Pool,
+    Progress,
+    Worker,
+    checked_workers,
+    on_one_thread,
+    why_not_sendable,
+)
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
@@ -199,6 +208,24 @@ def test_numbers_of_workers() -> None:
             checked_workers(wrong)
     with pytest.raises(InputError, match="give one of the two"):
         checked_workers(2, "tcp://x:1")
+
+
+def test_libraries_of_linear_algebra_compute_on_one_thread_and_then_as_before() -> None:
+    def threads() -> list[int]:
+        return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        assert set(before) == {2}
+        assert set(on_one_thread(threads)()) == {1}
+        assert threads() == before
+
+
+def test_a_command_has_set_one_thread_before_numpy_is_imported() -> None:
+    code = "import os, sys, softstart.cli; print('numpy' in sys.modules, os.environ['OMP_NUM_THREADS'])"
+    given = {key: value for key, value in os.environ.items() if "THREADS" not in key}
+    told = subprocess.run([sys.executable, "-c", code], env=given, capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["False", "1"]
 
 
 def test_what_another_process_cannot_load() -> None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
+from itertools import pairwise, takewhile
 from typing import Any
 
 import click
@@ -192,8 +193,14 @@ class Command(click.Command):
         return ["-h", "--help"]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """The arguments read; a UsageError always has its context."""
+        """The arguments read; a UsageError always has its context, and no option is the value of another."""
         try:
+            options = [one for one in self.get_params(ctx) if isinstance(one, click.Option)]
+            names = {name for one in options for name in one.opts}
+            valued = {name for one in options if not (one.is_flag or one.count) for name in one.opts}
+            for name, value in pairwise(takewhile("--".__ne__, args)):
+                if name in valued and value in names and not ctx.resilient_parsing:
+                    raise click.BadOptionUsage(name, f"{name} needs a value", ctx)
             return super().parse_args(ctx, args)
         except click.UsageError as error:
             error.ctx = error.ctx or ctx

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import webbrowser
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
-
-# linear algebra libraries spin on small matrices, and the page must answer within milliseconds: one thread
-# each, which they read when numpy is imported
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("MKL_NUM_THREADS", "1")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from softstart.cli.commands import Command
 from softstart.cli.options import drive_argument, read_machine, set_option

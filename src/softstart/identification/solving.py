@@ -37,6 +37,7 @@ from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.planning import plan_experiments
 from softstart.identification.result import Estimate, Identification
+from softstart.processes import on_one_thread
 from softstart.quantities import show
 
 CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
@@ -49,6 +50,7 @@ DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
 
+@on_one_thread
 def identify(
     logs: Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]],
     drive: Drive | Chain | str,

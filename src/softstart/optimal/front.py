@@ -365,7 +365,9 @@ def pareto(
     asked = {(terminal, t) for t in times} | {(YARDSTICK, t) for t in own}
     with (
         Records(target, inputs, ["terminal", "start_time_bound"]) as saved,
-        Pool(count, scheduler=scheduler, describe=_Point.__str__, kept="Finished points are kept.") as pool,
+        Pool(
+            count, scheduler=scheduler, describe=PointAsked.__str__, kept="Finished points are kept."
+        ) as pool,
     ):
         found = _Sweep(drive, options, saved, progress, each, pool).through(asked)
     points = tuple(found[terminal, t] for t in times)
@@ -407,25 +409,30 @@ def even_start_times(first: float, last: float, count: int) -> list[float]:
     return times
 
 
-class _Point(NamedTuple):
-    """A point to be computed, and the optimum from which collocation may start."""
+class PointAsked(NamedTuple):
+    """A point to be computed, what another one left to start from, and for how long (s) to go on.
+
+    Without a time limit a chain is looked for from all its seeds, a drive until there is an optimum.
+    """
 
     drive: Drive | Chain
     options: dict[str, Any]
     terminal: Terminal
     start_time: float
     warm: Any = None
+    time_limit: float | None = None
 
     def __str__(self) -> str:
         return f"the optimum for a start time of {self.start_time:.5g} s"
 
 
-def _computed(asked: _Point) -> tuple[FrontPoint, Any]:
+def computed(asked: PointAsked) -> tuple[FrontPoint, Any]:
     """The point, and what the next one can start from."""
     terminal, start_time, warm = asked.terminal, asked.start_time, asked.warm
     why = ""
     for start in (warm, None) if warm is not None else (None,):
-        seconds = math.inf if start is None and isinstance(asked.drive, Chain) else 0.0  # all seeds at first
+        from_seeds = start is None and isinstance(asked.drive, Chain)
+        seconds = asked.time_limit if asked.time_limit is not None else math.inf if from_seeds else 0.0
         try:
             best = optimize(
                 asked.drive, start_time, terminal=terminal, warm=start, time_limit=seconds, **asked.options
@@ -527,7 +534,7 @@ class _Chain:
         self.sweep, self.terminal, self.start_times = sweep, terminal, start_times
         self.stopped = False  # the last point was infeasible, and so are all shorter ones
         self._warm: Any = None
-        self._ahead: Iterator[tuple[_Point, tuple[FrontPoint, Any]]] | None = None
+        self._ahead: Iterator[tuple[PointAsked, tuple[FrontPoint, Any]]] | None = None
         self._done: dict[float, tuple[FrontPoint, Any]] = {}
 
     def computed(self, start_time: float) -> FrontPoint:
@@ -540,22 +547,22 @@ class _Chain:
                     break  # it was not computed in advance
                 self._done[asked.start_time] = answer
         if self._warm is not None or start_time not in self._done:
-            ((_, answer),) = results(_computed, [self._point(start_time, self._warm)])
+            ((_, answer),) = results(computed, [self._point(start_time, self._warm)])
             self._done[start_time] = answer
         point, self._warm = self._done[start_time]
         if self._ahead is None and self._warm is None:
-            self._ahead = results(_computed, self._shorter_than(start_time))
+            self._ahead = results(computed, self._shorter_than(start_time))
         return point
 
-    def _shorter_than(self, start_time: float) -> Iterator[_Point]:
+    def _shorter_than(self, start_time: float) -> Iterator[PointAsked]:
         for other in self.start_times:
             if self.stopped or self._warm is not None:
                 return
             if other < start_time and self.sweep.saved.find(self.terminal, other) is None:
                 yield self._point(other)
 
-    def _point(self, start_time: float, warm: Any = None) -> _Point:
-        return _Point(self.sweep.drive, self.sweep.options, self.terminal, start_time, warm)
+    def _point(self, start_time: float, warm: Any = None) -> PointAsked:
+        return PointAsked(self.sweep.drive, self.sweep.options, self.terminal, start_time, warm)
 
 
 def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:

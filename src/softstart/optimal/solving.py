@@ -34,6 +34,7 @@ from softstart.optimal.result import (
 from softstart.optimal.shortest import from_quickest, shortest_start_time, start_time_of_direct, verdict_on
 from softstart.optimal.whole_certificate import LITTLE_WORK, MOST_WORK, whole_bound
 from softstart.optimal.whole_certificate import not_certified as no_whole
+from softstart.processes import on_one_thread
 from softstart.profile import TorqueProfile
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
@@ -53,6 +54,7 @@ SHARED, MORE_LOOSE, DRIFT = 0.25, 1.3, 5e-4
 TOLERANCE = 0.005  # gap to the bound, relative, at which `auto` is content
 
 
+@on_one_thread
 def optimize(
     drive: Drive | Chain | str,
     start_time: float | str | None = None,

@@ -17,12 +17,12 @@ from softstart.errors import InputError, listed
 from softstart.language import said
 from softstart.late import late
 from softstart.optimal.chains import problem
-from softstart.optimal.front import FrontPoint
+from softstart.optimal.front import FrontPoint, PointAsked, computed
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.pulse_coast_hold import applies
-from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
+from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.optimal.solving import optimize
 from softstart.processes import DiedError, Worker
 from softstart.processes import Progress as WorkerProgress
@@ -270,16 +270,20 @@ def optima(
     *,
     progress: WorkerProgress,
 ) -> None:
-    """Look for the optima of start times, one after the other, and send each at once."""
-    for start_time in start_times:
+    """Look for the optima of start times and send each at once: the first one first, then by distance to it.
+
+    Each is looked for beside the optimum of the nearest start time that has one.
+    """
+    known: dict[float, Any] = {}
+    for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
+        nearest = min(known, key=lambda one: abs(one - start_time), default=None)
+        warm = None if nearest is None or isinstance(drive, Chain) else known[nearest]
         try:
-            point = FrontPoint.of_optimum(
-                optimize(drive, start_time, terminal=TERMINAL, time_limit=time_limit, seeds=seeds),
-                start_time,
+            point, left = computed(
+                PointAsked(drive, {"seeds": seeds}, TERMINAL, start_time, warm, time_limit)
             )
-        except InfeasibleError as error:
-            point = FrontPoint.of_verdict(error.verdict, start_time, TERMINAL)
-        except (OptimumError, NotConverged, InputError) as error:  # InputError: of no class it solves
+            known |= {} if left is None else {start_time: left}
+        except InputError as error:  # of no class it solves
             point = FrontPoint.not_found(str(error), start_time, TERMINAL)
         progress.part(point)
 
@@ -302,7 +306,10 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
         caption.append(said("The solid line joins optimal starts, each simulated exactly."))
     if limit.known:
         caption.append(
-            said("The dash-dotted line joins starts that a quick search found: possible, not proved best.")
+            said(
+                "The dash-dotted line is the gentlest start known in that time, of a strategy, an optimum or "
+                "a quick search (crosses): possible, not proved best."
+            )
         )
     starts = "; ".join(
         said(
@@ -575,10 +582,15 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
                 lw=1.2, marker=".", ms=7, label=said("optimum found"), zorder=3,
             )  # fmt: skip
         if limit.known:
+            steps = sorted({right, *own})
+            axes.step(
+                steps, [limit.gentlest_known(t, placed) for t in steps], where="post", ls=DASHES[2],
+                color="black", lw=1.0, zorder=3,
+                label=said("gentlest start known: possible, not proved best"),
+            )  # fmt: skip
             axes.plot(
-                [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], ls=DASHES[2],
-                color="black", lw=1.0, marker="+", ms=6, label=said("start found: possible, not proved best"),
-                zorder=3,
+                [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], "+",
+                color="black", ms=6, zorder=3,
             )  # fmt: skip
         for index, row in enumerate(placed):
             best = row in strong

@@ -24,6 +24,10 @@ ONE_SENTENCE = {
     "unknown option": (["compare", "--jsno"], ["no option --jsno", "did you mean --json?"]),
     "unknown option before a command": (["--verion"], ["did you mean --version?"]),
     "unknown short option": (["compare", "-z"], ["no option -z"]),
+    "option in place of a file": (
+        ["report", "--pdf", "--json"],
+        ["report:", "--pdf needs a value", "--pdf FILE"],
+    ),
     "option without value": (["compare", "--set"], ["compare:", "--set needs a value", "KEY=VALUE"]),
     "flag with value": (["compare", "--json=yes"], ["--json takes no value"]),
     "too many arguments": (["compare", "good.toml", "good.toml"], ["compare:", "extra argument"]),

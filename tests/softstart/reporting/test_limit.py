@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from softstart import Drive, simulate
+from softstart import Drive, optimize, simulate
 from softstart.optimal.front import FrontPoint
 from softstart.processes import Progress
 from softstart.reporting import report
@@ -56,7 +56,7 @@ def test_where_no_optimum_is_found_the_report_says_between_what_it_lies(monkeypa
     said = "".join(page.text)
     assert f"between {bound:.3f} (proved) and {known:.3f} (found): {best.name} with {own:.3f}" in said
     assert "not known to be the gentlest" in said
-    assert "start found: possible, not proved best" in said  # the legend of the figure
+    assert "gentlest start known: possible, not proved best" in said  # the legend of the figure
     row = rows_of(page, "times the bound")[best.name]
     assert float(row["gentlest start known in that time"]) == pytest.approx(known, abs=5e-4)
     assert float(row["times the bound"]) == pytest.approx(own / bound, abs=5e-3)
@@ -103,6 +103,29 @@ def test_a_drive_of_no_class_that_is_solved_is_an_answer_not_a_crash():
     points = [message.content for message in sent]
     assert [p.status for p in points] == ["NOT_FOUND", "NOT_FOUND"]
     assert "modelica" in points[0].status_text
+
+
+def test_optima_of_a_report_are_looked_for_beside_the_nearest_known(monkeypatch):
+    asked = []
+
+    def noted(point):
+        asked.append((point.start_time, point.warm))
+        return FrontPoint.not_found(
+            "", point.start_time, "reached"
+        ) if point.start_time == 0.32 else OPTIMUM, (
+            None if point.start_time == 0.32 else f"what {point.start_time} left"
+        )
+
+    OPTIMUM = FrontPoint.of_optimum(optimize(LAGGING.replace(torque_lag=0.0), 0.32, terminal="reached"), 0.32)
+    monkeypatch.setattr("softstart.reporting.limit.computed", noted)
+    optima(LAGGING, [0.3, 0.4, 0.31, 0.32, 0.35], progress=Progress(lambda message: None))
+    assert asked == [
+        (0.3, None),
+        (0.31, "what 0.3 left"),
+        (0.32, "what 0.31 left"),
+        (0.35, "what 0.31 left"),
+        (0.4, "what 0.35 left"),
+    ]
 
 
 def test_an_unknown_position_is_reported_with_where_it_is_worst():
