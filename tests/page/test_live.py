@@ -445,6 +445,23 @@ def test_a_parameter_of_a_strategy_follows_its_slider_and_goes_back_to_its_defau
     wait_for_k(page, simulate(CRANE, "ramp").k_dyn)
 
 
+def test_no_number_has_more_digits_than_a_reader_can_use(page):
+    opened(page)
+    drag(page, "shaft.gap", 0.3, 0.617, 7)
+    drag(page, "load.inertia", 0.3, 0.461, 7)
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    drag(page, "strategy.time", 0.5, 0.731, 8)
+    answered(page)
+    at_rest(page)
+    texts = page.evaluate("""() => [document.body.innerText,
+      ...[...document.querySelectorAll("input, textarea")].map((one) => one.value),
+      ...[...document.querySelectorAll("[title]")].map((one) => one.title),
+      ...[...document.querySelectorAll("[aria-label]")].map((one) => one.ariaLabel)]""")
+    assert len(texts) > 20
+    shown = [text for text in texts if "softstart-" not in text]
+    assert not [text for text in shown if re.search(r"\d\.?\d{9,}|\d\.\d{8,}", text)]
+
+
 def test_a_printed_page_has_plots_table_and_data_within_its_width(page):
     """Nothing that is pressed is on paper; the picture of it was looked at."""
     at_rest(opened(page))

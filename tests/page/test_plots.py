@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +195,52 @@ def test_what_is_seen_is_saved_as_svg(page):
         if "".join(one.itertext()).startswith("T, ")
     ]
     assert all(0.0 < x <= float(root.get("width")) and y > 0.0 for x, y in places)
+
+
+def test_peak_labels_and_names_do_not_lie_on_one_another(page):
+    every = page.locator(".strategies tbody tr input[type=checkbox]")
+    for index in range(every.count()):
+        every.nth(index).check()
+    refined(page, 2)
+    _, text = saved(page, "SVG")
+    words = [
+        (one, "".join(one.itertext())) for one in ET.fromstring(text).iter("{http://www.w3.org/2000/svg}text")
+    ]
+    peaks = [
+        (float(one.get("x")), float(one.get("y")), 6.0 * len(word))
+        for one, word in words
+        if re.fullmatch(r"\d+(\.\d+)?", word) and len(word.replace(".", "")) == 4
+    ]
+    assert f"{DIRECT.peak_torque:.1f}" in [word for _, word in words]  # the selected one is never left out
+    assert len(peaks) >= 2
+    for (x, y, wide), (other, height, _) in permutations(peaks, 2):
+        assert abs(y - height) >= 12.0 or other >= x + wide or other < x
+    names = [(float(one.get("x")), float(one.get("y"))) for one, word in words if word.startswith("T, ")]
+    assert len(names) == every.count() - 1
+    assert len(set(names)) == len(names)
+
+
+def test_an_instant_is_read_of_every_strategy_shown(page):
+    for name in ("ramp", "shaped", "s-curve"):
+        page.locator(f'tr[data-name="{name}"] input[type=checkbox]').check()
+    refined(page, 2)
+    page.evaluate("""() => {
+      window.written = [];
+      const write = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+        window.written.push(text);
+        write.call(this, text, ...rest);
+      };
+    }""")
+    place = box(page)
+    page.mouse.move(place["x"] + 300, place["y"] + 90)
+    page.wait_for_function("window.written.some((one) => one.startsWith('s-curve '))")
+    written = page.evaluate("window.written")
+    t = float(re.search(r"t (\S+) s", next(one for one in written if one.startswith("t ")))[1])
+    for name in ("ramp", "shaped", "s-curve"):
+        told = next(float(one.split()[1]) for one in written if re.fullmatch(rf"{name} -?[\d.]+", one))
+        exact = simulate(CRANE, name).at([t - 5e-5, t, t + 5e-5])["T"]  # the instant has four digits
+        assert exact.min() - 0.1 <= told <= exact.max() + 0.1
 
 
 def test_a_file_saved_while_figures_arrive_is_whole(page):
