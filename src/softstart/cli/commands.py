@@ -309,6 +309,9 @@ def usage_sentence(error: click.UsageError) -> str:
 
 def _reason(error: click.UsageError) -> str:
     if isinstance(error, click.NoSuchOption):
+        for one in error.ctx.command.params if error.ctx else ():
+            if isinstance(one, click.Argument) and error.option_name == f"--{one.name}":
+                return f"{error.option_name[2:].upper()} is given by itself: leave {error.option_name} out."
         return f"there is no option {error.option_name}; {did_you_mean(error.option_name, _options(error))}"
     if isinstance(error, click.MissingParameter) and error.param is not None:
         return _missing(error.param)

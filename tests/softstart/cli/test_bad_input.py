@@ -28,6 +28,7 @@ ONE_SENTENCE = {
         ["report", "--pdf", "--json"],
         ["report:", "--pdf needs a value", "--pdf FILE"],
     ),
+    "argument as an option": (["tune", "--drive", "crane-4amtkf"], ["tune:", "leave --drive out"]),
     "option without value": (["compare", "--set"], ["compare:", "--set needs a value", "KEY=VALUE"]),
     "flag with value": (["compare", "--json=yes"], ["--json takes no value"]),
     "too many arguments": (["compare", "good.toml", "good.toml"], ["compare:", "extra argument"]),
