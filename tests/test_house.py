@@ -41,7 +41,7 @@ BUDGET = {
     # 250 and a file: `identify`; 40: optima of chains
     # 15: a torque constant; 20: folders of identifications; 65: wear
     # 20: two masses of a chain where they are enough
-    # 33: options that read their own values; 7: chains where a drive goes; 10: an option is no value of another
+    # 33: options that read their own values; 7: chains where a drive goes; 10: no option is a value
     "cli": (4900, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
