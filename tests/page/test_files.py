@@ -7,12 +7,16 @@ import re
 import shlex
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
-from tests.page.conftest import SOFTSTART, comes_to, settled
+from tests.page.conftest import SOFTSTART, at_rest, comes_to, settled, wait_for_rows
+from tests.patience import patient
 
 from softstart import Chain, DataSheet, Drive, InputError, compare, simulate
 from softstart.identification.planning import made_up_log
@@ -31,6 +35,11 @@ torque = 7.16
 [start]
 target_sped = 92
 """
+SHEET = {
+    "motor.power": "3 kW", "motor.speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
+    "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
+    "gear.stiffness": "25 N*m/arcmin", "gear.backlash": "15 arcmin", "name": "gantry",
+}  # fmt: skip
 
 
 def put(page: Any, name: str, content: bytes) -> None:
@@ -50,6 +59,14 @@ def saved(page: Any, name: str, timeout: float = 20_000) -> tuple[str, bytes]:
 def k_dyn(page: Any, text: str) -> None:
     """Wait until the large figure shows this."""
     page.wait_for_function("text => document.getElementById('k-dyn').textContent.trim() === text", arg=text)
+
+
+def table_of(page: Any) -> dict[str, str]:
+    """K_dyn of each strategy, as the table has it."""
+    found: dict[str, str] = page.evaluate("""() => Object.fromEntries(
+      [...document.querySelectorAll(".strategies tbody tr")].map(
+        (row) => [row.dataset.name, row.querySelector("[data-key=k_dyn]").textContent]))""")
+    return found
 
 
 @pytest.fixture
@@ -173,20 +190,60 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     trouble.get_by_text("[motor] power is missing").wait_for()
     comes_to(page.locator(".drive-name").inner_text, before)
     assert page.get_by_test_id("sheet-load-reeving").is_hidden()
-    written = {
-        "motor.power": "3 kW", "motor.speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
-        "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
-        "gear.stiffness": "25 N*m/arcmin", "gear.backlash": "15 arcmin", "name": "gantry",
-    }  # fmt: skip
-    for path, text in written.items():
+    for path, text in SHEET.items():
         page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
     page.get_by_test_id("sheet-use").click()
-    drive = DataSheet.from_settings(written | {"load.machine": "travel"}).drive
+    drive = DataSheet.from_settings(SHEET | {"load.machine": "travel"}).drive
     k_dyn(page, f"{simulate(drive, 'direct').k_dyn:.3f}")
     comes_to(page.locator(".drive-name").inner_text, "gantry")
     comes_to(trouble.is_hidden, True)
     name, content = saved(page, "sheet-save")
     assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)
+
+
+def test_from_a_data_sheet_to_an_answer_and_its_link_elsewhere(
+    visit: Any, start_server: Callable[..., Any]
+) -> None:
+    """A new user's path, each step with its time (pytest -s); a hand types more slowly."""
+    began = time.monotonic()
+    steps: list[str] = []
+
+    def done(what: str) -> None:
+        steps.append(f"{time.monotonic() - began:6.1f} s  {what}")
+
+    page = visit(url=start_server().url, select="")
+    wait_for_rows(page)
+    done("the page is open, started by softstart serve")
+    page.get_by_role("tab", name="Sheet", exact=True).click()
+    for path, text in SHEET.items():
+        page.get_by_test_id(f"sheet-{path.replace('.', '-')}").press_sequentially(text, delay=20)
+    done(f"{len(SHEET)} values of the data sheet are typed")
+    page.get_by_test_id("sheet-use").click()
+    comes_to(page.locator(".drive-name").inner_text, SHEET["name"])
+    wait_for_rows(page)
+    at_rest(page)
+    found = compare(DataSheet.from_settings(SHEET | {"load.machine": "travel"}).drive)
+    figures = {row.run.controller.name: f"{row.run.k_dyn:.3f}" for row in found.rows}
+    page.wait_for_function(
+        "figure => document.querySelector('tr[data-name=direct] [data-key=k_dyn]').textContent === figure",
+        arg=figures["direct"],
+    )
+    assert {name: table_of(page)[name] for name in figures} == figures
+    done("all strategies are compared, the gentlest first, the map is there")
+    assert page.locator(".advice").inner_text()
+    selected = page.locator("tbody tr").first.get_attribute("data-name")
+    assert float(figures[selected]) == min(map(float, figures.values()))
+    page.get_by_role("tab", name="Files", exact=True).click()
+    assert saved(page, "export-report", 120_000)[0] == "gantry-report.html"
+    done("its report is saved")
+    other = start_server("hoist-15kw").url.rstrip("/")
+    elsewhere = visit(url=f"{other}/#{urlsplit(page.url).fragment}", select="")
+    comes_to(elsewhere.locator(".drive-name").inner_text, SHEET["name"])
+    wait_for_rows(elsewhere)
+    comes_to(lambda: table_of(elsewhere), table_of(page))
+    done("its link, opened by another server for another user, shows the same figures")
+    print("", *steps, sep="\n")
+    assert time.monotonic() - began < patient(300.0)
 
 
 def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
