@@ -346,8 +346,8 @@ class Loop:
     def _continuous(self) -> Continuous:
         if self.open:
             assert isinstance(self.drive, Chain)
-            return motor_side(self.drive)
-        return in_contact(self.drive)
+            return motor_side(self.drive, self.point.sample.loads)
+        return in_contact(self.drive, self.point.sample.loads)
 
     def _broken(self, plant: SampledPlant) -> System:
         A, B, C, _ = plant.system

@@ -82,18 +82,21 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     period = sizes.period
     enough = STEADY * sizes.base
     samples: list[Sample] = []
+    torques: list[float] = []  # of the samples in contact since it was last open
     steady = False
     for sample in start.samples(LONGEST * period + STIFF * _stiff(start.drive)):
         samples.append(sample)
+        if sample.pressing:
+            torques.append(start.shaft_torque(sample))
+        else:
+            torques.clear()
         if len(samples) >= MOST_SAMPLES:
             break
         if len(samples) % 8 == 0 and sample.pressing and math.isfinite(sample.ask_again):
             back = max(WINDOW, math.ceil(2.0 * period / (sample.ask_again - sample.time)))
-            recent = samples[-back:]
-            if len(recent) == back and all(one.pressing for one in recent):
-                torques = [start.shaft_torque(one) for one in recent]
-                demands = [one.demand for one in recent]
-                steady = max(np.ptp(torques), np.ptp(demands)) <= enough
+            if len(torques) >= back:
+                demands = [one.demand for one in samples[-back:]]
+                steady = max(np.ptp(torques[-back:]), np.ptp(demands)) <= enough
                 if steady:
                     break
     return _in_contact(tuple(samples), steady)
@@ -131,19 +134,19 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
     """The candidates along the contact, best prediction first; empty if there are no samples in contact."""
     if run.last - run.first < 2:
         return []
-    plant = sampled(
-        in_contact(start.drive), run.period, float(motor_of(start.drive).computing_delay), seen(start.sees),
-        start.differencing,
-    )  # fmt: skip
     ends = {run.first + 1, run.last}
     offsets = {round(1.5**k) for k in range(1, 30)}
     ends |= {run.first + offset for offset in offsets if run.first + offset < run.last}
-    found = [_linearised_at(start, run, index, plant) for index in sorted(ends)]
+    found = [_linearised_at(start, run, index) for index in sorted(ends)]
     return sorted(found, key=lambda one: one.mismatch)
 
 
-def _linearised_at(start: SampledStart, run: SampledRun, index: int, plant: SampledPlant) -> OperatingPoint:
+def _linearised_at(start: SampledStart, run: SampledRun, index: int) -> OperatingPoint:
     sample = run.samples[index]
+    plant = sampled(
+        in_contact(start.drive, sample.loads), run.period, float(motor_of(start.drive).computing_delay),
+        seen(start.sees), start.differencing,
+    )  # fmt: skip
     size = sizes_of(start.drive)
     base, windup, speed = size.base, size.windup, size.speed
     inputs = seen(start.sees)

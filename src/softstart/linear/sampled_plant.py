@@ -7,13 +7,15 @@ motion is a matrix exponential, so the sampled system is exact:
     x+ = Ad x + G1 d[k-n-1] + G0 d[k-n],   computing_delay = n h + f, 0 <= f < h,
     G0 = int_0^(h-f) e^(A s) B ds,         G1 = e^(A (h-f)) int_0^f e^(A s) B ds
 
-The torque limits and a limited torque rate do not enter: they do not act on small changes. The load torque
-is constant and does not enter either. All angles in rad, torques in N m, at the motor shaft.
+The torque limits and a limited torque rate do not enter: they do not act on small changes. A constant load
+torque does not enter either. All angles in rad, torques in N m, at the motor shaft.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -80,15 +82,16 @@ def motor_of(machine: Machine) -> Drive | Motor:
     return machine.motor
 
 
-def in_contact(machine: Machine) -> Continuous:
+def in_contact(machine: Machine, loads: Any = None) -> Continuous:
     """Motor, shaft and load while the flank presses: states phi1, then z, w1, w2 of `Drive.to_control`.
 
     Of a chain the angle of the motor, the twists of all springs and the speeds of all bodies: masses that are
-    joined rigidly are one. Its gears with losses pass power on from the motor to the load.
+    joined rigidly are one. Its gears with losses pass power on from the motor to the load. `loads` are the
+    records of its masses at an instant: on that piece a load curve is a spring or a damper to the ground.
     """
     if isinstance(machine, Chain):
         arrays = machine.at_motor_shaft()
-        return _chain_between(machine, arrays, range(arrays.J.size))
+        return _chain_between(machine, arrays, range(arrays.J.size), loads)
     drive = machine
     own = drive.to_control()
     A = np.zeros((4, 4))
@@ -100,7 +103,7 @@ def in_contact(machine: Machine) -> Continuous:
     return _with_lag(drive, A, B, rows, 2)
 
 
-def _chain_between(chain: Chain, arrays: ChainArrays, masses: range) -> Continuous:
+def _chain_between(chain: Chain, arrays: ChainArrays, masses: range, loads: Any) -> Continuous:
     """Neighbouring masses of a chain with all gaps closed, as if there were no others."""
     joints = range(masses.start, masses.stop - 1)
     if any(arrays.rigid[k] for k in joints if k in (arrays.motor - 1, arrays.motor)):
@@ -141,6 +144,12 @@ def _chain_between(chain: Chain, arrays: ChainArrays, masses: range) -> Continuo
             sign = 1.0 if arrays.motor <= k else -1.0
             rows["T"], rows["z"] = sign * torque, sign * rows[f"theta {k}"]
     rows |= {f"w {i}": _row(n, speed[i]) for i in masses}
+    for i in masses:
+        if loads is not None and loads["points"][i]:
+            twisted = [rows.get(f"theta {k}", 0.0) for k in range(*sorted((arrays.motor, i)))]
+            angle = rows["phi1"] - math.copysign(1.0, i - arrays.motor) * sum(twisted)
+            follows = angle if loads["by_angle"][i] else rows[f"w {i}"]
+            A[speed[i]] -= loads["slope"][i] / J[body[i]] * follows[0]
     return _with_lag(chain, A, B, rows, angles)
 
 
@@ -151,26 +160,20 @@ def _shares(arrays: ChainArrays, k: int) -> tuple[float, float]:
     return (1.0, loss) if at_after else (loss, 1.0)
 
 
-def motor_side(chain: Chain) -> Continuous:
-    """The masses that turn with the motor while all gaps are open."""
+def motor_side(chain: Chain, loads: Any = None) -> Continuous:
+    """The masses that turn with the motor while all gaps are open; `loads` as in `in_contact`."""
     arrays = chain.at_motor_shaft()
     first = last = arrays.motor
     while first > 0 and arrays.gap[first - 1] == 0.0:
         first -= 1
     while last < arrays.gap.size and arrays.gap[last] == 0.0:
         last += 1
-    if first == last:
-        return motor_alone(chain)
-    return _chain_between(chain, arrays, range(first, last + 1))
+    return _chain_between(chain, arrays, range(first, last + 1), loads)
 
 
-def motor_alone(machine: Machine) -> Continuous:
+def motor_alone(machine: Drive) -> Continuous:
     """The motor without the shaft: states phi1, w1."""
-    if isinstance(machine, Chain):
-        arrays = machine.at_motor_shaft()
-        J, viscous = float(arrays.J[arrays.motor]), float(arrays.d_ground[arrays.motor])
-    else:
-        J, viscous = float(machine.J1), float(machine.motor_viscous_friction)
+    J, viscous = float(machine.J1), float(machine.motor_viscous_friction)
     A = np.array([[0.0, 1.0], [0.0, -(viscous / J)]])
     B = np.array([[0.0], [1.0 / J]])
     nothing = np.zeros((1, 2))

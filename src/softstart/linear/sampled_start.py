@@ -30,7 +30,8 @@ from softstart.start.engine import MAX_EVENTS, Recorder, plain_answer
 FAR = 1e9  # in target speeds: never reached
 CLOSED = (CONTACT, JOINED, PRESSED, WELDED)
 
-Part = int | tuple[str, int]  # what is displaced: an index of `x`, of a chain ("theta", shaft), ("w", mass)
+Part = int | tuple[str, int]  # what is displaced: an index of `x`, of a chain ("theta", shaft), ("w", mass),
+# ("angle", mass) of a load curve
 
 Answer = tuple[float, float, float, Vector]  # demand N m, next sample s, slope N m/s, new state
 Step = Callable[[Vector, Vector], Answer]
@@ -56,6 +57,11 @@ class Sample:
     def time(self) -> float:
         """Instant, s."""
         return float(self.x[layout.TIME])
+
+    @property
+    def loads(self) -> Any:
+        """Records of the masses of a chain, with the piece of its load curve on which each is; else None."""
+        return self.parts[0] if self.parts else None
 
     @property
     def pressing(self) -> bool:
@@ -160,15 +166,24 @@ class SampledStart:
                 ({layout.W2: speed}, {"w1": speed, "w2": speed}),
                 ({layout.PHI2: angle}, {"phi1": angle}),
             ]
-        found: list[tuple[dict[Part, float], dict[str, float]]] = [({layout.PHI2: angle}, {"phi1": angle})]
+        masses, motor = self.given.masses, self.given.place.motor
+        curved = np.flatnonzero(masses["by_angle"] * masses["points"]).tolist()
+        found: list[tuple[dict[Part, float], dict[str, float]]] = [
+            ({layout.PHI2: angle} | {("angle", i): angle for i in curved}, {"phi1": angle})
+        ]
         bodies: list[list[int]] = [[0]]
         for k, rigid in enumerate(self.given.shafts["rigid"].tolist()):
             if rigid:
                 bodies[-1].append(k + 1)
             else:
                 bodies.append([k + 1])
-                found.append(({("theta", k): angle}, {f"theta {k}": angle}))
-        found += [({("w", i): speed for i in body}, {f"w {body[0]}": speed}) for body in bodies]
+                moves: dict[Part, float] = {("theta", k): angle}
+                for i in curved:  # what lies behind the shaft turns, seen from the motor
+                    if motor <= k < i or i <= k < motor:
+                        moves["angle", i] = -angle if k < i else angle
+                found.append((moves, {f"theta {k}": angle}))
+        moving = [body for body in bodies if np.isfinite(masses["J"][body]).all()]
+        found += [({("w", i): speed for i in body}, {f"w {body[0]}": speed}) for body in moving]
         return found
 
     def samples(self, until: float) -> Iterator[Sample]:

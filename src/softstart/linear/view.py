@@ -395,8 +395,6 @@ def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[floa
         if isinstance(one, Chain):
             if one.motor is None or one.target_speed is None:
                 wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
-            if one.freed is not one or any(mass.curve is not None for mass in one.masses):
-                wrong.append(f"{name}: {one.name} has a load curve or ground; a linear view leaves both out.")
         elif not isinstance(one, Drive):
             wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
         elif one.shape != ():

@@ -1,6 +1,7 @@
 """The loop of a controller on a whole chain: equal to that of two masses, and to the exact start of many."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,3 +122,50 @@ def test_what_has_no_loop_is_refused():
         linear_view(rigid, "take-up")
     with pytest.raises(InputError, match="no motor or no target speed"):
         linear_view(Chain(CHAIN.masses, CHAIN.shafts), "take-up")
+
+
+def loaded(seed, **curve):
+    """A random chain whose mass before the last one has a load curve."""
+    chain = random_chain(seed)
+    masses = list(chain.masses)
+    masses[-2] = masses[-2].replace(**curve)
+    return replace(chain, masses=tuple(masses))
+
+
+@pytest.mark.parametrize("seed", [3, 4, 11])
+@pytest.mark.parametrize(
+    "curve",
+    [
+        {"curve_speed": [0.0, 1.0, 2.0, 5.0, 500.0], "curve_torque": [0.0, 0.01, 0.05, 0.1, 9.0]},
+        {"curve_angle": [0.0, 0.1, 1.0, 2.0, 500.0], "curve_torque": [0.0, 0.5, 1.0, 3.0, 900.0]},
+    ],
+)
+def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(seed, curve):
+    start = SampledStart.of(loaded(seed, **curve), SpeedPI(0.1, 0.5, 10.0), CRANE)
+    point = operating_points(start, run_until_steady(start))[0]
+    assert point.mismatch < 1e-7
+    assert point.sample.loads["slope"].any()
+
+
+def test_a_straight_curve_has_the_loop_of_a_damped_mass():
+    few = {"fitted_to": CRANE, "inertias": (), "stiffnesses": ()}
+    curved = loaded(6, curve_speed=[-1e4, 1e4], curve_torque=[-20.0, 20.0])
+    masses = list(curved.masses)
+    own = masses[-2].damping
+    masses[-2] = masses[-2].replace(curve_speed=None, curve_torque=None, damping=own + 0.002)
+    by_curve = linear_view(curved, SpeedPI(0.1, 0.5, 10.0), **few)
+    damped = linear_view(replace(curved, masses=tuple(masses)), SpeedPI(0.1, 0.5, 10.0), **few)
+    assert by_curve.phase_margin == pytest.approx(damped.phase_margin, rel=1e-6)
+    assert by_curve.delay_margin == pytest.approx(damped.delay_margin, rel=1e-6)
+    assert by_curve.variations[-1].margins.phase_margin == pytest.approx(
+        damped.variations[-1].margins.phase_margin, rel=1e-6
+    )
+
+
+def test_a_load_held_by_a_shaft_to_the_ground():
+    wall = Chain(
+        [*CHAIN.masses, Mass(math.inf, name="wall")], [*CHAIN.shafts, Shaft(2e6, damping_ratio=0.05)],
+        CHAIN.motor, load_mass=CHAIN.masses[-1].name, target_speed=60.0, position="driving-flank",
+    )  # fmt: skip
+    start = SampledStart.of(wall, SpeedPI(0.1, 0.5, 10.0), CRANE)
+    assert operating_points(start, run_until_steady(start))[0].mismatch < 1e-7
