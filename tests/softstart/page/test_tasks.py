@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import shlex
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -38,6 +39,7 @@ from softstart.page.downloads import command_text, file_name
 from softstart.page.sentences import changed_since
 from softstart.page.tasks import label_of, player_of
 from softstart.page.tuning_panel import cell_table, controller_of, grid_of, tunable
+from softstart.reporting import report
 from softstart.views.printed import units_of
 
 CRANE = Drive.load("crane-4amtkf")
@@ -240,6 +242,18 @@ def test_the_command_line_starts_the_same_drive() -> None:
     assert words[-2:] == ["--controllers", "ramp"]
     own = CRANE.replace(name="My own; rm -rf")
     assert shlex.split(command_text(own, {}))[2] == "my-own-rm-rf.toml"
+
+
+def test_units_of_the_user_are_kept_in_the_file_the_command_and_the_report() -> None:
+    changed = CRANE.replace(gap="10 deg", units="deg, rpm")
+    assert 'units = "deg, rpm"' in changed.to_toml()
+    assert 'gap = "10 deg"' in changed.to_toml()
+    assert Drive.from_toml(changed.to_toml()) == changed
+    words = shlex.split(command_text(changed, {}))
+    assert {"units=deg, rpm", "shaft.gap=10deg"} <= set(words)
+    text = re.sub(r"<[^>]+>|\s", " ", report(changed, controllers=["direct"], budget=0.0).to_html())
+    assert "gap 10.00 deg" in text
+    assert not re.search(r"[\d.]{14,}", text.replace(changed.to_toml(), ""))
 
 
 def test_drift_names_what_was_and_what_is_another_drive() -> None:
