@@ -19,7 +19,7 @@ from softstart.input.files import write_whole
 from softstart.language import said, speaking
 from softstart.quantities import Units
 from softstart.reporting import document
-from softstart.reporting.first_page import answer, share_saved, tiles, verdicts
+from softstart.reporting.first_page import answer, tiles, verdicts
 from softstart.reporting.limit import Limit, chain_limit, how_near, limit_figure
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.project import Project
@@ -271,40 +271,10 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
 
 
 def _tiles(report: ChainReport, best: Row, direct: Row) -> Html:
-    run, hard = best.run, direct.run
     names = report.drive.shaft_names
-    return tiles(
-        [
-            (
-                said("largest shaft torque"),
-                f"{digits(run.peak_torque)} N m",
-                said(
-                    "direct {peak} N m: {saved} less",
-                    peak=digits(hard.peak_torque),
-                    saved=share_saved(best, direct),
-                ),
-            ),
-            (
-                said("costs in time"),
-                f"{digits(1e3 * best.time_lost, 3)} ms",
-                said(
-                    "start time {time} s, direct {direct_time} s",
-                    time=digits(run.start_time),
-                    direct_time=digits(hard.start_time),
-                ),
-            ),
-            (
-                said("is largest in"),
-                names[run.worst_shaft],
-                said("direct: {shaft}", shaft=names[hard.worst_shaft]),
-            ),
-            (
-                "K_dyn",
-                fixed(run.k_dyn, 3),
-                said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
-            ),
-        ]
-    )
+    worst = said("direct: {shaft}", shaft=names[direct.run.worst_shaft])
+    where = said("is largest in"), names[best.run.worst_shaft], worst
+    return tiles(best, direct, said("largest shaft torque"), where)
 
 
 def _shown(report: ChainReport) -> list[Row]:

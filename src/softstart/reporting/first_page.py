@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from softstart.drive.limits import Limits
@@ -87,7 +86,9 @@ def first_page(report: Report, figures: Figures) -> Html:
     return html(
         tag("section", tag("p", headline(report)), class_="answer", aria_label=said("The answer")),
         figures.shown("before-after", lambda: before_after_picture(rows), caption),
-        _tiles(report, rows[-1], rows[0]) if report.choice.chosen else None,
+        tiles(rows[-1], rows[0], said("peak shaft torque"), _gained(report))
+        if report.choice.chosen
+        else None,
         verdicts(limits, rows)
         if (limits := report.choice.recommendation.limits)
         else tag(
@@ -122,48 +123,45 @@ def before_after_picture(rows: list[Row]) -> Html:
     return inlined(before_after_figure(rows), "before-after", said("Before and after. {title}.", title=title))
 
 
-def _tiles(report: Report, best: Row, direct: Row) -> Html:
-    """What it saves, costs and gains."""
-    run, hard = best.run, direct.run
+def _gained(report: Report) -> tuple[str, str, str]:
+    """What it gains in life."""
     gain = report.life_gain
-    return tiles(
-        [
-            (
-                said("peak shaft torque"),
-                f"{digits(run.peak_torque)} N m",
-                said(
-                    "direct {peak} N m: {saved} less",
-                    peak=digits(hard.peak_torque),
-                    saved=share_saved(best, direct),
-                ),
-            ),
-            (
-                said("costs in time"),
-                f"{digits(1e3 * best.time_lost, 3)} ms",
-                said(
-                    "start time {time} s, direct {direct_time} s",
-                    time=digits(run.start_time),
-                    direct_time=digits(hard.start_time),
-                ),
-            ),
-            (
-                said("life of the shaft line"),
-                f"× {factor(gain)}" if gain is not None else said("not given"),
-                said("over that of direct, S-N slope {slope:g}", slope=report.life_slope)
-                if gain is not None
-                else said("needs a damping above 0 in the drive file"),
-            ),
-            (
-                "K_dyn",
-                fixed(run.k_dyn, 3),
-                said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
-            ),
-        ]
-    )
+    if gain is None:
+        how = said("needs a damping above 0 in the drive file")
+        return said("life of the shaft line"), said("not given"), how
+    how = said("over that of direct, S-N slope {slope:g}", slope=report.life_slope)
+    return said("life of the shaft line"), f"× {factor(gain)}", how
 
 
-def tiles(shown: Sequence[tuple[str, str, str]]) -> Html:
-    """Figures side by side: what, value, and what it is compared with."""
+def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> Html:
+    """Figures side by side, each beside that of direct: peak, called `torque`, time, a third one, K_dyn."""
+    run, hard = best.run, direct.run
+    shown = [
+        (
+            torque,
+            f"{digits(run.peak_torque)} N m",
+            said(
+                "direct {peak} N m: {saved} less",
+                peak=digits(hard.peak_torque),
+                saved=share_saved(best, direct),
+            ),
+        ),
+        (
+            said("costs in time"),
+            f"{digits(1e3 * best.time_lost, 3)} ms",
+            said(
+                "start time {time} s, direct {direct_time} s",
+                time=digits(run.start_time),
+                direct_time=digits(hard.start_time),
+            ),
+        ),
+        third,
+        (
+            "K_dyn",
+            fixed(run.k_dyn, 3),
+            said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
+        ),
+    ]
     return tag(
         "dl",
         *(
