@@ -14,6 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
+Parts = dict[str, tuple[tuple[str, ...], Callable[[], None]]]
+
 PATIENCE = 900.0  # s that a worker waits for another one which compiles
 
 
@@ -31,6 +33,13 @@ def steps() -> None:
 def drive() -> None:
     """The loop of starts."""
     import_module("softstart.plant.start")
+
+
+def stepwise() -> None:
+    """From one control instant to the next, for controllers in Python: the same code as in `drive`, again."""
+    number = import_module("numba").float64
+    row, rows = number[::1], number[:, ::1]
+    import_module("softstart.plant.advance").advance_vectors.compile((row, row, row, rows, rows, rows))
 
 
 def series() -> None:
@@ -87,16 +96,17 @@ def robust() -> None:
 
 
 # what must be compiled before, and what compiles it; the longest are taken first
-PARTS: dict[str, tuple[tuple[str, ...], Callable[[], None]]] = {
+PARTS: Parts = {
     "spans": ((), spans),
-    "series": (("spans",), series),
     "drive": (("spans",), drive),
+    "series": (("spans",), series),
     "steps": ((), steps),
+    "stepwise": (("spans",), stepwise),
     "chain": (("series", "drive"), chain),
     "controllers": (("drive", "steps"), controllers),
     "sensitivities": (("chain", "controllers"), sensitivities),
     "robust": (("controllers",), robust),
-    "plain": (("controllers",), plain),
+    "plain": (("controllers", "stepwise"), plain),
 }
 
 
@@ -106,17 +116,21 @@ def compile_all() -> None:
         PARTS[name][1]()
 
 
-def compile_together(folder: Path) -> None:
-    """All parts, with the other workers that are given the same folder; returns when none is left."""
+def compile_together(folder: Path, others: Parts | None = None) -> None:
+    """All parts, with the other workers that are given the same folder; returns when none is left.
+
+    `others` are parts that are no kernels: for a worker that would wait.
+    """
+    parts = PARTS | (others or {})
     until = time.monotonic() + PATIENCE
-    while not done(folder, PARTS) and time.monotonic() < until:
-        ready = (name for name, (needs, _) in PARTS.items() if done(folder, needs))
+    while not done(folder, parts) and time.monotonic() < until:
+        ready = (name for name, (needs, _) in parts.items() if done(folder, needs))
         name = next((name for name in ready if take(folder, name)), "")
         if not name:
             time.sleep(0.1)
             continue
         try:
-            PARTS[name][1]()
+            parts[name][1]()
         finally:
             (folder / f"{name}.done").touch()
 

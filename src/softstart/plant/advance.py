@@ -7,10 +7,10 @@ import math
 from softstart.plant.coupled import coupled_travel
 from softstart.plant.crossing import load_speed
 from softstart.plant.exchange import next_in_queue, note_excess, shaft_torque
-from softstart.plant.jit import inlined, merged
+from softstart.plant.jit import compiled, inlined, merged
 from softstart.plant.layout import (
-    ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT,
-    TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State,
+    ASK, BUFFER_FULL, ENDED, EVENT_LIMIT, EXIT, MOTION, NOTHING, NOT_FINITE, NOT_LOCATED, NO_EVENT, PLANT,
+    STATE, TOO_LONG, UNSOLVED, Matrix, Motion, Plant, Septuple, State, Vector,
 )  # fmt: skip
 from softstart.plant.modes import handle, reach_target, release_motor, start_motor
 from softstart.plant.motion import COUPLED, SERIES, motion, remainders
@@ -147,3 +147,9 @@ def advance(p: Plant, x: State, m: Motion, segments: Matrix, events: Matrix, sta
             x.ask_at = x.time
         if x.events > p.event_cap:
             return EVENT_LIMIT
+
+
+@compiled
+def advance_vectors(p: Vector, x: Vector, m: Vector, segments: Matrix, events: Matrix, stages: Matrix) -> int:
+    """`advance` on float64 vectors, for a controller in Python."""
+    return advance(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0], segments, events, stages)

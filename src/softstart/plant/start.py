@@ -138,7 +138,7 @@ def run(step, p, parameters, sees, x, m, measured, state, command, segments, eve
     return reason
 
 
-# The same for a controller in Python and for other kernels, one control instant at a time, on float64 vectors
+# The same for a controller in Python, one control instant at a time, on vectors: with `advance_vectors`
 
 
 @compiled
@@ -147,12 +147,6 @@ def begin(p: Vector, x: Vector, until: float, events: Matrix) -> None:
     for i in range(N_X):
         x[i] = 0.0
     first_state(p.view(PLANT)[0], x.view(STATE)[0], until, events)
-
-
-@compiled
-def advance(p: Vector, x: Vector, m: Vector, segments: Matrix, events: Matrix, stages: Matrix) -> int:
-    """On to the next instant at which the controller must be asked, see `softstart.plant.advance`."""
-    return go_on(p.view(PLANT)[0], x.view(STATE)[0], m.view(MOTION)[0], segments, events, stages)
 
 
 @compiled

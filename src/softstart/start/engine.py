@@ -24,6 +24,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.plant import exchange
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
+from softstart.plant.advance import advance_vectors
 from softstart.start.status import Status, status_of
 
 MAX_EVENTS = 1_000_000  # events and control instants of one start
@@ -96,7 +97,7 @@ class Recorder:
 
     def advance(self) -> int:
         """To the next control instant, the end, or a full record; returns which."""
-        reason: int = kernel.advance(self.p, self.x, self.m, self.segments, self.events, self.stages)
+        reason: int = advance_vectors(self.p, self.x, self.m, self.segments, self.events, self.stages)
         return reason
 
     def run(self, step: Any, numbers: at.Vector, state: at.Vector, command: at.Vector) -> int:
