@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import signal
+import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -81,9 +84,28 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if config.getoption("collectonly") or config.getoption("few_kernels"):
         return
     if folder := getattr(config, "workerinput", {}).get("kernels"):
-        kernels.compile_together(Path(folder))
+        kernels.compile_together(Path(folder), {"assertions": ((), partial(rewrite_assertions, config))})
     elif config.getoption("dist", "no") == "no":
         kernels.compile_all()
+
+
+def rewrite_assertions(config: pytest.Config) -> None:
+    """Rewrite the tests' assertions as pytest does where it imports them: else each worker would, 10 s long.
+
+    pytest has no public name for it; where these are others, each worker does it.
+    """
+    try:
+        rewrite = import_module("_pytest.assertion.rewrite")
+        state = config.stash[rewrite.assertstate_key]
+        for path in sorted(Path(__file__).parent.rglob("test_*.py")):
+            cache = rewrite.get_cache_dir(path) / (path.stem + rewrite.PYC_TAIL)
+            if sys.dont_write_bytecode or rewrite._read_pyc(path, cache) is not None:
+                continue
+            source, code = rewrite._rewrite_test(path, config)
+            if rewrite.try_makedirs(cache.parent):
+                rewrite._write_pyc(state, code, source, cache)
+    except (ImportError, AttributeError, TypeError):
+        return
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -98,6 +120,18 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     """Leave nothing behind."""
     if SHARED in config.stash:
         config.stash[SHARED].cleanup()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Iterator[None]:
+    """All that is collected stays to the end: the garbage collector need not look at it, again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
