@@ -45,7 +45,8 @@ BUDGET = {
     "cli": (4900, 22, 1, 0),  # 50 lines: a stop signal ends compiled code too; 130: the command `fatigue`
     "clutch": (2380, 10, 5, 0),
     # texts with choices; other parameters of a controller that stands; 60: the order of effort
-    "controller": (1270, 5, 0, 0),
+    # 12: the address of a step is looked up once, not for each start
+    "controller": (1282, 5, 0, 0),
     # where a start begins: positions, brake, reversal; 160 lines and a file: what the machine withstands
     # 30 lines: S-N curves; 50: one limit and what a figure leaves of it
     # 420 and a file: `DataSheet`, from plates and drawings to a drive
@@ -110,7 +111,8 @@ BUDGET = {
     # the spring; 60: functions compiled apart
     # 291 and a file: friction of the motor; viscous friction, which couples three speeds in one series
     # 6: what passes between plant and controller is a file of its own, compiled without the loop of starts
-    "plant": (3177, 16, 2, 0),
+    # 2: numbers of a single drive are not broadcast one by one
+    "plant": (3179, 16, 2, 0),
     # 40: life of the shaft line; 350 and two files: page 1, project file, revisions, sources,
     # names of functions of inverters, what is assumed; 370 and a file: the report of a chain
     # 15: lives of its shafts, parameters with their units

@@ -131,24 +131,25 @@ class TorqueProfile:
         [0.0]
         """
         allowed = tolerance * float(np.max(np.abs(self.torque), initial=1e-300))
+        time, torque = self.time.tolist(), self.torque.tolist()  # items of arrays are slow
+
+        def straight(i: int, j: int, k: int) -> bool:
+            """Whether knot j lies on the line from i to k."""
+            if time[j] in (time[i], time[k]):
+                return bool(time[i] == time[k])  # the middle one of three at the same instant
+            line = torque[i] + (torque[k] - torque[i]) * (time[j] - time[i]) / (time[k] - time[i])
+            return bool(abs(line - torque[j]) <= allowed)
+
         kept = [0]
-        for i in range(1, self.time.size):
-            if self.time[i] == self.time[kept[-1]] and abs(self.torque[i] - self.torque[kept[-1]]) <= allowed:
+        for i in range(1, len(time)):
+            if time[i] == time[kept[-1]] and abs(torque[i] - torque[kept[-1]]) <= allowed:
                 continue
-            if len(kept) >= 2 and self._straight(kept[-2], kept[-1], i, allowed):
+            if len(kept) >= 2 and straight(kept[-2], kept[-1], i):
                 kept.pop()
             kept.append(i)
-        if len(kept) >= 2 and abs(self.torque[kept[-1]] - self.torque[kept[-2]]) <= allowed:
+        if len(kept) >= 2 and abs(torque[kept[-1]] - torque[kept[-2]]) <= allowed:
             kept.pop()
         return TorqueProfile(self.time[kept], self.torque[kept], self.after_contact)
-
-    def _straight(self, i: int, j: int, k: int, allowed: float) -> bool:
-        """Whether knot j lies on the line from i to k."""
-        span = self.time[k] - self.time[i]
-        if self.time[j] in (self.time[i], self.time[k]):
-            return bool(self.time[i] == self.time[k])  # the middle one of three at the same instant
-        line = self.torque[i] + (self.torque[k] - self.torque[i]) * (self.time[j] - self.time[i]) / span
-        return bool(abs(line - self.torque[j]) <= allowed)
 
     def clipped(self, lowest: float, highest: float) -> TorqueProfile:
         """The same torque cut off at the limits, with knots where its lines cross them.

@@ -394,4 +394,6 @@ class PlainTwin(PlainController):
 
 def stack(drive: Drive, *values: Any) -> Vector:
     """Numbers and arrays of the drive's shape, stacked to shape drive.shape + (n,)."""
+    if drive.shape == () and all(isinstance(v, float | int) for v in values):
+        return np.array(values, dtype=np.float64)
     return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), drive.shape) for v in values], axis=-1)

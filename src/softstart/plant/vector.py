@@ -37,6 +37,8 @@ def plant_vector(drive: Drive, time_limit: float | None = None, max_events: int 
     count = math.prod(shape)
 
     def column(values: object) -> at.Vector:
+        if isinstance(values, float | int):
+            return np.full(count, values, dtype=np.float64)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).reshape(count)
 
     J1, J2, c = column(drive.J1), column(drive.J2), column(drive.c)

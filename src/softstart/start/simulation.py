@@ -141,7 +141,7 @@ def simulate(
     """
     if isinstance(drive, str):
         drive = cast("Drive | Startable", models.load_machine(drive))
-    if isinstance(drive, Startable):
+    if not isinstance(drive, Drive) and isinstance(drive, Startable):  # the protocol is slow to look for
         return drive.start(
             controller, until, parameters=parameters, fitted_to=fitted_to, base=base, time_limit=time_limit,
             max_events=max_events,
