@@ -55,7 +55,8 @@ floors: $(FLOORS)/.installed
 		tests/validation/test_gerasymiak_subbotin.py
 
 everything: $(VENV)/.installed-test
-	$(PIP) install --editable '.[dev,docs,page,package]'
+	$(PIP) install uv  # seconds where pip takes a minute
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --editable '.[dev,docs,page,package]'
 	@touch $(addprefix $(VENV)/.installed-,dev docs ui page package)
 
 serve: $(VENV)/.installed-ui
