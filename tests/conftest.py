@@ -178,6 +178,17 @@ def small_search() -> Iterator[None]:
 
 
 @pytest.fixture
+def hasty_search(small_search: None) -> Iterator[None]:
+    """Robust optima from fewer rounds of each descent, too: 0.1 % harder, where that is not the claim."""
+    from softstart.optimal.robust import solving
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solving, "FIRST_ROUNDS", 4)
+        patch.setattr(solving, "ROUNDS", 8)
+        yield
+
+
+@pytest.fixture
 def small_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
     """Certificates of the whole start from their first grid: where it is not the claim how near they come."""
     from softstart.optimal import whole_certificate

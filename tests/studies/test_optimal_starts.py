@@ -133,7 +133,7 @@ def test_a_stricter_terminal_is_never_gentler(found):
 
 
 @pytest.mark.slow
-def test_one_profile_for_several_gaps_is_in_time_and_above_the_own_optima(small_search):
+def test_one_profile_for_several_gaps_is_in_time_and_above_the_own_optima(hasty_search):
     (one,) = sensor.sensed(Extent(sensor_multiples=(1.2,), sensor_gaps=(0.5, 0.6)), lambda text: None)
     for robust in (one.worth.blind, one.worth.reacting):
         assert max(robust.start_times) <= one.start_time

@@ -16,7 +16,7 @@ CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
 @pytest.mark.slow
-def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, small_search):
+def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, hasty_search):
     code, out, err = run("optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x")
     assert (code, err) == (0, "")
     assert "K_dyn if known to start at opposite-flank" in out
@@ -279,7 +279,7 @@ def test_a_gap_that_no_drive_has(run, nothing_left):
 
 
 @pytest.mark.slow
-def test_one_profile_for_two_gaps(run, place, small_search):
+def test_one_profile_for_two_gaps(run, place, hasty_search):
     code, out, err = run(
         "optimize", *SIXTY, "--start-time", "0.3", "--gaps", "0.4 rad", "--json", "--out", "both"
     )

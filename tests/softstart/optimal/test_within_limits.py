@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from typing import Any
@@ -12,6 +13,7 @@ from tests.softstart.plant.test_brake import HOIST
 
 from softstart import Drive, InputError, TorqueProfile, compare, optimize, simulate
 from softstart.controller import ready_controller_names
+from softstart.optimal.collocation import search as collocation
 from softstart.optimal.momentum import momentum_bound
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import PulseCoastHold
@@ -24,6 +26,15 @@ HELD = HOIST.replace(brake="motor", start_position="hanging", permissible_torque
 # a permissible start time is held against the answer only: tests of other limits share it
 IN_TIME = HELD.replace(permissible_start_time=0.3)
 TOO_LATE = HELD.replace(permissible_torque=153.0, permissible_start_time=0.2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def collocated_once() -> Iterator[None]:
+    """What collocation finds is also where the search for the least start time begins: the same program."""
+    solve = cache(collocation.solve)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(collocation, "solve", lambda problem, warm=None: solve(problem))  # none is warm here
+        yield
 
 
 @cache
@@ -159,7 +170,7 @@ def test_a_life_that_is_asked_for_may_be_what_forbids_a_quicker_start() -> None:
 
 
 @pytest.mark.slow
-def test_an_unknown_position_keeps_the_limits_from_each(small_search: None) -> None:
+def test_an_unknown_position_keeps_the_limits_from_each(hasty_search: None) -> None:
     """One profile, the peak and the start time the worst of three; in less time momentum forbids it."""
     drive = CRANE.replace(gap=0.02, start_position="unknown", target_speed=30.0, permissible_torque=70.0)
     best = optimize(drive, limits=True, time_limit=0.0)
