@@ -84,12 +84,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if config.getoption("collectonly") or config.getoption("few_kernels"):
         return
     if folder := getattr(config, "workerinput", {}).get("kernels"):
-        kernels.compile_together(Path(folder), {"assertions": ((), partial(rewrite_assertions, config))})
+        halves = {f"assertions {i}": ((), partial(rewrite_assertions, config, i)) for i in range(2)}
+        kernels.compile_together(Path(folder), halves)
     elif config.getoption("dist", "no") == "no":
         kernels.compile_all()
 
 
-def rewrite_assertions(config: pytest.Config) -> None:
+def rewrite_assertions(config: pytest.Config, half: int) -> None:
     """Rewrite the tests' assertions as pytest does where it imports them: else each worker would, 10 s long.
 
     pytest has no public name for it; where these are others, each worker does it.
@@ -97,7 +98,7 @@ def rewrite_assertions(config: pytest.Config) -> None:
     try:
         rewrite = import_module("_pytest.assertion.rewrite")
         state = config.stash[rewrite.assertstate_key]
-        for path in sorted(Path(__file__).parent.rglob("test_*.py")):
+        for path in sorted(Path(__file__).parent.rglob("test_*.py"))[half::2]:
             cache = rewrite.get_cache_dir(path) / (path.stem + rewrite.PYC_TAIL)
             if sys.dont_write_bytecode or rewrite._read_pyc(path, cache) is not None:
                 continue
