@@ -103,7 +103,7 @@ FILES = {
 }  # fmt: skip
 
 
-def test_the_files(run, place):
+def test_the_files_which_the_same_command_writes_again(run, place):
     code, out, err = run(*ANCHOR, "--out", "deep/best")
     assert (code, err) == (0, "")
     assert out.endswith("Written to deep/best: report.md, the profile (CSV, TOML, C), figure and traces.\n")
@@ -127,14 +127,9 @@ def test_the_files(run, place):
         )  # fmt: skip
         assert code == 0
         assert json.loads(out)["k_dyn"] == pytest.approx(float(row["k_dyn"]), rel=1e-9)
-
-
-def test_the_same_command_writes_the_same_files(run, place):
-    seen = []
-    for _ in range(2):
-        assert run(*ANCHOR, "--out", "best").code == 0
-        seen.append({path.name: path.read_bytes() for path in (place / "best").iterdir()})
-    assert seen[0] == seen[1]
+    written = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert run(*ANCHOR, "--out", "deep/best").code == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == written
 
 
 @pytest.mark.parametrize("output", [(), ("--json",), ("--out", "best")])
