@@ -191,8 +191,9 @@ class Limits:
     ) -> Solution | None:
         """The best x within the bounds (columns, 2); None where there is none.
 
-        By the dual simplex method, from the last basis of `warm`; where that takes far longer than usual, by
-        the interior point method. `interior` takes that one at once and stays in the middle of all best x,
+        By the dual simplex method, from the last basis of `warm`; again without scaling where its answer is
+        within the tolerance only in the scale of the solver; where that fails or takes far longer than usual,
+        by the interior point method. `interior` takes that one at once and stays in the middle of all best x,
         where the simplex method goes to a corner.
         """
         if highs is None:
@@ -208,11 +209,17 @@ class Limits:
             return Solution(np.asarray(found.x), float(found.fun), above, equal)
         size = self.cost.size, self.b_ub.size, self.b_eq.size
         basis = None if warm is None else warm.begin(size)
-        for solver, start in (("simplex", basis), ("ipm", None))[interior:]:
+        attempts = ("simplex", basis, True), ("simplex", None, False), ("ipm", None, True)
+        status = highs.HighsModelStatus.kNotset
+        for solver, start, scaled in attempts[2 * interior :]:
+            if not scaled and status != highs.HighsModelStatus.kUnknown:
+                continue
             engine = highs._Highs()
             engine.setOptionValue("output_flag", False)
             engine.setOptionValue("solver", solver)
-            if not presolve:
+            if not scaled:  # what is within the tolerance in its own scale may not be so in that of the rows
+                engine.setOptionValue("simplex_scale_strategy", 0)
+            if not (presolve and scaled):
                 engine.setOptionValue("presolve", "off")
             if interior:
                 engine.setOptionValue("run_crossover", "off")
