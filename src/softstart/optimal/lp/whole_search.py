@@ -29,8 +29,10 @@ Value = Callable[[Timing], float]
 DOUBLINGS = 40  # of the time in which full torque is simulated until the load moves
 COARSE, MIDDLE = 40, 80  # steps of the contact: to find the instants, to refine them
 REFINEMENT = Refinement(most=260, mending=6, settled=2e-5)
-SCANNED, WINDINGS = 14, 4  # instants of the contact, and durations of the winding up, that are tried at first
-LONGEST_WINDING = 6.0  # times the one under full torque
+SCANNED = 14  # instants of the contact that are tried at first
+# durations of the winding up that are tried, as multiples of the one under full torque and of a quarter of
+# the period in which the motor swings against the load at rest: a damped impact under full torque has none
+WINDING, SWING = (1.0, 6.0), (0.02, 0.5)
 ENOUGH = 5e-6  # relative: other instants that lower P by less end the search
 LATER = (1.05, 1.3)  # times an end
 SOONER = (0.93, 0.8, 0.6, 0.45, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05)  # shares of an end that are tried
@@ -351,7 +353,14 @@ class _Timings:
         """Values over a coarse net of instants, the earliest first."""
         windings = [0.0]
         if self.winds and self.waits:
-            windings = (self.shortest_winding * np.geomspace(1.0, LONGEST_WINDING, WINDINGS)).tolist()
+            drive: Any = self.problem.drive
+            quarter = 0.5 * math.pi * math.sqrt(drive.J1 / drive.c)
+            least, most = (
+                max(one * self.shortest_winding, share * quarter)
+                for one, share in zip(WINDING, SWING, strict=True)
+            )
+            count = math.ceil(math.log2(most / least)) + 1
+            windings = sorted({self.shortest_winding, *np.geomspace(least, most, count).tolist()})
         tried = {(end, 0.0, end): math.inf}
         late = 0
         for x in self._times(end):
