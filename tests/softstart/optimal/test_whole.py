@@ -238,6 +238,24 @@ def test_finer_grids_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
     assert finer.P <= best.P * (1.0 + 5e-5)
 
 
+def test_windings_are_tried_where_full_torque_needs_none() -> None:
+    """A damped impact under full torque breaks the load away at once; the gentlest start winds it up."""
+    drive = Drive(
+        motor_inertia=0.010638, starting_torque=4.8655, torque_lag=0.020356, torque_rate=57.06,
+        stiffness=3.8355, damping=0.06246, gap=7.9476, load_inertia=0.015795, load_torque=2.3819,
+        load_kind="reactive", target_speed=15.4946, start_position=-3.9738,
+    )  # fmt: skip
+    curve = ((0.0, 4.8655), (10.846, 4.6222), (30.989, 1.4596))
+    problem = Problem(drive, 0.5062, "reached", torque_speed=curve)
+    best = whole_search.search(problem)
+    assert best is not None
+    assert best.at.tb - best.at.tc > 0.003
+    impact = next(order for order in phase_orders(problem) if "stuck" not in order.kinds)
+    hard = whole_search._Timings(problem, impact, 0.5062, 40).best(0.5062)
+    assert hard is not None
+    assert best.P < 0.9 * hard.P
+
+
 @pytest.mark.parametrize(
     ("drive", "options", "why"),
     [
