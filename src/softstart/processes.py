@@ -60,8 +60,8 @@ def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
 
     In processes whose environment is not softstart's own: see ONE_THREAD.
 
-    >>> on_one_thread(math.hypot)(3.0, 4.0)
-    5.0
+    >>> on_one_thread(sum)([3.0, 4.0])
+    7.0
     """
 
     @wraps(function)

@@ -18,7 +18,6 @@ from softstart.chain.simulation import drive_of
 from softstart.chain.vibration import natural_vibration
 from softstart.chain.vibration_with_gaps import chain_backbone
 from softstart.errors import InputError
-from softstart.linear.view import linear_view
 from softstart.optimal.chains.problem import ChainProblem, momentum_bound
 from softstart.views.chain_schemes import scheme_svg
 
@@ -193,8 +192,6 @@ def test_ground_is_drawn_and_the_rest_is_said():
     assert "load curves of mass 2" in notes
     with pytest.raises(InputError, match="leave ground out"):
         chain_backbone(chain, 10.0)
-    with pytest.raises(InputError, match="linear view"):
-        linear_view(chain, "direct")
     problem = ChainProblem(chain, 1.0)
     assert momentum_bound(problem).k_dyn == 0.0
     with pytest.raises(InputError, match="leave no steady torque"):
