@@ -293,7 +293,15 @@ def test_maps_of_two_strategies_are_compared(page):
       const { map } = window.getElement(document.querySelector(".instrument")).instrument;
       return map.head?.strategy === strategy && map.fresh.size === map.rows.length;
     }"""
-    page.locator("#map-other").check()  # also before all of the map is there
+    page.locator('tr[data-name="ramp"] input[type=radio]').check()
+    page.wait_for_function(whole, arg="ramp")
+    page.evaluate("""() => {
+      const { map } = window.getElement(document.querySelector(".instrument")).instrument;
+      map.forget();
+      map.rows = map.fresh = undefined; // nothing has come yet
+      map.other.click();
+    }""")
+    page.locator('tr[data-name="direct"] input[type=radio]').check()
     page.wait_for_function(whole, arg="direct")
     assert page.locator("#map-other").is_checked()
     page.locator('tr[data-name="ramp"] input[type=radio]').check()

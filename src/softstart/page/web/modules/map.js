@@ -120,9 +120,9 @@ export class GapMap {
     this.redraw();
   }
 
-  // ticked before all rows have come, the first map that is whole is kept
+  // ticked before the first row or before all have come, the first map that is whole is kept
   hold() {
-    if (this.other.checked && !this.pinned && this.fresh?.size === this.rows?.length) this.pinned = { head: this.head, rows: [...this.rows] };
+    if (this.rows && this.other.checked && !this.pinned && this.fresh.size === this.rows.length) this.pinned = { head: this.head, rows: [...this.rows] };
   }
 
   // numbers of the map, as they are drawn
