@@ -278,8 +278,8 @@ def solve(
             continue
         tried.append(_trial(found))
         goes_on = abs(found.minimised / best.minimised - 1.0) > tolerance
-        if found.minimised < best.minimised * (1.0 - TIGHT):
-            best = found
+        bound = max(best.bound, found.bound, key=lambda one: one.k_dyn)  # both are of this problem
+        best = replace(found if found.minimised < best.minimised * (1.0 - TIGHT) else best, bound=bound)
     if may_bounce and time.perf_counter() < until and best.gap_percent > 100.0 * tolerance:
         best, others = _beside_shipped(hold, best, work)
         tried += others

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,16 @@ from scipy.linalg import expm
 from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.optimal.certificate import ENDINGS
-from softstart.optimal.lp.rows import Limits, Solution, Sparse, WarmStarts, no_linear_objective
+from softstart.optimal.lp.rows import (
+    Limits,
+    RowList,
+    Rows,
+    Solution,
+    Sparse,
+    WarmStarts,
+    below,
+    no_linear_objective,
+)
 from softstart.optimal.lp.whole import ONE, SLOPE, STATES, W2, Kind, R, U, V, Z
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
@@ -39,19 +50,19 @@ GRIDS = 6  # each grid has FINER times the steps of the one before
 SUBSTEPS = 3  # of the torque in a span over which T is averaged
 GAP_STEPS, WINDING_STEPS = 24, 16  # of the torque
 SPANS = 60  # at least, and at least two a radian
-# of missing an equation by as much as its unit, in units of the torque; the lowest that is enough leaves
-# multipliers that prove most of other cells
-PRICES = (0.25, 0.5, 1.0, 2.0, 4.0, 40.0, 400.0)
+# of missing an equation by as much as its unit, in units of the torque; the lowest that is enough is taken
+PRICES = (4.0, 40.0, 400.0)
 KICKED = 0.02  # of a price: for a kick where phases meet
-PROGRAMS = 24  # on a grid
-FAILURES, APART = 3, 2  # programs on a grid that may close few cells; others are tried so many cells away
+PROGRAMS = 40  # on a grid
+FAILURES = 5  # programs on a grid that may close few cells
+APART, NEARBY = 2, 0.1  # cells away from them, and of the extent of all open ones, others are tried
 KEPT = 8  # sets of multipliers that the next grid begins with
 CLOSED_FORM = 6  # steps that take as long as the closed form of a gap
-MOST_WORK, LITTLE_WORK = 2.8e8, 3e7  # numbers computed in all; a drive is judged alike on every machine
+MOST_WORK, LITTLE_WORK = 5.6e8, 3e7  # numbers computed in all; a drive is judged alike on every machine
 ROUNDING = 1e-9
 GAINED = 1e-4  # relative: what is left of the goal, or gained by a grid, that ends the work
-CLOSED = 0.1  # of the open cells: a program that closes fewer is a failure
-LEVELS = (0.95, 0.99, 1.0)  # of the goal, one after the other
+CLOSED = 0.04  # of the open cells: a program that closes fewer is a failure
+LEVELS = (0.95, 0.993, 1.0)
 
 
 def not_certified(problem: Problem) -> str:
@@ -84,75 +95,72 @@ def not_certified(problem: Problem) -> str:
 class _Cells:
     """Cells of two durations, on the first grid all, on a finer one those that a coarser one leaves open.
 
-    The cell [i, k] of `lowest` has tau from first[0] + i steps on, and from first[1] + k steps on g where the
-    load moves, w where it rests and is wound up across the gap; one column where te or the rest is all that
-    moves. With a load at rest that is moved by a damped contact at once (`winds` is false) T there is above
-    Mc, not more. The bounds of all other cells are at least `outside`.
+    The cell (i, k) has tau from i to i + 1 steps, and from k to k + 1 steps g where the load moves, w where
+    it rests and is wound up across the gap; k = 0 where te or the rest is all that moves. With a load at rest
+    that is moved by a damped contact at once (`winds` is false) T there is above Mc, not more. Cells are in
+    the order of (i, k); `parent` is their place among the coarser ones. The bounds of all others are at least
+    `outside`.
     """
+
+    i: Any
+    k: Any
+    lowest: Vector  # bound of each, N m
 
     def __init__(
         self, start: Start, winds: bool, coarse: _Cells | None = None, goal: float = math.inf
     ) -> None:
         self.start, self.winds = start, winds
         s, n = start, start.n
-        self.wide = s.open and (winds or not s.rests)  # two durations
-        last, self.outside = (n, n if self.wide else 1), math.inf
-        self.first = (0, 0)
-        if coarse is not None:
-            i0, i1, k0, k1 = coarse.open_box(goal) or (0, 1, 0, 1)
-            self.first = FINER * i0, FINER * k0 if self.wide else 0
-            last = min(FINER * i1, n), min(FINER * k1, n) if self.wide else 1
-            rest = coarse.lowest.copy()
-            above, left = coarse.first
-            rest[i0 - above : i1 - above, k0 - left : k1 - left] = math.inf
-            self.outside = min(coarse.outside, float(rest.min()))
-        i: Any = np.arange(self.first[0], last[0])[:, None]
-        k: Any = np.arange(self.first[1], last[1])
+        wide = s.open and (winds or not s.rests)  # two durations
+        self.outside = math.inf
+        if coarse is None:
+            i, k = (one.ravel() for one in np.indices((n, n if wide else 1)))
+            self.parent = i
+        else:
+            opened = coarse.lowest < goal
+            self.outside = min(coarse.outside, float(np.min(coarse.lowest[~opened], initial=math.inf)))
+            parts = FINER if wide else 1
+            self.parent = np.repeat(np.flatnonzero(opened), FINER * parts)
+            of_i, of_k = (np.tile(one.ravel(), opened.sum()) for one in np.indices((FINER, parts)))
+            i, k = FINER * coarse.i[self.parent] + of_i, parts * coarse.k[self.parent] + of_k
         if s.rests:
-            plain = s.Mc + s.J2 * s.problem.target / (s.h * (i + 1.0))
+            plain: Any = s.Mc + s.J2 * s.problem.target / (s.h * (i + 1.0))
             fits = i + k + (s.n0 + 1 if winds and s.open else s.n0 if s.open else 1) <= n
         else:
             missing = s.problem.target - s.first[W2]
             plain = (s.J2 * missing + s.Mc * s.h * (i + k)) / (s.h * (i + 1.0))
             fits = (i + k + 1 <= n) & (k >= s.n0) if s.open else i < n
-        self.lowest = np.where(fits, plain, math.inf)
+        kept = np.lexsort((k, i))
+        kept = kept[fits[kept]]
+        self.i, self.k, self.parent, self.lowest = i[kept], k[kept], self.parent[kept], plain[kept]
         if coarse is not None:
-            parent = i // FINER - coarse.first[0], (k // FINER if self.wide else k) - coarse.first[1]
-            known = coarse.lowest[parent]
-            self.lowest = np.maximum(self.lowest, np.where(np.isfinite(known), known, -math.inf))
-
-    lowest: Matrix
+            np.maximum(self.lowest, coarse.lowest[self.parent], out=self.lowest)
 
     @property
     def least(self) -> float:
         """The least bound of all cells, N m."""
-        return min(self.outside, float(self.lowest.min()))
+        return min(self.outside, float(np.min(self.lowest, initial=math.inf)))
 
     def middle(self, goal: float, but: list[tuple[int, int]]) -> tuple[int, int] | None:
         """The cell in the middle of those below `goal`, not near any of `but`; None if there is none."""
-        alive = self.lowest < goal
-        for i, k in but:
-            row, column = i - self.first[0], k - self.first[1]
-            alive[max(row - APART, 0) : row + APART + 1, max(column - APART, 0) : column + APART + 1] = False
-        counts = alive.sum(axis=1)
-        if not counts.any():
+        alive = np.flatnonzero(self.lowest < goal)
+        if not alive.size:
             return None
-        row = int(np.searchsorted(np.cumsum(counts), 0.5 * counts.sum()))
-        columns = np.flatnonzero(alive[row])
-        return row + self.first[0], int(columns[columns.size // 2]) + self.first[1]
+        i, k = self.i[alive], self.k[alive]
+        apart_i, apart_k = (max(APART, int(NEARBY * np.ptp(one))) for one in (i, k))
+        left = np.ones(alive.size, dtype=bool)
+        for at_i, at_k in but:
+            left &= (np.abs(i - at_i) > apart_i) | (np.abs(k - at_k) > apart_k)
+        i, k = i[left], k[left]
+        if not i.size:
+            return None
+        row = int(i[(i.size - 1) // 2])
+        columns = k[i == row]
+        return row, int(columns[columns.size // 2])
 
     def count(self, goal: float) -> int:
         """How many cells are below `goal`."""
         return int(np.count_nonzero(self.lowest < goal))
-
-    def open_box(self, goal: float) -> tuple[int, int, int, int] | None:
-        """(First row, end of rows, first column, end of columns) of the cells below `goal`, if any."""
-        alive = self.lowest < goal
-        if not alive.any():
-            return None
-        rows, columns = np.flatnonzero(alive.any(axis=1)), np.flatnonzero(alive.any(axis=0))
-        i, k = self.first
-        return int(rows[0]) + i, int(rows[-1]) + 1 + i, int(columns[0]) + k, int(columns[-1]) + 1 + k
 
     def instants(self, cell: tuple[int, int]) -> tuple[int, int, int]:
         """(steps in the gap, winding up, in contact) of a start in a cell."""
@@ -183,26 +191,33 @@ class _Cells:
 
         True if the dual raised one of them.
         """
-        box = self.open_box(goal)
-        if box is None:
+        below = np.flatnonzero(self.lowest < goal)
+        if not below.size:
             return False
-        i0, i1, k0, k1 = box
-        i, k = self.first
-        known = self.lowest[i0 - i : i1 - i, k0 - k : k1 - k]
-        found = dual.cells((i0, i1), (k0, k1), self.winds, known < goal)
-        proved = np.where(np.isfinite(found), found, -math.inf)
-        raised = bool(np.any((proved > known) & (known < goal)))
-        np.maximum(known, proved, out=known)
-        return raised
+        known = self.lowest[below]
+        proved = dual.cells(self.i[below], self.k[below], self.winds)
+        self.lowest[below] = np.where(np.isfinite(proved), np.maximum(proved, known), known)
+        return bool(np.any(self.lowest[below] > known))
+
+    def take(self, finer: _Cells) -> None:
+        """Take the least bound of the parts of each cell that a finer grid has, where it is larger."""
+        least = np.full(self.lowest.size, math.inf)
+        np.minimum.at(least, finer.parent, finer.lowest)
+        parents = np.unique(finer.parent)
+        self.lowest[parents] = np.maximum(self.lowest[parents], least[parents])
 
     def work(self, goal: float, walked: int) -> float:
         """How many numbers a set of multipliers takes, with so many steps in the gap (`Start.walked`)."""
-        first, last = spans_of(self.lowest < goal).T
-        n, i = self.start.n, np.arange(first.size) + self.first[0]
-        steps = last + self.first[1]
+        n, below = self.start.n, self.lowest < goal
+        if not below.any():
+            return 60.0 * n
+        row, spans = spans_of(self.i[below], self.k[below])
+        first, last = spans.T
+        i = np.arange(first.size) + row
+        steps = last + 1
         if self.start.rests:
             gap = np.minimum(np.maximum(n - i, 0), walked + CLOSED_FORM)
-            steps = (last - first + 1) * gap + last if self.winds == self.start.open else n - i
+            steps = (last - first + 2) * gap + last if self.winds == self.start.open else n - i
         return 5.0 * float(np.sum(steps, where=last >= first)) + 60.0 * n
 
 
@@ -212,15 +227,11 @@ class _Cells:
 class _Program:
     """Good multipliers for given durations: T and the curve by means over spans and at their ends."""
 
-    def __init__(
-        self, start: Start, durations: tuple[int, int, int], rough: bool = False,
-        warm: WarmStarts | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, start: Start, durations: tuple[int, int, int], warm: WarmStarts | None = None) -> None:
         self.start, self.warm = start, warm or WarmStarts()
         gap, winding, contact = durations
         s = self.start
-        spans = max(SPANS, int(2.0 * s.Omega * s.h * contact)) // (2 if rough else 1)
-        self.prices = PRICES if rough else PRICES[-3:]
+        spans = max(SPANS, int(2.0 * s.Omega * s.h * contact))
         inner = _even(contact, spans * SUBSTEPS)
         self.parts: list[tuple[Kind, Vector]] = []
         if gap:
@@ -234,132 +245,109 @@ class _Program:
     def solve(self, goal: float) -> Multipliers | None:
         """Multipliers whose bound is above `goal` N m, or the largest; None where HiGHS finds none."""
         s = self.start
-        scale_z, scale_v = s.c / s.most, s.c / (s.Omega * s.most)
         steps = np.concatenate([np.diff(edges) for _, edges in self.parts]).round(9)  # in h
         kinds = [kind for kind, edges in self.parts for _ in range(edges.size - 1)]
         m = steps.size
         bent = s.rate < math.inf
-        demands = m + 1 if bent else m
-        joints = len(self.parts) - 2
-        sags = demands + 4 * joints  # T above the linear one, where that may be below 0
-        begun = kinds.index("contact")
-        X = np.zeros((STATES + 3, sags + (m - begun if s.below.any() else 0) + 1))
-        X[:STATES, -1] = s.first[:STATES]
-        flows: dict[tuple[Kind, float], Matrix] = {}
-        T_now, T_sum, z_now, curve = [], [], [], []
-        equal: list[tuple[str, Vector]] = []
-        ends = np.cumsum([edges.size - 1 for _, edges in self.parts])
-        for k in range(m):
-            key = (kinds[k], float(steps[k]))
-            if key not in flows:
-                flows[key] = _with_means(s, key[0], key[1] * s.h)
-            F = flows[key]
-            dt = steps[k] * s.h
-            states = [Z, V, W2, U, 7, 8, 9]
-            X[STATES:] = 0.0
-            moved = F[np.ix_(states, [Z, V, W2, U])] @ X[:STATES]
-            on_r, on_slope = F[states, R], F[states, SLOPE] / dt
-            if bent:
-                moved[:, k] += on_r - on_slope
-                moved[:, k + 1] += on_slope
-            else:
-                moved[:, k] += on_r
-            moved[:, -1] += F[states, ONE]
-            X = moved
-            if kinds[k] == "contact":
-                T_now.append(s.c * X[Z] + s.d * X[V])
-                T_sum.append(X[STATES].copy())
-                if s.below.any():
-                    sag = sags + k - begun
-                    T_now[-1][sag] += 1.0
-                    T_sum[-1][sag] += dt
-                    X[V, sag] -= dt * (1.0 / s.J1 + 1.0 / s.J2)
-                    X[W2, sag] += dt / s.J2
-                z_now.append(s.c * X[Z])
-            curve.append((X[STATES + 1].copy(), X[STATES + 2].copy()))
-            if k + 1 == ends[-2]:
-                equal.append(("speed", X[W2] / s.problem.target))
-                if s.problem.terminal != "reached":
-                    equal.append(("rate", X[V] * scale_v))
-                if s.problem.terminal == "steady":
-                    equal.append(("torque", T_now[-1] / s.most))
-            elif k + 1 in ends[:-2]:
-                if kinds[k] == "stuck":
-                    equal.append(("breakaway", (s.c * X[Z] + s.d * X[V]) / s.most))
-                else:
-                    equal.append(("contact", X[Z] * scale_z))
-                joints -= 1
-                kick = demands + 4 * joints
-                X[Z, kick : kick + 2] += np.array([1.0, -1.0]) / s.c
-                X[V, kick + 2 : kick + 4] += np.array([1.0, -1.0]) * s.Omega / s.c
-        return self._solved(steps, demands, T_now, T_sum, z_now, curve, equal, goal)
-
-    def _solved(self, steps: Any, demands: int, T_now: Any, T_sum: Any, z_now: Any, curve: Any,
-                equal: list[tuple[str, Vector]], goal: float) -> Multipliers | None:  # fmt: skip
-        s = self.start
-        m = steps.size
         inner = self.parts[-2][1].size - 1  # steps in contact up to te
         after = m - inner - (self.parts[-1][1].size - 1)  # steps before the contact
-        T_now, T_sum = np.array(T_now) / s.most, np.array(T_sum)
-        first = np.arange(0, inner, SUBSTEPS)
-        lengths = np.add.reduceat(steps[after : after + inner], first) * s.h
-        means = np.add.reduceat(T_sum[:inner], first, axis=0) / lengths[:, None] / s.most
-        at_ends = np.append(first[1:] - 1, inner - 1)
-        peak = np.vstack([means, T_now[at_ends], T_now[inner:]])
-        kept = np.array(z_now)[at_ends] / s.most if s.pulls else np.vstack([means, T_now[at_ends]])
-        lines = []
-        begins = np.concatenate([np.arange(after), after + first])  # of the means of the curve
-        times = np.add.reduceat(steps[: after + inner], begins)[:, None] * s.h
-        w1, uu = (
-            np.add.reduceat(np.array(one)[: after + inner], begins, axis=0) / times / s.most
-            for one in zip(*curve, strict=True)
-        )
-        for slope, w, u in s.lines:
-            row = uu - slope * w1
-            row[:, -1] -= (u - slope * w) / s.most
-            lines.append(row)
-        count = len(equal)
+        ends = np.cumsum([edges.size - 1 for _, edges in self.parts])
+        begins = np.concatenate([np.arange(a, b, SUBSTEPS) for a, b in pairwise([0, *ends])])  # of spans
+        # Columns: demands, kicks, T above the linear one where that may be below 0, states at the beginning
+        # of each span (eliminated, they would fill all rows), slack of the equations, of T >= 0 and curve, P
+        demands = m + 1 if bent else m
         sags = demands + 4 * (len(self.parts) - 2)
-        free = peak.shape[1] - 1
-        columns = free + 2 * count + 2  # demand, kicks, slack of the equations, of T >= 0 and curve, P
-        unit = np.append(np.full(free, s.most), 1.0)
-        blocks = [_rows(peak * unit, free, columns, {columns - 1: -1.0})]
-        blocks.append(_rows(-kept * unit, free, columns, {columns - 2: -1.0}))
-        blocks += [_rows(row * unit, free, columns, {columns - 2: -1.0}) for row in lines]
-        if s.rate < math.inf:
-            rise = np.zeros((m, columns + 1))
-            rise[np.arange(m), np.arange(m)] = -1.0
-            rise[np.arange(m), np.arange(m) + 1] = 1.0
-            rise[:, -1] = -s.rate * steps * s.h / s.most
-            fall = -rise
-            fall[:, -1] = rise[:, -1]
-            blocks += [rise, fall]
-        ub = np.vstack(blocks)
+        known = sags + (m - after if s.below.any() else 0)
+        free = known + STATES * begins.size
+        units = s.most * np.array([1.0 / s.c, s.Omega / s.c, s.Omega / s.c, 1.0])
+        sides = list(pairwise([*begins.tolist(), m]))
+        spans = [_span(s, kinds[a], tuple(steps[a:b].tolist()), units) for a, b in sides]
+        of = np.repeat(np.arange(begins.size), np.diff([*begins, m]))  # span of each step
+        at = np.column_stack(
+            [
+                known + STATES * np.arange(begins.size)[:, None] + np.arange(STATES),
+                begins[:, None] + np.arange(SUBSTEPS + 1),
+                sags + begins[:, None] - after + np.arange(SUBSTEPS),
+            ]
+        )  # columns of each span
+
+        def rows(values: Matrix, span: Any) -> Rows:
+            row, place = np.nonzero(values[:, :-1])
+            return Sparse(len(values), row, at[span][row, place], values[row, place]), values[:, -1]
+
+        def means(values: Matrix, first: Any) -> Rows:
+            times = np.add.reduceat(steps[: after + inner], first)[:, None] * s.h
+            return rows(np.add.reduceat(values[: after + inner], first, axis=0) / times, of[first])
+
+        def stacked(*some: Rows) -> Rows:
+            return Sparse.stacked([one for one, _ in some]), np.concatenate([one for _, one in some])
+
+        T_now, T_sum, z_now, w1_sum, u_sum = np.concatenate([one.rows for one in spans]).transpose(1, 0, 2)
+        first = begins[(begins >= after) & (begins < after + inner)]
+        last, tail = np.append(first[1:], after + inner) - 1, np.arange(after + inner, m)
+        T_mean, T_last = means(T_sum, first), rows(T_now[last], of[last])
+        kept = rows(z_now[last], of[last]) if s.pulls else stacked(T_mean, T_last)
+        lines = []
+        for slope, w, u in s.lines:
+            below_it = means(u_sum - slope * w1_sum, np.append(np.arange(after), first))
+            lines.append((below_it[0], below_it[1] - (u - slope * w) / s.most))
+        equal: list[tuple[str, Rows]] = []
+        links = RowList()
+        for k, (_, end) in enumerate(sides[:-1]):
+            state = spans[k].end
+            X = state / units[:, None]
+            link, constant = rows(X, np.full(STATES, k))
+            next_one = known + STATES * (k + 1) + np.arange(STATES)
+            link = link - Sparse.of(STATES, next_one, np.ones(STATES))
+            if end == ends[-2]:
+                equal.append(("speed", rows(state[[W2]] / s.problem.target, [k])))
+                if s.problem.terminal != "reached":
+                    equal.append(("rate", rows(X[[V]], [k])))
+                if s.problem.terminal == "steady":
+                    equal.append(("torque", rows(T_now[[end - 1]], [k])))
+            elif end in ends[:-2]:
+                name = "breakaway" if kinds[end - 1] == "stuck" else "contact"
+                equal.append((name, rows(T_now[[end - 1]] if name == "breakaway" else X[[Z]], [k])))
+                kicks = sags - 4 * len(equal) + np.arange(4)
+                kicked = Sparse(STATES, np.array([Z, Z, V, V]), kicks, np.array([-1.0, 1.0, -1.0, 1.0]))
+                link = link - kicked
+            links.add(link, -constant)
+        count = len(equal)
+        columns = free + 2 * count + 2
+        slack, P = (Sparse.single({columns - back: 1.0}) for back in (2, 1))
+        blocks = [below(stacked(T_mean, T_last, rows(T_now[tail], of[tail])), P), below(kept, slack, -1.0)]
+        blocks += [below(one, slack) for one in lines]
+        if bent:
+            moves, most = np.arange(m), s.rate * steps * s.h / s.most
+            rise = Sparse.of(m, np.append(moves + 1, moves), np.repeat([1.0, -1.0], m))
+            blocks += [(rise, most), (-1.0 * rise, most)]
+        above, most_above = stacked(*blocks)
         targets = {"speed": 1.0, "torque": s.Mc / s.most, "breakaway": s.Mc / s.most}
-        eq = np.zeros((count, columns + 1))
-        for k, (name, row) in enumerate(equal):
-            eq[k, :free] = row[:free] * s.most
-            eq[k, -1] = row[-1] - targets.get(name, 0.0)
-            eq[k, free + 2 * k : free + 2 * k + 2] = 1.0, -1.0
+        named = RowList()
+        for k, (name, (row, constant)) in enumerate(equal):
+            slacks = Sparse.single({free + 2 * k: -1.0, free + 2 * k + 1: 1.0})
+            named.add(row - slacks, targets.get(name, 0.0) - constant)
+        equations, exactly = stacked(named.all(), links.all())
         bounds = np.tile([0.0, np.inf], (columns, 1))
         bounds[:demands] = s.low / s.most, s.high / s.most
-        if free > sags:  # by the steps that are left to the end of the swing
-            left = np.cumsum(steps[: sags - free - 1 : -1])[::-1]
-            bounds[sags:free, 1] = s.below[np.ceil(left).astype(int) - 1] / s.most
+        bounds[known:free, 0] = -np.inf
+        bounds[known : known + STATES] = (s.first[:STATES] / units)[:, None]
+        if known > sags:  # by the steps that are left to the end of the swing
+            left = np.cumsum(steps[after:][::-1])[::-1]
+            bounds[sags:known, 1] = s.below[np.ceil(left).astype(int) - 1] / s.most
         priced = np.r_[demands:sags, free : columns - 1]
-        if s.rate < math.inf:
+        if bent:
             bounds[0] = s.problem.first_demand / s.most
             if math.isfinite(s.held):
                 bounds[after + inner] = s.held / s.most
-        above, equations = (Sparse.dense(rows[:, :-1]) for rows in (ub, eq))
         found: Solution | None = None
-        for price in self.prices:
+        for price in PRICES:
             cost = np.full(columns, price)
             cost[:demands] = 0.0
             cost[demands:sags] *= KICKED
             cost[sags:free] = 0.0
             cost[-1] = 1.0
-            found = Limits(cost, above, -ub[:, -1], equations, -eq[:, -1]).solved(bounds, self.warm)
+            found = Limits(cost, above, most_above, equations, exactly).solved(bounds, self.warm)
             if found is None:
                 return None
             self.P = found.cost * s.most
@@ -368,10 +356,10 @@ class _Program:
         assert found is not None
         parts = np.split(
             np.maximum(-found.above, 0.0),
-            np.cumsum([len(one) for one in blocks])[:-1],
+            np.cumsum([right.size for _, right in blocks])[:-1],
         )
-        names = dict(zip([name for name, _ in equal], found.equal, strict=True))
-        return self._multipliers(parts, names, steps, first, at_ends, inner, after)
+        names = dict(zip([name for name, _ in equal], found.equal[:count], strict=True))
+        return self._multipliers(parts, names, steps, first - after, last - after, inner, after)
 
     def _multipliers(self, parts: list[Vector], names: dict[str, float], steps: Any, first: Any,
                      at_ends: Any, inner: int, after: int) -> Multipliers | None:  # fmt: skip
@@ -442,14 +430,40 @@ def _even(steps: int, parts: int) -> Vector:
     return np.unique(np.round(np.linspace(0, steps, min(parts, steps) + 1)).astype(int))
 
 
-def _rows(rows: Matrix, free: int, columns: int, extra: dict[int, float]) -> Matrix:
-    """Rows over all variables and a constant, of rows over the demands in units and a constant."""
-    out = np.zeros((rows.shape[0], columns + 1))
-    out[:, :free] = rows[:, :free]
-    out[:, -1] = rows[:, -1]
-    for column, value in extra.items():
-        out[:, column] = value
-    return out
+@dataclass(frozen=True, eq=False)
+class _Span:
+    """How a few steps move the state: over states before in units, demands, T above the linear one, and 1."""
+
+    rows: Any  # (steps, 5, places): T, the integral of T, c z, integrals of w1 and u, in units of the torque
+    end: Matrix  # (STATES, places): the state afterwards
+
+
+def _span(s: Start, kind: Kind, steps: tuple[float, ...], units: Vector) -> _Span:
+    if (kind, steps) in s.spans:
+        known: _Span = s.spans[kind, steps]
+        return known
+    states = [Z, V, W2, U, 7, 8, 9]
+    X = np.zeros((len(states), STATES + 2 * SUBSTEPS + 2))
+    X[np.arange(STATES), np.arange(STATES)] = units
+    rows = np.zeros((len(steps), 5, X.shape[1]))
+    for k, step in enumerate(steps):
+        if (kind, step) not in s.spans:
+            s.spans[kind, step] = _with_means(s, kind, step * s.h)
+        F, dt, demand, sag = s.spans[kind, step], step * s.h, STATES + k, STATES + SUBSTEPS + 1 + k
+        X = F[np.ix_(states, [Z, V, W2, U])] @ X[:STATES]
+        on_r, on_slope = s.most * F[states, R], s.most * F[states, SLOPE] / dt
+        X[:, demand] += on_r
+        if s.limited:
+            X[:, demand] -= on_slope
+            X[:, demand + 1] += on_slope
+        X[:, -1] += F[states, ONE]
+        rows[k] = s.c * X[Z] + s.d * X[V], X[STATES], s.c * X[Z], X[STATES + 1], X[STATES + 2]
+        if kind == "contact" and s.below.any():
+            rows[k, :2, sag] += s.most * np.array([1.0, dt])
+            X[V, sag] -= s.most * dt * (1.0 / s.J1 + 1.0 / s.J2)
+            X[W2, sag] += s.most * dt / s.J2
+    s.spans[kind, steps] = span = _Span(rows / s.most, X[:STATES])
+    return span
 
 
 def _with_means(start: Start, kind: Kind, dt: float) -> Matrix:
@@ -501,7 +515,7 @@ def dual_at(problem: Problem, instants: tuple[float, float, float], steps: int =
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0, torque_lag=0.005)
     >>> dual = dual_at(Problem(drive, 0.2883042), (0.02667, 0.02667, 0.2883042))
     >>> gap, _, contact = dual.by.durations
-    >>> bound = float(dual.nodes((contact, contact), (gap, gap), False)[0, 0])  # N m, at these instants
+    >>> bound = dual.nodes(np.array([contact]), np.array([gap]), False).item()  # N m, at these instants
     >>> round(bound / dual.start.problem.base_torque, 2)
     0.93
     """
@@ -557,27 +571,35 @@ def _least(start: Start, goal: float, near: tuple[float, float, float] | None, l
            winds: bool, known: list[Multipliers], proof: list[Multipliers]) -> float:  # fmt: skip
     """The least bound over the cells, each raised by multipliers found among them, on finer grids.
 
-    It begins with the multipliers `known`; those that raised cells on the last grid are added to `proof`.
+    The lowest cells decide: all are brought to one level, on grids as fine as it needs, before any is brought
+    to the next. It begins with the multipliers `known`; of those that raised cells some are added to `proof`.
     """
-    cells, before = _Cells(start, winds), 0.0
-    used = list(known)
-    for finer in range(GRIDS):
-        if finer:
-            start = Start(start.problem, FINER * start.n)
-            cells = _Cells(start, winds, cells, goal)
-        used = [by.on(start) for by in used]
-        instants = cells.near(near) if near else None
-        failures: list[tuple[int, int]] = []
-        for level in LEVELS[2 if known else 0 :]:
-            left, used = _raise(cells, level * goal, goal, instants, left, used, failures, report)
-            instants = None
-        near_enough = cells.least >= goal * (1.0 - GAINED) or cells.least < before * (1.0 + GAINED)
-        walked = start.walked(used[-1]) if used else start.n
-        if near_enough or left < 3.0 * FINER**2 * cells.work(goal, walked):
+    grids, used = [_Cells(start, winds)], [list(known)]
+    failures: list[list[tuple[int, int]]] = [[] for _ in range(GRIDS)]
+    levels = [share * goal for share in LEVELS[len(LEVELS) - 1 if known else 0 :]]
+    for level in levels:
+        for finer in range(GRIDS):
+            if finer == len(used):
+                used.append([])
+            if finer:
+                fine = grids[finer].start if finer < len(grids) else start.refined(finer)
+                used[finer] += [by.on(fine) for by in used[finer - 1]]
+                grids[finer:] = [_Cells(fine, winds, grids[finer - 1], level)]
+            cells = grids[finer]
+            instants = cells.near(near) if near and level == levels[0] else None
+            left, used[finer] = _raise(
+                cells, level, goal, instants, left, used[finer], failures[finer], report
+            )
+            walked = cells.start.walked(used[finer][-1]) if used[finer] else cells.start.n
+            if cells.count(level) == 0 or left < 3.0 * FINER**2 * cells.work(level, walked):
+                break
+        reached = cells.count(level) == 0
+        for coarse, its_parts in reversed(list(pairwise(grids))):
+            coarse.take(its_parts)
+        if not reached or grids[0].least >= goal * (1.0 - GAINED):
             break
-        before = cells.least if finer else 0.0
-    proof += used
-    return cells.least
+    proof += [by.on(start) for some in used for by in some][-KEPT:]
+    return grids[0].least
 
 
 def _raise(cells: _Cells, level: float, goal: float, near: tuple[int, int, int] | None, left: float,
@@ -606,7 +628,7 @@ def _raise(cells: _Cells, level: float, goal: float, near: tuple[int, int, int] 
             failures.append(cell)
             continue
         solved.append(durations)
-        program = _Program(start, durations, level < goal, warm)
+        program = _Program(start, durations, warm)
         found = program.solve(goal)
         left -= 5.0 * float(sum(edges.size for _, edges in program.parts)) ** 2
         if found is not None:

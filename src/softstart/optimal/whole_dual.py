@@ -160,6 +160,7 @@ class Start:
         self.rates = {kind: phase_rates(drive, kind) for kind in kinds}
         self.phases = {kind: Phase(self.rates[kind], self.h) for kind in kinds}
         self.T = np.array([self.c, self.d, 0.0, 0.0, 0.0])
+        self.spans: dict[Any, Any] = {}  # of linear programs on this grid (whole_certificate.py)
         self.pull = 0.0 if self.rests else self.Mc / self.J2
         v0 = float(drive.initial_motor_speed - drive.initial_load_speed)
         z0 = float(drive.theta0 - 0.5 * drive.gap)
@@ -173,6 +174,10 @@ class Start:
             half = math.pi / self.Omega
             last = max(half, -math.log(MARGIN) * self.d / self.c)
             self.below[: self.tail + math.ceil(last / self.h)] = MARGIN * self.high * half / last
+
+    def refined(self, times: int) -> Start:
+        """The same on a grid that is finer so many times."""
+        return Start(self.problem, FINER**times * self.n)
 
     def walked(self, by: Multipliers) -> int:
         """Steps in the gap, back from the contact, that are computed one by one; the rest is in closed form.
@@ -284,19 +289,11 @@ class Dual:
 
     # bounds at the nodes ---------------------------------------------------------------------------------
 
-    def nodes(
-        self, rows: tuple[int, int], columns: tuple[int, int], winds: bool, wanted: Any = None
-    ) -> Matrix:
-        """F at the nodes from rows[0] to rows[1], and from columns[0] to columns[1], of the cells of a box.
-
-        Only at the corners of the cells `wanted` of it, if given; elsewhere -inf.
-        """
+    def nodes(self, i: Any, k: Any, winds: bool) -> Vector:
+        """F at nodes, each of tau = i steps, and k steps of w or g where there are two durations."""
         s = self.start
-        wide = s.open and (winds or not s.rests)
-        count = rows[1] - rows[0] + 1
-        spans = np.tile(np.array(columns if wide else (0, 0)), (count, 1))
-        if wanted is not None:
-            spans = spans_of(wanted) + (columns[0] if wide else 0)
+        first, spans = spans_of(i, k)
+        before = np.cumsum(np.append(0, np.maximum(spans[:, 1] - spans[:, 0] + 1, 0)))
         joint = np.zeros(LAST + 1)
         if winds:
             joint = self.by.breakaway * s.T
@@ -307,9 +304,9 @@ class Dual:
             np.vstack([one.phase.E, one.phase.A, one.phase.b[None], one.phase.weight[None]])
             for one in (self.winding, self.gap)
         ]
-        out = np.full((count, columns[1] - columns[0] + 1 if wide else 1), -math.inf)
+        out = np.full(before[-1], -math.inf)
         _walk(
-            rows[0], columns[0], spans, s.n, s.tail, s.rests, s.open, winds, self.p, joint, self.mu,
+            first, spans, before, s.n, s.tail, s.rests, s.open, winds, self.p, joint, self.mu,
             np.array(self.q), self.lost,
             early[0], self.winding.added, self.winding.sources, self.winding.direct,
             early[1], self.gap.added, self.gap.sources, self.gap.direct,
@@ -317,44 +314,43 @@ class Dual:
             s.first, s.problem.first_demand, s.held, s.h, s.low, s.high, s.rate if s.limited else -1.0,
             kinks, counted, np.zeros((3, 2)), np.empty((4, LAST + 1)), out,
         )  # fmt: skip
-        return out
+        row = np.asarray(i) - first
+        return np.asarray(out[before[row] + k - spans[row, 0]])
 
     # bounds of cells -------------------------------------------------------------------------------------
 
-    def cells(
-        self, rows: tuple[int, int], columns: tuple[int, int], winds: bool, wanted: Any = None
-    ) -> Matrix:
-        """What is proved of the cells of a box [i, k]: tau from i to i + 1 steps, and from k to k + 1 steps
+    def cells(self, i: Any, k: Any, winds: bool) -> Vector:
+        """What is proved of cells: tau from i to i + 1 steps, and from k to k + 1 steps
 
-        w with a load at rest that is wound up across the gap, g with a load that moves; else there is one
-        column, and te moves with tau, or stays where the load rests. Of cells not `wanted` nothing.
+        w with a load at rest that is wound up across the gap, g with a load that moves; else k = 0, and te
+        moves with tau, or stays where the load rests.
         """
         s = self.start
-        i = np.arange(*rows)
         loss = s.h**2 / 8.0
-        f = self.nodes(rows, columns, winds, wanted)
         if not s.open or (s.rests and not winds):
-            if s.rests:
-                left = s.h * (s.n - i)
-                if winds:
-                    M = self._along_winding(i, left, 0.0)[2]
-                else:
-                    M = self._along_gap(i, left[:, None])[2][:, 0]
-            else:
+            f = self.nodes(np.append(i, i + 1), np.append(k, k), winds).reshape(2, -1)
+            if not s.rests:
                 M = self._touching(i)
-            return np.asarray(np.minimum(f[:-1], f[1:]) - M[:, None] * loss)
-        k = np.arange(*columns)
+            elif winds:
+                M = self._along_winding(i, s.h * (s.n - i), 0.0)[2]
+            else:
+                M = self._along_gap(i, s.h * (s.n - i))[2]
+            return np.asarray(f.min(axis=0) - M * loss)
+        corners = (
+            np.tile(i, 4) + np.repeat([0, 1, 0, 1], i.size),
+            np.tile(k, 4) + np.repeat([0, 0, 1, 1], i.size),
+        )
+        f = self.nodes(*corners, winds).reshape(4, -1)
         if s.rests:
-            g = s.h * np.maximum(s.n - i[:, None] - k, 0)
-            M_tau, M_other, M_diagonal = self._along_winding(i[:, None], s.h * (k + 1.0), g)
+            g = s.h * np.maximum(s.n - i - k, 0)
+            M_tau, M_other, M_diagonal = self._along_winding(i, s.h * (k + 1.0), g)
         else:
-            M_tau, M_other, M_diagonal = self._along_gap(i, s.h * (k + 1.0)[None])
-        whole = i[:, None] + k + 2 <= s.n
-        three = np.minimum(f[:-1, :-1], np.minimum(f[1:, :-1], f[:-1, 1:]))
-        corners = np.minimum(three, np.where(whole, f[1:, 1:], math.inf))
+            M_tau, M_other, M_diagonal = self._along_gap(i, s.h * (k + 1.0))
+        whole = i + k + 2 <= s.n
+        f[3, ~whole] = math.inf
         # of a cell cut by the last end, or by the beginning, the triangle below its diagonal
         across = np.where(whole, M_other, np.maximum(M_other, M_diagonal))
-        return np.asarray(corners - (M_tau + across) * loss)
+        return np.asarray(f.min(axis=0) - (M_tau + across) * loss)
 
     def _touching(self, i: Any) -> Vector:
         """M where the contact lasts from the beginning: along te = tau."""
@@ -363,49 +359,49 @@ class Dual:
         M = by_demand * (self.a1[i] @ np.abs(phase.b)) + self.a2[i] @ np.abs(s.first)
         return np.asarray(M + (s.rate * self.turns[i] if s.limited else 0.0))
 
-    def _along_gap(self, i: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
+    def _along_gap(self, i: Any, g: Any) -> tuple[Vector, Vector, Vector]:
         """M along tau, along g, and along tau while te stays, of cells with a gap of up to g s."""
         s, gap, phase = self.start, self.gap, self.start.phases["contact"]
         most, J1, lag, h = s.most, s.J1, s.lag, s.h
         a1, a2 = self.a1[i], self.a2[i]
         _, v0, w0, u0, _ = np.abs(s.first)
-        (V1, U1, L1), (V2, U2, L2) = ([a[:, [one]] for one in (V, U, W2)] for a in (a1, a2))
+        (V1, U1, L1), (V2, U2, L2) = ([a[:, one] for one in (V, U, W2)] for a in (a1, a2))
         max_V = self.max_V
         by_W2 = float(np.abs(gap.sources[:, W2]).max())
         if lag > 0.0:
             p = self.p[i]
-            at_first = np.abs(p[:, [V]] / J1 - p[:, [U]] / lag + gap.sources[0, U])  # of p_U'
+            at_first = np.abs(p[:, V] / J1 - p[:, U] / lag + gap.sources[0, U])  # of p_U'
             at_first = at_first + h * (U1 / lag + V1 / J1)
             begun = np.exp(-np.maximum(g - h, 0.0) / lag)
             q1 = (at_first * begun + lag * max_V / J1 + gap.on_U) / lag
             turned = at_first + gap.on_U + g * max_V / J1
             swept, on_q = U2 + g * V2 / J1, U1 * begun / lag + V1 / J1
             beside = U2 + 2.0 * (U1 / lag + V1 / J1) + (at_first + gap.on_U) / lag + (max_V + g * V2) / J1
-            joint = np.abs(gap.sources[0, U] - self.sources[i][:, [U]]) / lag
+            joint = np.abs(gap.sources[0, U] - self.sources[i, U]) / lag
             u_now = u0 * (q1 + max_V / J1)
         else:
             q1 = max_V / J1 + 0.0 * V1 * g
-            turned = g * max_V / J1 + gap.on_q + self.direct[i][:, None]
+            turned = g * max_V / J1 + gap.on_q + self.direct[i]
             swept, on_q = g * V2 / J1, V1 / J1
             beside = g * V2 / J1 + gap.on_V / J1
-            joint = (np.abs(self.mu + gap.sources[0, V] - self.d1[i][:, [V]]) + h * V2) / J1
+            joint = (np.abs(self.mu + gap.sources[0, V] - self.d1[i, V]) + h * V2) / J1
             u_now = 0.0
-        slope = (a1 @ np.abs(phase.b))[:, None]
-        fixed_tau = (a1 @ np.abs(phase.A[:, LAST]))[:, None] + g * s.pull * (V2 + L2)
+        slope = a1 @ np.abs(phase.b)
+        fixed_tau = a1 @ np.abs(phase.A[:, LAST]) + g * s.pull * (V2 + L2)
         fixed_tau = fixed_tau + V2 * v0 + L2 * w0 + (U2 + lag * V2 / J1) * u0
         fixed_g = s.pull * (max_V + by_W2) + u_now
         crossed = s.pull * (V1 + L1) + u0 * (U1 / lag + 2.0 * V1 / J1 if lag > 0.0 else 0.0)
         if not s.limited:
             along_tau, along_g = most * (slope + swept) + fixed_tau, most * q1 + fixed_g
             return along_tau, along_g, along_tau + along_g + 2.0 * (most * on_q + crossed)
-        turns = self.turns[i][:, None]
+        turns = self.turns[i]
         along_tau = most * (slope + swept) + fixed_tau + s.rate * turns
         along_g = abs(s.problem.first_demand) * q1 + fixed_g + s.rate * (turns + turned)
-        jump = gap.on_q + self.direct[i][:, None]
+        jump = gap.on_q + self.direct[i]
         diagonal = most * (joint + beside) + fixed_tau + fixed_g + 2.0 * crossed + s.rate * jump
         return along_tau, along_g, diagonal
 
-    def _along_winding(self, i: Any, w: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
+    def _along_winding(self, i: Any, w: Any, g: Any) -> tuple[Vector, Vector, Vector]:
         """M along tau, along w, and along tau while tau + w stays, of cells with up to w and g s."""
         s, gap, winding, by = self.start, self.gap, self.winding, self.by
         most, J1, lag, h, contact = s.most, s.J1, s.lag, s.h, s.phases["contact"]
@@ -479,18 +475,18 @@ class Dual:
         return along_tau, along_w, most * (in_stuck + in_gap(mixed)) + own + jump
 
 
-def spans_of(wanted: Any) -> Any:
-    """First and last node of each row of nodes that the wanted cells [i, k] need; (0, -1): none.
+def spans_of(i: Any, k: Any) -> tuple[int, Any]:
+    """The least i, and least and largest k in each row from it on; (0, -1): none.
 
-    >>> spans_of(np.array([[False, True], [False, False], [True, False]])).tolist()
-    [[1, 2], [1, 2], [0, 1], [0, 1]]
+    >>> spans_of(np.array([3, 3, 5]), np.array([4, 7, 1]))[1].tolist()
+    [[4, 7], [0, -1], [1, 1]]
     """
-    any_row: Any = np.zeros((wanted.shape[0] + 1, wanted.shape[1]), dtype=bool)
-    any_row[:-1] |= wanted
-    any_row[1:] |= wanted
-    first, last = np.argmax(any_row, axis=1), wanted.shape[1] - np.argmax(any_row[:, ::-1], axis=1)
-    some = any_row.any(axis=1)[:, None]
-    return np.where(some, np.column_stack([first, last]), (0, -1))
+    first = int(np.min(i))
+    spans = np.tile([np.iinfo(np.int64).max, -1], (int(np.max(i)) - first + 1, 1))
+    np.minimum.at(spans[:, 0], i - first, k)
+    np.maximum.at(spans[:, 1], i - first, k)
+    spans[spans[:, 1] < 0, 0] = 0
+    return first, spans
 
 
 # compiled ---------------------------------------------------------------------------------------------------
@@ -674,14 +670,14 @@ def _swept(x: float, a: float, b: float, e: float, lag: float) -> float:
 
 
 @compiled
-def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
+def _walk(i0: int, spans: Any, before: Any, n: int, tail: int, rests: bool,
           opened: bool, winds: bool, p: Any, joint: Any, mu: float, q: Any, lost: Any,
           stuck: Any, stuck_added: Any, stuck_sources: Any, stuck_direct: Any,
           gap: Any, gap_added: Any, gap_sources: Any, gap_direct: Any, walked: int, J1: float, lag: float,
           first: Any, first_demand: float, held: float, h: float, low: float, high: float, rate: float,
           kinks: Any, count: Any, least: Any, work: Any, out: Any) -> None:  # fmt: skip
-    """Fill `out` with F at the nodes within `spans`; see `Dual.nodes`. Of what is known of the demand up to
-    now, copy 0 is in contact, 1 winding up, 2 in the gap.
+    """Fill `out` with F at the nodes within `spans`, row by row; see `Dual.nodes`. Of what is known of the
+    demand up to now, copy 0 is in contact, 1 winding up, 2 in the gap.
     """
     size = first.size
     S, G, rates = work[0], work[1], work[2:4]
@@ -692,7 +688,7 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
         _added(q[0, index], q[1, index], lost[index], h, low, high, rate, kinks[0], count[0], least[0])
     if i0 == 0 and math.isfinite(held):
         _fixed(held, half, kinks[0], count[0], least[0])
-    for row in range(out.shape[0]):
+    for row in range(spans.shape[0]):
         i, begin, end = i0 + row, spans[row, 0], spans[row, 1]
         last = -1 if end < begin else n - i if winds and not opened else end if winds else 0
         _copied(kinks, count, least, 0, 1)
@@ -716,16 +712,16 @@ def _walk(i0: int, base: int, spans: Any, n: int, tail: int, rests: bool,
                             total = _value(first_demand, half, kinks[2], count[2], least[2])
                         for a in range(size):
                             total += G[a] * first[a]
-                        column = 0 if not opened else j - base if not rests else k - base if winds else 0
-                        out[row, column] = total
+                        column = 0 if not opened else j - begin if not rests else k - begin if winds else 0
+                        out[before[row] + column] = total
                     if j < until:
                         _back(G, gap, gap_added[j], gap_sources[j], gap_direct[j], h, low, high, rate,
                               kinks[2], count[2], least[2], rates)  # fmt: skip
                 if beyond < 0:
-                    out[row, k - base] = np.inf
+                    out[before[row] + k - begin] = np.inf
             if k < last:
                 _back(S, stuck, stuck_added[k], stuck_sources[k], stuck_direct[k], h, low, high, rate,
                       kinks[1], count[1], least[1], rates)  # fmt: skip
         index = tail + i
-        if row + 1 < out.shape[0]:
+        if row + 1 < spans.shape[0]:
             _added(q[0, index], q[1, index], lost[index], h, low, high, rate, kinks[0], count[0], least[0])
