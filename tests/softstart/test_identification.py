@@ -84,6 +84,43 @@ def test_a_torque_error_moves_the_signal_as_its_response_says(log: Log) -> None:
     assert np.all(np.triu(response, 1)[:-1] == 0.0)  # no error moves what came before it
 
 
+RUBBED = {"motor_friction": 1.0, "motor_viscous_friction": 0.02, "load_viscous_friction": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("changes", "values"),
+    [
+        ({}, {}),
+        ({"torque_lag": 0.0}, {}),
+        ({"contact_law": "dead-zone"}, {}),
+        ({"contact_law": "modelica"}, {"gap": 0.02}),
+        ({"torque_rate": 2000.0}, {}),
+        ({"damping": 0.0, "load_kind": "active"}, {}),
+        ({"motor_friction": 5.0, "load_torque": 12.0}, {}),
+        (RUBBED, {}),
+        ({}, {"computing_delay": 1.7e-3}),
+    ],
+)
+@pytest.mark.parametrize("kind", ["demand", "measured", "speed"])
+def test_responses_to_torque_errors_are_those_of_finite_differences(
+    log: Log, changes: dict[str, Any], values: dict[str, float], kind: str
+) -> None:
+    """Across impacts, parting flanks, breakaway and stops of load and motor."""
+    time = log.time[::2]
+    signal: dict[str, Any] = {"speed" if kind == "speed" else "angle": time**2.1}
+    blank = Log(time, log.torque[::2], torque_is="measured" if kind == "measured" else "demand", **signal)
+    model = LogModel(blank, TRUTH.replace(**changes, start_position="mid-gap"))
+    values = {"position": -0.6} | values | ({"speed_filter": 3e-3} if kind == "speed" else {})
+    response = model.torque_responses(values)
+    differences = []
+    for error in 1e-5 * np.eye(time.size):
+        signals = []
+        for model.error in (error, -error):
+            signals.extend(model.signals([values]))
+        differences.append((signals[0] - signals[1]) / 2e-5)
+    assert response == pytest.approx(np.array(differences).T, abs=1e-6 * float(np.max(np.abs(response))))
+
+
 @pytest.mark.parametrize(
     ("counts", "exponent"),
     [(3.0, 1.0), (12.0, 1.0), (40.0, 1.0), (3.0, 2.0), (12.0, 2.0), (40.0, 2.0), (97.0, 2.0), (700.0, 2.0)],

@@ -397,9 +397,9 @@ class Fitter:
             model.shift = None if model.error is None else response @ model.error
             response = response[rows]
             root = np.sqrt(self._measurement(i, model.log.values[rows]))
-            vectors, singular, _ = np.linalg.svd(response / root[:, None], full_matrices=True)
-            eigenvalues = np.zeros(vectors.shape[0])
-            eigenvalues[: singular.size] = singular**2
+            seen = response / root[:, None]
+            eigenvalues, vectors = np.linalg.eigh(seen @ seen.T)
+            eigenvalues = np.maximum(eigenvalues, 0.0)
             made.append(Weights(vectors.T / root, eigenvalues, response, root, model.error, model.shift))
         return made
 
@@ -556,7 +556,7 @@ class Fitter:
         eigenvalues, rotation = one.eigenvalues[seen], one.rotation[seen]
         patterns = (rotation @ one.response) / np.sqrt(eigenvalues)[:, None]
         model.error = error
-        answers = model.torque_responses(self.space.values(x, log), patterns)[self.counts[log]]
+        answers = model.torque_responses(self.space.values(x, log))[self.counts[log]] @ patterns.T
         along = np.sqrt(eigenvalues) * np.sum(rotation * answers.T, axis=1)
         return float(
             np.sum(2.0 * errors.ripple**2 * along / (errors.noise**2 + errors.ripple**2 * eigenvalues))

@@ -14,6 +14,7 @@ from softstart.controller import CompiledController, make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.identification.logs import Log
+from softstart.identification.sensitivity import torque_sensitivities
 from softstart.plant import exchange, record
 from softstart.plant import layout as at
 from softstart.plant.vector import plant_vector
@@ -106,44 +107,39 @@ class LogModel:
             out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers[delays[i]], row.get(FILTER, 0.0))
         return out
 
-    def torque_responses(self, values: Mapping[str, float], patterns: Matrix | None = None) -> Matrix:
+    def torque_responses(self, values: Mapping[str, float]) -> Matrix:
         """How the signal moves, a column for each block of samples, per N m of error in the torque there.
-
-        Or a column for each of the patterns, rows with a factor for each block.
 
         Scaled by 1/sqrt(samples in a block): with independent errors of the samples, the covariance of the
         signal is their variance times this matrix and its transpose.
         """
-        p, lag, dead_time = (
-            self.plants([values])[0],
-            values.get(FILTER, 0.0),
-            values.get(DEAD_TIME, self.dead_time),
-        )
-        numbers = self.numbers(dead_time)
-        base = self._signal(p, numbers, lag)
-        per_sample = 2 if self.log.torque_is == "demand" else 1
-        # the torques begin behind period, numbers of knots, room and the times; with a dead time one more
-        first = 4 + int(numbers[3]) + (1 if dead_time > 0.0 else 0)
-        step = 1e-3 * max(float(np.max(np.abs(self.log.torque))), 1e-300)
-        patterns = np.eye(math.ceil(self.times.size / self.block)) if patterns is None else patterns
-        columns = []
-        for pattern in patterns:
-            changed, scale = numbers.copy(), step / float(np.max(np.abs(pattern)))
-            torques = changed[first : first + per_sample * self.times.size]
-            torques += scale * np.repeat(pattern, per_sample * self.block)[: torques.size]
-            columns.append((self._signal(p, changed, lag) - base) / scale)
-        return np.column_stack(columns) / math.sqrt(self.block)
+        p, lag = self.plants([values])[0], values.get(FILTER, 0.0)
+        dead_time, speed = values.get(DEAD_TIME, self.dead_time), self.log.kind == "speed"
+        smoothed = speed and lag > 0.0
+        found = torque_sensitivities(
+            p, self._segments(p, self.numbers(dead_time)), self.times + dead_time,
+            held=self.log.torque_is == "demand", block=self.block,
+            times=self._fine if smoothed else self.times, speed=speed,
+        )  # fmt: skip
+        if smoothed:
+            found = filtered(self._fine, found.T, lag).T[::FINE]
+        found /= math.sqrt(self.block)
+        return found
 
     def states(self, values: Mapping[str, float]) -> Matrix:
         """The states at the samples, in the columns of `plant.record`."""
         numbers = self.numbers(values.get(DEAD_TIME, self.dead_time))
         return self._states(self.plants([values])[0], numbers)
 
+    @property
+    def _fine(self) -> Vector:
+        count = self.times.size
+        fine: Vector = np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
+        return fine
+
     def _signal(self, p: Vector, numbers: Vector, lag: float = 0.0) -> Vector:
         if lag > 0.0 and self.log.kind == "speed":
-            count = self.times.size
-            fine = np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
-            return filtered(fine, self._states(p, numbers, fine)[:, record.W1_OUT], lag)[::FINE]
+            return filtered(self._fine, self._states(p, numbers, self._fine)[:, record.W1_OUT], lag)[::FINE]
         states = self._states(p, numbers)
         if self.log.kind == "speed":
             return states[:, record.W1_OUT].copy()
@@ -152,6 +148,15 @@ class LogModel:
 
     def _states(self, p: Vector, numbers: Vector, times: Vector | None = None) -> Matrix:
         times = self.times if times is None else times
+        segments = self._segments(p, numbers)
+        starts = segments[:, at.index(at.SEGMENT, "start")]
+        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
+        out = np.empty((times.size, record.N_OUT))
+        record.states_at(p, segments, index, times, np.zeros(at.N_X), np.zeros(at.N_M), out)
+        return out
+
+    def _segments(self, p: Vector, numbers: Vector) -> Matrix:
+        """The spans of the motion; they hold until the next call."""
         player, one = self.player, self.recorder
         one.p = p
         one.m[:] = 0.0
@@ -161,16 +166,13 @@ class LogModel:
             one.grow()
         if reason != at.ENDED:
             raise SimulationError(f"The start of the log could not be computed (status {reason}).")
-        segments = one.segments[: int(one.x[at.index(at.STATE, "n_segments")])]
-        starts = segments[:, at.index(at.SEGMENT, "start")]
-        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
-        out = np.empty((times.size, record.N_OUT))
-        record.states_at(p, segments, index, times, np.zeros(at.N_X), np.zeros(at.N_M), out)
-        return out
+        return one.segments[: int(one.x[at.index(at.STATE, "n_segments")])]
 
 
 def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
     """A signal, straight between these instants, behind a filter of the first order that begins settled.
+
+    Of several signals each is a row.
 
     >>> filtered(np.linspace(0.0, 5.0, 6), np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0]), 0.01).round(2).tolist()
     [0.0, 0.99, 1.0, 1.0, 1.0, 1.0]
@@ -178,11 +180,11 @@ def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
     steps = np.diff(time)
     kept = np.exp(-steps / lag)
     mean = (1.0 - kept) * lag / steps
-    pushed = (1.0 - mean) * signal[1:] + (mean - kept) * signal[:-1]
+    pushed = (1.0 - mean) * signal[..., 1:] + (mean - kept) * signal[..., :-1]
     out = np.empty_like(signal)
-    out[0] = value = float(signal[0])
-    for i, (share, push) in enumerate(zip(kept.tolist(), pushed.tolist(), strict=True), 1):
-        out[i] = value = share * value + push
+    out[..., 0] = value = signal[..., 0]
+    for i, share in enumerate(kept.tolist()):
+        out[..., i + 1] = value = share * value + pushed[..., i]
     return out
 
 
