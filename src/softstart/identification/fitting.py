@@ -1,10 +1,14 @@
 """The fit: a search that needs no good guess, then least squares weighted by what the errors do.
 
-The log is y = f(x) + G e + n: f the exact plant under the torque of the log, G its response to an error of
-the torque, e independent with the standard deviation `ripple` in each sample, n what the encoder rounds, with
-the covariance B (`rounding`). So y has the covariance V = noise^2 B + ripple^2 G G'. Least squares without G
-is far too sure of itself: a torque error is integrated twice and stays in all later samples. Both deviations
-follow from restricted maximum likelihood,
+The log is y = f(x, e) + n: f the exact plant under the torque of the log and an error e of it, independent
+with the standard deviation `ripple` in each sample, n what the encoder rounds, with the covariance B
+(`rounding`). About the e that is most likely at x, y has the covariance V = noise^2 B + ripple^2 G G', G the
+response to e, and x is found by
+
+    L(x) = ln|V| + r' V^-1 r -> min        r = f(x, e) - G e - y
+
+Least squares without G is far too sure of itself: a torque error is integrated twice and stays in all later
+samples. Both deviations follow from restricted maximum likelihood,
 
     ln|V| + ln|J' V^-1 J| + r' P r -> min,    P = V^-1 - V^-1 J (J' V^-1 J)^-1 J' V^-1
 
@@ -20,7 +24,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import least_squares, minimize
 from scipy.stats import qmc
 from scipy.stats import t as student
@@ -44,13 +48,18 @@ SETTLED: Final = 5e-4  # in logarithms
 # beforehand a torque error of 2.5 % of the largest torque, within a factor of 3: a log that cannot tell how
 # large it is (coarse encoder, few samples) must not conclude that there is none
 RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
-MOST_STEPS, HALVINGS = 20, 7  # towards an end of an interval
+MOST_STEPS, HALVINGS = 20, 7  # towards an end of an interval, or the most likely x
+TURNS: Final = 4  # of the most likely torque error at one x; fewer if it moves by less than
+ERROR_SETTLED: Final = 0.1  # standard deviations, all samples together
+ROUNDING: Final = 1e-14  # of the largest variance
+STEEP: Final = 1e-3  # what the likelihood must still gain for another step
 ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
 SCANNED: Final = 5  # values of what the logs do not tell, at which all else is fitted
+LOADS: Final = (0.08, 0.25, 0.45, 0.7)  # load torques from which valleys are sought, over the largest
+FIRST_ROUNDS: Final = 2  # of weights and fit, on the way to a valley
 LONGEST_STEP: Final = 0.7  # of a number of x, towards it
 CLOSE: Final = 0.04  # how far the root of the squares may be off there
-MOST_RIPPLE: Final = 0.25  # of the largest torque: more is no small error, see `Fitter.bias`
-SEEN: Final = 0.1  # variance by the torque error over that by rounding, below which a pattern is not seen
+MOST_RIPPLE: Final = 0.25  # of the largest torque: more is no small error, see `Fitter.slope`
 APART: Final = 0.02  # of x, or half a standard error if that is less: for derivatives of covariances
 AGREED: Final = 2  # searches that end at the best minimum before it is believed
 WIDEST_FRICTION: Final = 1.0  # units of a friction, see `Space.of`; its interval is wider if it is unknown
@@ -247,6 +256,23 @@ class Errors(NamedTuple):
     ripple: float
 
 
+class Likely(NamedTuple):
+    """A log about the torque error that is most likely at one x, in units of what the encoder rounds."""
+
+    value: float  # ln|V| + r' V^-1 r
+    root: Matrix  # V = root root'
+    seen: Matrix  # the response to the torque error, each of one standard deviation
+    residual: Vector  # root^-1 r
+
+
+class Slope(NamedTuple):
+    """L(x + s) = value + 2 gradient' s + s' curvature s, nearly; see the head of this file."""
+
+    value: float
+    gradient: Vector
+    curvature: Matrix
+
+
 class Solution(NamedTuple):
     """Where the fit ended, within which bounds, and how sure it is."""
 
@@ -256,11 +282,10 @@ class Solution(NamedTuple):
     part: Part
     lower: Vector
     upper: Vector
+    slope: Slope
 
-    @property
-    def least(self) -> float:
-        """The weighted squares."""
-        return float(self.part.residual @ self.part.residual)
+
+Other = tuple[Vector, Matrix, float]  # another explanation: x, its covariance, L
 
 
 def rounding(angle: Vector, count: float) -> Vector:
@@ -285,7 +310,6 @@ class Fitter:
     def __init__(self, models: Sequence[LogModel], space: Space, progress: Progress | None = None) -> None:
         self.models, self.space = list(models), space
         self.counts = [np.isfinite(one.log.values) for one in models]
-        self.biases: list[Vector] | None = None  # see `bias`
         self.progress = progress or (lambda _: None)
 
     @property
@@ -321,8 +345,7 @@ class Fitter:
             jacobian[:, i] = ((column - signals[0]) / step)[rows]
         if offset is not None:
             jacobian[:, offset] = 1.0
-        residual = base[rows] if self.biases is None or short is not model else base[rows] - self.biases[log]
-        return Part(residual, jacobian)
+        return Part(base[rows], jacobian)
 
     def parts(self, x: Vector, share: float = 1.0, derivatives: bool = True) -> list[Part]:
         """Residuals and derivatives of every log."""
@@ -458,11 +481,10 @@ class Fitter:
             return rest + before + float(np.log(values[kept]).sum() - np.sum(along**2 / values[kept]))
 
         starts = [np.log([one * noise, two * ripple]) for one, two in ((1.0, 1.0), (1.0, 10.0), (0.1, 1.0))]
-        tried = [
-            minimize(loss, one, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-4})
-            for one in starts
-        ]
+        rough, fine = {"xatol": 0.1, "fatol": 0.03}, {"xatol": 1e-3, "fatol": 1e-4}
+        tried = [minimize(loss, one, method="Nelder-Mead", options=rough) for one in starts]
         best: Vector = min(tried, key=lambda one: float(one.fun)).x
+        best = minimize(loss, best, method="Nelder-Mead", options=fine).x
         s, u = np.exp(best)
 
         def log_variances(logs: Vector) -> Vector:
@@ -496,71 +518,147 @@ class Fitter:
         return Part(np.concatenate(residuals), np.vstack(jacobians))
 
     def refine(self, x: Vector, lower: Vector, upper: Vector) -> Solution:
+        """The most likely x near this one: weights and fit in turns, then L itself and the deviations.
+
+        With weights that do not move, a fit finds only where r' V^-1 r is least, at which its errors may be
+        large; but it comes from afar.
+        """
+        x, errors, freedom = self._weighted(x, lower, upper, ROUNDS)
+        return self._settled(x, errors, freedom, lower, upper)
+
+    def _weighted(
+        self, x: Vector, lower: Vector, upper: Vector, rounds: int
+    ) -> tuple[Vector, Errors, Vector]:
         """Weights, fit and torque error in turns until none moves.
 
         The torque error that explains most of what is left (the best linear unbiased prediction) is added to
         the torque of the model, and its linear response taken off again: so the derivatives are those along
         the motion that was logged, with its own contacts, and not along that of the ideal torque.
         """
-        noise, ripple, self.biases = 1.0, RIPPLE * self.largest_torque, None
-        for _ in range(ROUNDS):
+        noise, ripple = 1.0, RIPPLE * self.largest_torque
+        for model in self.models:
+            model.error = model.shift = None
+        for number in range(rounds):
             weights = self.weights(x)  # before the parts, which it shifts
             errors, freedom = self.deviations(self.parts(x), Errors(weights, noise, ripple))
             noise, ripple = errors.noise, errors.ripple
             new = self.fit(x, errors, lower, upper)
             moved, x = float(np.max(np.abs(new - x))), new
             self.progress("weights and fit")
-            if moved < SETTLED:
+            if moved < SETTLED or number == rounds - 1:
                 break
             self.predict(x, errors)
-        self.biases = self.bias(x, errors)
-        x = self.fit(x, errors, lower, upper)
-        return Solution(x, errors, freedom, self.whitened(x, errors), lower, upper)
+        return x, errors, freedom
 
-    def bias(self, x: Vector, errors: Errors) -> list[Vector]:
-        """What the torque error does to the signals on average, through parameters that are fitted with it.
+    def _settled(self, x: Vector, errors: Errors, freedom: Vector, lower: Vector, upper: Vector) -> Solution:
+        """The most likely x near this one, and the deviations there, in turns."""
+        for _ in range(ROUNDS):
+            new, _ = self.descended(x, errors, lower, upper)
+            moved, x = float(np.max(np.abs(new - x))), new
+            before, weights = errors, self.weights(x)
+            errors, freedom = self.deviations(self.parts(x), errors._replace(weights=weights))
+            self.progress("weights and fit")
+            if moved < SETTLED or abs(math.log(errors.ripple / before.ripple)) < SETTLED:
+                break
+        return Solution(x, errors, freedom, self.whitened(x, errors), lower, upper, self.slope(x, errors))
 
-        The motion follows the errors, so the derivatives do, and they go together: sum(u w)/sum(w^2), with
-        w = (u + e)/J, is on average J too small by the share ripple^2/u^2. The likelihood has no such bias:
-        r' V^-1 r + ln|V| -> min, V about the most likely error, which moves x by -1/2 C grad ln|V|. The
-        derivative of ln|V| is a sum over the patterns of the torque error that the log sees.
+    def likely(self, x: Vector, log: int, errors: Errors) -> Likely:
+        """A log about the torque error that is most likely at x, which its model has from then on."""
+        model, values = self.models[log], self.space.values(x, log)
+        size = errors.weights[log].root
+        for turn in range(TURNS):
+            response = model.torque_responses(values)
+            model.shift = None if model.error is None else response @ model.error
+            residual = self.part(x, log, derivatives=False).residual / size
+            seen = errors.ripple * response[self.counts[log]] / size[:, None]
+            covariance = seen @ seen.T
+            floor = ROUNDING * float(np.max(np.diag(covariance)))  # where no ripple is that large
+            covariance.flat[:: covariance.shape[0] + 1] += errors.noise**2 + floor
+            root = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+            white = solve_triangular(root, residual, lower=True, check_finite=False)
+            value = 2.0 * float(np.log(np.diag(root)).sum()) + float(white @ white)
+            pulled = solve_triangular(root, white, lower=True, trans=1, check_finite=False)
+            shares = -(seen.T @ pulled)
+            before = np.zeros(1) if model.error is None else model.error / errors.ripple
+            if turn == TURNS - 1 or float(np.linalg.norm(shares - before)) < ERROR_SETTLED:
+                break
+            model.error = errors.ripple * shares
+        return Likely(value, root, seen, white)
+
+    def likelihood(self, x: Vector, errors: Errors) -> float:
+        """L at x, with what was known beforehand of the torque error; infinite where there is no motion."""
+        try:
+            total = sum(self.likely(x, i, errors).value for i in range(len(self.models)))
+        except SimulationError:
+            return math.inf
+        return total + self._beforehand(errors.ripple)
+
+    def _beforehand(self, ripple: float) -> float:
+        return (math.log(ripple / (RIPPLE * self.largest_torque)) / math.log(RIPPLE_FACTOR)) ** 2
+
+    def slope(self, x: Vector, errors: Errors) -> Slope:
+        """L at x and its derivatives; the curvature is that of r' V^-1 r.
+
+        The torque error that is most likely follows x; by how much, the response says.
         """
+        value, gradient = self._beforehand(errors.ripple), np.zeros(x.size)
+        curvature, each = np.zeros((x.size, x.size)), []
+        for log, one in enumerate(errors.weights):
+            likely = self.likely(x, log, errors)
+            jacobian = self.part(x, log).jacobian / one.root[:, None]
+            jacobian = solve_triangular(likely.root, jacobian, lower=True, check_finite=False)
+            value += likely.value
+            gradient += jacobian.T @ likely.residual
+            curvature += jacobian.T @ jacobian
+            each.append((likely, jacobian))
         if errors.ripple > MOST_RIPPLE * self.largest_torque:
-            return [np.zeros(1) for _ in self.models]
-        covariance = covariance_of(self.whitened(x, errors).jacobian, self.space)
-        deviations, slope, parts = np.sqrt(np.diag(covariance)), np.zeros(x.size), self.parts(x)
-        for log, (one, part) in enumerate(zip(errors.weights, parts, strict=True)):
-            ripple, size = errors.ripple, errors.noise**2 + errors.ripple**2 * one.eigenvalues
-            known = np.zeros(one.response.shape[1]) if one.error is None else one.error
-            before = self._spread(x, log, errors, known)
+            return Slope(value, gradient, curvature)
+        deviations = np.sqrt(np.diag(np.linalg.inv(curvature + np.diag(self.space.weak))))
+        for log, (likely, jacobian) in enumerate(each):
+            model, size, ripple = self.models[log], errors.weights[log].root, errors.ripple
+            before, shift = model.error, model.shift
+            known = np.zeros(likely.seen.shape[1]) if before is None else before
+            inverse = cho_solve((likely.root, True), likely.seen, check_finite=False)
+            pulls = solve_triangular(likely.root, jacobian, lower=True, trans=1, check_finite=False)
             position, _ = self.space.place(log)
-            for i in [*range(len(self.space.shared)), *([] if position is None else [position])]:
-                move = min(APART, 0.5 * float(deviations[i]))
-                move *= -1.0 if i == position and x[i] > 0.5 else 1.0
-                other = x.copy()
-                other[i] += move
-                pull = one.rotation.T @ ((one.rotation @ part.jacobian[:, i]) / size)
-                error = known - move * ripple**2 * (one.response.T @ pull)
-                slope[i] += (self._spread(other, log, errors, error) - before) / move
-        self.about(errors.weights)
-        step = -0.5 * covariance @ slope
-        step /= max(1.0, float(np.max(np.abs(step) / deviations)))  # more is no longer of first order
-        return [part.jacobian @ step for part in parts]
+            moved = [*range(len(self.space.shared)), *([] if position is None else [position])]
+            moves = np.minimum(APART, 0.5 * deviations[moved])
+            moves[[i == position and x[i] > 0.5 for i in moved]] *= -1.0
+            points = [
+                self.space.values(x + move * np.eye(x.size)[i], log)
+                for i, move in zip(moved, moves, strict=True)
+            ]
+            plants = model.plants(points)
+            for i, move, point, plant in zip(moved, moves, points, plants, strict=True):
+                model.error = known - move * ripple * (likely.seen.T @ pulls[:, i])
+                response = model.torque_responses(point, plant)[self.counts[log]]
+                more = ripple * response / size[:, None] - likely.seen
+                gradient[i] += float(np.sum(inverse * more)) / move
+            model.error, model.shift = before, shift
+        return Slope(value, gradient, curvature)
 
-    def _spread(self, x: Vector, log: int, errors: Errors, error: Vector) -> float:
-        """ln|V| of a log about this torque error, but for a constant and what is not of first order."""
-        model, one = self.models[log], errors.weights[log]
-        seen = np.flatnonzero(errors.ripple**2 * one.eigenvalues > SEEN * errors.noise**2)
-        if seen.size == 0:
-            return 0.0
-        eigenvalues, rotation = one.eigenvalues[seen], one.rotation[seen]
-        patterns = (rotation @ one.response) / np.sqrt(eigenvalues)[:, None]
-        model.error = error
-        answers = model.torque_responses(self.space.values(x, log))[self.counts[log]] @ patterns.T
-        along = np.sqrt(eigenvalues) * np.sum(rotation * answers.T, axis=1)
-        return float(
-            np.sum(2.0 * errors.ripple**2 * along / (errors.noise**2 + errors.ripple**2 * eigenvalues))
-        )
+    def descended(self, x: Vector, errors: Errors, lower: Vector, upper: Vector) -> tuple[Vector, Slope]:
+        """Where L is least, from x, with these deviations; and L there."""
+        self.about(errors.weights)
+        x = np.clip(x, lower, upper)
+        slope = self.slope(x, errors)
+        for _ in range(MOST_STEPS):
+            step = self._outward(x, slope, lower, upper)
+            gain = -float(2.0 * slope.gradient @ step + step @ slope.curvature @ step)
+            if gain < STEEP:
+                break
+            length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
+            for cut in 0.5 ** np.arange(HALVINGS):
+                point = np.clip(x + cut * length * step, lower, upper)
+                if self.likelihood(point, errors) < slope.value - 0.1 * cut * length * gain:
+                    break
+            else:
+                break
+            x, last = point, slope.value
+            slope = self.slope(x, errors)
+            if last - slope.value < STEEP:
+                break
+        return x, slope
 
     def predict(self, x: Vector, errors: Errors) -> None:
         """Take the most likely torque error of each log into its model."""
@@ -584,78 +682,102 @@ class Fitter:
         )
         return np.asarray(found.x, dtype=np.float64)
 
-    def elsewhere(self, solution: Solution, unknown: Iterable[int]) -> list[tuple[Vector, Matrix, float]]:
-        """Where the logs are explained nearly as well, with a number that they do not tell set elsewhere.
+    def elsewhere(self, solution: Solution, unknown: Sequence[int]) -> tuple[Solution, list[Other]]:
+        """Where else the logs are explained nearly as well; and the solution, if that is better there.
 
-        A start that begins at the flank and one that crosses the gap first are two valleys; where the logs
-        do not say which, no step along one of them finds the other. Each shared number of `unknown` takes
-        values over its range, positions begin in mid-gap, and all else is fitted. Points, covariances with
-        that number fixed, and the weighted squares.
+        A start that begins at the flank and one that crosses the gap first are two valleys: no step along
+        one of them finds the other. Where logs leave anything unknown, positions begin in mid-gap with the
+        load torque at values over its range, and at the flank; all else is fitted, then the load torque
+        too. Each other shared number of `unknown` takes values over its range, and all else is fitted.
         """
-        found = []
-        first, last = len(self.space.shared), len(self.space.shared) + sum(self.space.positions)
-        for i in (one for one in unknown if one < first):
-            least, most = (abs(self.space.value(i, float(x[i]))) for x in (solution.lower, solution.upper))
+        space, first = self.space, len(self.space.shared)
+        last = first + sum(space.positions)
+        load = space.shared.index("load_torque") if "load_torque" in space.shared else None
+        found: list[tuple[Vector, int | None]] = []
+        valleys = [solution]
+        for i in unknown if last > first else ():
+            if i >= first or i == load:
+                continue
+            least, most = (abs(space.value(i, float(x[i]))) for x in (solution.lower, solution.upper))
             for value in np.geomspace(max(least, 1e-3 * most), most, SCANNED).tolist():
-                x, lower, upper = solution.x.copy(), solution.lower.copy(), solution.upper.copy()
-                x[i] = self.space.number(i, math.copysign(value, self.space.units[i]))
-                x[first:last] = root_of(0.0)
-                lower[i], upper[i] = x[i] - 1e-9, x[i] + 1e-9
+                x, lower, upper = self._fixed(solution, i, value)
+                self.about(solution.errors.weights)
                 try:
-                    x = self.fit(x, solution.errors, lower, upper)
-                    part = self.whitened(x, solution.errors)
+                    found.append((self.fit(x, solution.errors, lower, upper), i))
                 except (InputError, SimulationError):
                     continue
-                part.jacobian[:, i] = 0.0
-                covariance = covariance_of(part.jacobian, self.space)
-                covariance[i, i] = 0.0
-                found.append((x, covariance, float(part.residual @ part.residual)))
-        return found
+        if unknown and last > first and load is not None:
+            most = abs(space.value(load, float(solution.upper[load])))
+            starts = [self._fixed(solution, load, share * most) for share in LOADS]
+            flank = solution.x.copy()
+            flank[first:last] = root_of(1.0)
+            for start, lower, upper in (*starts, (flank, solution.lower, solution.upper)):
+                try:
+                    x, errors, freedom = self._weighted(start, lower, upper, FIRST_ROUNDS)
+                    found.append((x, load if lower[load] > solution.lower[load] else None))
+                    valleys.append(self._settled(x, errors, freedom, solution.lower, solution.upper))
+                except (InputError, SimulationError):
+                    continue
+        best = min(valleys, key=lambda one: one.slope.value)
+        found.extend((one.x, None) for one in valleys if one is not best)
+        others = []
+        for x, fixed in found:
+            self.about(best.errors.weights)
+            try:
+                slope = self.slope(x, best.errors)
+            except (InputError, SimulationError):
+                continue
+            curvature = slope.curvature + np.diag(space.weak)
+            if fixed is not None:
+                curvature[fixed, fixed] += 1e12
+            covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+            others.append((x, covariance, slope.value))
+        return best, others
+
+    def _fixed(self, solution: Solution, i: int, value: float) -> tuple[Vector, Vector, Vector]:
+        """A shared number at this value, with positions in mid-gap: x and the bounds of all else."""
+        x, lower, upper = solution.x.copy(), solution.lower.copy(), solution.upper.copy()
+        x[i] = self.space.number(i, math.copysign(value, self.space.units[i]))
+        first = len(self.space.shared)
+        x[first : first + sum(self.space.positions)] = root_of(0.0)
+        lower[i], upper[i] = x[i] - 1e-9, x[i] + 1e-9
+        return x, lower, upper
 
     def end(
-        self,
-        solution: Solution,
-        i: int,
-        sign: float,
-        half: float,
-        others: Sequence[tuple[Vector, Matrix, float]] = (),
+        self, solution: Solution, i: int, sign: float, half: float, others: Sequence[Other] = ()
     ) -> float:
         """The end of the interval of x_i above (sign 1) or below; `half` is half the quadratic one.
 
-        The largest x_i whose weighted squares are larger by at most the square of Student's quantile. All
-        other numbers move along, until J' r = lambda e_i. Each step solves this for linear residuals, so it
-        follows a bent valley, along which a fit at fixed x_i creeps (D. J. Venzon, S. H. Moolgavkar, Appl.
-        Statist. 37 (1988) 87-94). The first step ends where a quadratic has its interval; where the squares
-        are right there, that is the end. So is a bound that they do not exclude. The steps begin at that of
-        the `others` from which they get furthest, see `elsewhere`.
+        The largest x_i where L is larger by at most the square of Student's quantile. All other numbers move
+        along, until dL/dx = lambda e_i. Each step solves this for a quadratic L, so it follows a bent
+        valley, along which a fit at fixed x_i creeps (D. J. Venzon, S. H. Moolgavkar, Appl. Statist. 37
+        (1988) 87-94). The first step ends where a quadratic has its interval; where L is right there, that
+        is the end. So is a bound that L does not exclude. The steps begin at that of the `others` from which
+        they get furthest, see `elsewhere`.
 
         A fit that went far along a valley has explained errors as motion: the deviations are found anew from
-        what is left at the end, and hold for both places. So is the response to the torque error, about the
-        error that is most likely there: contacts come at other times, and by the response of the solution
-        the squares at the end are too large, by a factor of up to 5. No end lies nearer than the quadratic.
+        what is left at the end, and hold for both places. No end lies nearer than the quadratic.
         """
         bound = float((solution.upper if sign > 0.0 else solution.lower)[i])
-        middle, errors, least = float(solution.x[i]), solution.errors, solution.least
+        middle, errors, least = float(solution.x[i]), solution.errors, solution.slope.value
         quantile = quantile_of(solution.freedom[i])
         begin, far = solution.x, middle + sign * half
-        for point, covariance, squares in others:
-            left = least + quantile**2 - squares
+        for point, covariance, value in others:
+            left = least + quantile**2 - value
             reach = float(point[i]) + sign * math.sqrt(max(left, 0.0) * float(covariance[i, i]))
             if left > 0.0 and sign * (reach - far) > 0.0:
                 begin, far = point, reach
+        self.about(errors.weights)
         end, x, straight = self._traced(solution, i, sign, begin, errors, least, quantile)
-        for _ in range(ROUNDS_OF_ENDS):
+        for _ in range(0 if straight else ROUNDS_OF_ENDS):
+            last = end
+            errors, freedom = self.deviations(self.parts(x), errors._replace(weights=self.weights(x)))
+            self.about(solution.errors.weights)
+            slope = self.slope(solution.x, errors)
+            step = self._outward(solution.x, slope, solution.lower, solution.upper)
+            least = slope.value + min(float(2.0 * slope.gradient @ step + step @ slope.curvature @ step), 0.0)
+            quantile = quantile_of(freedom[i])
             self.about(errors.weights)
-            self.predict(x, errors)
-            errors, last = errors._replace(weights=self.weights(x)), end
-            if not straight:
-                errors, freedom = self.deviations(self.parts(x), errors)
-                residual, jacobian = self.whitened(
-                    solution.x, errors._replace(weights=solution.errors.weights)
-                )
-                pull = jacobian.T @ residual
-                least = float(residual @ residual - pull @ covariance_of(jacobian, self.space) @ pull)
-                quantile = quantile_of(freedom[i])
             end, x, _ = self._traced(solution, i, sign, x, errors, least, quantile)
             if abs(end - last) < CLOSE * abs(end - middle):
                 break
@@ -672,20 +794,21 @@ class Fitter:
         quantile: float,
     ) -> tuple[float, Vector, bool]:
         """The end for these deviations, from x; where that is in x; whether one step sufficed."""
-        part = self.whitened(x, errors)
+        same = x is solution.x and errors is solution.errors
+        slope = solution.slope if same else self.slope(x, errors)
         middle, bound = float(solution.x[i]), float((solution.upper if sign > 0.0 else solution.lower)[i])
         best, straight = middle, False
 
-        def ratio_of(residual: Vector) -> float:
-            return math.sqrt(max(float(residual @ residual) - least, 0.0)) / quantile
+        def ratio_of(value: float) -> float:
+            return math.sqrt(max(value - least, 0.0)) / quantile
 
-        over = max(ratio_of(part.residual) - 1.0, 0.0)
+        over = max(ratio_of(slope.value) - 1.0, 0.0)
         for number in range(MOST_STEPS):
-            step = self._outward(x, part, solution, i, sign, least + quantile**2)
+            step = self._outward(x, slope, solution.lower, solution.upper, i, sign, least + quantile**2)
             length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
             for cut in 0.5 ** np.arange(HALVINGS):
                 point = np.clip(x + cut * length * step, solution.lower, solution.upper)
-                ratio = ratio_of(self.whitened(point, errors, False).residual)
+                ratio = ratio_of(self.likelihood(point, errors))
                 if ratio <= 1.0 + max(0.1, 0.5 * over) and (
                     ratio < 1.0 + over or sign * float(point[i] - x[i]) > 0.0
                 ):
@@ -697,26 +820,37 @@ class Fitter:
             straight = number == 0 and cut * length == 1.0 and abs(ratio - 1.0) < CLOSE
             if over < CLOSE and (straight or x[i] == bound or moved < 0.5 * CLOSE * abs(best - middle)):
                 break
-            part = self.whitened(x, errors)
+            slope = self.slope(x, errors)
         return best, x, straight
 
-    def _outward(self, x: Vector, part: Part, solution: Solution, i: int, sign: float, most: float) -> Vector:
-        """The step to the end of x_i, were residuals linear; numbers at bounds stay there."""
-        residual, jacobian = part
+    def _outward(
+        self,
+        x: Vector,
+        slope: Slope,
+        lower: Vector,
+        upper: Vector,
+        i: int = 0,
+        sign: float = 0.0,
+        most: float = 0.0,
+    ) -> Vector:
+        """The step to the least L, were it quadratic, or to the end of x_i; numbers at bounds stay there."""
         step, free = np.zeros(x.size), np.ones(x.size, dtype=bool)
+        curvature = slope.curvature + np.diag(self.space.weak)
         for _ in range(x.size + 1):
-            rest, columns = residual + jacobian[:, ~free] @ step[~free], jacobian[:, free]
-            spread = np.linalg.inv(columns.T @ columns + np.diag(self.space.weak[free]))
-            pull = columns.T @ rest
+            fixed = step[~free]
+            pull = slope.gradient[free] + curvature[np.ix_(free, ~free)] @ fixed
+            spread = np.linalg.inv(curvature[np.ix_(free, free)])
             step[free] = -spread @ pull
-            if free[i]:
+            if sign != 0.0 and free[i]:
                 along = spread[:, int(free[:i].sum())]
-                left = most - float(rest @ rest - pull @ spread @ pull)
+                value = slope.value + float(2.0 * slope.gradient[~free] @ fixed)
+                value += float(fixed @ curvature[np.ix_(~free, ~free)] @ fixed)
+                left = most - (value - float(pull @ spread @ pull))
                 step[free] += sign * math.sqrt(max(left, 0.0) / float(along[int(free[:i].sum())])) * along
-            outside = free & ((x + step < solution.lower) | (x + step > solution.upper))
+            outside = free & ((x + step < lower) | (x + step > upper))
             if not outside.any():
                 break
-            step[outside] = (np.clip(x + step, solution.lower, solution.upper) - x)[outside]
+            step[outside] = (np.clip(x + step, lower, upper) - x)[outside]
             free &= ~outside
         return step
 

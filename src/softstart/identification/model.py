@@ -58,6 +58,7 @@ class LogModel:
         self.player = _player(TorqueProfile([0.0], [0.0]))
         self.error: Vector | None = None  # of the torque, as the fit knows it: scaled, one for each block
         self.shift: Vector | None = None  # what the linear response to it adds to the signal
+        self.last: tuple[dict[str, float] | None, Matrix] = None, np.empty((0, 0))  # values and their row
         self.block = max(1, math.ceil(self.times.size / MOST_BLOCKS))
 
     def first(self, share: float) -> LogModel:
@@ -70,6 +71,8 @@ class LogModel:
 
     def plants(self, values: Sequence[Mapping[str, float]]) -> Matrix:
         """A row of the kernel's parameters for each set of values."""
+        if len(values) == 1 and values[0] == self.last[0]:
+            return self.last[1]
         names = {name for row in values for name in row} - {POSITION, DEAD_TIME, FILTER}
         changes = {name: np.array([row[name] for row in values]) for name in names}
         if any(POSITION in row for row in values):
@@ -77,9 +80,12 @@ class LogModel:
             changes["start_position"] = 0.5 * gaps * np.array([row[POSITION] for row in values])
         elif not changes:
             changes = {"gap": np.array([float(self.drive.gap)])}
-        end = float(self.times[-1])
-        rows = plant_vector(self.drive.replace(**changes), time_limit=1e9 + end)
+        # numbers already, and within their ranges: to read and check them takes longer than the motion
+        drive = object.__new__(Drive)
+        vars(drive).update(vars(self.drive) | changes)
+        rows = plant_vector(drive, time_limit=1e9 + float(self.times[-1]))
         rows.view(at.PLANT)[:, 0]["longest"] = math.inf
+        self.last = dict(values[0]), rows[:1]
         return rows
 
     def numbers(self, dead_time: float) -> Vector:
@@ -107,13 +113,14 @@ class LogModel:
             out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers[delays[i]], row.get(FILTER, 0.0))
         return out
 
-    def torque_responses(self, values: Mapping[str, float]) -> Matrix:
+    def torque_responses(self, values: Mapping[str, float], plant: Vector | None = None) -> Matrix:
         """How the signal moves, a column for each block of samples, per N m of error in the torque there.
 
         Scaled by 1/sqrt(samples in a block): with independent errors of the samples, the covariance of the
-        signal is their variance times this matrix and its transpose.
+        signal is their variance times this matrix and its transpose. `plant` is the row of these values, if
+        it is known.
         """
-        p, lag = self.plants([values])[0], values.get(FILTER, 0.0)
+        p, lag = self.plants([values])[0] if plant is None else plant, values.get(FILTER, 0.0)
         dead_time, speed = values.get(DEAD_TIME, self.dead_time), self.log.kind == "speed"
         smoothed = speed and lag > 0.0
         found = torque_sensitivities(

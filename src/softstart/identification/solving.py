@@ -23,6 +23,7 @@ from softstart.identification.fitting import (
     MOST_FRICTION,
     STEP,
     Fitter,
+    Other,
     Progress,
     Solution,
     Space,
@@ -144,8 +145,10 @@ def identify(
     guess, lower, upper = _bounds(space, drive, read)
     found = fitter.search(guess, lower, upper, searches, seed)
     solution = fitter.refine(found[0][0], lower, upper)
+    fitter.progress("other explanations")
+    solution, others = fitter.elsewhere(solution, _untold(fitter, solution, guess))
     covariance = covariance_of(solution.part.jacobian, space)
-    estimates = _estimates(fitter, solution, covariance, guess)
+    estimates = _estimates(fitter, solution, covariance, guess, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     kept = len(estimates)
@@ -278,20 +281,33 @@ def _bounds(space: Space, drive: Drive, logs: Sequence[Log]) -> tuple[Vector, Ve
     return np.array(guess), np.array(lower), np.array(upper)
 
 
-def _estimates(fitter: Fitter, solution: Solution, covariance: Matrix, guess: Vector) -> list[Estimate]:
-    """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
-    space, found, lost = fitter.space, [], set[str]()
-    sizes = [
+def _sizes(solution: Solution, covariance: Matrix) -> list[float]:
+    """Half the quadratic interval of each number."""
+    return [
         quantile_of(freedom) * math.sqrt(float(variance))
         for freedom, variance in zip(solution.freedom, np.diag(covariance), strict=True)
     ]
-    told = [
-        space.known(i, float(solution.x[i]), sizes[i], float(guess[i]))
+
+
+def _untold(fitter: Fitter, solution: Solution, guess: Vector) -> list[int]:
+    """The numbers that the logs do not tell, were all intervals quadratic."""
+    space = fitter.space
+    sizes = _sizes(solution, covariance_of(solution.part.jacobian, space))
+    return [
+        i
         for i, name in enumerate(space.names)
         if not name.startswith("offset")
+        and not space.known(i, float(solution.x[i]), sizes[i], float(guess[i]))
     ]
-    fitter.progress("other explanations")
-    others = fitter.elsewhere(solution, [i for i, known in enumerate(told) if not known])
+
+
+def _estimates(
+    fitter: Fitter, solution: Solution, covariance: Matrix, guess: Vector, others: Sequence[Other]
+) -> list[Estimate]:
+    """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
+    space, found, lost = fitter.space, [], set[str]()
+    sizes, untold = _sizes(solution, covariance), _untold(fitter, solution, guess)
+    told = [i not in untold for i, name in enumerate(space.names) if not name.startswith("offset")]
     for i, (name, tells) in enumerate(zip(space.names, told, strict=False)):
         position = i >= len(space.shared)
         middle, half = float(solution.x[i]), sizes[i]
@@ -392,6 +408,8 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         amount, error = -float(alone @ part.residual) / strength, 1.0 / math.sqrt(strength)
         if amount < -had.get(name, math.inf):
             continue  # it would drive
+        if name == "offset" and abs(amount) > fitter.largest_torque:
+            continue  # no small effect, of which alone the derivative tells
         if abs(amount) > SURE * error and abs(amount) / error > abs(best[1]) / max(best[2], 1e-300):
             best = (name, amount, error)
     name, amount, error = best
