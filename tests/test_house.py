@@ -67,7 +67,8 @@ BUDGET = {
     # 65: no bias by the torque error, ends of intervals about the torque error that is likely there
     # 240 and a file: exact responses to torque errors
     # 140: the likelihood itself, with its derivatives, in fits and at the ends of intervals
-    "identification": (3760, 10, 4, 0),
+    # 35: when a count ended, instead of samples on it
+    "identification": (3795, 10, 4, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

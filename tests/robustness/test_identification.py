@@ -2,15 +2,19 @@
 
     python -m tests.robustness.test_identification results.jsonl coverage --fits 200 --lines 64 --period 4e-3
     python -m tests.robustness.test_identification results.jsonl coverage --fits 50 --drive friction
+    python -m tests.robustness.test_identification results.jsonl cells --fits 200
     python -m tests.robustness.test_identification results.jsonl table
     python -m tests.robustness.test_identification results.jsonl search --fits 200
     python -m tests.robustness.test_identification results.jsonl plan --fits 30
 
 `coverage` fits simulated logs of one drive with a torque error of 2.5 %, from random places in the gap and
 random phases of the encoder. The fit begins at the true values (`--factor 3`: up to a factor of 3 off in
-every parameter). `--drive friction` has friction of motor and load, which is found too. `table` sums up all
-coverage of the smooth drive that the file has. `search` fits one log from 200 such guesses. `plan` compares
-the planned experiment of random drives with the standard ones. What the file has is not computed again.
+every parameter). `--drive friction` has friction of motor and load, which is found too. `cells` fits
+all logs of start and reversal, 64 and 1024 lines, 1, 4 and 10 ms, twenty of each cell in turns, so that
+it may be stopped and called again at any time (`--numbers odd` and `even`: for two processes). `table` sums
+up all coverage of the smooth drive that the file has, with binomial intervals. `search` fits one log from 200
+such guesses. `plan` compares the planned experiment of random drives with the standard ones. What the file
+has is not computed again.
 """
 
 from __future__ import annotations
@@ -18,7 +22,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import time
 from collections import defaultdict
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +54,14 @@ NAMES = (
 )  # fmt: skip
 REVERSE, LONGER = "two levels, then reverse", "reversed three times"
 RIPPLE = 1.0  # N m, 2.5 % of the level of the experiments
+LEAST, MOST = 0.9, 0.98  # of the intervals that are to hold the truth
+BATCH = 20  # logs of a cell, before the next cell
+CELLS = [
+    {"experiment": experiment, "lines": lines, "period": period, "factor": 1.0}
+    for experiment in ("start", REVERSE)
+    for lines in (1024.0, 64.0)
+    for period in (10e-3, 4e-3, 1e-3)
+]
 SAME = 0.1  # half widths between two fits that ended at the same minimum
 
 
@@ -62,10 +76,10 @@ def off_by(drive: Drive, factor: float, generator: np.random.Generator) -> Drive
     )
 
 
-def told(found: Identification) -> dict[str, Any]:
-    """The fit as a row of the file."""
+def told(found: Identification, seconds: float) -> dict[str, Any]:
+    """The fit as a row of the file, with its processor time."""
     estimates = {one.name: [one.value, one.lower, one.upper, one.known] for one in found.estimates}
-    return {"estimates": estimates, "seconds": found.seconds, "ripple": found.ripple, "agreed": found.agreed}
+    return {"estimates": estimates, "seconds": seconds, "ripple": found.ripple, "agreed": found.agreed}
 
 
 def bounds_of(drive: Drive, one: Experiment, period: float) -> dict[str, float]:
@@ -88,9 +102,11 @@ def covered(
         seed=int(generator.integers(2**31)),
     )  # fmt: skip
     guess = off_by(truth, factor, generator)
+    before = time.process_time()
     found = identify(log, guess, searches=1 if factor == 1.0 else 12, seed=number)
+    seconds = time.process_time() - before
     rubs = {name: float(getattr(truth, name)) for name in FRICTIONS}
-    return {"truth": {"position 1": position, **rubs}, **told(found)}
+    return {"truth": {"position 1": position, **rubs}, **told(found, seconds)}
 
 
 def searched(lines: float, period: float, factor: float, number: int) -> dict[str, Any]:
@@ -98,7 +114,9 @@ def searched(lines: float, period: float, factor: float, number: int) -> dict[st
     drive = DRIVE.replace(encoder_lines=lines)
     log = made_up_log(drive, REVERSE, log_period=period, ripple=RIPPLE, position=0.35, phase=0.6, seed=11)
     guess = off_by(drive, factor if number else 1.0, np.random.default_rng(number))
-    return told(identify(log, guess, seed=number))
+    before = time.process_time()
+    found = identify(log, guess, seed=number)
+    return told(found, time.process_time() - before)
 
 
 def planned(number: int) -> dict[str, Any]:
@@ -190,10 +208,11 @@ def table_of(rows: list[dict[str, Any]]) -> str:
             cells[row["experiment"], row["lines"], row["period"]].append(row)
     names = [*NAMES, "position 1"]
     lines = [
-        "| log | logs | " + " | ".join(names) + " | unknown, held |",
-        "|---|" + "--:|" * (len(names) + 2),
+        "| log | logs | time, s | " + " | ".join(names) + " | unknown, held |",
+        "|---|" + "--:|" * (len(names) + 3),
     ]
     every: dict[str, list[bool]] = defaultdict(list)
+    low, high, fair = [], [], 0
     for (experiment, count, period), fits in sorted(cells.items()):
         held = defaultdict(list)
         for row in fits:
@@ -202,22 +221,38 @@ def table_of(rows: list[dict[str, Any]]) -> str:
                 held["unknown" if name.startswith("unknown") else name].append(distance <= 1.0)
         for name, one in held.items():
             every[name].extend(one)
-        told = " | ".join(
-            f"{sum(held[name])} of {len(held[name])}" if held[name] else "-" for name in [*names, "unknown"]
-        )
-        lines.append(f"| {experiment}, {count:g} lines, {1e3 * period:g} ms | {len(fits)} | {told} |")
+        cell = f"{experiment}, {count:g} lines, {1e3 * period:g} ms"
+        told = " | ".join(shares(held[name]) for name in [*names, "unknown"])
+        seconds = np.median([row["seconds"] for row in fits])
+        lines.append(f"| {cell} | {len(fits)} | {seconds:.1f} | {told} |")
+        for name in names:
+            mean = np.mean(held[name]) if held[name] else 0.95
+            said = f"  {name}: {cell}: {shares(held[name])}"
+            if mean < LEAST:
+                low.append(said)
+            elif mean > MOST:
+                high.append(said)
+            else:
+                fair += bool(held[name])
     for title, one in (
         ("known", [held for name in names for held in every[name]]),
         ("unknown", every["unknown"]),
     ):
-        low, high = binomtest(sum(one), max(len(one), 1)).proportion_ci(0.95)
-        share = sum(one) / max(len(one), 1)
-        lines.append(
-            f"{title}: {sum(one)} of {len(one)} intervals hold the truth, "
-            f"{100.0 * share:.1f} % (binomial {100.0 * low:.1f} to {100.0 * high:.1f} %, as if those of one "
-            "log were independent)"
-        )
-    return "\n".join(lines)
+        lines.append(f"{title}: {shares(one)}, as if the intervals of one log were independent")
+    lines.append(f"{fair} shares within {100 * LEAST:g} and {100 * MOST:g} %; below, {len(low)}:")
+    return "\n".join([*lines, *low, f"above, {len(high)}:", *high])
+
+
+def shares(held: list[bool]) -> str:
+    """How many of them, and the binomial interval of 95 % of the share.
+
+    >>> shares([True] * 95 + [False] * 5)
+    '95 of 100 (89-98 %)'
+    """
+    if not held:
+        return "-"
+    low, high = binomtest(sum(held), len(held)).proportion_ci(0.95)
+    return f"{sum(held)} of {len(held)} ({100.0 * low:.0f}-{100.0 * high:.0f} %)"
 
 
 def searches_of(rows: list[dict[str, Any]]) -> str:
@@ -266,22 +301,57 @@ def test_what_a_gap_within_1_percent_takes() -> None:
     assert longer["stiffness"] < 0.005
 
 
+def read(file: Path) -> list[dict[str, Any]]:
+    """The rows that the file has."""
+    text = file.read_text(encoding="utf-8") if file.exists() else ""
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def add(
+    file: Path, wanted: dict[str, Any], numbers: Iterable[int], work: Callable[..., dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """All rows of this kind and with these keys, after those that the file lacks were computed."""
+    rows = [
+        row for row in read(file) if wanted.items() <= row.items() and ("drive" in row) == ("drive" in wanted)
+    ]
+    keys = {key: value for key, value in wanted.items() if key != "kind"}
+    for number in sorted(set(numbers) - {row["number"] for row in rows}):
+        try:
+            found = work(**keys, number=number)
+        except InputError as error:
+            found = {"error": str(error)}
+        rows.append({**wanted, "number": number, **found})
+        with file.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(rows[-1]) + "\n")
+    return rows
+
+
 def main() -> None:
     """Compute what the file lacks, and sum up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
-    parser.add_argument("kind", choices=("coverage", "table", "search", "plan"))
+    parser.add_argument("kind", choices=("coverage", "cells", "table", "search", "plan"))
     parser.add_argument("--experiment", default=REVERSE)
     parser.add_argument("--fits", type=int, default=200)
+    parser.add_argument("--numbers", choices=("all", "odd", "even"), default="all")
     parser.add_argument("--drive", choices=list(DRIVES), default="smooth")
     parser.add_argument("--lines", type=float, default=1024.0)
     parser.add_argument("--period", type=float, default=4e-3)
     parser.add_argument("--factor", type=float)
     given = parser.parse_args()
     kind, lines, period = given.kind, given.lines, given.period
-    text = given.file.read_text(encoding="utf-8") if given.file.exists() else ""
-    if kind == "table":
-        print(table_of([json.loads(line) for line in text.splitlines()]))
+    chosen = [
+        number
+        for number in range(kind != "search", given.fits + 1)
+        if given.numbers == "all" or (number % 2 == 1) == (given.numbers == "odd")
+    ]
+    if kind == "cells":
+        for first in range(0, given.fits, BATCH):
+            for cell in CELLS:
+                batch = [number for number in chosen if first < number <= first + BATCH]
+                add(given.file, {"kind": "coverage", **cell}, batch, covered)
+    if kind in ("cells", "table"):
+        print(table_of(read(given.file)))
         return
     factor = given.factor or (1.0 if kind == "coverage" else 3.0)
     log = {"experiment": given.experiment, "lines": lines, "period": period, "factor": factor}
@@ -292,18 +362,7 @@ def main() -> None:
     }[kind]
     work = {"coverage": covered, "search": searched, "plan": planned}[kind]
     wanted = {"kind": kind, **keys}
-    rows = [
-        row for row in map(json.loads, text.splitlines())
-        if wanted.items() <= row.items() and ("drive" in row) == ("drive" in wanted)
-    ]  # fmt: skip
-    for number in sorted({*range(kind != "search", given.fits + 1)} - {row["number"] for row in rows}):
-        try:
-            found = work(**keys, number=number)
-        except InputError as error:
-            found = {"error": str(error)}
-        rows.append({**wanted, "number": number, **found})
-        with given.file.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(rows[-1]) + "\n")
+    rows = add(given.file, wanted, chosen, work)
     print(", ".join(f"{key} {value}" for key, value in wanted.items()))
     print({"coverage": coverage_of, "search": searches_of, "plan": plans_of}[kind](rows))
 

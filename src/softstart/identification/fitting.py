@@ -2,7 +2,7 @@
 
 The log is y = f(x, e) + n: f the exact plant under the torque of the log and an error e of it, independent
 with the standard deviation `ripple` in each sample, n what the encoder rounds, with the covariance B
-(`rounding`). About the e that is most likely at x, y has the covariance V = noise^2 B + ripple^2 G G', G the
+(`edges`). About the e that is most likely at x, y has the covariance V = noise^2 B + ripple^2 G G', G the
 response to e, and x is found by
 
     L(x) = ln|V| + r' V^-1 r -> min        r = f(x, e) - G e - y
@@ -32,6 +32,7 @@ from scipy.stats import t as student
 from softstart.arrays import Matrix, Vector
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
+from softstart.identification.logs import Log
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE, WIDEST
 from softstart.quantities import nearest, show
@@ -288,20 +289,38 @@ class Solution(NamedTuple):
 Other = tuple[Vector, Matrix, float]  # another explanation: x, its covariance, L
 
 
-def rounding(angle: Vector, count: float) -> Vector:
-    """Variance of what an encoder rounds, sample by sample: count^2/12, times the samples on the same count.
+def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
+    """What an encoder tells in each sample: the angle and its variance, infinite where others tell it.
 
-    While the motor rests or creeps, neighbours have nearly the same error and tell no more than one of them.
-    How alike they are depends on the motion, and a covariance that follows the fitted motion fits what it
-    rounds: with 64 lines it found the torque error of a single start a quarter too small. A count that is
-    taken as one sample depends on the log alone, and errs on the wide side.
+    Samples on one count have nearly the same error while the motor creeps, and together they tell one thing:
+    when the count ended. In the last of them the motor was before that edge by less than it then moved to the
+    next sample: by half of that on average, and uniformly about it. How far it moves follows from the times
+    to the neighbouring edges, the shorter of which is taken for the variance. A motor that passes a count or
+    more from sample to sample has the variance of a rounded number, count^2/12. The first sample, and the
+    last, are rounded numbers.
 
-    >>> (rounding(np.array([0.0, 0.0, 0.0, 0.1, 0.3]), 0.1) * 1200).round(6).tolist()
-    [3.0, 3.0, 3.0, 1.0, 1.0]
+    All this depends on the log alone: a covariance that follows the fitted motion fits what it rounds, and
+    found the torque error of a single start with 64 lines a quarter too small.
+
+    >>> angle, variance = edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
+    >>> angle.tolist(), (12.0 * variance).tolist()
+    ([0.0, 0.25, 1.0, 1.25, 2.0, 2.0, 2.0], [1.0, 0.25, inf, 0.25, inf, inf, 1.0])
     """
-    edges = np.flatnonzero(np.abs(np.diff(angle)) > 0.5 * count) + 1
-    lengths = np.diff(np.concatenate([[0], edges, [angle.size]]))
-    return np.asarray(count**2 / 12.0 * np.repeat(lengths, lengths))
+    told, variance = angle.copy(), np.full(angle.size, math.inf)
+    ends = np.flatnonzero(np.abs(np.diff(angle)) > 0.5 * count)
+    variance[[0, -1]] = count**2 / 12.0
+    if ends.size == 0:
+        return told, variance
+    steps, passed = angle[ends + 1] - angle[ends], time[ends + 1] - time[ends]
+    at = np.concatenate([[time[0]], 0.5 * (time[ends] + time[ends + 1]), [time[-1]]])
+    before, after = np.diff(at)[:-1], np.diff(at)[1:]
+    moved = 2.0 * count * passed / np.maximum(before + after, 1e-300)
+    most = np.minimum(count * passed / np.maximum(np.minimum(before, after), 1e-300), count)
+    single = (np.abs(steps) < 1.5 * count) & (moved < count)
+    inner = np.where(single, 0.5 * (count - moved), 0.0)
+    told[ends] += np.sign(steps) * inner
+    variance[ends] = np.where(single, most, count) ** 2 / 12.0
+    return told, variance
 
 
 class Fitter:
@@ -309,7 +328,10 @@ class Fitter:
 
     def __init__(self, models: Sequence[LogModel], space: Space, progress: Progress | None = None) -> None:
         self.models, self.space = list(models), space
-        self.counts = [np.isfinite(one.log.values) for one in models]
+        told = [self._measured(one.log, one.log.values) for one in models]
+        self.values = [values for values, _ in told]  # NaN where there is none, or where others tell it
+        self.counts = [np.isfinite(values) for values in self.values]
+        self.roots = [np.sqrt(variance[rows]) for (_, variance), rows in zip(told, self.counts, strict=True)]
         self.progress = progress or (lambda _: None)
 
     @property
@@ -335,7 +357,7 @@ class Fitter:
             steps.append(step)
             points.append(space.values(other, log))
         signals = short.signals(points)
-        base = signals[0] - short.log.values
+        base = signals[0] - self.values[log][: short.times.size]
         if short.shift is not None:
             base = base - short.shift[: base.size]
         if offset is not None:
@@ -346,6 +368,17 @@ class Fitter:
         if offset is not None:
             jacobian[:, offset] = 1.0
         return Part(base[rows], jacobian)
+
+    def left(self, x: Vector) -> list[Vector]:
+        """Model minus log in each sample of each log."""
+        found = []
+        for i, model in enumerate(self.models):
+            _, offset = self.space.place(i)
+            one = model.signals([self.space.values(x, i)])[0] - model.log.values
+            if model.shift is not None:
+                one -= model.shift
+            found.append((one if offset is None else one + x[offset])[np.isfinite(model.log.values)])
+        return found
 
     def parts(self, x: Vector, share: float = 1.0, derivatives: bool = True) -> list[Part]:
         """Residuals and derivatives of every log."""
@@ -419,7 +452,7 @@ class Fitter:
             response = model.torque_responses(self.space.values(x, i))
             model.shift = None if model.error is None else response @ model.error
             response = response[rows]
-            root = np.sqrt(self._measurement(i, model.log.values[rows]))
+            root = self.roots[i]
             seen = response / root[:, None]
             eigenvalues, vectors = np.linalg.eigh(seen @ seen.T)
             eigenvalues = np.maximum(eigenvalues, 0.0)
@@ -431,24 +464,32 @@ class Fitter:
         for model, one in zip(self.models, weights, strict=True):
             model.error, model.shift = one.error, one.shift
 
-    def _measurement(self, log: int, angle: Vector) -> Vector:
-        """Variance of what encoder or log round, in the samples that count."""
-        one = self.models[log].log
-        if one.kind != "angle" or one.count == 0.0:
-            return np.full(angle.size, max(one.floor, 1e-3 * one.scale) ** 2)
-        return rounding(angle, one.count)
+    @staticmethod
+    def _measured(log: Log, logged: Vector) -> tuple[Vector, Vector]:
+        """The values of a log that count, NaN for all others, and their variance by encoder or rounding."""
+        rows = np.isfinite(logged)
+        values, variance = np.full(logged.size, math.nan), np.full(logged.size, math.inf)
+        if log.kind != "angle" or log.count == 0.0:
+            values[rows], variance[rows] = logged[rows], max(log.floor, 1e-3 * log.scale) ** 2
+            return values, variance
+        values[rows], variance[rows] = edges(log.time[rows], logged[rows], log.count)
+        values[~np.isfinite(variance)] = math.nan
+        return values, variance
 
     def foreseen(self, x: Vector, ripple: float) -> Matrix:
         """Derivatives of all logs, whitened for a ripple that is known: what logs not yet made will tell."""
         found = []
-        for i, (model, part) in enumerate(zip(self.models, self.parts(x), strict=True)):
-            rows, values = self.counts[i], self.space.values(x, i)
-            angle = model.signals([values])[0][rows]
+        for i, model in enumerate(self.models):
+            values = self.space.values(x, i)
+            logged = model.signals([values])[0]
             if model.log.count:  # as it will be logged
-                angle = np.round(angle / model.log.count) * model.log.count
+                logged = np.round(logged / model.log.count) * model.log.count
+            self.values[i], variance = self._measured(model.log, logged)
+            rows = self.counts[i] = np.isfinite(self.values[i])
             response = model.torque_responses(values)[rows]
-            covariance = np.diag(self._measurement(i, angle)) + ripple**2 * (response @ response.T)
-            found.append(solve_triangular(cholesky(covariance, lower=True), part.jacobian, lower=True))
+            covariance = np.diag(variance[rows]) + ripple**2 * (response @ response.T)
+            factor = cholesky(covariance, lower=True)
+            found.append(solve_triangular(factor, self.part(x, i).jacobian, lower=True))
         return np.vstack(found)
 
     def deviations(self, parts: Sequence[Part], before: Errors) -> tuple[Errors, Vector]:

@@ -174,7 +174,7 @@ def identify(
         agreed=sum(cost <= 1.01 * best + 1e-300 for _, cost in found),
         seconds=time.perf_counter() - began,
         notes=tuple(notes),
-        residuals=tuple(one.residual for one in fitter.parts(solution.x, derivatives=False)),
+        residuals=tuple(fitter.left(solution.x)),
     )
 
 
