@@ -844,6 +844,7 @@ class Fitter:
             return math.sqrt(max(value - least, 0.0)) / quantile
 
         over = max(ratio_of(slope.value) - 1.0, 0.0)
+        best = sign * max(sign * best, sign * (middle + float(x[i] - middle) / (1.0 + over)))
         for number in range(MOST_STEPS):
             step = self._outward(x, slope, solution.lower, solution.upper, i, sign, least + quantile**2)
             length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
