@@ -68,7 +68,8 @@ BUDGET = {
     # 240 and a file: exact responses to torque errors
     # 140: the likelihood itself, with its derivatives, in fits and at the ends of intervals
     # 35: when a count ended, instead of samples on it
-    "identification": (3795, 10, 4, 0),
+    # 70: largest shaft torque and travel of an experiment over all start positions
+    "identification": (3865, 10, 4, 0),
     # columns.py: one reader of CSV files instead of four; files are checked first; 50: quantities that may be
     # words, former names of keys
     "input": (1510, 6, 0, 0),

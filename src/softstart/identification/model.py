@@ -175,6 +175,19 @@ class LogModel:
             raise SimulationError(f"The start of the log could not be computed (status {reason}).")
         return one.segments[: int(one.x[at.index(at.STATE, "n_segments")])]
 
+    def travels(self, values: Sequence[Mapping[str, float]]) -> Matrix:
+        """How far the load moves at most under each set of values, and how often the gap opens and closes.
+
+        Seen at events and samples: exact for a reactive load, which turns at events only.
+        """
+        numbers, found = self.numbers(self.dead_time), np.empty((len(values), 2))
+        for row, p in zip(found, self.plants(values), strict=True):
+            angles = self._segments(p, numbers)[:, at.S_PHI2]
+            last = float(self.recorder.x[at.PHI2])
+            row[0] = np.max(np.abs(np.append(angles, last) - angles[0]))
+            row[1] = self.recorder.x[at.GAP_EVENTS]
+        return found
+
 
 def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
     """A signal, straight between these instants, behind a filter of the first order that begins settled.

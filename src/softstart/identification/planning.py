@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from softstart.arrays import Vector
-from softstart.controller import make_controller
+from softstart.controller import Controller, make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import POWERS, Fitter, Space, chosen, covariance_of, root_of, usual
@@ -21,18 +21,23 @@ from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE
 from softstart.late import late
+from softstart.plant import layout as at
 from softstart.plant import record
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
-from softstart.start.simulation import simulate
+from softstart.start.batch import array_starts
+from softstart.start.engine import MAX_EVENTS, ended
 
 views = late("softstart.views.identification")  # above this module; see softstart.late
 
 LEVEL: Final = 0.65  # of the starting torque
 SAMPLES: Final = 400  # of an experiment at most
 RIPPLE: Final = 0.025  # of the torque level
-CHECKED: Final = 65  # places in the gap from which an experiment is simulated; an impact may need one of them
-COARSE: Final = 8  # of these only each eighth while a torque is designed
+CHECKED: Final = 257  # start positions from which an experiment is simulated first, see `largest`
+COARSE: Final = 4  # of these every fourth while a torque is designed
+KINKS: Final = 16  # parts of the distance between them in which changes of the contacts are located
+EXACT: Final = 1e-9  # relative error of a largest value
+SHORTEST: Final = 1e-13  # of the gap, between positions
 PIECES: Final = 9  # levels of a designed torque at least
 ROUGH: Final = 150, 50  # samples, and blocks of the torque error, at most while a torque is designed
 DRAWS: Final = 30  # random torques before the programs, and as many steps from the best one behind them
@@ -40,7 +45,7 @@ SPREAD: Final = 0.15  # of the largest level
 ITERATIONS: Final = 8
 STEP: Final = 2e-3  # of the largest level, for derivatives
 WIDER: Final = 4.0  # times the largest level of a seed: as far as a design may go
-NEAR: Final = 0.01  # relative distance of a design to its limits: from places between those checked
+NEAR: Final = 0.01  # relative distance of a design to its limits: for positions between those checked then
 RESTING: Final = 0.9  # of the load torque: what the shaft may have where the load must not move
 TRIED: Final = 4  # torques beyond a limit that are pulled back to it
 QUIET: Final[dict[str, Any]] = {
@@ -65,7 +70,7 @@ class Experiment:
     widths : dict
         Half an interval of 95 % over the value for each parameter; infinite where it would be unknown.
     peak : float
-        Peak of the shaft torque on the exact plant, N m, the worst of 65 places in the gap.
+        Peak of the shaft torque on the exact plant, N m, from the worst position in the gap.
     travel : float
         How far the load is moved at most from where it stood, rad at the motor shaft.
     wanted : tuple of str
@@ -383,6 +388,36 @@ def _standard(drive: Drive, level: float) -> dict[str, tuple[Vector, Vector]]:
     return {name: (np.array(times), np.array(levels)) for name, (times, levels) in found.items()}
 
 
+def largest(figure: Callable[[Vector], tuple[Vector, Vector]], places: Vector) -> float:
+    """The largest value of a figure that is continuous in the start position.
+
+    `figure` gives values and counts of contacts. An interval is halved while it may hold a larger value, by
+    the values at its ends and the slopes there and beside; and where the count changes: a contact that is
+    only just made, or just missed, has a steep and narrow peak beside it.
+
+    >>> round(largest(lambda x: (1.0 - abs(x - 0.1234567), x > 0.12), np.linspace(0.0, 1.0, 5)), 9)
+    1.0
+    """
+    span, (values, counts) = float(np.ptp(places)), figure(places)
+    close = 1.01 * span / (KINKS * CHECKED)
+    while True:
+        steps, rises = np.diff(places), np.pad(np.abs(np.diff(values)), 1)
+        room = np.maximum(rises[1:-1], np.maximum(rises[:-2], rises[2:]))
+        may = np.maximum(values[1:], values[:-1]) + room > (1.0 + EXACT) * values.max()
+        may = (may & (steps > SHORTEST * span)) | ((counts[1:] != counts[:-1]) & (steps > close))
+        if not may.any():
+            return float(values.max())
+        after = np.flatnonzero(may) + 1
+        middles = 0.5 * (places[after - 1] + places[after])
+        more = figure(middles)
+        places = np.insert(places, after, middles)
+        values, counts = np.insert(values, after, more[0]), np.insert(counts, after, more[1])
+
+
+def _player(profile: TorqueProfile) -> Controller:
+    return make_controller("profile", {"profile": profile})
+
+
 def _profile(durations: Vector, levels: Vector) -> tuple[TorqueProfile, float]:
     edges = np.concatenate([[0.0], np.cumsum(durations)])
     return TorqueProfile.steps(edges, levels), float(edges[-1])
@@ -408,11 +443,9 @@ class _Bench:
         self.count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
         self.quantile = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
         limit = 10.0 * float(drive.Ms)
-        free_torque = self.base.replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
-        places = 0.5 * float(drive.gap) * np.linspace(-1.0, 1.0, CHECKED)
-        self.starts = (
-            [free_torque.replace(start_position=place) for place in places] if self.moving else [free_torque]
-        )
+        self.wide = self.base.replace(maximum_torque=limit, minimum_torque=-limit, brake="none")
+        half = 0.5 * float(drive.gap)
+        self.places = np.linspace(-half, half, CHECKED) if self.moving else np.zeros(1)
 
     def experiment(self, name: str, durations: Vector, levels: Vector, rough: bool = False) -> Experiment:
         """What these levels would tell; roughly, for a design."""
@@ -446,19 +479,42 @@ class _Bench:
         )
         if not rough:  # a design needs their slope
             widths[[not space.known(i, x[i], one) for i, one in enumerate(half.tolist())]] = math.inf
-        peaks, travels = self.loads = self.load(profile, end, rough)
+        peak, travel = self.load(profile, end) if not rough else (math.nan, math.nan)
         told = dict(zip(self.free, widths.tolist(), strict=True))
-        return Experiment(name, profile, end, told, float(peaks.max()), float(travels.max()), self.wanted)
+        return Experiment(name, profile, end, told, peak, travel, self.wanted)
 
-    def load(self, profile: TorqueProfile, end: float, rough: bool = False) -> tuple[Vector, Vector]:
-        """Largest shaft torque and travel of the load, from places all over the gap."""
-        peaks, travels, times = [], [], np.linspace(0.0, end, SAMPLES)
-        for drive in self.starts[:: COARSE if rough else 1]:
-            run = simulate(drive, make_controller("profile", {"profile": profile}), until=end)
-            way = run.at(times)["phi2"]
-            peaks.append(run.peak_torque)
-            travels.append(float(np.max(np.abs(way - way[0]))))
-        return np.array(peaks), np.array(travels)
+    def load(self, profile: TorqueProfile, end: float) -> tuple[float, float]:
+        """Largest shaft torque and travel of the load, of all positions in the gap."""
+        peak = largest(lambda places: self.peaks(profile, end, places), self.places)
+        return peak, largest(lambda places: self.travels(profile, end, places), self.places[::COARSE])
+
+    def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
+        """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
+        notes = array_starts(self._starts(places), _player(profile), until=end)
+        for x in notes:
+            ended(x, int(x[at.STATUS]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
+        return np.abs(notes[:, at.PEAK]), notes[:, at.GAP_EVENTS]
+
+    def travels(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
+        """Travel of the load from each of these positions, and how often the gap opens and closes."""
+        times = np.union1d(profile.time[profile.time < end], end)
+        if self.drive.load_kind != "reactive":
+            times = np.union1d(times, np.linspace(0.0, end, SAMPLES))
+        model = LogModel(_demand(times, profile.at(times), self.signal), self.base)
+        shares = places / (0.5 * float(self.drive.gap) or 1.0)
+        found = model.travels([{POSITION: share} if self.moving else {} for share in shares.tolist()])
+        return found[:, 0], found[:, 1]
+
+    def _starts(self, places: Vector) -> Drive:
+        return self.wide.replace(start_position=places) if self.moving else self.wide
+
+    def excess(self, profile: TorqueProfile, end: float, torque: float, travel: float) -> Vector:
+        """By which share each of some positions exceeds the limits, below 0 where it keeps them."""
+        places = self.places[::COARSE]
+        found = [self.peaks(profile, end, places)[0] / torque]
+        if travel < math.inf:
+            found.append(self.travels(profile, end, places[::COARSE])[0] / travel)
+        return np.concatenate(found) - 1.0
 
     def resting(self) -> list[Experiment]:
         """A push to and fro that leaves the load at rest, by the energy of the motor at a flank."""
@@ -473,9 +529,12 @@ class _Bench:
         edges = _edges(one)
         for share in (1.0, 0.99, 0.97, 0.93, *0.85 ** np.arange(1, 20)):
             levels = share * one.profile.at(edges)
-            peaks, travels = self.load(_profile(np.diff([*edges, one.end]), levels)[0], one.end)
-            if peaks.max() <= torque and travels.max() <= travel:
-                return one if share == 1.0 else self.experiment(one.name, np.diff([*edges, one.end]), levels)
+            played = _profile(np.diff([*edges, one.end]), levels)
+            if self.excess(*played, torque, travel).max() > 0.0:
+                continue
+            found = one if share == 1.0 else self.experiment(one.name, np.diff([*edges, one.end]), levels)
+            if found.peak <= torque and found.travel <= travel:
+                return found
         return None
 
     def designed(self, name: str, seeds: Sequence[Experiment], torque: float, travel: float) -> Experiment:
@@ -496,8 +555,7 @@ class _Bench:
         def evaluated(shares: Vector) -> Vector:
             shares = np.clip(shares, lower, upper)  # a quadratic program that failed may leave them
             one = self.experiment(name, durations, scale * shares, rough=True)
-            peaks, travels = self.loads
-            over = np.concatenate([peaks / torque, travels / travel if travel < math.inf else []]) - 1.0
+            over = self.excess(one.profile, one.end, torque, travel)
             tried.append((math.log(one.score), float(over.max()), shares))
             return np.concatenate([[tried[-1][0]], over])
 
@@ -516,9 +574,7 @@ class _Bench:
         self._wander(evaluated, tried, lower, upper, anywhere=False)
         within = sorted((one for one in tried if one[1] <= 0.0), key=lambda one: one[0])[:TRIED]
         exact = [self.experiment(name, durations, scale * point) for _, _, point in within]
-        exact = [
-            one for each in exact if (one := self.keeping(each, (1.0 - NEAR) * torque, travel)) is not None
-        ]
+        exact = [one for each in exact if (one := self.keeping(each, torque, travel)) is not None]
         best = [seed, *exact]
         chosen = min(best, key=lambda one: one.score)
         by = f'"{seed.name}"' if chosen is seed else f'CasADi, from "{seed.name}"'
@@ -551,10 +607,8 @@ class _Bench:
             inside, outside = 0.0, 1.0
             for _ in range(8):
                 middle = 0.5 * (inside + outside)
-                peaks, travels = self.load(
-                    *_profile(durations, scale * (anchor + middle * (point - anchor))), True
-                )
-                keeps = peaks.max() <= torque and travels.max() <= travel
+                played = _profile(durations, scale * (anchor + middle * (point - anchor)))
+                keeps = self.excess(*played, torque, travel).max() <= 0.0
                 inside, outside = (middle, outside) if keeps else (inside, middle)
             found.append(anchor + inside * (point - anchor))
         return found
