@@ -574,7 +574,7 @@ def _least(start: Start, goal: float, near: tuple[float, float, float] | None, l
     The lowest cells decide: all are brought to one level, on grids as fine as it needs, before any is brought
     to the next. It begins with the multipliers `known`; of those that raised cells some are added to `proof`.
     """
-    grids, used = [_Cells(start, winds)], [list(known)]
+    grids, used = [_Cells(start, winds)], [[by.on(start) for by in known]]
     failures: list[list[tuple[int, int]]] = [[] for _ in range(GRIDS)]
     levels = [share * goal for share in LEVELS[len(LEVELS) - 1 if known else 0 :]]
     for level in levels:
