@@ -64,7 +64,7 @@ figure.set_label("Dual: the price of T <= P over time, and the weight of the dem
 # %%
 # **Value.** The constants and the integral together, for the instants of this start:
 gap, _, steps = dual.by.durations
-F = float(dual.nodes((steps, steps), (gap, gap), False)[0, 0])
+F = dual.nodes(np.array([steps]), np.array([gap]), False).item()
 print(f"F = {F:.4f} N m, {100.0 * (P / F - 1.0):.2f} % below P")
 
 # %%
