@@ -60,9 +60,9 @@ KEPT = 8  # sets of multipliers that the next grid begins with
 CLOSED_FORM = 6  # steps that take as long as the closed form of a gap
 MOST_WORK, LITTLE_WORK = 5.6e8, 3e7  # numbers computed in all; a drive is judged alike on every machine
 ROUNDING = 1e-9
-GAINED = 1e-4  # relative: what is left of the goal, or gained by a grid, that ends the work
+GAINED = 1e-4  # relative: what is left of the goal that ends the work
 CLOSED = 0.04  # of the open cells: a program that closes fewer is a failure
-LEVELS = (0.95, 0.993, 1.0)
+LEVELS = (0.95, 0.993, 1.0)  # of the goal, one after the other
 
 
 def not_certified(problem: Problem) -> str:
