@@ -69,7 +69,7 @@ class ChainReport:
     Examples
     --------
     >>> from softstart.reporting import report_chain
-    >>> report_chain("crane-4-mass", controllers=["ramp"]).headline[:36]
+    >>> report_chain("crane-4-mass", controllers=["ramp"], budget=0.0).headline[:36]
     'Gentlest start: ramp. The largest sh'
     """
 
@@ -155,7 +155,7 @@ def report_chain(
 
     Examples
     --------
-    >>> found = report_chain("crane-4-mass", controllers=["ramp"])
+    >>> found = report_chain("crane-4-mass", controllers=["ramp"], budget=0.0)
     >>> [row.name for row in found.comparison.rows]
     ['ramp', 'direct']
 
