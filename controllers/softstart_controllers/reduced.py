@@ -55,7 +55,7 @@ def closing_speed(drive: Drive, torque: Any) -> Any:
     """
     rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
     a = np.asarray(torque) / drive.J1 + rolling * drive.Mc / drive.J2
-    way = np.maximum(0.5 * np.asarray(drive.gap) - drive.assumed.theta0, 0.0)
+    way = np.maximum(0.5 * np.asarray(drive.gap) - drive.design_drive.theta0, 0.0)
     v = np.asarray(drive.initial_motor_speed) - drive.initial_load_speed
     return number(np.sqrt(np.maximum(v * v + 2.0 * a * way, 0.0)))
 

@@ -82,7 +82,7 @@ def test_a_second_gap_at_a_light_mass_adds_to_the_first_and_does_no_harm_at_the_
     assert found["gap"].value == pytest.approx(0.08 + second, rel=0.04)
     for strategy in ("direct", "s-curve"):
         of_motor = float(simulate_chain(chain, strategy).k_dyns[0])
-        assert float(simulate(found.drive.assumed, strategy).k_dyn) == pytest.approx(of_motor, rel=0.02)
+        assert float(simulate(found.drive.design_drive, strategy).k_dyn) == pytest.approx(of_motor, rel=0.02)
 
 
 @pytest.mark.parametrize("light", [0.008, 0.016])  # a quarter and a half of the rotor
@@ -98,7 +98,7 @@ def test_a_second_gap_at_a_middle_mass_is_noticed_or_does_no_harm_at_the_motor(
     assert named == (second * light > 2e-4)
     for strategy in ("direct", "s-curve") if not named else ():
         own, each = (
-            float(simulate(found.drive.assumed, strategy).k_dyn),
+            float(simulate(found.drive.design_drive, strategy).k_dyn),
             simulate_chain(chain, strategy).k_dyns,
         )
         assert float(each[0]) == pytest.approx(own, rel=0.02)

@@ -218,7 +218,7 @@ def test_each_position_is_the_drive_with_that_position() -> None:
             same = drive.replace(start_position=where)
             assert (one, one.given(), one.theta0) == (same, same.given(), same.theta0)
             assert one.to_toml() == same.to_toml()
-        assert drive.assumed == drive.replace(start_position="mid-gap")
+        assert drive.design_drive == drive.replace(start_position="mid-gap")
 
 
 def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:

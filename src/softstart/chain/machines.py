@@ -51,7 +51,7 @@ def one_machine(given: Machine | str | os.PathLike[str]) -> Machine:
 
 def two_masses(machine: Machine) -> Drive:
     """The drive for which controllers are set up; of a chain its modal reduction to two masses."""
-    return drive_of(machine) if isinstance(machine, Chain) else machine.assumed
+    return drive_of(machine) if isinstance(machine, Chain) else machine.design_drive
 
 
 def here(machine: Machine) -> tuple[float, float]:

@@ -207,7 +207,7 @@ class Chain:
         motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key in Drive.PARAMETERS})
         return cls(
             (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source,
-            position="unknown" if unknown else "mid-gap", units=of.units,
+            assumed=of.assumed, position="unknown" if unknown else "mid-gap", units=of.units,
         )  # fmt: skip
 
     def to_toml(self) -> str:

@@ -132,11 +132,11 @@ class Reduction:
         shaft = chain.shafts[0]
         bigger = max((motor, load), key=lambda mass: abs(mass.torque))
         unknown = len(self.chain.positions) > 1
-        note = f"; assumed: {self.chain.assumed}" if self.chain.assumed else ""
         return Drive(
             **chain.motor.keywords(),
             name=f"{self.chain.name}, reduced to two masses ({self.method})",
-            source=f"reduced from a chain of {len(self.chain.masses)} masses: {self.chain.source}{note}",
+            source=f"reduced from a chain of {len(self.chain.masses)} masses: {self.chain.source}",
+            assumed=self.chain.assumed,
             units=self.chain.units,
             motor_inertia=motor.inertia,
             load_inertia=load.inertia,

@@ -139,7 +139,7 @@ def simulate_chain(
 def drive_of(chain: Chain) -> Drive:
     """The two-mass drive for which a controller is set up where none is named: the modal reduction."""
     try:
-        return reduce_chain(chain, 2, method="modal", force=True).to_drive().assumed
+        return reduce_chain(chain, 2, method="modal", force=True).to_drive().design_drive
     except InputError as error:
         sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
         raise InputError(sentences) from None

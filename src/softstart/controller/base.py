@@ -244,7 +244,7 @@ class Controller:
         missing = [name for name, value in given.items() if value is None]
         if not missing:
             return self
-        derived = self.defaults(drive.assumed)
+        derived = self.defaults(drive.design_drive)
         return replace(self, **{name: derived[name] for name in missing if name in derived})
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
@@ -252,7 +252,7 @@ class Controller:
 
         That is `fitted(drive)` and the same drive; gains that were tuned for another drive bring that one.
         """
-        drive = drive.assumed
+        drive = drive.design_drive
         return self.fitted(drive), drive
 
     @property

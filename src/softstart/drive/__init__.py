@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from softstart.drive.checks import FRICTIONS
-from softstart.drive.limits import LIMIT_TABLES, Limit, Limits, SNCurve
+from softstart.drive.limits import INFORMATIVE_TABLES, Limit, Limits, SNCurve
 from softstart.drive.model import (
     PARAMETERS,
     TABLES,
@@ -22,7 +22,7 @@ from softstart.drive.model import (
 
 __all__ = [
     "FRICTIONS",
-    "LIMIT_TABLES",
+    "INFORMATIVE_TABLES",
     "PARAMETERS",
     "TABLES",
     "UNKNOWN_POSITIONS",

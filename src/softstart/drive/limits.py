@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from softstart.input.parameters import Parameter, Wording
 from softstart.language import later
 
-__all__ = ["LIMIT_TABLES", "Limits", "SNCurve", "contradicting_limits", "limits_of"]
+__all__ = ["INFORMATIVE_TABLES", "Limits", "SNCurve", "contradicting_limits", "limits_of"]
 
-LIMIT_TABLES = ("limits", "limits.fatigue")  # what stands there changes no start
+INFORMATIVE_TABLES = ("limits", "limits.fatigue", "gear")  # what stands there changes no start
 
 
 @dataclass(frozen=True)

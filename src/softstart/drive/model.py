@@ -90,6 +90,13 @@ class Drive(ParameterSet):
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
+    assumed: str = parameter(
+        "assumed",
+        "",
+        "what is assumed rather than known",
+        '"efficiency 0.95; damping ratio 0.02"',
+        default="",
+    )
     units: str = parameter(
         "units", "", "units in which page and report show angles and speeds", '"deg, rpm"', default=""
     )
@@ -154,6 +161,9 @@ class Drive(ParameterSet):
         "dead time between what a controller measures and the torque demand that follows from it",
         '"1 ms"', "0 or more", default=0.0,
     )  # fmt: skip
+    gear_ratio: MaybeNumbers = parameter(
+        "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=None
+    )
     stiffness: Numbers = parameter(
         "shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"', "above 0", symbol="c"
     )
@@ -478,7 +488,7 @@ class Drive(ParameterSet):
         return one
 
     @property
-    def assumed(self) -> Self:
+    def design_drive(self) -> Self:
         """The drive that controllers are set up for: where the position is unknown, the middle of the gap."""
         where = self.start_position
         return self._at("mid-gap") if isinstance(where, str) and where == "unknown" else self

@@ -352,7 +352,7 @@ def _moving(drive: Drive) -> bool:
 
 
 def _at_rest(drive: Drive) -> Drive:
-    return drive.replace(start_position="mid-gap") if _moving(drive) else drive.assumed
+    return drive.replace(start_position="mid-gap") if _moving(drive) else drive.design_drive
 
 
 def _asked(free: Sequence[str] | None, drive: Drive) -> tuple[str, ...]:

@@ -202,7 +202,7 @@ def _source(drive: Drive, logs: Sequence[Log]) -> str:
 
 def _standing(drive: Drive) -> Drive:
     """The drive at one position: that of the file."""
-    return drive.assumed.replace(initial_speed=0.0) if drive.initial_speed else drive.assumed
+    return drive.design_drive.replace(initial_speed=0.0) if drive.initial_speed else drive.design_drive
 
 
 def _free(free: Iterable[str] | None, drive: Drive, logs: Sequence[Log]) -> tuple[tuple[str, ...], bool]:

@@ -326,7 +326,7 @@ def linear_view(
     made = make_controller(controller, parameters)
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
     # the loop in contact is the same from anywhere
-    assumed = drive.assumed if isinstance(drive, Drive) else next(iter(drive.positions.values()))
+    assumed = drive.design_drive if isinstance(drive, Drive) else next(iter(drive.positions.values()))
     start = SampledStart.of(assumed, made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)

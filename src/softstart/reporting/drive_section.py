@@ -19,7 +19,7 @@ from softstart.start import metrics
 from softstart.views import chain_schemes
 from softstart.views.printed import NOTHING, RPM, digits, short, unit, units_of
 
-HIDDEN = ("name", "source", "units", "noise_seed", "encoder_phase")
+HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
 _ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
 _LABEL = 124.0  # px: what the gap and its label need at least
@@ -166,7 +166,7 @@ def scheme(drive: Drive, prefix: str) -> Html:
         seen = short(float(f"{units.shown(gap, 'rad'):.4g}"))
         label = said("gap {gap} {unit}", gap=seen, unit=units.angle)
         room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
-        parts += _claw(x, room, opening, float(drive.assumed.theta0) / gap, label)
+        parts += _claw(x, room, opening, float(drive.design_drive.theta0) / gap, label)
         x += room
     else:
         parts.append(_line(x, _AXIS, x + 60.0, _AXIS))

@@ -95,7 +95,7 @@ def array_starts(
     [164.81, 257.18]
     """
     if len(drive.positions) > 1:
-        told = fitted_to or drive.assumed
+        told = fitted_to or drive.design_drive
         return worst_of(
             [array_starts(one, controller, until, told, time_limit, max_events)
              for one in drive.positions.values()]

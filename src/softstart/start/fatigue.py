@@ -249,7 +249,7 @@ def fatigue(
     """
     asked = _runs(runs)
     estimate = _read_estimate(estimate_damping)
-    told, drive = fitted_to or asked[0].drive.assumed, asked[0].drive
+    told, drive = fitted_to or asked[0].drive.design_drive, asked[0].drive
     curve, given = _curve(drive, slope)
     gap = _read_gap(worn_gap, drive)
     if not estimate and not drive.damping > 0.0:

@@ -159,7 +159,7 @@ def simulate(
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
     positions = drive.positions
     if len(positions) > 1:
-        told, counted = fitted_to or drive.assumed, base or drive
+        told, counted = fitted_to or drive.design_drive, base or drive
         return worst_run(
             {
                 name: simulate(

@@ -15,7 +15,7 @@ import numpy as np
 from softstart.chain.machines import BY_PATH, Machine, knob, knobs
 from softstart.chain.model import Chain
 from softstart.controller.finding import quantity
-from softstart.drive import LIMIT_TABLES, PARAMETERS
+from softstart.drive import INFORMATIVE_TABLES, PARAMETERS
 from softstart.errors import InputError
 from softstart.input.parameter_set import meant_by
 from softstart.input.parameters import Wording, read_value
@@ -206,7 +206,7 @@ def _of_drive(key: str, name: str, values: object, machine: Machine | None) -> C
     parameter = PARAMETERS[name] if found is None else found.parameter
     if found is not None and parameter.unit and not parameter.many:
         values = [_multiple(value, found.value) for value in values]  # type: ignore[attr-defined]
-    if (not parameter.unit and not parameter.choices) or parameter.table in LIMIT_TABLES:
+    if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
         raise InputError(f"{key}: the {parameter.meaning} changes no start; sweep another parameter.")
     wording = Wording(written={name: key})
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from softstart.drive import LIMIT_TABLES, PARAMETERS, Drive
+from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, Drive
 from softstart.language import later
 from softstart.views.numbers import printable, short
 
@@ -62,6 +62,7 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
         f"  load   J2 = {short(float(drive.J2))} kg m2, Mc = {short(float(drive.Mc))} N m, {drive.load_kind}",
         f"  start  to {short(float(drive.target_speed))} rad/s ({rpm:.4g} rpm)",
         *(["  also   " + ", ".join(extra)] if extra else []),
+        *([f"  assumed: {printable(drive.assumed)}"] if drive.assumed else []),
         *([f"  note   {drive.doubt}"] if drive.doubt else []),
         *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to is not None else []),
     ]
@@ -78,7 +79,9 @@ def controllers_set_up(drive: Drive | None, fitted_to: Any) -> str:
     found = []
     for parameter in PARAMETERS.values() if drive is not None else ():
         there, here = getattr(fitted_to, parameter.name), getattr(drive, parameter.name)
-        changes = parameter.name not in ("name", "source") and parameter.table not in LIMIT_TABLES
+        changes = (
+            parameter.name not in ("name", "source", "assumed") and parameter.table not in INFORMATIVE_TABLES
+        )
         if changes and there != here:
             shown = [_set(value) for value in (there, here)]
             found.append(f"{parameter.path} {shown[0]} there, {shown[1]} here")

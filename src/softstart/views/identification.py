@@ -103,7 +103,7 @@ def figure(found: Identification) -> Any:
         for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
             own = f"{POSITION} {i + 1}"
             position = {POSITION: found[own].value} if own in {one.name for one in found.estimates} else {}
-            base = found.guess.replace(start_position="mid-gap") if position else found.guess.assumed
+            base = found.guess.replace(start_position="mid-gap") if position else found.guess.design_drive
             model = LogModel(log, base).signals([values | position])[0]
             seen = np.isfinite(log.values)
             time, unit = log.time - log.time[0], "rad" if log.kind == "angle" else "rad/s"

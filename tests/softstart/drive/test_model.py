@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softstart.drive import LIMIT_TABLES, PARAMETERS, TABLES, Drive
+from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, TABLES, Drive
 from softstart.errors import InputError
 
 CRANE = {
@@ -189,7 +189,7 @@ def test_the_table_the_fields_and_the_keywords_agree():
     assert list(keywords) == list(fields) == list(PARAMETERS)
     required = {name for name, parameter in PARAMETERS.items() if parameter.required}
     assert required == {name for name, keyword in keywords.items() if keyword.default is keyword.empty}
-    assert TABLES == ("motor", "shaft", "load", "start", "limits", "limits.fatigue")
+    assert TABLES == ("motor", "gear", "shaft", "load", "start", "limits", "limits.fatigue")
     assert len({p.path for p in PARAMETERS.values()}) == len(PARAMETERS)
     for parameter in PARAMETERS.values():
         choices = typing.get_args(typing.get_type_hints(Drive)[parameter.name])
@@ -201,7 +201,7 @@ def test_the_table_the_fields_and_the_keywords_agree():
 )
 def test_the_example_of_each_parameter_is_valid(crane, parameter):
     # a life needs the starts per hour, a point of an S-N curve torque, cycles and slope
-    table = [p for p in PARAMETERS.values() if p.table == parameter.table in LIMIT_TABLES]
+    table = [p for p in PARAMETERS.values() if p.table == parameter.table in INFORMATIVE_TABLES]
     changed = crane.with_settings([f"{p.path}={p.example}" for p in table or [parameter]])
     assert Drive.from_toml(changed.to_toml()) == changed
 

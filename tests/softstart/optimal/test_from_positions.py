@@ -205,7 +205,9 @@ def compared(drive: Drive, best: Optimum | RobustOptimum) -> dict[str, float]:
         except SimulationError:
             continue
     for run in runs.values():
-        each = [simulate(one, run.controller, fitted_to=drive.assumed) for one in drive.positions.values()]
+        each = [
+            simulate(one, run.controller, fitted_to=drive.design_drive) for one in drive.positions.values()
+        ]
         assert run.k_dyn == max(single.k_dyn for single in each)
     singles = [
         simulate(one, "profile", parameters={"profile": best.profile}) for one in drive.positions.values()
