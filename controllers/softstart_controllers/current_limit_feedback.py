@@ -12,6 +12,7 @@ from softstart.controller import CompiledController, Effort, compiled_step, para
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
+from softstart_controllers.landing import horizon, over_dead_time, pole
 from softstart_controllers.reduced import reduced_torque
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
@@ -24,6 +25,7 @@ from softstart_controllers.sampled import (
     sample_period,
 )
 from softstart_controllers.shaft_observer import Observer, observer, predict
+from softstart_controllers.shaping import swing
 
 DAMPING_RATIO = 0.7
 SLEWED_SHARE = 0.25  # of Ms
@@ -64,6 +66,10 @@ class Parameters:
     k_speed: float
     k_torque: float
     k_rate: float
+    lag: float
+    dead: float
+    sigma: float
+    omega: float
 
 
 class State:
@@ -125,7 +131,12 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
 
     limit = p.low + (p.full - p.low) * x.progress
     if phase == CLOSED:
-        y.torque = min(max(limit - p.feedback * y.rate, 0.0), p.full)
+        rate = y.rate
+        if p.dead > 0.0:  # until then the last demand goes on acting
+            mean, _ = over_dead_time(u, x.demand, p.lag, p.dead)
+            rest = (p.motor_bend * mean + p.load_bend * p.Mc) / (p.motor_bend + p.load_bend)
+            _, rate = swing(y.T, rate, rest, p.sigma, p.omega, p.dead)
+        y.torque = min(max(limit - p.feedback * rate, 0.0), p.full)
         y.progress = min(1.0, x.progress + p.rise)
     elif phase == IMPATIENT:
         y.torque = limit
@@ -162,8 +173,8 @@ class CurrentLimitFeedback(CompiledController):
     T' is below 0.2 Ms.
 
     *Gap open.* The low limit accelerates the motor until it is `approach_speed` faster than the load, and
-    keeps that speed: u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag)), 0, low_torque). The speed of
-    the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the approach speed,
+    keeps that speed: u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag + computing
+    delay)), 0, low_torque). The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the approach speed,
     no further), and after a contact the estimate w1 - T'/c of the instant at which it ended. With
     approach_speed = Omega M12avg_base/c the impact alone swings the shaft to M12avg_base, [G](12), that is to
     K_dyn = 1, which the full torque needs anyway; from however wide a gap.
@@ -175,12 +186,14 @@ class CurrentLimitFeedback(CompiledController):
     With [G](7): T'' + (kd c/J1) T' + Omega^2 T = c (limit/J1 + Mc/J2), so kd gives the shaft the damping
     ratio asked for on top of its own. The rise goes on only while the gap counts as closed.
 
-    *Limits of the feedback.* A delay tau in the loop (torque lag, the time in which a limited rate slews a
-    quarter of Ms, half a period, and the observer's lag as far as its model may miss the load, J1/(J1 + J2))
-    turns damping into its opposite: the loop gain is one at Omega (zeta + sqrt(zeta^2 + 1)), and a phase
-    margin of 30 degrees is kept there by zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau). An observer that
-    lags by more than 1/Omega cannot follow the shaft: from there to 2/Omega the damping ratio is taken back
-    to zero. A drive whose torque or observer is too slow for its elastic frequency so gets no feedback, but
+    *Limits of the feedback.* The model bridges the computing delay: the feedback takes T' as it will be then,
+    under the last demand. A delay tau in the loop (torque lag, the time in which a limited rate slews a
+    quarter of Ms, half a period, and observer's lag and computing delay as far as the model may miss the
+    load, J1/(J1 + J2)) turns damping into its opposite: the loop gain is one at Omega (zeta + sqrt(zeta^2 +
+    1)), and a phase margin of 30 degrees is kept there by zeta <= (m^2 - 1)/(2 m), m = (pi/3)/(Omega tau).
+    Where observer's lag and computing delay together exceed 1/Omega, the feedback cannot follow the shaft:
+    from there to 2/Omega the damping ratio is taken back to zero. A drive whose torque or observer is too
+    slow for its elastic frequency so gets no feedback, but
     the soft approach and the rise all the same; its gap, once closed, then counts as closed for good.
 
     If the load is not at its target speed within `patience`, the feedback is dropped and the limit raised,
@@ -282,21 +295,22 @@ class CurrentLimitFeedback(CompiledController):
             drive, period, drive.J1, self.low_torque, self.full_torque,
             2.0 * ratio * drive.J1 * drive.Omega / drive.c, threshold, opening,
             period / np.maximum(rise, period),
-            self.approach_speed, 2.0 * (period + drive.torque_lag), drive.initial_load_speed,
+            self.approach_speed, horizon(drive, period), drive.initial_load_speed,
             rolling * drive.Mc / drive.J2, self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
             drive.d * drive.Omega**2 / drive.c, drive.Mc, eyes.angle_gain, eyes.speed_gain, eyes.torque_gain,
-            eyes.rate_gain,
+            eyes.rate_gain, drive.torque_lag, drive.computing_delay, *pole(drive, drive.c),
         )  # fmt: skip
 
 
 def _damping_ratio(drive: Drive, eyes: Observer, period: Any) -> Any:
-    """0.7 less that of the shaft, and at most what the lag of torque and observer allow."""
+    """0.7 less that of the shaft, and at most what the delays of torque and observer allow."""
     unforeseen = drive.J1 / (drive.J1 + drive.J2)
+    foreseen = eyes.rate_lag + drive.computing_delay
     slewing = SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
-    delay = drive.torque_lag + slewing + 0.5 * np.asarray(period) + unforeseen * eyes.rate_lag
+    delay = drive.torque_lag + slewing + 0.5 * np.asarray(period) + unforeseen * foreseen
     m = (0.5 * math.pi - PHASE_LEFT) / (drive.Omega * delay)
     own = 0.5 * drive.d * drive.Omega / drive.c
-    following = np.clip(2.0 - drive.Omega * eyes.rate_lag, 0.0, 1.0)
+    following = np.clip(2.0 - drive.Omega * foreseen, 0.0, 1.0)
     return following * np.clip(DAMPING_RATIO - own, 0.0, np.maximum(0.5 * (m - 1.0 / m), 0.0))
 
 

@@ -22,6 +22,8 @@ from softstart_controllers.shaft_observer import DISTURBANCE, OUTPUT, TRANSITION
 
 CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
 
+CRANES_SHIPPED = ("crane-4amtkf", "crane-4amtkf-worn", "crane-4amtkf-light", "crane-4amtkf-light-worn")
+
 
 def crane(gap: float, J2: float, lag: float, kind: Any) -> Drive:
     return CRANE.replace(gap=gap, load_inertia=J2, torque_lag=lag, load_kind=kind)
@@ -35,20 +37,6 @@ def test_gap_and_start_position_enter_nowhere() -> None:
 
 
 # observer ------------------------------------------------------------------------------------------------
-
-
-def test_prediction_is_the_closed_form_of_its_model() -> None:
-    """J1 w1' = u - T with T'' constant, against a fine integration by hand."""
-    J1, h, u, bend = 0.035, 0.001, 40.0, 3e5
-    phi, w, T, R = 0.1, 5.0, 20.0, 900.0
-    n = 20_000
-    t = (np.arange(n) + 0.5) * h / n
-    a = (u - (T + R * t + 0.5 * bend * t * t)) / J1
-    got = predict(phi, w, T, R, bend, u, J1, h)
-    assert got[0] == pytest.approx(phi + w * h + np.sum(a * (h - t)) * h / n, rel=1e-9)
-    assert got[1] == pytest.approx(w + np.sum(a) * h / n, rel=1e-9)
-    assert got[2] == pytest.approx(T + R * h + 0.5 * bend * h * h, rel=1e-12)
-    assert got[3] == pytest.approx(R + bend * h, rel=1e-12)
 
 
 def test_the_design_matrices_are_those_of_the_prediction() -> None:
@@ -168,6 +156,17 @@ def test_invariant_to_gap_and_inertia(kind: Any, most: float, spread: tuple[floa
     assert soft.max() < most
     assert np.all(np.ptp(soft, axis=0) < spread)
     assert np.all(np.ptp(direct, axis=0) > 2.8)
+
+
+@pytest.mark.parametrize(
+    ("name", "lag"),
+    [("conveyor-11kw", 0.005), *((c, 0.0) for c in CRANES_SHIPPED), (CRANES_SHIPPED[0], 0.002)],
+)
+def test_the_computing_delay_is_counted(name: str, lag: float) -> None:
+    """K_dyn over that without delay: measured at most 0.050 more (0.177 were it left out of the design)."""
+    drive = Drive.load(name).replace(start_position="mid-gap", torque_lag=lag)
+    k_dyn = simulate(drive.replace(computing_delay=[0.0, 0.002, 0.004, 0.006]), CurrentLimitFeedback()).k_dyn
+    assert max(k_dyn.values) < k_dyn.values[0] + 0.06
 
 
 def test_servo_drives() -> None:
