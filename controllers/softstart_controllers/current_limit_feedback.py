@@ -173,9 +173,10 @@ class CurrentLimitFeedback(CompiledController):
     T' is below 0.2 Ms.
 
     *Gap open.* The low limit accelerates the motor until it is `approach_speed` faster than the load, and
-    keeps that speed: u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag + computing
-    delay)), 0, low_torque). The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down to half the approach speed,
-    no further), and after a contact the estimate w1 - T'/c of the instant at which it ended. With
+    keeps that speed: u = clip(J1 (w2 + approach_speed - w1)/(2 (period + lag + computing delay)), 0,
+    low_torque). The speed of the load is known: at the start w2(0), under an active load less Mc t/J2 (down
+    to half the approach speed, no further), and after a contact the estimate w1 - T'/c of the instant at
+    which it ended. With
     approach_speed = Omega M12avg_base/c the impact alone swings the shaft to M12avg_base, [G](12), that is to
     K_dyn = 1, which the full torque needs anyway; from however wide a gap.
 
