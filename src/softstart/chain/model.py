@@ -35,6 +35,7 @@ from softstart.chain.elements import (
 )
 from softstart.drive import UNKNOWN_POSITIONS, ContactLaw, Drive, Limits, library
 from softstart.drive.checks import wrong_units
+from softstart.drive.doubts import TwoMasses
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document, read_table
 from softstart.input.files import ABSENT, read_text, refusal_of
@@ -300,6 +301,37 @@ class Chain:
         )
 
     # ---- as a drive has it: what starts and comparisons ask for -------------------------------------------
+
+    @property
+    def lumped(self) -> TwoMasses:
+        """The chain as two masses: each split between motor and load by compliance (lever rule).
+
+        >>> round(Chain.from_drive(Drive.load("crane-4amtkf")).lumped.J2, 6)
+        0.175
+        """
+        at, motor = self.at_motor_shaft(), self.motor
+        path = list(at.path)
+        soft = np.where(at.rigid, 0.0, 1.0 / at.c)[path]
+        to_load = np.zeros(at.c.size)  # how much of the compliance each shaft of the path has
+        to_load[path] = soft / soft.sum() if soft.any() else 1.0 / len(path)
+        share = np.concatenate([[0.0], np.cumsum(to_load)])
+        share = share if at.load > at.motor or at.motor == 0 else 1.0 - share
+        J = at.J if at.held is None else np.full(at.J.size, math.nan)
+        drives = np.where(np.arange(at.c.size) >= at.motor, 1.0, -1.0)
+        twists = [drives * one.at_motor_shaft().theta0 for one in self.positions.values()]
+        return TwoMasses(
+            J1=float(J @ (1.0 - share)),
+            J2=float(J @ share),
+            c=float(1.0 / soft.sum()) if soft.any() else math.inf,
+            d=float(at.d[path] @ to_load[path] ** 2),
+            gap=float(at.gap[path].sum()),
+            travel=float(max(np.maximum(0.5 * at.gap - twist, 0.0)[path].sum() for twist in twists)),
+            Ms=math.nan if motor is None else motor.starting_torque,
+            Mc=float(at.Mc.sum()),
+            active=bool(np.any((at.Mc != 0.0) & ~at.reactive)),
+            speed=math.nan if self.target_speed is None else self.target_speed,
+            ratio=1.0 / float(at.speed_ratio[at.load]),
+        )
 
     @property
     def limits(self) -> Limits:

@@ -12,6 +12,7 @@ from softstart.cli.commands import Command
 from softstart.cli.completion import files_only, table_keys
 from softstart.cli.options import changes_option, json_option, read_changes
 from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
+from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.input.files import write_whole
 from softstart.input.parameters import Parameter, Wording, read_value
@@ -67,8 +68,11 @@ def init(
             raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
         write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
-        print_json({"data_sheet": found.summary(), "drive": drive.values()})
-    elif out is None:
+        print_json({"data_sheet": found.summary(), "drive": drive.values(), "doubts": doubts(drive)})
+        return
+    for one in doubts(drive):
+        click.echo(f"softstart: doubt: {one}", err=True)
+    if out is None:
         click.echo(text, nl=False)
     else:
         sentence(console(), f"{out} is written. What next: softstart compare {out}")

@@ -31,7 +31,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.quantities import whole_number
-from softstart.views.drives import drive_lines
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
     fits,
@@ -339,7 +338,7 @@ def fatigue(
         rows = list(found.rows)
         if controllers is None:
             rows.sort(key=lambda row: -row.relative)
-        print_lines(to, drive_lines(found.drive, fitted_to))
+        print_lines(to, starts.machine_lines(found.drive, fitted_to))
         to.print()
         print_table(to, lives.fatigue_table(found, rows))
         print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
@@ -360,7 +359,7 @@ def _fatigue_of_chain(
             lives.write_chain_fatigue(found, folder, command_line())
 
     def show(to: Console) -> None:
-        print_lines(to, chains.chain_lines(chain))
+        print_lines(to, starts.machine_lines(chain))
         for table in lives.chain_tables(found):
             to.print()
             print_table(to, table)

@@ -500,22 +500,6 @@ class Drive(ParameterSet):
             return 0.0
         return math.inf if isinstance(self.release, str) else self.release
 
-    @property
-    def doubt(self) -> str:
-        """A sentence if the start begins in a state that cannot last, and nobody said that it does; or "".
-
-        >>> Drive.load("crane-4amtkf").doubt
-        ''
-        """
-        falls = self.load_kind == "active" and np.any(self.Mc != 0.0) and self.brake == "none"
-        at_rest = np.all(self.initial_load_speed == 0.0) and np.all(self.initial_motor_speed == 0.0)
-        if not falls or not at_rest or "start_position" in vars(self)["_given"]:
-            return ""
-        return (
-            "start.position is not given: the start begins in mid-gap, where nothing holds this active load; "
-            'write "hanging" (and start.brake "motor" if a brake holds the motor), or "mid-gap" if it is so.'
-        )
-
     def with_gap(self, gap: Any, **changes: Any) -> Self:
         """The drive with another gap, its start where it was in the gap: as `replace`, for maps and wear.
 

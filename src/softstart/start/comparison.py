@@ -14,6 +14,7 @@ import numpy as np
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import Drive
+from softstart.drive.doubts import doubts
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.start import metrics
@@ -135,6 +136,7 @@ class Comparison:
             "fitted_to": None if self.fitted_to is None else self.fitted_to.name,
             "recommendation": self.recommendation.summary(),
             "strategies": [row.summary() for row in self.rows],
+            "doubts": doubts(self.drive),
         }
 
 

@@ -18,11 +18,8 @@ POSITIONS = {
 }
 
 
-def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
-    """The drive in a few lines: its name, the parameters that matter, and under which laws it starts.
-
-    With `fitted_to`, also for which drive the controllers are set up.
-    """
+def drive_lines(drive: Drive) -> list[str]:
+    """The drive in a few lines: its name, the parameters that matter, and under which laws it starts."""
     extra = []
     if drive.d:
         extra.append(f"d = {short(float(drive.d))} N m s/rad")
@@ -63,8 +60,6 @@ def drive_lines(drive: Drive, fitted_to: Drive | None = None) -> list[str]:
         f"  start  to {short(float(drive.target_speed))} rad/s ({rpm:.4g} rpm)",
         *(["  also   " + ", ".join(extra)] if extra else []),
         *([f"  assumed: {printable(drive.assumed)}"] if drive.assumed else []),
-        *([f"  note   {drive.doubt}"] if drive.doubt else []),
-        *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to is not None else []),
     ]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softstart.chain.model import Chain
 from softstart.drive import Drive
+from softstart.drive.doubts import doubts
 from softstart.language import later, said
 from softstart.start.comparison import Comparison
 from softstart.start.metrics import SETTLED_BAND
@@ -56,11 +57,13 @@ SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 
 
 def machine_lines(machine: Drive | Chain, fitted_to: Drive | None = None) -> list[str]:
-    """The drive or chain in a few lines, and for which drive the controllers are set up if for another."""
-    if isinstance(machine, Drive):
-        return drive_lines(machine, fitted_to)
-    set_up = [] if fitted_to is None else [f"  {controllers_set_up(None, fitted_to)}"]
-    return [*chains.chain_lines(machine), *set_up]
+    """The machine in a few lines, what is doubted of it, and for which drive the controllers are set up."""
+    drive = machine if isinstance(machine, Drive) else None
+    return [
+        *(drive_lines(machine) if isinstance(machine, Drive) else chains.chain_lines(machine)),
+        *(f"  doubt  {one}" for one in doubts(machine)),
+        *([f"  {controllers_set_up(drive, fitted_to)}"] if fitted_to else []),
+    ]
 
 
 def figure_rows(run: Run) -> list[list[str]]:
@@ -520,6 +523,7 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
 
     parts = [
         f"# {markdown(name)}: soft-start strategies compared",
+        *(f"Doubt: {markdown(one)}" for one in doubts(comparison.drive)),
         comparison.recommendation.text,
         markdown_table(comparison_table(rows)),
         *notes(comparison),

@@ -1,0 +1,150 @@
+"""Values of a machine that are possible and hardly ever true: mostly a wrong unit, or an inverted ratio."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple, Protocol
+
+from softstart.drive.checks import elastic_frequency
+from softstart.drive.model import Drive
+from softstart.errors import InputError
+
+__all__ = ["TwoMasses", "doubts"]
+
+
+class TwoMasses(NamedTuple):
+    """A machine as two masses at the motor shaft; NaN for what it does not have.
+
+    `travel` is that through the gap to the driving flank, `speed` what the load is to reach.
+    """
+
+    J1: float  # kg m2
+    J2: float  # kg m2
+    c: float  # N m/rad
+    d: float  # N m s/rad
+    gap: float  # rad
+    travel: float  # rad
+    Ms: float  # N m, less the friction of the motor
+    Mc: float  # N m
+    active: bool
+    speed: float  # rad/s
+    ratio: float  # turns of the motor for one of the output
+
+
+class Lumped(Protocol):
+    """A machine of more masses that says what it is as two: `Chain`."""
+
+    @property
+    def lumped(self) -> TwoMasses: ...
+
+
+def doubts(machine: Drive | Lumped) -> list[str]:
+    """Sentences on what can hardly be: each with the value, what is usual, and the likeliest mistake.
+
+    Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed
+    at most 10,000 rpm; start under the starting torque, (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of
+    direct at the first contact, [G](16) and (18), at most 8; no ratio below 1 before the larger inertia. A
+    chain counts by the lever rule. Raises `InputError` for a batch of drives.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> doubts(crane)
+    []
+    >>> doubts(crane.replace(target_speed=880))[0][:56]
+    'target speed 8,403 rpm, '
+    """
+    if not isinstance(machine, Drive):
+        return list(_doubts(machine.lumped))
+    if machine.shape != ():
+        raise InputError(f"{machine.name}: doubts are those of one drive; give its elements().")
+    return [*_doubts(_of_drive(machine)), *_nothing_holds(machine)]
+
+
+def _of_drive(drive: Any) -> TwoMasses:
+    return TwoMasses(
+        J1=drive.J1,
+        J2=drive.J2,
+        c=drive.c,
+        d=drive.d,
+        gap=drive.gap,
+        travel=max(0.0, *(0.5 * drive.gap - one.theta0 for one in drive.positions.values())),
+        Ms=drive.Ms - drive.motor_friction,
+        Mc=drive.Mc,
+        active=drive.load_kind == "active",
+        speed=drive.target_speed,
+        ratio=math.nan if drive.gear_ratio is None else drive.gear_ratio,
+    )
+
+
+def _doubts(of: TwoMasses) -> Iterator[str]:
+    """Comparisons with NaN are false, so that nothing is doubted that is not known."""
+    J1, J2, c, Ms, Mc = of.J1, of.J2, of.c, of.Ms, of.Mc
+    rpm = of.speed * 30.0 / math.pi
+    Omega = elastic_frequency(J1, J2, c)
+    frequency = float(Omega) / (2.0 * math.pi)
+    if frequency < 0.5 or 500.0 < frequency < math.inf:
+        yield (
+            f"elastic frequency {frequency:.4g} Hz, where drives have 0.5 to 500 Hz: a stiffness per degree "
+            "or in kN m, an inertia in kg cm2 or g m2 written as kg m2, or a value that is not at the motor "
+            "shaft (divided by the ratio squared)?"
+        )
+    if of.gap > math.pi:
+        yield (
+            f"gap {of.gap:.4g} rad at the motor shaft, more than half a turn (3.14 rad), where drives have "
+            "0.001 to 2 rad: degrees, arcmin or mm written as rad?"
+        )
+    if not math.isnan(J2 / J1) and not 0.01 <= J2 / J1 <= 100.0:
+        yield (
+            f"inertia of the load {J2 / J1:.4g} times that of the motor, where drives have 0.01 to 100 "
+            "times: not at the motor shaft (divided by the ratio squared), the ratio inverted, or kg cm2 "
+            "or g m2 written as kg m2?"
+        )
+    if of.ratio < 1.0 and J2 > J1:
+        yield (
+            f"gear ratio {of.ratio:.4g} before a load of {J2 / J1:.4g} times the inertia of the motor, where "
+            f"gears slow such a load down: inverted? It counts turns of the motor for one of the output, "
+            f"perhaps {1.0 / of.ratio:.4g}."
+        )
+    if rpm > 10_000.0:
+        yield (
+            f"speed {rpm:,.0f} rpm, where motors run at up to 10,000 rpm: rpm written without a unit? A bare "
+            f'number is rad/s; write "{of.speed:.4g} rpm".'
+        )
+    time = (J1 + J2) * of.speed / (Ms - Mc) if Ms > Mc else math.nan
+    if time > 60.0:
+        yield (
+            f"start under full starting torque {time:,.4g} s, (J1 + J2) w/(Ms - Mc), where starts take up to "
+            "a minute: kW written as W, kg cm2 as kg m2, a load that is not at the motor shaft, or the ratio "
+            "inverted?"
+        )
+    k = _k_dyn_of_direct(of, float(Omega))
+    if 8.0 < k < math.inf:
+        yield (
+            f"K_dyn of direct about {k:.4g} by [G](16) and (18), where drives have up to 8: a gap "
+            "in degrees, arcmin or mm written as rad, the stiffness of one part alone, or a wrong unit of torque?"
+        )
+
+
+def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
+    """Peak of the first contact over M12avg, (16) and (18), less what a quarter period of damping takes off.
+
+    An active load turns back in the gap; the flanks meet at sqrt(2 a travel).
+    """
+    J = of.J1 * of.J2 / (of.J1 + of.J2)
+    mean = (of.Ms * of.J2 + of.J1 * of.Mc) / (of.J1 + of.J2)
+    if not mean > 0.0:
+        return math.nan
+    a = of.Ms / of.J1 + (of.Mc / of.J2 if of.active else 0.0)
+    decay = math.exp(-0.25 * math.pi * of.d / (J * Omega))
+    return 1.0 + decay * math.sqrt(1.0 + of.c * J * 2.0 * a * of.travel / mean**2)
+
+
+def _nothing_holds(drive: Drive) -> Iterator[str]:
+    """The start begins in a state that cannot last, and nobody said that it does."""
+    falls = drive.load_kind == "active" and drive.Mc != 0.0 and drive.brake == "none"
+    at_rest = drive.initial_load_speed == drive.initial_motor_speed == 0.0
+    if falls and at_rest and "start_position" not in drive.given():
+        yield (
+            "start.position is not given: the start begins in mid-gap, where nothing holds this active load; "
+            'write "hanging" (and start.brake "motor" if a brake holds the motor), or "mid-gap" if it is so.'
+        )

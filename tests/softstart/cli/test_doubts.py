@@ -1,0 +1,88 @@
+"""What can hardly be is doubted: each limit on both sides, and no machine that is shipped."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from softstart import Chain, Drive, simulate
+from softstart.chain.elements import LIBRARY, Mass, Motor, Shaft
+from softstart.drive import library
+from softstart.drive.doubts import doubts
+
+CRANE = Drive.load("crane-4amtkf")
+J = 0.035 * 0.175 / 0.21  # of the elastic mode
+TURN = 2.0 * math.pi
+
+
+@pytest.mark.parametrize("machine", [*library.names(), *LIBRARY.names()])
+def test_no_shipped_machine_is_doubted(machine: str) -> None:
+    assert doubts((Drive if machine in library.names() else Chain).load(machine)) == []
+
+
+@pytest.mark.parametrize(
+    ("about", "at_limit", "beyond", "others"),
+    [
+        ("elastic frequency", {"stiffness": J * (0.5 * TURN) ** 2}, 0.99, {}),
+        ("elastic frequency", {"stiffness": J * (500 * TURN) ** 2}, 1.01, {"gap": 0.0}),
+        ("half a turn", {"gap": math.pi}, 1.01, {}),
+        ("inertia of the load", {"load_inertia": 0.01 * 0.035}, 0.99, {}),
+        ("inertia of the load", {"load_inertia": 100 * 0.035}, 1.01, {}),
+        ("rpm", {"target_speed": 10_000 * TURN / 60}, 1.01, {}),
+        ("a minute", {"starting_torque": 7.16 + 0.21 * 92.153 / 60}, 0.999, {}),
+    ],
+)  # fmt: skip
+def test_each_limit_on_both_sides(
+    about: str, at_limit: dict[str, float], beyond: float, others: dict[str, float]
+) -> None:
+    ((name, value),) = at_limit.items()
+    inward = 1.0 + 1e-3 * math.copysign(1.0, 1.0 - beyond)
+    within, without = (CRANE.replace(**{name: share * value}, **others) for share in (inward, beyond))
+    for of in (lambda drive: drive, Chain.from_drive):
+        assert not any(about in one for one in doubts(of(within)))
+        (found,) = (one for one in doubts(of(without)) if about in one)
+        assert found.endswith(("?", ".")), "the likeliest mistake comes last"
+
+
+@pytest.mark.parametrize(
+    ("inertia", "ratio", "doubted"), [(0.6, 0.99, True), (0.6, 1.0, False), (0.03, 0.5, False)]
+)
+def test_a_ratio_below_one_is_doubted_before_the_larger_inertia(
+    inertia: float, ratio: float, doubted: bool
+) -> None:
+    """A fan may turn faster than its motor."""
+    chain = Chain([Mass(0.4), Mass(inertia)], [Shaft(4000, gap=0.1, ratio=ratio)], Motor(62, rated_speed=90))
+    drive = CRANE.replace(motor_inertia=0.4, load_inertia=inertia / ratio**2, gear_ratio=ratio)
+    for machine in (chain, drive):
+        assert [one[:16] for one in doubts(machine)] == ["gear ratio 0.99 "] * doubted
+
+
+@pytest.mark.parametrize("position", ["mid-gap", "opposite-flank", "hanging"])
+def test_k_dyn_that_is_doubted_is_that_of_the_start(position: str) -> None:
+    """Undamped, the estimate is the peak of the first contact itself, [G](16) and (18)."""
+    for stiffness, doubted in ((368.465, False), (3684.65, True)):
+        drive = CRANE.replace(start_position=position, gap=3.0, stiffness=stiffness)
+        k = simulate(drive, "direct").k_dyn_first_contact
+        found = [one for one in doubts(drive) if one.startswith("K_dyn of direct")]
+        assert bool(found) == (k > 8.0) == (doubted and position != "hanging")
+        assert not found or f"about {k:.4g} " in found[0]
+
+
+def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run) -> None:
+    """Of 9 arcmin written as 9 rad, behind 25:1, come 225 rad at the motor."""
+    sheet = {
+        "load.machine": "rotor", "motor.power": "15 kW", "motor.speed": "1460 rpm", "motor.inertia": 0.09,
+        "gear.ratio": 25, "gear.backlash": "9 rad", "gear.stiffness": "1.1e6 N*m/rad", "load.inertia": 290,
+    }  # fmt: skip
+    settings = [part for key, value in sheet.items() for part in ("--set", f"{key}={value}")]
+    code, out, err = run("init", *settings, "--out", "mine.toml")
+    assert code == 0
+    assert "doubt: gap 225 rad at the motor shaft" in err
+    gap, k_dyn = json.loads(run("init", *settings, "--json").out)["doubts"]
+    assert gap.startswith("gap 225 rad")
+    code, out, err = run("compare", "mine.toml", "--controllers", "direct", "--json")
+    assert json.loads(out)["doubts"] == [gap, k_dyn]
+    out = run("compare", "mine.toml", "--controllers", "direct").out
+    assert out.count("  doubt  gap 225 rad") == out.count("  doubt  K_dyn of direct about") == 1
