@@ -121,7 +121,7 @@ def _doubts(of: TwoMasses) -> Iterator[str]:
     if 8.0 < k < math.inf:
         yield (
             f"K_dyn of direct about {k:.4g} by [G](16) and (18), where drives have up to 8: a gap "
-            "in degrees, arcmin or mm written as rad, the stiffness of one part alone, or a wrong unit of torque?"
+            "in degrees, arcmin or mm written as rad, the stiffness of one part alone, or a wrong unit?"
         )
 
 
