@@ -116,7 +116,7 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "clutch": ["--law", "--set", "--until", "--optimal", "--points", "--nondecreasing", "--json"],
     "balance": ["--speed", "--set", "--json"],
-    "report": ["--controllers", "--set", "--param", "--resolution", "--budget", "--project", "--sentences"],
+    "report": ["--controllers", "--set", "--param", "--resolution", "--budget", "--project"],
     "serve": ["--set", "--port", "--host", "--token", "--expose"],
     "init": ["--set", "--json"],
     "identify": [

@@ -49,18 +49,8 @@ BROWSERS = (
     "C:/Program Files/Google/Chrome/Application/chrome.exe",
     "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
 )
-EXAMPLES = {"--out": "report.html", "--pdf": "report.pdf", "--sentences": "german.toml"}
+EXAMPLES = {"--out": "report.html", "--pdf": "report.pdf"}
 PRINTING = 120.0  # s for a browser to print a report
-
-
-def _write_sentences(context: click.Context, _option: click.Parameter, path: str | None) -> None:
-    """Write the file of a translation, and end."""
-    if path is None:
-        return
-    _check_file("--sentences", path)
-    count, missing = reporting.write_sentences(Path(path))
-    click.echo(f"{path}: {count} sentences, {missing} of them not translated yet")
-    context.exit()
 
 
 def _read_resolution(text: str, option: str) -> reporting.Resolution:
@@ -116,17 +106,8 @@ def _check_files(given: Mapping[str, Any]) -> None:
     "--project",
     metavar="FILE",
     type=Reading(lambda path, option: reporting.Project.load(path)),
-    help="TOML file with customer, project, author, logo, revisions, approval, data sources, paper size, "
-    "decimal sign and language (example in docs/howto/read-a-report.md).",
-)
-@click.option(
-    "--sentences",
-    metavar="FILE",
-    expose_value=False,
-    is_eager=True,
-    callback=_write_sentences,
-    help="Write all texts of the report to a TOML file for translation, and exit; existing translations "
-    "are kept. The project file refers to it: language = FILE.",
+    help="TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and "
+    "decimal sign (example in docs/howto/read-a-report.md).",
 )
 @json_option
 def report(

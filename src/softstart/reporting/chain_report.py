@@ -16,7 +16,6 @@ from softstart.controller.base import label_of
 from softstart.controller.finding import ready_controller_names
 from softstart.errors import InputError, SimulationError, listed
 from softstart.input.files import write_whole
-from softstart.language import said, speaking
 from softstart.quantities import Units
 from softstart.reporting import document
 from softstart.reporting.first_page import answer, tiles, verdicts
@@ -96,9 +95,8 @@ class ChainReport:
     @property
     def headline(self) -> str:
         """The answer in one sentence or two."""
-        with speaking(self.project.language.table):
-            what = said("The largest shaft torque, brought to the motor shaft,")
-            return answer(self.comparison.recommendation, self.chosen, self.direct, what)
+        what = "The largest shaft torque, brought to the motor shaft,"
+        return answer(self.comparison.recommendation, self.chosen, self.direct, what)
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain data, for JSON: as `compare` gives it, what is chosen, and where it is from."""
@@ -185,12 +183,8 @@ def report_chain(
                 raise
             failed.append((label_of(one), " ".join(str(error).split())))
     comparison = Comparison(chain, tuple(rows), worst_case=rows[0].worst_case)
-    with speaking(about.language.table):  # what is recommended is said once
-        assert comparison.recommendation.text
-        found = ChainReport(
-            chain, comparison, tuple(failed), provenance(chain, command), about, resolution=steps
-        )
-        return _with_limit_and_sheet(found, made, budget, progress or (lambda share, what: None))
+    found = ChainReport(chain, comparison, tuple(failed), provenance(chain, command), about, resolution=steps)
+    return _with_limit_and_sheet(found, made, budget, progress or (lambda share, what: None))
 
 
 def _with_limit_and_sheet(
@@ -221,15 +215,15 @@ def _page(report: ChainReport) -> str:
     figures = Figures()
     first = _first_page(report, figures)
     sections = [
-        ("compared", said("The strategies compared"), _strategies(report)),
-        ("starts", said("The starts in detail"), _starts(report, figures)),
-        ("gentlest", said("How gentle could a start be?"), _limit(report, figures)),
-        ("sheet", said("Parameter sheets for the inverter"), _sheets(report)),
-        ("chain", said("The chain"), _chain(report.drive, figures)),
-        ("validity", said("What this report assumes, and where it holds"), _validity(report.drive)),
+        ("compared", "The strategies compared", _strategies(report)),
+        ("starts", "The starts in detail", _starts(report, figures)),
+        ("gentlest", "How gentle could a start be?", _limit(report, figures)),
+        ("sheet", "Parameter sheets for the inverter", _sheets(report)),
+        ("chain", "The chain", _chain(report.drive, figures)),
+        ("validity", "What this report assumes, and where it holds", _validity(report.drive)),
         (
             "provenance",
-            said("About this document"),
+            "About this document",
             document.provenance_section(report.provenance, report.project, chain=True),
         ),
     ]
@@ -241,16 +235,16 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
     direct, best = report.direct, report.chosen
     rows = _shown(report)
     limits = report.comparison.recommendation.limits
-    caption = said(
-        "{names}: torques of motor and shafts, brought to the motor shaft, computed for the chain as it is.",
-        names=listed([row.name for row in rows]),
+    caption = (
+        f"{listed([row.name for row in rows])}: torques of motor and shafts, brought to the motor "
+        "shaft, computed for the chain as it is."
     )
     return html(
-        tag("section", tag("p", report.headline), class_="answer", aria_label=said("The answer")),
+        tag("section", tag("p", report.headline), class_="answer", aria_label="The answer"),
         tag("p", " ".join(_sentences(report.drive)[:2]), class_="small"),
         figures.shown(
             "before-after",
-            lambda: inlined(starts.comparison_figure(rows, ""), "before-after", said("Before and after.")),
+            lambda: inlined(starts.comparison_figure(rows, ""), "before-after", "Before and after."),
             caption,
         ),
         _tiles(report, best, direct) if best is not None else None,
@@ -258,23 +252,21 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
         if limits
         else tag(
             "p",
-            said(
+            (
                 "Neither passed nor failed: the chain's file permits no torque. Give the permissible_torque "
                 "of a shaft there, and this page says what passes, with the margin."
             ),
             class_="verdict",
         ),
-        _table(
-            _gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), said("Strategies on this chain"), best
-        ),
+        _table(_gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), "Strategies on this chain", best),
     )
 
 
 def _tiles(report: ChainReport, best: Row, direct: Row) -> Html:
     names = report.drive.shaft_names
-    worst = said("direct: {shaft}", shaft=names[direct.run.worst_shaft])
-    where = said("is largest in"), names[best.run.worst_shaft], worst
-    return tiles(best, direct, said("largest shaft torque"), where)
+    worst = f"direct: {names[direct.run.worst_shaft]}"
+    where = "is largest in", names[best.run.worst_shaft], worst
+    return tiles(best, direct, "largest shaft torque", where)
 
 
 def _shown(report: ChainReport) -> list[Row]:
@@ -300,15 +292,12 @@ def _strategies(report: ChainReport) -> Html:
         shafts, others = shafts[:-1], (*shafts[-1:], *others)
     notes = [
         *starts.notes(report.comparison),
-        *(
-            said("{name} could not be examined: {reason}", name=name, reason=reason)
-            for name, reason in report.failed
-        ),
+        *(f"{name} could not be examined: {reason}" for name, reason in report.failed),
     ]
     return html(
         tag("p", report.comparison.recommendation.text),
-        _table(rows, (*starts.QUICK, *others), said("How quick, and how often gaps close"), best),
-        _table(rows, shafts, said("K_dyn of each shaft"), best) if 1 < count <= MOST_SHAFTS else None,
+        _table(rows, (*starts.QUICK, *others), "How quick, and how often gaps close", best),
+        _table(rows, shafts, "K_dyn of each shaft", best) if 1 < count <= MOST_SHAFTS else None,
         tag("ul", joined(tag("li", one) for one in notes), class_="notes"),
     )
 
@@ -318,10 +307,10 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
     parts, pictures = [], []
     for row in reversed(_shown(report)):
         key = f"start-{label_of(row.run.controller)}"
-        title = said("{name}: torques, speeds and twists", name=row.name)
+        title = f"{row.name}: torques, speeds and twists"
         parts += [
             tag("h3", row.name),
-            tag("p", said("Parameters: {values}.", values=values))
+            tag("p", f"Parameters: {values}.")
             if (values := _parameters(row.run.controller, units_of(report.drive)))
             else None,
             printed(chains.shaft_table(row.run)),
@@ -330,10 +319,9 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
             figures.shown(
                 key,
                 partial(_start_picture, row, key, title),
-                said(
-                    "{name}: torques with their peaks, speeds, and the twist of each shaft with a gap over "
-                    "half its gap (within -1 and 1 the gap is open).",
-                    name=row.name,
+                (
+                    f"{row.name}: torques with their peaks, speeds, and the twist of each shaft with a gap "
+                    "over half its gap (within -1 and 1 the gap is open)."
                 ),
             )
         )
@@ -348,18 +336,18 @@ def _limit(report: ChainReport, figures: Figures) -> Html:
     motor = chain.motor
     assert motor is not None
     least, most = motor.minimum_torque, min(motor.starting_torque, motor.maximum_torque)
-    bound = said(
-        "Lower bound: proved from the momentum of the load mass, for every torque from {least} to {most} N m "
-        "over time, however often and in whichever order the gaps close.",
-        least=short(float(least)),
-        most=short(float(most)),
+    bound = (
+        "Lower bound: proved from the momentum of the load mass, for every torque from "
+        f"{short(float(least))} to {short(float(most))} N m over time, however often and in whichever "
+        "order the gaps close."
     )
-    none = said("There is no bound for this chain: gears with losses, or a motor on the load mass.")
-    caption = said(
-        "Every strategy (filled: the chosen one) by its start time and K_dyn. Below the dashed line "
-        "(hatched) no start is possible, with whatever motor torque and however it is controlled."
+    none = "There is no bound for this chain: gears with losses, or a motor on the load mass."
+    caption = (
+        "Every strategy (filled: the chosen one) by its start time and K_dyn. Below the dashed "
+        "line (hatched) no start is possible, with whatever motor torque and however it is "
+        "controlled."
     )
-    title = said("K_dyn of the chain against start time")
+    title = "K_dyn of the chain against start time"
     return html(
         figures.shown(
             "limit",
@@ -378,22 +366,16 @@ def _limit(report: ChainReport, figures: Figures) -> Html:
 def _on_optimum(limit: Limit) -> list[str]:
     """What the search on the chain found."""
     notes = [
-        said(
-            "In {time} s, the start time of the chosen strategy, the gentlest start found has K_dyn {k_dyn}: "
-            "by linear programs on the exact start of the chain, from the torque of that strategy. It is "
-            "simulated exactly, and not proved the gentlest; softstart optimize writes its torque.",
-            time=digits(p.start_time_bound),
-            k_dyn=fixed(p.k_dyn, 3),
+        (
+            f"In {digits(p.start_time_bound)} s, the start time of the chosen strategy, the gentlest start "
+            f"found has K_dyn {fixed(p.k_dyn, 3)}: by linear programs on the exact start of the chain, from "
+            "the torque of that strategy. It is simulated exactly, and not proved the gentlest; softstart "
+            "optimize writes its torque."
         )
         for p in limit.found
     ]
     if limit.missing and limit.budget > 0.0:
-        notes.append(
-            said(
-                "No optimum was found within the {budget} s given (more: --budget).",
-                budget=short(limit.budget),
-            )
-        )
+        notes.append(f"No optimum was found within the {short(limit.budget)} s given (more: --budget).")
     return notes
 
 
@@ -405,7 +387,7 @@ def _sheets(report: ChainReport) -> Html:
         report.sheets,
         report.resolution,
         report.chosen.name if report.chosen else "",
-        said("recommended") if recommended else said("gentlest unbeaten"),
+        "recommended" if recommended else "gentlest unbeaten",
     )
 
 
@@ -422,12 +404,12 @@ def _parameters(controller: Controller, units: Units) -> str:
 
 def _life(report: ChainReport) -> Html:
     """The life of each shaft beside that under direct, or why it is not counted."""
-    title = tag("h3", said("Life of the shafts"))
+    title = tag("h3", "Life of the shafts")
     rows = _gentlest_first(report)
     try:
         found = chain_fatigue([row.run for row in rows])
     except InputError as error:
-        return html(title, tag("p", said("Not counted: {reason}", reason=" ".join(error.sentences))))
+        return html(title, tag("p", f"Not counted: {' '.join(error.sentences)}"))
     shown = lives.chain_tables(found)[1] if len(report.drive.shafts) <= MOST_SHAFTS else None
     notes = [lives.chain_conclusion(found), *lives.chain_notes(found)]
     return html(title, shown and printed(shown), tag("p", " ".join(notes)))
@@ -447,13 +429,13 @@ def _chain(chain: Chain, figures: Figures) -> Html:
         figures.shown(
             "scheme",
             lambda: Html(chain_schemes.scheme_svg(chain)),
-            said("The chain: masses, shafts, gaps and gears, and below them its first elastic shape."),
+            "The chain: masses, shafts, gaps and gears, and below them its first elastic shape.",
         ),
         printed(chains.frequencies_table(vibration)),
         figures.shown(
             "shapes",
-            lambda: inlined(chains.shapes_figure(vibration), "shapes", said("Lowest elastic shapes")),
-            said("Lowest elastic shapes with the gaps closed; circles: nodes."),
+            lambda: inlined(chains.shapes_figure(vibration), "shapes", "Lowest elastic shapes"),
+            "Lowest elastic shapes with the gaps closed; circles: nodes.",
         ),
     )
 
@@ -472,13 +454,11 @@ def _validity(chain: Chain) -> Html:
         document.motor_sentence(
             float(motor.minimum_torque), float(motor.maximum_torque), float(motor.torque_lag)
         ),
-        said(
-            "Controllers are set up for the two masses that stand for the chain, and start the chain itself."
-        ),
-        said(
+        "Controllers are set up for the two masses that stand for the chain, and start the chain itself.",
+        (
             "The equations are solved as Taylor series from event to event; peaks are located, not read off "
             "a grid."
         ),
-        said("Not in this report: maps over wear and load; the page (softstart serve) draws them."),
+        "Not in this report: maps over wear and load; the page (softstart serve) draws them.",
     ]
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

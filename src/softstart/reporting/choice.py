@@ -9,7 +9,6 @@ from typing import Any
 
 from softstart.controller.base import Effort
 from softstart.errors import listed
-from softstart.language import said
 from softstart.reporting.markup import Html, html, table, tag
 from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import realisable
@@ -75,7 +74,7 @@ class Choice:
     @property
     def role(self) -> str:
         """What the chosen one is, in a word or two."""
-        return said("gentlest unbeaten") if self.recommendation.recommended is None else said("recommended")
+        return "gentlest unbeaten" if self.recommendation.recommended is None else "recommended"
 
     def of(self, name: str) -> Candidate | None:
         """The candidate of this name."""
@@ -129,57 +128,51 @@ def choice_section(choice: Choice, answer: str) -> Html:
     """The answer, the rule behind it, and every strategy before it."""
     limits = bool(choice.recommendation.limits)
     cases = choice.candidates[0].row.worst_case
-    worst = (
-        said("on the drive as it is, with {cases}", cases=listed([said(case) for case in cases]))
-        if cases
-        else said("on the drive as it is")
-    )
+    worst = f"on the drive as it is, with {listed(list(cases))}" if cases else "on the drive as it is"
     rule = (
-        said(
-            "The rule: the simplest strategy that keeps the limits of the drive {worst}, of several of the "
+        (
+            f"The rule: the simplest strategy that keeps the limits of the drive {worst}, of several of the "
             "same effort the one with the larger margin. Effort rises from what a contactor does to ramps, "
-            "torque steps, code of your own, and the same with an encoder.",
-            worst=worst,
+            "torque steps, code of your own, and the same with an encoder."
         )
         if limits
-        else said(
-            "The rule: the drive has no limits, so nothing says which peak is low enough. Those strategies "
-            "are named that no other one beats in K_dyn and settled time at once, with the cost of each "
-            "step."
+        else (
+            "The rule: the drive has no limits, so nothing says which peak is low enough. Those "
+            "strategies are named that no other one beats in K_dyn and settled time at once, with the "
+            "cost of each step."
         )
     )
     timed = choice.candidates[0].row.run.drive.limits.start_time is not None
     never = (
-        said(
+        (
             "Never recommended: what is flagged (harder than direct start, not settled), and what needs a "
             "sensor that drives do not have."
         )
         if timed
-        else said(
-            "Never recommended: what is flagged (harder than direct start, not settled, more than {slow} "
-            "times as slow), and what needs a sensor that drives do not have.",
-            slow=short(SLOW),
+        else (
+            "Never recommended: what is flagged (harder than direct start, not settled, more than "
+            f"{short(SLOW)} times as slow), and what needs a sensor that drives do not have."
         )
     )
     order = sorted(choice.candidates, key=lambda one: (one.row.effort.order, one.row.run.k_dyn))
     units = units_of(choice.candidates[0].row.run.drive)
     rows = [
         [
-            one.name, said(one.row.run.controller.summary), said(one.row.effort.meaning), fixed(one.worst, 3),
+            one.name, one.row.run.controller.summary, one.row.effort.meaning, fixed(one.worst, 3),
             digits(units.shown(one.map.worst_at[0], "rad"), 3), digits(one.map.worst_at[1], 3), one.verdict,
         ]
         for one in order
     ]  # fmt: skip
     strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
-    heads = said(
-        "strategy | what it does | takes | worst K_dyn on the map | at gap, {unit} | and J2, kg m² | verdict",
-        unit=units.angle,
+    heads = (
+        f"strategy | what it does | takes | worst K_dyn on the map | at gap, {units.angle} | and J2, "
+        "kg m² | verdict"
     ).split(" | ")
     return html(
         tag("p", answer),
         tag("p", rule, " ", never),
         table(
-            heads, rows, caption=said("Every strategy before the rule, in the order of effort"),
+            heads, rows, caption="Every strategy before the rule, in the order of effort",
             text_columns=(0, 1, 2, 6), strong=strong, class_="words",
         ),
     )  # fmt: skip

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from softstart.drive import Drive
 from softstart.errors import listed
-from softstart.language import said, speaking
 from softstart.reporting.choice import Candidate, Choice, choice_section
 from softstart.reporting.drive_section import drive_section
 from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
@@ -68,7 +67,7 @@ def document(report: Report) -> str:
 
 def whole(project: Project, made: Callable[[], str]) -> str:
     """The page that is `made`, its figures drawn with any letters, with the project's decimal sign."""
-    with _any_script(), speaking(project.language.table):
+    with _any_script():
         text = typeset(made())
     return with_comma(text) if project.decimal == "comma" else text
 
@@ -80,28 +79,28 @@ def _document(report: Report) -> str:
     best = choice.chosen.name if choice.chosen else ""
     first = first_page(report, figures)
     sections: list[tuple[str, str, Html]] = [
-        ("recommendation", said("The recommendation, and why"), choice_section(choice, answer(report))),
+        ("recommendation", "The recommendation, and why", choice_section(choice, answer(report))),
         (
             "strategies",
-            said("The strategies compared"),
+            "The strategies compared",
             strategies_section(drive, rows, chosen, report.failed),
         ),
-        ("traces", said("Torques of each start"), traces_section(rows, figures)),
-        ("drive", said("The drive"), drive_section(drive, project, figures)),
-        ("limit", said("How gentle could a start be?"), limit_section(drive, choice, report.limit, figures)),
+        ("traces", "Torques of each start", traces_section(rows, figures)),
+        ("drive", "The drive", drive_section(drive, project, figures)),
+        ("limit", "How gentle could a start be?", limit_section(drive, choice, report.limit, figures)),
         (
             "robustness",
-            said("When the gap wears and the load changes"),
+            "When the gap wears and the load changes",
             robustness_section(drive, choice.mapped, figures),
         ),
         (
             "sheets",
-            said("Parameter sheets for the inverter"),
+            "Parameter sheets for the inverter",
             sheet_section(drive, report.sheets, report.resolution, best, choice.role),
         ),
         *life_chapter(report.lives, figures),
-        ("validity", said("What this report assumes, and where it holds"), validity_section(drive, project)),
-        ("provenance", said("About this document"), provenance_section(report.provenance, project)),
+        ("validity", "What this report assumes, and where it holds", validity_section(drive, project)),
+        ("provenance", "About this document", provenance_section(report.provenance, project)),
     ]
     return page(str(drive.name), project, report.provenance.made, first, sections)
 
@@ -112,11 +111,11 @@ def page(
     """A whole file: head, first page, contents, and numbered sections, each (key, title, content)."""
     contents = tag(
         "nav",
-        tag("h2", said("Contents"), id="contents"),
+        tag("h2", "Contents", id="contents"),
         tag("ol", joined(tag("li", tag("a", title, href=f"#{key}")) for key, title, _ in sections)),
         aria_labelledby="contents",
     )
-    heads = [*project.lines, (said("Date"), made)]
+    heads = [*project.lines, ("Date", made)]
     names = [tag("div", tag("dt", what), tag("dd", value)) for what, value in heads]
     body = tag(
         "main",
@@ -125,11 +124,11 @@ def page(
             tag(
                 "img",
                 src=project.logo,
-                alt=said("Logo of {company}", company=project.company or project.author),
+                alt=f"Logo of {project.company or project.author}",
             )
             if project.logo
             else None,
-            tag("p", said("Soft start of a drive with backlash in its transmission"), class_="kind"),
+            tag("p", "Soft start of a drive with backlash in its transmission", class_="kind"),
             tag("h1", name),
             tag("dl", *names, class_="made"),
         ),
@@ -153,12 +152,12 @@ def page(
         tag("meta", http_equiv="Content-Security-Policy", content=guard),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light"),
-        tag("title", said("{name}: soft start report", name=name)),
+        tag("title", f"{name}: soft start report"),
         tag("style", Html(style(name, " · ".join(filter(None, (project.number, made))), project.paper))),
     )
     return html(
         Html("<!DOCTYPE html>\n"),
-        tag("html", head, "\n", tag("body", body), lang=project.language.code),
+        tag("html", head, "\n", tag("body", body), lang="en"),
         "\n",
     )
 
@@ -167,49 +166,40 @@ def validity_section(drive: Drive, project: Project) -> Html:
     """The assumptions behind all figures, and where their data are from."""
     units = units_of(drive)
     damping = (
-        said(
-            "damping of the shaft: {d} N m s/rad, proportional to the speed of its twist",
-            d=short(float(drive.d)),
-        )
+        f"damping of the shaft: {short(float(drive.d))} N m s/rad, proportional to the speed of its twist"
         if drive.d
-        else said("no damping: oscillations do not die out, as those of a real shaft do")
+        else "no damping: oscillations do not die out, as those of a real shaft do"
     )
     load = (
-        said(
+        (
             "Load: the load torque acts always, also at rest (a hanging load); its torque and inertia are "
             "constant during the start."
         )
         if drive.load_kind == "active"
-        else said(
+        else (
             "Load: the load torque is friction: it holds the load at rest and opposes its motion; its "
             "torque and inertia are constant during the start."
         )
     )
     notes = [
-        said(
-            "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model; "
-            "for several gaps or masses use softstart compare with a chain."
+        (
+            "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model; for "
+            "several gaps or masses use softstart compare with a chain."
         ),
         motor_sentence(float(drive.minimum_torque), float(drive.maximum_torque), float(drive.torque_lag)),
-        said("Contact law: {law}; {damping}.", law=drive.contact_law, damping=damping),
+        f"Contact law: {drive.contact_law}; {damping}.",
         load,
-        said("The start begins {position}.", position=said(POSITIONS[drive.start_position]))
+        f"The start begins {POSITIONS[drive.start_position]}."
         if isinstance(drive.start_position, str)
-        else said(
-            "The start begins at a twist of {twist} {unit}.",
-            twist=digits(units.shown(float(drive.theta0), "rad")),
-            unit=units.angle,
+        else (
+            f"The start begins at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}."
         ),
-        said(
-            "Statements on wear and load hold from {least_gap} to {most_gap} times the gap and from "
-            "{least_inertia} to {most_inertia} times the load inertia, for the values computed. Other "
-            "stiffness, damping or load torque was not examined.",
-            least_gap=short(GAPS[0]),
-            most_gap=short(GAPS[-1]),
-            least_inertia=short(INERTIAS[0]),
-            most_inertia=short(INERTIAS[-1]),
+        (
+            f"Statements on wear and load hold from {short(GAPS[0])} to {short(GAPS[-1])} times the gap and "
+            f"from {short(INERTIAS[0])} to {short(INERTIAS[-1])} times the load inertia, for the values "
+            "computed. Other stiffness, damping or load torque was not examined."
         ),
-        said(
+        (
             "The equations are solved in closed form from event to event; peaks are located, not read off a "
             "grid. The figures are as good as the data: check gap, stiffness and inertias first where "
             "measured starts differ."
@@ -218,17 +208,12 @@ def validity_section(drive: Drive, project: Project) -> Html:
     guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
     if guessed:
         notes.append(
-            said(
-                "Guessed, so to be checked before the values of the sheets are used: {guessed}.",
-                guessed=listed(guessed),
-            )
+            f"Guessed, so to be checked before the values of the sheets are used: {listed(guessed)}."
         )
     elif not project.sources:
         notes.append(
-            said(
-                "Where each value of the drive is from (data sheet, drawing, measured, identified, guessed) "
-                "is not stated; [[source]] in the file of --project does."
-            )
+            "Where each value of the drive is from (data sheet, drawing, measured, identified, guessed) "
+            "is not stated; [[source]] in the file of --project does."
         )
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
 
@@ -237,57 +222,56 @@ def motor_sentence(least: float, most: float, lag: float) -> str:
     """What stands for the motor: its torques (N m) and the lag of its torque (s)."""
     values = {"least": short(least), "most": short(most), "lag": short(1e3 * lag)}
     if lag:
-        return said(
-            "The motor is a source of torque from {least} to {most} N m that follows its demand with a lag "
-            "of {lag} ms. Currents, fluxes and a motor started directly at the mains are not in the model.",
-            **values,
-        )
-    return said(
-        "The motor is a source of torque from {least} to {most} N m that follows its demand without lag. "
-        "Currents, fluxes and a motor started directly at the mains are not in the model.",
-        **values,
-    )
+        return (
+            "The motor is a source of torque from {least} to {most} N m that follows its demand with "
+            "a lag of {lag} ms. Currents, fluxes and a motor started directly at the mains are not in "
+            "the model."
+        ).format(**values)
+    return (
+        "The motor is a source of torque from {least} to {most} N m that follows its demand without "
+        "lag. Currents, fluxes and a motor started directly at the mains are not in the model."
+    ).format(**values)
 
 
 def provenance_section(about: Provenance, project: Project, chain: bool = False) -> Html:
     """Revisions, approval, versions, date, command, and the drive's file with all changes."""
     signed = [
-        [said("made by"), project.author],
-        [said("checked by"), project.checked],
-        [said("approved by"), project.approved],
+        ["made by", project.author],
+        ["checked by", project.checked],
+        ["approved by", project.approved],
     ]
     signed = [[role, who or "\N{EN DASH}", ""] for role, who in signed]
     rows = [
-        [said("date"), about.made],
+        ["date", about.made],
         ["softstart", tag("code", about.softstart)],
         ["Python", tag("code", about.python)],
-        [said("libraries"), tag("code", ", ".join(f"{name} {version}" for name, version in about.libraries))],
+        ["libraries", tag("code", ", ".join(f"{name} {version}" for name, version in about.libraries))],
     ]
     revisions = [[one.number, one.date, one.author, one.change] for one in project.revisions]
     return html(
         table(
-            said("revision | date | author | change").split(" | "),
+            ["revision", "date", "author", "change"],
             revisions,
-            caption=said("Revisions"),
+            caption="Revisions",
             text_columns=range(4),
         )
         if revisions
         else None,
         table(
-            ["", said("name, date"), said("signature")],
+            ["", "name, date", "signature"],
             signed,
-            caption=said("Approval"),
+            caption="Approval",
             text_columns=range(3),
             class_="signed",
         ),
-        table(said("what | which").split(" | "), rows, caption=said("Made with"), text_columns=(0, 1)),
-        tag("p", said("The command that made this report:"), class_="lead") if about.command else None,
+        table(["what", "which"], rows, caption="Made with", text_columns=(0, 1)),
+        tag("p", "The command that made this report:", class_="lead") if about.command else None,
         tag("pre", about.command, class_="command") if about.command else None,
         tag(
             "p",
-            said("The chain as a file for softstart, with all changes (chain.toml):")
+            "The chain as a file for softstart, with all changes (chain.toml):"
             if chain
-            else said("The drive as a file for softstart, with all changes (drive.toml):"),
+            else "The drive as a file for softstart, with all changes (drive.toml):",
             class_="lead",
         ),
         tag("pre", about.drive_toml, class_="file"),
@@ -313,7 +297,7 @@ def answer(report: Report) -> str:
 def _sheet_of(report: Report, best: Candidate) -> str:
     """Which strategy the figures that follow are those of, where the text names several."""
     several = report.choice.recommendation.recommended is None and len(report.choice.recommendation.best) > 1
-    return said("The parameters below are those of the gentlest, {name}.", name=best.name) if several else ""
+    return f"The parameters below are those of the gentlest, {best.name}." if several else ""
 
 
 def _on_an_ordinary_inverter(report: Report) -> list[str]:
@@ -321,12 +305,9 @@ def _on_an_ordinary_inverter(report: Report) -> list[str]:
     if plain is None or plain is best or report.choice.recommendation.limits:
         return []
     run = plain.row.run
-    text = said(
-        "On an ordinary inverter, one that offers torque ramps and no more, {name} is the best: K_dyn "
-        "{k_dyn} and {time} s.",
-        name=plain.name,
-        k_dyn=fixed(run.k_dyn, 3),
-        time=digits(run.start_time),
+    text = (
+        f"On an ordinary inverter, one that offers torque ramps and no more, {plain.name} is the best: "
+        f"K_dyn {fixed(run.k_dyn, 3)} and {digits(run.start_time)} s."
     )
     return [text, _after_rounding(report, plain)]
 
@@ -343,17 +324,16 @@ def _compared(report: Report, best: Candidate) -> str:
         "bound": fixed(math.floor(bound * 1000.0) / 1000.0, 3),
     }
     if known is None or known >= best.row.run.k_dyn * (1.0 - SAME):
-        return said(
-            "For comparison: no motor torque from {least} to {most} N m, however it is controlled, brings "
-            "this load to speed in that time with a K_dyn below {bound}.",
-            **figures,
-        )
+        return (
+            "For comparison: no motor torque from {least} to {most} N m, however it is controlled, "
+            "brings this load to speed in that time with a K_dyn below {bound}."
+        ).format(**figures)
     figures["known"] = fixed(math.ceil(known * 1000.0) / 1000.0, 3)
-    return said(
-        "For comparison: no motor torque from {least} to {most} N m, however it is controlled, brings this "
-        "load to speed in that time with a K_dyn below {bound}; the gentlest start known has {known}.",
-        **figures,
-    )
+    return (
+        "For comparison: no motor torque from {least} to {most} N m, however it is controlled, brings "
+        "this load to speed in that time with a K_dyn below {bound}; the gentlest start known has "
+        "{known}."
+    ).format(**figures)
 
 
 def _after_rounding(report: Report, one: Candidate) -> str:
@@ -362,28 +342,23 @@ def _after_rounding(report: Report, one: Candidate) -> str:
     if sheet is None:
         return ""
     if sheet.rounded is None:
-        return said("But its values cannot be set in the steps given (section 7).")
+        return "But its values cannot be set in the steps given (section 7)."
     exact, rounded = sheet.exact, sheet.rounded
     if math.isnan(rounded.start_time):
-        return said("But rounded to the steps given, its values do not bring the load to its target speed.")
+        return "But rounded to the steps given, its values do not bring the load to its target speed."
     harm = max(rounded.k_dyn / exact.k_dyn, rounded.start_time / exact.start_time) - 1.0
     if harm > HARMED:
-        return said(
-            "But these are exact values: rounded to the steps given, they make it K_dyn {k_dyn} and {time} "
-            "s.",
-            k_dyn=fixed(rounded.k_dyn, 3),
-            time=digits(rounded.start_time),
+        return (
+            "But these are exact values: rounded to the steps given, they make it K_dyn "
+            f"{fixed(rounded.k_dyn, 3)} and {digits(rounded.start_time)} s."
         )
     if not max(sheet.worst_k_dyn / exact.k_dyn, sheet.slowest / exact.start_time) - 1.0 <= HARMED:
         if sheet.variants and math.isnan(sheet.worst_k_dyn + sheet.slowest):
-            return said(
-                "But with values half a step off, the load may not reach its target speed (section 7)."
-            )
+            return "But with values half a step off, the load may not reach its target speed (section 7)."
         if sheet.variants:
-            return said(
-                "With values half a step off, K_dyn may be {k_dyn} and the start time {time} s.",
-                k_dyn=fixed(sheet.worst_k_dyn, 3),
-                time=digits(sheet.slowest),
+            return (
+                f"With values half a step off, K_dyn may be {fixed(sheet.worst_k_dyn, 3)} and the "
+                f"start time {digits(sheet.slowest)} s."
             )
     return ""
 

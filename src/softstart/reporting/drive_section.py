@@ -11,7 +11,6 @@ import math
 from functools import partial
 
 from softstart.drive import PARAMETERS, Drive
-from softstart.language import said
 from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
@@ -34,18 +33,18 @@ _polyline = partial(chain_schemes.polyline, colour=_INK, width=2)
 
 def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
     """Scheme, data, and what follows from them."""
-    caption = said(
-        "The drive, everything brought to the motor shaft. The height of a disc goes with the fourth root "
-        "of its inertia; spring and gap are drawn to one scale of angles, the spring as long as the shaft "
-        "is twisted by the starting torque. The shaft carries torque only while the gap is closed on a "
-        "flank."
+    caption = (
+        "The drive, everything brought to the motor shaft. The height of a disc goes with the "
+        "fourth root of its inertia; spring and gap are drawn to one scale of angles, the spring "
+        "as long as the shaft is twisted by the starting torque. The shaft carries torque only "
+        "while the gap is closed on a flank."
     )
     return html(
         figures.shown("scheme", lambda: scheme(drive, "scheme"), caption),
-        tag("h3", said("Data")),
+        tag("h3", "Data"),
         _data(drive, project),
-        tag("p", said("Source of the data: {source}.", source=drive.source)) if drive.source else None,
-        tag("h3", said("What follows from them")),
+        tag("p", f"Source of the data: {drive.source}.") if drive.source else None,
+        tag("h3", "What follows from them"),
         _derived(drive),
     )
 
@@ -73,38 +72,37 @@ def _data(drive: Drive, project: Project) -> Html:
         source = project.source_of(parameter.path)
         if value == parameter.default and not source:
             shown = text if isinstance(value, str) else f"{text} {of}".strip()
-            meaning = said(parameter.meaning)
+            meaning = parameter.meaning
             (absent if value in (0.0, math.inf) else defaults).append(
                 meaning if value == 0.0 else f"{meaning}: {shown}"
             )
             continue
         rows.append(
             [
-                said(parameter.meaning),
+                parameter.meaning,
                 parameter.symbol,
                 text,
                 "" if isinstance(value, str) else of.replace(" ", "\N{NO-BREAK SPACE}"),
                 other,
-                *([source or said("not stated")] if sourced else []),
+                *([source or "not stated"] if sourced else []),
             ]
         )
     heads = [
-        *said("parameter | symbol | value | unit | that is").split(" | "),
-        *([said("source")] if sourced else []),
+        *["parameter", "symbol", "value", "unit", "that is"],
+        *(["source"] if sourced else []),
     ]
     return html(
         table(
             heads,
             rows,
-            caption=said("Data of the drive, at the motor shaft"),
+            caption="Data of the drive, at the motor shaft",
             text_columns=(0, 1, 3, 5)[: 3 + sourced],
         ),
         tag(
             "p",
-            said(
-                "Not given, and therefore none: {absent}. At their defaults: {defaults}.",
-                absent="; ".join(absent) or NOTHING,
-                defaults="; ".join(defaults) or NOTHING,
+            (
+                f"Not given, and therefore none: {'; '.join(absent) or NOTHING}. At their defaults: "
+                f"{'; '.join(defaults) or NOTHING}."
             ),
             class_="small",
         ),
@@ -115,26 +113,24 @@ def _derived(drive: Drive) -> Html:
     (rated, basis), units = rated_torque(drive), units_of(drive)
     rows = [
         [
-            said("mean shaft torque under the starting torque: K_dyn = 1"),
+            "mean shaft torque under the starting torque: K_dyn = 1",
             digits(float(metrics.base_torque(drive))),
             "N m",
         ],
-        [said("elastic frequency with the gap closed"), digits(float(drive.Omega) / (2.0 * math.pi)), "Hz"],
-        [said("elastic period"), digits(1e3 * float(drive.elastic_period)), "ms"],
+        ["elastic frequency with the gap closed", digits(float(drive.Omega) / (2.0 * math.pi)), "Hz"],
+        ["elastic period", digits(1e3 * float(drive.elastic_period)), "ms"],
         [
-            said("twist of the shaft under the starting torque"),
+            "twist of the shaft under the starting torque",
             digits(units.shown(float(drive.Ms / drive.c), "rad")),
             units.angle,
         ],
         [
-            said("100 % of torque in the parameter sheets: the {basis}", basis=said(basis)),
+            f"100 % of torque in the parameter sheets: the {basis}",
             digits(rated),
             "N m",
         ],
     ]
-    return table(
-        said("figure | value | unit").split(" | "), rows, caption=said("Derived figures"), text_columns=(0, 2)
-    )
+    return table(["figure", "value", "unit"], rows, caption="Derived figures", text_columns=(0, 2))
 
 
 def scheme(drive: Drive, prefix: str) -> Html:
@@ -145,18 +141,18 @@ def scheme(drive: Drive, prefix: str) -> Html:
     high1, high2 = (max(_LEAST, _TALLEST * (J / tallest) ** 0.25) for J in (J1, J2))
     windup = float(drive.Ms) / c
     coil = max(_LEAST_COIL, _ANGLES * windup / (windup + gap))
-    kind = said("active") if drive.load_kind == "active" else said("reactive")
+    kind = "active" if drive.load_kind == "active" else "reactive"
     damper = f"d = {short(d)} N m s/rad" if d > 0.0 else ""
     inertia = f"{short(J1)} kg m²"  # is wider than its disc, and beside the damper's label
     spring = max(_SHORTEST_SHAFT, coil + 24.0, _width(damper) + max(_width(inertia) - 64.0, 2.0 * _APART))
     opening = max(_LEAST_GAP, _ANGLES * gap / (windup + gap)) if gap > 0.0 else 0.0
     parts: list[str] = []
     motor, load = (
-        said("up to {most} N m", most=short(float(drive.maximum_torque))),
+        f"up to {short(float(drive.maximum_torque))} N m",
         f"{short(float(drive.Mc))} N m, {kind}",
     )
     x = max(120.0, 40.0 + _width(motor, 12))
-    parts += _disc(x, high1, "#D6E6F2", "J1", said("motor"), inertia)
+    parts += _disc(x, high1, "#D6E6F2", "J1", "motor", inertia)
     parts += _torque(x - 34.0, "u", motor, _ORANGE, left=True)
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high1 - 12.0, "phi1, w1"))
     x += 64.0
@@ -164,27 +160,22 @@ def scheme(drive: Drive, prefix: str) -> Html:
     x += spring + 24.0
     if gap > 0.0:
         seen = short(float(f"{units.shown(gap, 'rad'):.4g}"))
-        label = said("gap {gap} {unit}", gap=seen, unit=units.angle)
+        label = f"gap {seen} {units.angle}"
         room = max(opening + 36.0, _LABEL, _width(label) + 2.0 * _APART)
         parts += _claw(x, room, opening, float(drive.design_drive.theta0) / gap, label)
         x += room
     else:
         parts.append(_line(x, _AXIS, x + 60.0, _AXIS))
-        parts.append(_text(x + 30.0, _AXIS - 14.0, said("no gap")))
+        parts.append(_text(x + 30.0, _AXIS - 14.0, "no gap"))
         x += 60.0
-    parts += _disc(x, high2, "#E3EFE0", "J2", said("load"), f"{short(J2)} kg m²")
+    parts += _disc(x, high2, "#E3EFE0", "J2", "load", f"{short(J2)} kg m²")
     parts += _torque(x + 98.0, "Mc", load, _BLUE, left=False)
     parts.append(_text(x + 32.0, _AXIS - 0.5 * high2 - 12.0, "phi2, w2"))
     width = x + max(64.0 + 150.0, 98.0 + 18.0 + _width(load, 12))
-    title = said(
-        "Two masses and a gap: motor J1 = {J1} kg m², shaft c = {c} N m/rad, gap {gap} {unit}, load J2 = "
-        "{J2} kg m², load torque Mc = {Mc} N m",
-        J1=short(J1),
-        c=short(c),
-        gap=digits(units.shown(gap, "rad")),
-        unit=units.angle,
-        J2=short(J2),
-        Mc=short(float(drive.Mc)),
+    title = (
+        f"Two masses and a gap: motor J1 = {short(J1)} kg m², shaft c = {short(c)} N m/rad, gap "
+        f"{digits(units.shown(gap, 'rad'))} {units.angle}, load J2 = {short(J2)} kg m², load torque "
+        f"Mc = {short(float(drive.Mc))} N m"
     )
     head = tag("title", title, id=f"{prefix}-title")
     return Html(

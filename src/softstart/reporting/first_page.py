@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from softstart.drive.limits import Limits
 from softstart.errors import listed
-from softstart.language import later, said
 from softstart.reporting.choice import Choice
 from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
 from softstart.reporting.strategies import before_after_figure
@@ -19,7 +18,7 @@ from softstart.views.printed import NOTHING, digits, fixed, percent
 if TYPE_CHECKING:
     from softstart.reporting.result import Report
 
-AS_IT_IS = later("the drive as it is")
+AS_IT_IS = "the drive as it is"
 SAME = 0.005  # a peak within this share of that of direct is no saving
 
 
@@ -44,26 +43,14 @@ def answer(
     if best is None or direct is None:
         return recommendation.text
     named = recommendation.recommended is not None
-    what = (
-        said("Recommended: {name}.", name=best.name)
-        if named
-        else said("Gentlest start: {name}.", name=best.name)
-    )
+    what = f"Recommended: {best.name}." if named else f"Gentlest start: {best.name}."
     run, hard = best.run, direct.run
     if best is direct or run.peak_torque > (1.0 - SAME) * hard.peak_torque:
-        return said(
-            "{what} No strategy that was examined is noticeably gentler than direct start.", what=what
-        )
-    return said(
-        "{what} {torque} peaks at {peak} N m instead of {direct_peak} N m under direct start, {saved} less; "
-        "the start takes {time} s instead of {direct_time} s.",
-        what=what,
-        torque=torque or said("The shaft torque"),
-        peak=digits(run.peak_torque),
-        direct_peak=digits(hard.peak_torque),
-        saved=share_saved(best, direct),
-        time=digits(run.start_time),
-        direct_time=digits(hard.start_time),
+        return f"{what} No strategy that was examined is noticeably gentler than direct start."
+    return (
+        f"{what} {torque or 'The shaft torque'} peaks at {digits(run.peak_torque)} N m instead of "
+        f"{digits(hard.peak_torque)} N m under direct start, {share_saved(best, direct)} less; the "
+        f"start takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
     )
 
 
@@ -78,25 +65,22 @@ def share_saved(row: Row, direct: Row | None) -> str:
 def first_page(report: Report, figures: Figures) -> Html:
     """Answer, picture, tiles and the table of limits."""
     rows = before_and_after(report.choice, report.comparison)
-    caption = said(
-        "{names}: shaft torque and load speed, computed for the drive as it is. Dots: the peaks. Dotted: "
-        "the target speed.",
-        names=listed([row.name for row in rows]),
+    caption = (
+        f"{listed([row.name for row in rows])}: shaft torque and load speed, computed for the drive "
+        "as it is. Dots: the peaks. Dotted: the target speed."
     )
     return html(
-        tag("section", tag("p", headline(report)), class_="answer", aria_label=said("The answer")),
+        tag("section", tag("p", headline(report)), class_="answer", aria_label="The answer"),
         figures.shown("before-after", lambda: before_after_picture(rows), caption),
-        tiles(rows[-1], rows[0], said("peak shaft torque"), _gained(report))
-        if report.choice.chosen
-        else None,
+        tiles(rows[-1], rows[0], "peak shaft torque", _gained(report)) if report.choice.chosen else None,
         verdicts(limits, rows)
         if (limits := report.choice.recommendation.limits)
         else tag(
             "p",
-            said(
-                "Neither passed nor failed: the drive file has no limits. Give the permissible shaft "
-                "torque, the longest start time or the life in [limits], and this page says what passes, "
-                "with the margin."
+            (
+                "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, "
+                "the longest start time or the life in [limits], and this page says what passes, with the "
+                "margin."
             ),
             class_="verdict",
         ),
@@ -117,20 +101,18 @@ def before_and_after(choice: Choice, comparison: Comparison) -> list[Row]:
 
 def before_after_picture(rows: list[Row]) -> Html:
     """The two starts, as an <svg> element."""
-    title = "; ".join(
-        said("{name}: peak {peak} N m", name=row.name, peak=digits(row.run.peak_torque)) for row in rows
-    )
-    return inlined(before_after_figure(rows), "before-after", said("Before and after. {title}.", title=title))
+    title = "; ".join(f"{row.name}: peak {digits(row.run.peak_torque)} N m" for row in rows)
+    return inlined(before_after_figure(rows), "before-after", f"Before and after. {title}.")
 
 
 def _gained(report: Report) -> tuple[str, str, str]:
     """What it gains in life."""
     gain = report.life_gain
     if gain is None:
-        how = said("needs a damping above 0 in the drive file")
-        return said("life of the shaft line"), said("not given"), how
-    how = said("over that of direct, S-N slope {slope:g}", slope=report.life_slope)
-    return said("life of the shaft line"), f"× {factor(gain)}", how
+        how = "needs a damping above 0 in the drive file"
+        return "life of the shaft line", "not given", how
+    how = f"over that of direct, S-N slope {report.life_slope:g}"
+    return "life of the shaft line", f"× {factor(gain)}", how
 
 
 def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> Html:
@@ -140,26 +122,18 @@ def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> H
         (
             torque,
             f"{digits(run.peak_torque)} N m",
-            said(
-                "direct {peak} N m: {saved} less",
-                peak=digits(hard.peak_torque),
-                saved=share_saved(best, direct),
-            ),
+            f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less",
         ),
         (
-            said("costs in time"),
+            "costs in time",
             f"{digits(1e3 * best.time_lost, 3)} ms",
-            said(
-                "start time {time} s, direct {direct_time} s",
-                time=digits(run.start_time),
-                direct_time=digits(hard.start_time),
-            ),
+            f"start time {digits(run.start_time)} s, direct {digits(hard.start_time)} s",
         ),
         third,
         (
             "K_dyn",
             fixed(run.k_dyn, 3),
-            said("direct {k_dyn}; 1 is the mean torque of the start", k_dyn=fixed(hard.k_dyn, 3)),
+            f"direct {fixed(hard.k_dyn, 3)}; 1 is the mean torque of the start",
         ),
     ]
     return tag(
@@ -180,23 +154,23 @@ def verdicts(limits: Limits, rows: list[Row]) -> Html:
             cells.append(
                 [
                     row.name,
-                    f"{said(margin.name)}, {margin.unit}",
+                    f"{margin.name}, {margin.unit}",
                     digits(margin.value),
                     digits(margin.limit),
                     percent(margin.share),
-                    said(margin.case or AS_IT_IS),
+                    (margin.case or AS_IT_IS),
                     tag(
                         "b",
-                        said("pass") if margin.kept else said("fail"),
+                        "pass" if margin.kept else "fail",
                         class_="pass" if margin.kept else "fail",
                     ),
                 ]
             )
-    cases = [said(case) for case in (AS_IT_IS, *rows[0].worst_case)]
+    cases = [AS_IT_IS, *rows[0].worst_case]
     return table(
-        said("strategy | limit | worst value | permitted | margin | worst with | verdict").split(" | "),
+        ["strategy", "limit", "worst value", "permitted", "margin", "worst with", "verdict"],
         cells,
-        caption=said("Pass or fail, in the worst of {cases}", cases=listed(cases)),
+        caption=f"Pass or fail, in the worst of {listed(cases)}",
         text_columns=(0, 1, 5, 6),
         class_="names",
     )
@@ -211,7 +185,7 @@ def _choices(report: Report) -> Html:
     cells = [
         [
             row.name,
-            said(row.effort.meaning),
+            row.effort.meaning,
             digits(row.run.peak_torque),
             share_saved(row, direct),
             fixed(row.run.k_dyn, 3),
@@ -221,9 +195,9 @@ def _choices(report: Report) -> Html:
     ]
     best = choice.chosen.row if choice.chosen else None
     return table(
-        said("strategy | takes | peak torque, N m | less than direct | K_dyn | start time, s").split(" | "),
+        ["strategy", "takes", "peak torque, N m", "less than direct", "K_dyn", "start time, s"],
         cells,
-        caption=said("What more effort buys"),
+        caption="What more effort buys",
         text_columns=(0, 1),
         strong=[index for index, row in enumerate(rows) if row is best],
         class_="names",

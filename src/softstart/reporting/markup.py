@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from softstart.language import said
 from softstart.late import late
 from softstart.views.drawing import drawing
 from softstart.views.numbers import Table
@@ -89,7 +88,7 @@ def table(
 def printed(one: Table, strong: Sequence[int] = (), caption: str = "") -> Html:
     """A table of the terminal as one of the page; its headings are said in the language of the page."""
     texts = [index for index, column in enumerate(one.columns) if not column.number]
-    headings = [said(column.heading).replace("-\n", "- ").replace("\n", " ") for column in one.columns]
+    headings = [column.heading.replace("-\n", "- ").replace("\n", " ") for column in one.columns]
     return table(headings, one.rows, caption=caption or one.title, text_columns=texts, strong=strong)
 
 
@@ -118,7 +117,7 @@ class Figures:
         self.count += 1
         if key not in self.ready:
             self.ready[key] = picture()
-        number = tag("b", said("Figure {number}.", number=self.count), " ")
+        number = tag("b", f"Figure {self.count}.", " ")
         return tag("figure", self.ready[key], tag("figcaption", number, caption))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
@@ -12,9 +12,7 @@ from softstart.errors import InputError, Mistakes
 from softstart.input.documents import Table, read_document
 from softstart.input.files import text_of
 from softstart.input.parameters import REQUIRED, Parameter
-from softstart.language import said
 from softstart.quantities import nearest
-from softstart.reporting.translation import Translation
 
 Paper = Literal["A4", "letter"]
 Decimal = Literal["point", "comma"]
@@ -42,7 +40,6 @@ TABLES = (
             _line("logo", "picture for the head of page 1", "logo.png"),
             _line("paper", "paper size", "A4", default="A4", choices=get_args(Paper)),
             _line("decimal", "decimal sign", "point", default="point", choices=get_args(Decimal)),
-            _line("language", "file of a translation", "german.toml"),
         ),
         required=False,
     ),
@@ -87,12 +84,12 @@ class Source:
     note: str
 
     def __str__(self) -> str:
-        return ", ".join(filter(None, (said(self.origin), self.note)))
+        return ", ".join(filter(None, (self.origin, self.note)))
 
 
 @dataclass(frozen=True)
 class Project:
-    """Names, revisions, sources and language of a report; `logo` is a data URI. All may be empty.
+    """Names, revisions and sources of a report; `logo` is a data URI. All may be empty.
 
     >>> Project.read('[project]\\ncustomer = "Harbour Cranes Ltd"').customer
     'Harbour Cranes Ltd'
@@ -111,13 +108,12 @@ class Project:
     logo: str = ""
     paper: Paper = "A4"
     decimal: Decimal = "point"
-    language: Translation = field(default_factory=Translation)
     revisions: tuple[Revision, ...] = ()
     sources: tuple[Source, ...] = ()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """From a TOML file; logo and translation are looked for beside it."""
+        """From a TOML file; the logo is looked for beside it."""
         return cls.read(text_of(path, "a project"), str(path), Path(path).parent)
 
     @classmethod
@@ -125,7 +121,6 @@ class Project:
         """From a TOML text; all mistakes at once."""
         found = read_document(text, TABLES, "a project", where=where)
         about = found["project"] or {}
-        language = about.pop("language", "")
         made = cls(
             **about,
             revisions=tuple(Revision(**row) for row in found["revision"]),
@@ -142,9 +137,6 @@ class Project:
                 )
         with wrong.noted():
             made = replace(made, logo=_picture(made.logo, folder))
-        if language:
-            with wrong.noted(f'[project] language = "{language}": '):
-                made = replace(made, language=Translation.load(folder / language))
         wrong.settle(f"{where}: " if where else "")
         return made
 
@@ -156,15 +148,15 @@ class Project:
     def lines(self) -> list[tuple[str, str]]:
         """Names for the head of page 1: what, and who or which."""
         named = [
-            (said("Customer"), self.customer),
-            (said("Project"), self.project),
-            (said("Document"), self.number),
-            (said("Author"), ", ".join(filter(None, (self.author, self.company)))),
+            ("Customer", self.customer),
+            ("Project", self.project),
+            ("Document", self.number),
+            ("Author", ", ".join(filter(None, (self.author, self.company)))),
         ]
         if self.revisions:
             last = self.revisions[-1]
-            dated = said("{number} of {date}", number=last.number, date=last.date)
-            named.append((said("Revision"), dated if last.number and last.date else last.number or last.date))
+            dated = f"{last.number} of {last.date}"
+            named.append(("Revision", dated if last.number and last.date else last.number or last.date))
         return [(what, value) for what, value in named if value]
 
 

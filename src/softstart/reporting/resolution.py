@@ -9,7 +9,6 @@ from typing import Self
 
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.language import later, said
 from softstart.quantities import nearest, to_si
 from softstart.views.printed import RPM, decimals_of, digits, short
 
@@ -100,23 +99,23 @@ class Resolution:
         """What is rounded to what, in words."""
         rated, basis = rated_torque(drive)
         if self.torque is not None:
-            torques = said("torques to {step} N m", step=short(self.torque))
+            torques = f"torques to {short(self.torque)} N m"
         else:
-            torques = said(
-                "torques to {percent} % of the {basis} of {rated} N m, that is {step} N m",
-                percent=short(100.0 * self.torque_share), basis=said(basis), rated=digits(rated),
-                step=short(float(f"{self.torque_share * rated:.4g}")),
-            )  # fmt: skip
+            step = short(float(f"{self.torque_share * rated:.4g}"))
+            torques = (
+                f"torques to {short(100.0 * self.torque_share)} % of the {basis} of {digits(rated)} N m, "
+                f"that is {step} N m"
+            )
         return [
             torques,
-            said("times to {step} ms", step=short(1e3 * self.time)),
-            said("speeds to {step} rpm", step=short(self.speed * RPM)),
-            said("frequencies to {step} Hz", step=short(self.frequency)),
-            said("shares and gains to {step}", step=short(self.share)),
+            f"times to {short(1000.0 * self.time)} ms",
+            f"speeds to {short(self.speed * RPM)} rpm",
+            f"frequencies to {short(self.frequency)} Hz",
+            f"shares and gains to {short(self.share)}",
         ]
 
 
-RATED = later("rated torque")
+RATED = "rated torque"
 
 
 def rated_torque(drive: Drive) -> tuple[float, str]:
@@ -129,7 +128,7 @@ def rated_torque(drive: Drive) -> tuple[float, str]:
         return float(drive.rated_torque), RATED
     if drive.rated_power is not None and drive.rated_speed is not None:
         return float(drive.rated_power / drive.rated_speed), RATED
-    return float(drive.Ms), later("starting torque")
+    return float(drive.Ms), "starting torque"
 
 
 def nearest_step(value: float, step: float, most: float = math.inf) -> float:

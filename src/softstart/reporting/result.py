@@ -21,7 +21,6 @@ from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
-from softstart.language import speaking
 from softstart.late import late
 from softstart.reporting.choice import Choice, choose
 from softstart.reporting.limit import Limit, bound_at, limit
@@ -272,22 +271,6 @@ def report(
     docs/howto/read-a-report.md; K_dyn: [G] (16); the limit: docs/theory/optimum.md.
     """
     about = project if isinstance(project, Project) else Project.load(project) if project else Project()
-    with speaking(about.language.table):
-        return _report(drive, controllers, parameters, resolution, budget, progress, command, about, draw)
-
-
-def _report(
-    drive: Drive | Uncertain | str,
-    controllers: Sequence[str | Controller] | None,
-    parameters: Mapping[str, Mapping[str, object]] | None,
-    resolution: Resolution | Mapping[str, object] | str | None,
-    budget: float,
-    progress: Progress | None,
-    command: str,
-    about: Project,
-    draw: bool,
-) -> Report:
-    """The report, in the language that is in use."""
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws()

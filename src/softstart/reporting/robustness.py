@@ -12,7 +12,6 @@ import numpy as np
 from softstart.arrays import Matrix
 from softstart.controller import Controller
 from softstart.drive import Drive
-from softstart.language import said
 from softstart.late import late
 from softstart.quantities import Units
 from softstart.reporting.markup import Figures, Html, html, inlined, printed, tag
@@ -115,20 +114,18 @@ def robustness_section(drive: Drive, shown: Sequence[Mapped], figures: Figures) 
     """The maps of strategies, in one scale of colours."""
     first, units = shown[0].map, units_of(drive)
     least, most = (digits(units.shown(gap, "rad"), 3) for gap in (first.gaps[0], first.gaps[-1]))
-    gaps = said("gaps from {least} to {most} {unit}", least=least, most=most, unit=units.angle)
+    gaps = f"gaps from {least} to {most} {units.angle}"
     if drive.gap == 0.0:
-        gaps = said("no gap (the drive has none, so the maps have one row and say nothing about play)")
-    text = said(
+        gaps = "no gap (the drive has none, so the maps have one row and say nothing about play)"
+    text = (
         "Gears wear and loads change. Each strategy was set up once, for the drive as it is, and then "
-        "started at {gaps} and load inertias from {least} to {most} kg m². K_dyn refers to the drive as it "
-        "is everywhere, so the numbers compare shaft torques.",
-        gaps=gaps,
-        least=short(first.inertias[0]),
-        most=short(first.inertias[-1]),
+        f"started at {gaps} and load inertias from {short(first.inertias[0])} to "
+        f"{short(first.inertias[-1])} kg m². K_dyn refers to the drive as it is everywhere, so the "
+        "numbers compare shaft torques."
     )
-    caption = said(
-        "K_dyn over gap and load inertia, all maps in one scale of colours, dark is gentle. Framed: the "
-        "drive as it is. Grey: the load does not reach its target speed."
+    caption = (
+        "K_dyn over gap and load inertia, all maps in one scale of colours, dark is gentle. "
+        "Framed: the drive as it is. Grey: the load does not reach its target speed."
     )
     return html(tag("p", text), figures.shown("maps", lambda: maps_picture(drive, shown), caption))
 
@@ -141,17 +138,14 @@ def maps_picture(drive: Drive, shown: Sequence[Mapped]) -> Html:
         min(first.inertias, key=lambda v: abs(v - float(drive.J2))),
     )
     worst = "; ".join(
-        said(
-            "{name}, worst {k_dyn} at gap {gap} {unit} and J2 {inertia} kg m²",
-            name=one.name,
-            k_dyn=fixed(one.map.worst, 3),
-            gap=digits(units.shown(one.map.worst_at[0], "rad"), 3),
-            unit=units.angle,
-            inertia=short(one.map.worst_at[1]),
+        (
+            f"{one.name}, worst {fixed(one.map.worst, 3)} at gap "
+            f"{digits(units.shown(one.map.worst_at[0], 'rad'), 3)} {units.angle} and J2 "
+            f"{short(one.map.worst_at[1])} kg m²"
         )
         for one in shown
     )
-    title = said("K_dyn over gap and load inertia: {worst}", worst=worst)
+    title = f"K_dyn over gap and load inertia: {worst}"
     return inlined(maps_figure([(one.name, one.map) for one in shown], nominal, units), "maps", title)
 
 
@@ -160,21 +154,21 @@ def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[st
     if found is None:
         return []
     if isinstance(found, str):
-        content = tag("p", said("Lives cannot be given. {reason}", reason=found))
+        content = tag("p", f"Lives cannot be given. {found}")
     else:
         shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
-        title = said("Cycles of one start, and life over that of direct")
+        title = "Cycles of one start, and life over that of direct"
         content = html(
             tag("p", lives.conclusion(found)),
-            printed(shown, caption=said("Life of the shaft line under each strategy")),
+            printed(shown, caption="Life of the shaft line under each strategy"),
             figures.shown(
                 "life",
                 lambda: inlined(lives.fatigue_figure(found), "life", title),
-                said("{title}. Rainflow cycles of the shaft torque.", title=title),
+                f"{title}. Rainflow cycles of the shaft torque.",
             ),
             *(tag("p", one) for one in lives.notes(found)),
         )
-    return [("life", said("How long the shaft line lasts"), content)]
+    return [("life", "How long the shaft line lasts", content)]
 
 
 def maps_figure(
@@ -204,7 +198,7 @@ def maps_figure(
             )
             for (i, j), value in np.ndenumerate(one.k_dyn):
                 dark = math.isnan(value) or float(scale(value)) > 0.55
-                text = f"{value:.2f}" if math.isfinite(value) else said("none")
+                text = f"{value:.2f}" if math.isfinite(value) else "none"
                 panel.text(j, i, text, ha="center", va="center", fontsize=SMALL - 1.0,
                            color="black" if dark else "white")  # fmt: skip
             _frame(panel, first.gaps.index(nominal[0]), first.inertias.index(nominal[1]))
@@ -217,9 +211,9 @@ def maps_figure(
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
         for panel in axes[:, 0]:
-            panel.set_ylabel(said("gap, {unit}", unit=f"{_powers(gap)}{units.angle}"), fontsize=SMALL)
+            panel.set_ylabel(f"gap, {_powers(gap)}{units.angle}", fontsize=SMALL)
         for panel in axes.flat[max(0, len(shown) - 2) : len(shown)]:
-            panel.set_xlabel(said("load inertia J2, {unit}", unit=f"{_powers(inertia)}kg m²"), fontsize=SMALL)
+            panel.set_xlabel(f"load inertia J2, {_powers(inertia)}kg m²", fontsize=SMALL)
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28)
         bar.set_label(K_DYN, fontsize=SMALL)
         bar.solids.set_rasterized(False)  # a picture of pixels would have to be loaded
@@ -241,7 +235,7 @@ def _powers(unit: float) -> str:
 
 
 def _worst(one: RobustnessMap) -> str:
-    return said("worst {k_dyn:.3f}", k_dyn=one.worst) if math.isfinite(one.worst) else said("grey: no start")
+    return f"worst {one.worst:.3f}" if math.isfinite(one.worst) else "grey: no start"
 
 
 def _plain_ticks(bar: Any, low: float, high: float) -> None:

@@ -20,7 +20,6 @@ from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError, listed
-from softstart.language import later, said
 from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, kind_of
@@ -50,13 +49,13 @@ _DATA = {
     "load_inertia": "J2",
     "stiffness": "c",
     "damping": "d",
-    "gap": later("the gap"),
+    "gap": "the gap",
     "starting_torque": "Ms",
     "load_torque": "Mc",
-    "torque_lag": later("the torque lag"),
-    "torque_rate": later("the torque rate"),
-    "torque_noise": later("the noise of the torque"),
-    "computing_delay": later("the dead time"),
+    "torque_lag": "the torque lag",
+    "torque_rate": "the torque rate",
+    "torque_noise": "the noise of the torque",
+    "computing_delay": "the dead time",
 }
 _LEFT_OUT_AT_0 = ("damping", "torque_noise", "computing_delay")  # data that such a drive simply has not
 _PROBE = 1e-3  # relative
@@ -278,11 +277,8 @@ def _within_the_rule(
             return tuple(replace(s, rounded=tried.get(s.name, s.rounded)) for s in settings), moved
         reason = reason or broken
     raise SimulationError(
-        said(
-            "rounded to these steps the strategy breaks the rule by which it was chosen ({reason}), and so "
-            "it does a step beside them: finer steps are needed.",
-            reason=reason,
-        )
+        f"rounded to these steps the strategy breaks the rule by which it was chosen ({reason}), and so "
+        "it does a step beside them: finer steps are needed."
     )
 
 
@@ -432,16 +428,15 @@ def sheet_section(
 ) -> Html:
     """One sheet for each strategy; `chosen` is the name of that one with this `role`."""
     if not sheets:
-        return tag("p", said("There is no sheet, because no strategy is recommended."))
+        return tag("p", "There is no sheet, because no strategy is recommended.")
     steps = "; ".join(resolution.described(drive))
     return html(
         tag(
             "p",
-            said(
-                "Every value is rounded to what the inverter can be set to: {steps}. The drive was then "
-                "started again with the rounded values, and once more with every value half a step off, as "
-                "a display that rounds may hide.",
-                steps=steps,
+            (
+                f"Every value is rounded to what the inverter can be set to: {steps}. The drive was then "
+                "started again with the rounded values, and once more with every value half a step off, as a "
+                "display that rounds may hide."
             ),
         ),
         joined(_sheet(sheet, role if sheet.name == chosen else "", drive) for sheet in sheets),
@@ -455,12 +450,12 @@ def _motor_torque(run: AnyRun) -> Vector:
 
 
 FUNCTIONS = {
-    "limit": later("torque limit"),
-    "braking": later("torque limit, generating"),
-    "reference": later("torque reference"),
-    "backlash": later("torque limit after a change of direction, and its ramp"),
-    "ramp": later("ramp and S-curve of the speed reference"),
-    "preload": later("torque before the brake opens, and its ramp"),
+    "limit": "torque limit",
+    "braking": "torque limit, generating",
+    "reference": "torque reference",
+    "backlash": "torque limit after a change of direction, and its ramp",
+    "ramp": "ramp and S-curve of the speed reference",
+    "preload": "torque before the brake opens, and its ramp",
 }
 
 
@@ -476,7 +471,7 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
         rows += [
             [
                 f"{family['name']} [{number}]" if key == named[0] else "",
-                said(FUNCTIONS[key]),
+                FUNCTIONS[key],
                 tag("code", family[key]),
             ]
             for key in named
@@ -484,17 +479,17 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
         sources.append(tag("code", f"[{number}] {family['source']}."))
     return tag(
         "section",
-        tag("h3", said("Where to set it")),
+        tag("h3", "Where to set it"),
         table(
-            said("inverter | function | name in its manual").split(" | "),
+            ["inverter", "function", "name in its manual"],
             rows,
-            caption=said("Names of these functions"),
+            caption="Names of these functions",
             text_columns=(0, 1, 2),
             class_="words",
         ),
         tag(
             "p",
-            said(
+            (
                 "Only names that a public manual prints; what is missing was not found there. The ramps of "
                 "the sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves "
                 "of speed) are ramps of the speed reference and do not replace them: make them shorter than "
@@ -510,22 +505,22 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
 
 def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
     rows = [_setting(one, drive) for one in sheet.settings]
-    role = role or said("for an ordinary inverter")
-    heads = said("parameter | meaning | set to | unit | that is | exact").split(" | ")
+    role = role or "for an ordinary inverter"
+    heads = ["parameter", "meaning", "set to", "unit", "that is", "exact"]
     return tag(
         "section",
         tag("h3", f"{sheet.name} ({role})"),
         table(
             heads,
             rows,
-            caption=said("Parameter sheet: {name}", name=sheet.name),
+            caption=f"Parameter sheet: {sheet.name}",
             text_columns=(0, 1, 3, 4),
             class_="sheet",
         )
         if rows and sheet.rounded is not None
         else None
         if rows
-        else tag("p", said("This strategy has no parameters.")),
+        else tag("p", "This strategy has no parameters."),
         _outcome(sheet),
         tag("ul", joined(tag("li", one) for one in _notes(sheet, drive)), class_="notes"),
         class_="sheet",
@@ -535,7 +530,7 @@ def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
 def _setting(one: Setting, drive: Drive) -> list[str]:
     name = one.name.replace("_", " ")
     if isinstance(one.exact, str) or isinstance(one.rounded, str):
-        return [name, said(one.meaning), str(one.rounded), "", "", str(one.exact)]
+        return [name, one.meaning, str(one.rounded), "", "", str(one.exact)]
     value, exact, step, shown = one.rounded, one.exact, one.step, unit(one.unit)
     other = ""
     if one.unit == "s":
@@ -547,18 +542,16 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
     elif one.unit == "N*m":
         rated, basis = rated_torque(drive)
         share = step and 100.0 * step / rated
-        other = said(
-            "{percent} % of the {basis}", percent=_multiple(100.0 * value / rated, share), basis=said(basis)
-        )
+        other = f"{_multiple(100.0 * value / rated, share)} % of the {basis}"
     text = _multiple(value, step)
-    meaning = said(one.meaning)
+    meaning = one.meaning
     if one.name == "period":
-        meaning = said("{meaning} of the control code", meaning=meaning)
+        meaning = f"{meaning} of the control code"
         digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
         most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
         return [name, meaning, f"≤ {short(float(f'{most:.3g}'))}", shown, "", short(float(f"{value:.5g}"))]
     if one.step is None:
-        meaning, text = said("{meaning} (not rounded)", meaning=meaning), short(float(f"{value:.4g}"))
+        meaning, text = f"{meaning} (not rounded)", short(float(f"{value:.4g}"))
     return [name, meaning, text, shown, other, short(float(f"{exact:.5g}"))]
 
 
@@ -583,24 +576,22 @@ def _multiple(value: float | None, step: float | None) -> str:
 
 def _outcome(sheet: Sheet) -> Html:
     if sheet.rounded is None:
-        return tag(
-            "p", said("The start with the rounded values could not be made: {reason}", reason=sheet.failure)
-        )
+        return tag("p", f"The start with the rounded values could not be made: {sheet.failure}")
     exact, rounded = sheet.exact, sheet.rounded
     rows = [
-        [said("exact values"), fixed(exact.k_dyn, 4), digits(exact.peak_torque), digits(exact.start_time, 5)],
-        [said("rounded values, as in the sheet"), fixed(rounded.k_dyn, 4), digits(rounded.peak_torque),
+        ["exact values", fixed(exact.k_dyn, 4), digits(exact.peak_torque), digits(exact.start_time, 5)],
+        ["rounded values, as in the sheet", fixed(rounded.k_dyn, 4), digits(rounded.peak_torque),
          digits(rounded.start_time, 5)],
     ]  # fmt: skip
     if sheet.variants:
         peak = sheet.worst_k_dyn * exact.peak_torque / exact.k_dyn if exact.k_dyn > 0.0 else math.nan
         rows.append(
-            [said("worst with the values half a step off"), fixed(sheet.worst_k_dyn, 4), digits(peak),
+            ["worst with the values half a step off", fixed(sheet.worst_k_dyn, 4), digits(peak),
              digits(sheet.slowest, 5)]
         )  # fmt: skip
     return table(
-        said("start with | K_dyn | peak torque, N m | start time, s").split(" | "), rows,
-        caption=said("{name}: started again after rounding", name=sheet.name),
+        ["start with", "K_dyn", "peak torque, N m", "start time, s"], rows,
+        caption=f"{sheet.name}: started again after rounding",
     )  # fmt: skip
 
 
@@ -616,21 +607,11 @@ def _limits(sheet: Sheet, drive: Drive) -> str:
         if torque:
             limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
             share = _multiple(100.0 * limit / rated, 100.0 * step / rated)
-            text.append(
-                said(
-                    "{torque} N m ({share} % of the {basis})",
-                    torque=_multiple(limit, step),
-                    share=share,
-                    basis=said(basis),
-                )
-            )
-    limits = said(
-        "Torque limits of the inverter, not tighter than what this start takes: {limits}.",
-        limits=listed(text),
-    )
+            text.append(f"{_multiple(limit, step)} N m ({share} % of the {basis})")
+    limits = f"Torque limits of the inverter, not tighter than what this start takes: {listed(text)}."
     if basis is not RATED:
         return limits
-    current = said("A limit of the torque-producing current: the same percentages.")
+    current = "A limit of the torque-producing current: the same percentages."
     return f"{limits} {current}"
 
 
@@ -638,43 +619,30 @@ def _notes(sheet: Sheet, drive: Drive) -> list[str]:
     notes = []
     if sheet.moved:
         moved = listed([name.replace("_", " ") for name in sheet.moved])
-        notes.append(
-            said("Not at the nearest step, which would break the rule of section 1: {moved}.", moved=moved)
-        )
+        notes.append(f"Not at the nearest step, which would break the rule of section 1: {moved}.")
     if sheet.variants:
         notes.append(
-            said(
-                "Half a step off: {count} starts, all combinations of half a step down or up.",
-                count=sheet.variants,
-            )
+            f"Half a step off: {sheet.variants} starts, all combinations of half a step down or up."
             if sheet.corners
-            else said(
-                "Half a step off: {count} starts, each value alone, and all together, half a step down or "
-                "up.",
-                count=sheet.variants,
+            else (
+                f"Half a step off: {sheet.variants} starts, each value alone, and all together, half a "
+                "step down or up."
             )
         )
         permitted = drive.limits.shaft_torque
         peak = sheet.worst_k_dyn * sheet.exact.peak_torque / sheet.exact.k_dyn
         if permitted is not None and peak > float(permitted):
             notes.append(
-                said(
-                    "Half a step off the shaft torque may reach {peak} N m, more than the {permitted} N m "
-                    "that are permitted: set these values exactly, or finer ones.",
-                    peak=digits(peak),
-                    permitted=digits(float(permitted)),
-                )
+                f"Half a step off the shaft torque may reach {digits(peak)} N m, more than the "
+                f"{digits(float(permitted))} N m that are permitted: set these values exactly, or finer "
+                "ones."
             )
         if math.isnan(sheet.worst_k_dyn):
-            notes.append(
-                said("In at least one of them the load does not reach its target speed: set finer steps.")
-            )
+            notes.append("In at least one of them the load does not reach its target speed: set finer steps.")
     notes.append(_limits(sheet, drive))
     coarse = [one.name.replace("_", " ") for one in sheet.settings if one.coarse]
     if coarse:
-        notes.append(
-            said("The steps are coarse against {coarse}: look for a finer setting.", coarse=", ".join(coarse))
-        )
+        notes.append(f"The steps are coarse against {', '.join(coarse)}: look for a finer setting.")
     if sheet.kind in ORDINARY:
         return notes + _on_ramps(sheet, drive)
     if sheet.kind != "direct":
@@ -688,44 +656,25 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
     if rise := sheet.full_rise:
         rated, basis = rated_torque(drive)
         notes.append(
-            said(
-                "Some inverters ask for the time of a ramp from 0 to 100 % of torque ({rated} N m, the "
-                "{basis}): that is {exact} ms, a mean rise of {rise} N m/s. Set to {rounded} ms the rise "
-                "takes {takes} ms, K_dyn is {k_dyn} and the start time {time} s.",
-                rated=short(float(f"{rated:.4g}")),
-                basis=said(basis),
-                exact=digits(1e3 * rise.exact),
-                rise=digits(rated / rise.exact),
-                rounded=short(1e3 * rise.rounded),
-                takes=digits(1e3 * rise.rise),
-                k_dyn=fixed(rise.run.k_dyn, 4),
-                time=digits(rise.run.start_time, 5),
-            )
+            f"Some inverters ask for the time of a ramp from 0 to 100 % of torque ({digits(rated)} N m, the "
+            f"{basis}): that is {digits(1e3 * rise.exact)} ms, a mean rise of {digits(rated / rise.exact)} "
+            f"N m/s. Set to {short(1e3 * rise.rounded)} ms the rise takes {digits(1e3 * rise.rise)} ms, "
+            f"K_dyn is {fixed(rise.run.k_dyn, 4)} and the start time {digits(rise.run.start_time, 5)} s."
         )
     if gear := sheet.gear_ramp:
         notes.append(
-            said(
-                "ABB DCS 500B, gear backlash compensation (4000 counts of the rated torque, each 3.3 ms at "
-                "50 Hz): GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP {exact}, "
-                "set to {rounded}. The rise then takes {takes} ms, K_dyn is {k_dyn} and the start time "
-                "{time} s.",
-                exact=digits(gear.exact),
-                rounded=short(gear.rounded),
-                takes=digits(1e3 * gear.rise),
-                k_dyn=fixed(gear.run.k_dyn, 4),
-                time=digits(gear.run.start_time, 5),
-            )
+            "ABB DCS 500B, gear backlash compensation (4000 counts of the rated torque, each 3.3 ms at "
+            "50 Hz): GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP "
+            f"{digits(gear.exact)}, set to {short(gear.rounded)}. The rise then takes "
+            f"{digits(1000.0 * gear.rise)} ms, K_dyn is {fixed(gear.run.k_dyn, 4)} and the start time "
+            f"{digits(gear.run.start_time, 5)} s."
         )
     if sheet.kind == "s-curve":
         values = {one.name: one.rounded for one in sheet.settings}
         share, time = float(values["rounding"]), float(values["time"])
         notes.append(
-            said(
-                "S-curve share {share} %: rounded ends of {time} ms each at the beginning and at the end of "
-                "the rise.",
-                share=short(100.0 * share),
-                time=digits(500.0 * share * time),
-            )
+            f"S-curve share {short(100.0 * share)} %: rounded ends of {digits(500.0 * share * time)} ms "
+            "each at the beginning and at the end of the rise."
         )
     return notes
 
@@ -733,16 +682,17 @@ def _on_ramps(sheet: Sheet, drive: Drive) -> list[str]:
 def _on_code(sheet: Sheet, drive: Drive) -> str:
     """What an inverter must run and know for a strategy that is a program."""
     found = (
-        said("The strategy is code of its own (equations: docs/controllers.md of softstart)")
+        "The strategy is code of its own (equations: docs/controllers.md of softstart)"
         if sheet.kind in DOCUMENTED
-        else said("The strategy is code of its own")
+        else "The strategy is code of its own"
     )
     if not sheet.computes_with:
         return f"{found}."
-    values = {"code": found, "data": listed([said(one) for one in sheet.computes_with])}
+    values = {"code": found, "data": listed(list(sheet.computes_with))}
     if sheet.own == drive:
-        return said("{code}; beside the sheet it computes with {data} of the drive.", **values)
-    return said(
-        "{code}; beside the sheet it computes with {data} of the drive that its gains were tuned for.",
-        **values,
+        return "{code}; beside the sheet it computes with {data} of the drive.".format(**values)
+    return (
+        "{code}; beside the sheet it computes with {data} of the drive that its gains were tuned for.".format(
+            **values
+        )
     )

@@ -13,7 +13,6 @@ from softstart.controller import Controller
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive
 from softstart.errors import listed
-from softstart.language import said
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
 from softstart.start import metrics
 from softstart.start.comparison import LIGHT_INERTIA, WORN_GAP
@@ -77,66 +76,56 @@ def strategies_section(
     strong = [rows.index(row) for row in chosen]
     base = float(metrics.base_torque(drive))
     notes = [
-        said(
-            "K_dyn is the largest shaft torque of the whole start, divided by {mean} N m, the mean shaft "
-            "torque under the full starting torque. It is located in the exact solution, not read off a "
-            "grid.",
-            mean=digits(base),
+        (
+            f"K_dyn is the largest shaft torque of the whole start, divided by {digits(base)} N m, the mean "
+            "shaft torque under the full starting torque. It is located in the exact solution, not read off "
+            "a grid."
         ),
-        said(
-            "Gap × {gap} and J2 × {inertia}: the strategy as it was set up for this drive, when the gap is "
-            "{gap} times as wide or the load inertia {inertia} times as large.",
-            gap=short(WORN_GAP),
-            inertia=short(LIGHT_INERTIA),
+        (
+            f"Gap × {short(WORN_GAP)}, J2 × {short(LIGHT_INERTIA)}: the strategy as it was set up for this "
+            f"drive, when the gap is {short(WORN_GAP)} times as wide or the load inertia "
+            f"{short(LIGHT_INERTIA)} times as large."
         ),
-        said(
-            "Settled: from then on the load speed is never more than {percent} % below the target. "
-            "Later: start time beyond that of direct start.",
-            percent=short(100.0 * SETTLED_BAND),
+        (
+            f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below "
+            "the target. Later: start time beyond that of direct start."
         ),
         *([_limits_note(rows[0])] if limited else []),
-        *([said(INTERVALS_NOTE)] if rows[0].intervals else []),
+        *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
         *(
-            said(
-                "{name} is flagged: {reasons}.",
-                name=row.name,
-                reasons="; ".join(flag.text for flag in row.flags),
-            )
+            f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
             for row in rows
             if row.flags and not math.isnan(row.run.start_time)
         ),
         *(
-            f"{label_of(row.run.controller)}: {said(row.run.status.value)}"
+            f"{label_of(row.run.controller)}: {row.run.status.value}"
             for row in rows
             if math.isnan(row.run.start_time)
         ),
         *(
-            said("{name}, torque cut off: {clipped}.", name=row.run.controller_name, clipped=clipped)
+            f"{row.run.controller_name}, torque cut off: {clipped}."
             for row in rows
             if (clipped := clipped_torque(row.run))
         ),
-        *(
-            said("{name} could not be examined: {reason}", name=name, reason=reason)
-            for name, reason in failed
-        ),
+        *(f"{name} could not be examined: {reason}" for name, reason in failed),
     ]
     first = table(
         [
-            said("strategy"),
+            "strategy",
             "K_dyn",
-            said("K_dyn, gap × {gap}", gap=short(WORN_GAP)),
-            said("K_dyn, J2 × {inertia}", inertia=short(LIGHT_INERTIA)),
-            said("peak torque, N m"),
-            said("start time, s"),
-            said("settled, s"),
-            said("later, s"),
-            said("contacts"),
-            *([said("limits, least margin")] if limited else []),
-            said("flag"),
+            f"K_dyn, gap × {short(WORN_GAP)}",
+            f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
+            "peak torque, N m",
+            "start time, s",
+            "settled, s",
+            "later, s",
+            "contacts",
+            *(["limits, least margin"] if limited else []),
+            "flag",
         ],
         cells,
-        caption=said("Strategies on this drive, the gentlest first"),
+        caption="Strategies on this drive, the gentlest first",
         text_columns=(0, 9, 10) if limited else (0, 9),
         strong=strong,
         class_="names",
@@ -149,12 +138,12 @@ def _interval(row: Row) -> str:
     if not row.intervals:
         return ""
     lower, upper = row.intervals["k_dyn"]
-    return said(" ({least} to {most})", least=fixed(lower, 3), most=fixed(upper, 3))
+    return f" ({fixed(lower, 3)} to {fixed(upper, 3)})"
 
 
 def _limits_note(row: Row) -> str:
-    worst = [said(case) for case in ("the drive as it is", *row.worst_case)]
-    return said("Limits: the least share left of any limit, in the worst of {worst}.", worst=listed(worst))
+    worst = ["the drive as it is", *row.worst_case]
+    return f"Limits: the least share left of any limit, in the worst of {listed(worst)}."
 
 
 def _decimals(start_time: float) -> int:
@@ -169,11 +158,10 @@ def traces_section(rows: Sequence[Row], figures: Figures) -> Html:
     parts = []
     for key, some, note in trace_groups(rows):
         names = ", ".join(row.marked for row in some)
-        caption = said(
-            "Shaft torque (solid) and motor torque (dashed), with the K_dyn, under {names}. Grey: the gap "
-            "is open; dot: peak; dotted: start time, and the permissible torque where one is given. All "
-            "panels share both scales.",
-            names=names,
+        caption = (
+            f"Shaft torque (solid) and motor torque (dashed), with the K_dyn, under {names}. Grey: "
+            "the gap is open; dot: peak; dotted: start time, and the permissible torque where one "
+            "is given. All panels share both scales."
         )
         parts.append(
             figures.shown(key, partial(traces_picture, key, rows, some), f"{caption} {note}".strip())
@@ -186,13 +174,7 @@ def trace_groups(rows: Sequence[Row]) -> list[tuple[str, list[Row], str]]:
     rows = ordered(rows)
     shown, _, _ = _frame(rows)
     late = [label_of(row.run.controller) for row in rows if row.run.start_time > shown]
-    cut = (
-        said(
-            "The start of {late} goes on beyond the {shown} s shown.", late=listed(late), shown=digits(shown)
-        )
-        if late
-        else ""
-    )
+    cut = f"The start of {listed(late)} goes on beyond the {digits(shown)} s shown." if late else ""
     pieces = -(-len(rows) // AT_ONCE)
     size = -(-len(rows) // pieces)
     return [(f"traces-{i}", rows[i : i + size], cut) for i in range(0, len(rows), size)]
@@ -201,15 +183,13 @@ def trace_groups(rows: Sequence[Row]) -> list[tuple[str, list[Row], str]]:
 def traces_picture(key: str, rows: Sequence[Row], some: Sequence[Row]) -> Html:
     """The figure of `some` rows in the frame of all."""
     title = "; ".join(
-        said(
-            "{name}: peak shaft torque {peak} N m, start time {time} s",
-            name=row.marked,
-            peak=digits(row.run.peak_torque),
-            time=digits(row.run.start_time),
+        (
+            f"{row.marked}: peak shaft torque {digits(row.run.peak_torque)} N m, start time "
+            f"{digits(row.run.start_time)} s"
         )
         for row in some
     )
-    return inlined(traces_figure(some, *_frame(rows)), key, said("Traces over time. {title}.", title=title))
+    return inlined(traces_figure(some, *_frame(rows)), key, f"Traces over time. {title}.")
 
 
 def _frame(rows: Sequence[Row]) -> tuple[float, float, float]:
@@ -234,7 +214,7 @@ def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: f
         for row, panel in zip(rows, axes.flat, strict=False):
             run = row.run
             shade_open_gap(panel, run, longest)
-            _torques(panel, run, (said("motor torque u"), said("shaft torque T")))
+            _torques(panel, run, ("motor torque u", "shaft torque T"))
             title = f"{name_in_figure(row.marked)}: {run.k_dyn:.3f}"
             panel.set_title(title, loc="left", fontsize=SMALL, pad=3)
             if not math.isnan(run.start_time):
@@ -247,7 +227,7 @@ def traces_figure(rows: Sequence[Row], longest: float, lowest: float, highest: f
         for column in range(ACROSS):
             last = axes[down - 1 - (len(rows) <= (down - 1) * ACROSS + column), column]
             last.tick_params(labelbottom=True)
-            last.set_xlabel(said("time, s"), fontsize=SMALL)
+            last.set_xlabel("time, s", fontsize=SMALL)
         for panel in axes[:, 0]:
             panel.set_ylabel("N m", fontsize=SMALL)
         handles = axes[0, 0].get_legend_handles_labels()[0]
@@ -271,15 +251,13 @@ def before_after_figure(rows: Sequence[Row]) -> Any:
             speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, ls=dash, lw=width)
         permissible = rows[0].run.drive.limits.shaft_torque
         if permissible is not None:
-            torque.axhline(
-                permissible, color="#B00020", lw=1.4, ls=DASHES[1], label=said("permissible torque")
-            )
+            torque.axhline(permissible, color="#B00020", lw=1.4, ls=DASHES[1], label="permissible torque")
         torque.set_ylim(bottom=min(0.0, torque.get_ylim()[0]))  # "15 % less" is seen as that
-        labels = said("shaft torque, N m"), said("load speed, {unit}", unit=units.speed)
+        labels = "shaft torque, N m", f"load speed, {units.speed}"
         for panel, what in zip((torque, speed), labels, strict=True):
             panel.set_xlim(0.0, 1.1 * longest)
             panel.set_ylabel(what, fontsize=SMALL)
-            panel.set_xlabel(said("time, s"), fontsize=SMALL)
+            panel.set_xlabel("time, s", fontsize=SMALL)
             panel.tick_params(labelsize=SMALL - 0.5)
         target = units.shown(float(rows[0].run.drive.target_speed), "rad/s")
         speed.axhline(target, color=GREY, lw=0.8, ls=":")
@@ -296,7 +274,7 @@ def _torques(panel: Axes, run: Run, labels: tuple[str, str]) -> None:
     panel.plot([run.peak_time], [_peak(run)], "o", ms=3.0, color=COLOURS[0])
     permissible = run.drive.limits.shaft_torque
     if permissible is not None:
-        panel.axhline(permissible, color="#B00020", lw=0.9, ls=":", label=said("permissible torque"))
+        panel.axhline(permissible, color="#B00020", lw=0.9, ls=":", label="permissible torque")
 
 
 def name_in_figure(name: str) -> str:
