@@ -36,6 +36,7 @@ __all__ = [
     "RefusedError",
     "Units",
     "Value",
+    "doubtful_comma",
     "nearest",
     "parse",
     "read_unit",
@@ -77,6 +78,7 @@ QUANTITIES: dict[str, Quantity] = {
         Quantity("m", "a length", "82 mm"),
         Quantity("kg", "a mass", "0.68 kg"),
         Quantity("kg*m", "an imbalance", "0.045 kg*m"),
+        Quantity("N/m", "a stiffness along a line", "1.6 MN/m"),
         Quantity("Pa", "a pressure", "10 bar", ("J/m^3",)),
         Quantity("m^2", "an area", "0.05 m^2"),
         Quantity("A", "a current", "12 A"),
@@ -92,7 +94,6 @@ OTHER_NOUNS = {
     "m/s": "a speed along a line",
     "m/s^2": "an acceleration along a line",
     "rad/s^2": "an angular acceleration",
-    "N/m": "a stiffness along a line",
     "N*s/m": "a damping along a line",
     "N*m^2": "a flywheel moment",
     "N*m*s": "an angular momentum",
@@ -123,16 +124,15 @@ year = 31557600 * second
 tonne = 1e6 * gram = t
 pound = 453.59237 * gram = lb
 degree = 0.017453292519943295 * radian = deg = °
-turn = 6.283185307179586 * radian = rev = revolution = r
+turn = 6.283185307179586 * radian = rev = revolution = r = U
 arcminute = degree / 60 = arcmin
 arcsecond = degree / 3600 = arcsec
 revolutions_per_minute = turn / minute = rpm
 hertz = 1 / second = Hz
 newton = kilogram * meter / second ** 2 = N
-kilogram_force = 9.80665 * newton = kgf = force_kilogram
+kilogram_force = 9.80665 * newton = kgf = force_kilogram = kp
 pound_force = 4.4482216152605 * newton = lbf = force_pound
 ounce_force = 0.27801385095378125 * newton = ozf = force_ounce
-newton_meter = newton * meter = Nm
 pascal = newton / meter ** 2 = Pa
 bar = 1e5 * pascal
 watt = joule / second = W
@@ -142,8 +142,8 @@ metric_horsepower = 735.49875 * watt = PS
 
 # Spellings that are offered for an unknown one.
 _USUAL = """
-m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf Nm
-kNm mNm J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
+m mm cm in ft kg g lb t s ms min h days years rad mrad deg arcmin arcsec turn rev rpm Hz kHz N kN kgf lbf
+J kJ W kW MW hp PS Pa kPa MPa bar mbar A mA kA
 """
 
 # Factors of what most drive files write; pint, which says the same, takes a fifth of a second to import.
@@ -171,6 +171,10 @@ TYPED = {
 _SYMBOLS = str.maketrans(
     {"·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁴": "^4", "¹": "^1", "⁻": "^-", "⁺": "^+"}
 )
+# Units of data sheets without dots: kgm^2, Nm, Nms, Ncm, kgfm, Ws; to pint "Nms" is the plural of Nm.
+_WITHOUT_DOTS = re.compile(
+    r"\b(?:(k?g(?=[cm]?m\^2)|[kMm]?N|kgf|kp)([cm]?m)(s?)|([kMm]?[NWJ])(s))(?![^\W\d_])"
+)
 # Only products, quotients and one-digit powers of names reach pint: its own grammar knows much more.
 _NAME = re.compile(r"(?:[^\W\d]|°)+")
 _FACTOR = rf"(?:{_NAME.pattern}|1)(?:\s*(?:\*\*|\^)\s*[+-]?[1-9])?(?![\w.])"
@@ -189,7 +193,7 @@ class Unit(NamedTuple):
 
 @lru_cache(maxsize=512)
 def read_unit(written: str) -> Unit | str:
-    """The unit as written by people ("kg m2", "N·m/rad", "s⁻¹"), or the reason why it is none.
+    """The unit as written by people ("kgm²", "N·m/rad", "N-m", "s⁻¹"), or the reason why it is none.
 
     >>> read_unit("rpm")
     Unit(size=0.10471975511965977, dimensions=(('[angle]', 1.0), ('[time]', -1.0)))
@@ -201,8 +205,9 @@ def read_unit(written: str) -> Unit | str:
     if len(written) > LONGEST:
         return f'"{written[:30]}..." is too long for a unit'
     text = written.translate(_SYMBOLS).replace("^-^", "^-").replace("^+^", "^")
-    text = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", text)  # "N.m"
+    text = re.sub(r"(?<=[^\W\d])[.-](?=[^\W\d])", "*", text)  # "N.m", "lbf-ft"
     text = re.sub(r"(?<=[^\W\d_])([+-]?[1-9])(?![\w.])", r"^\1", text)  # "kg m2", "s-1" as in data sheets
+    text = _WITHOUT_DOTS.sub(lambda found: "*".join(filter(None, found.groups())), text)
     if not _is_product(text):
         return f'"{written}" is no unit'
     registry = _registry()
@@ -465,11 +470,13 @@ def _text(text: str, unit: str, infinite: bool) -> float:
         raise RefusedError(f"this is no number with a unit; {_remedy(unit)}")
     written = stripped[match.end() :].strip()
     if "," in written:
-        raise RefusedError(_doubtful_comma(stripped, unit))
+        raise RefusedError(doubtful_comma(stripped, unit))
     named = infinite and "inf" in match.group().lower()  # infinity is written, not a number with many digits
     number = _checked(float(match.group()), unit, named)
     if not written:
         return number
+    if written == "%" and unit == "1":
+        return number / 100.0
     factor = _factor(written, match.group(), unit)
     # Decimal units are applied by one correctly rounded operation: "9 ms" is 0.009, not a neighbour of it.
     divisor = round(1.0 / factor) if 1e-15 < factor < 1.0 else 0
@@ -479,7 +486,7 @@ def _text(text: str, unit: str, infinite: bool) -> float:
     return _checked(scaled, unit, named)
 
 
-def _doubtful_comma(text: str, unit: str) -> str:
+def doubtful_comma(text: str, unit: str = "") -> str:
     """The reason why a number with a comma is refused, and how to write it."""
     reason = "a comma may divide decimals or thousands; "
     number = re.match(r"([+-]?[0-9]*),([0-9]+)(?![0-9]*[.,])", text)
@@ -502,6 +509,9 @@ def _factor(written: str, number: str, unit: str) -> float:
     found = read_unit(written)
     if isinstance(found, str):
         raise RefusedError(f"{found}; {_remedy(unit)}")
+    if unit == "rad/s" and "min" in written and found.dimensions == _known("Hz").dimensions:
+        found = read_unit(f"({written})*turn")  # 1/min, min-1: revolutions, ISO 80000-3
+        assert isinstance(found, Unit)
     for form in (unit, *quantity.others):
         wanted = _known(form)
         if wanted.dimensions == found.dimensions:
@@ -518,10 +528,8 @@ def _wrong_kind(written: str, number: str, found: Unit, quantity: Quantity) -> s
         return f"{written} is not a unit of {quantity.noun}; {_remedy(unit)}"
     is_what = f"{written} is {other}"
     if unit == "rad/s" and other == "a frequency":
-        per_minute = "min" in written
-        count, radian = ("rpm", "rad/min") if per_minute else ("turn/s", "rad/s")
-        amount = number if per_minute else f"{float(number) * found.size:.12g}"
-        return f'{is_what}, which may count turns or radians; write "{amount} {count}" or "{amount} {radian}"'
+        amount = f"{float(number) * found.size:.12g}"
+        return f'{is_what}, which may count turns or radians; write "{amount} turn/s" or "{amount} rad/s"'
     if unit == "kg*m^2" and other == "a flywheel moment":
         return f"{is_what} (GD^2); divide it by 4 g and write the inertia in kg*m^2"
     if unit in ("N*m/rad", "N*m*s/rad") and other == _noun_of(unit.removesuffix("/rad")):

@@ -17,7 +17,7 @@ import numpy as np
 
 from softstart.errors import MOST, InputError
 from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of
-from softstart.quantities import nearest, shortest, show
+from softstart.quantities import doubtful_comma, nearest, shortest, show
 
 T = TypeVar("T")
 
@@ -203,6 +203,8 @@ def _invalid(message: str, text: str, wording: Wording) -> str:
     what = what[0].lower() + what[1:]
     unquoted = what.startswith(("invalid value", "expected newline or end of document"))
     remedy = '; write text and quantities in quotes: gap = "0.5 rad"' if unquoted else ""
+    if comma := re.fullmatch(r"[\w.-]+\s*=\s*([+-]?\d+,\d+[^,\[\]#]*?)\s*(?:#.*)?", shown):
+        what, remedy = doubtful_comma(comma[1]), ""
     cut = shown if len(shown) <= 60 else f"{shown[:60]}..."
     subject = f"{where}, {cut!r}" if shown else where
     return wording.sentence(subject, f"this is not valid TOML ({what}){remedy}")
