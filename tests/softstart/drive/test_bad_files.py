@@ -55,7 +55,7 @@ TOML = [
     ("[motor]", "gap = 0.5\n[motor]", "gap = 0.5: ", "gap belongs below [shaft]"),
     ("[motor]", "load_kind = 'active'\n[motor]", 'load_kind = "active": ', "written kind, below [load]"),
     ("[motor]", "nam = 'x'\n[motor]", 'nam = "x": ', "did you mean name?"),
-    ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, assumed, units, [motor]"),
+    ("[motor]", "colour = 'red'\n[motor]", 'colour = "red": ', "it has name, source, assumed, units, ["),
     ("[motor]", "clutch = 3\n[motor]", "clutch = 3: ", "has no key clutch"),
 ]  # fmt: skip
 
