@@ -148,6 +148,24 @@ def test_a_halt_of_half_a_second_in_a_drag_loses_none_of_its_steps(page, server)
     assert settled(page, "window.updates") >= 55
 
 
+def test_the_table_is_sorted_again_at_rest_and_a_note_is_no_alarm(page):
+    opened(page)
+    at_rest(page)
+    field(page, "start.position").fill("unknown")
+    field(page, "start.position").press("Enter")
+    page.wait_for_function("document.querySelector('.figure .status').textContent.includes('is unknown')")
+    colour = "getComputedStyle(document.querySelector('.figure .status')).color"
+    comes_to(lambda: page.evaluate(colour), page.evaluate(colour.replace("status", "unit")))
+    field(page, "shaft.gap").fill("2")
+    field(page, "shaft.gap").press("Enter")
+    answered(page)
+    at_rest(page)
+    drawn(page)
+    cells = page.locator('.strategies tbody td[data-key="k_dyn"]').all_inner_texts()
+    assert len(cells) > 5
+    assert [float(one) for one in cells] == sorted(float(one) for one in cells)
+
+
 def test_a_press_on_the_map_goes_to_that_gap_and_inertia(page):
     opened(page)
     at_rest(page)

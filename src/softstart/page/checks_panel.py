@@ -77,4 +77,5 @@ class ChecksPanel:
         best = None if self._found is None else self._found.quickest
         if best is None:
             raise InputError("There is no quickest start to add; give limits, and compute again.")
+        self._stale.check()
         self._session.add(f"quickest {best.end_time:.4g} s", tasks.player_of(best), select=False)

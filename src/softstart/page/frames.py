@@ -576,7 +576,7 @@ def reference_words(kept: Reference, session: Session) -> tuple[str, ...]:
         for one in (parameters_of(controller) if type(other) is type(controller) else ())
         if (value := getattr(controller, one.name)) != getattr(other, one.name)
     ]
-    return kept.label, *own, differences(kept.drive, session.drive)
+    return kept.label, *own, differences(kept.drive, session.machine)
 
 
 def drawn(

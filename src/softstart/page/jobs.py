@@ -21,8 +21,8 @@ MOST_WAITING = 8  # jobs of one user
 
 OUT_OF_MEMORY = "The computation needs more memory than there is; ask for fewer points or a smaller grid."
 MISTAKE = (
-    "There is a mistake in softstart, and this could not be computed; the log of the server, where "
-    "softstart serve was started, says more. Everything else goes on."
+    "There is a mistake in softstart, and this could not be computed; the log of the server "
+    "says more. Everything else goes on."
 )
 
 log = logging.getLogger("softstart.page")

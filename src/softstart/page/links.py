@@ -79,7 +79,8 @@ def _given(controller: Controller) -> dict[str, Any]:
 
 
 def bench_of(link: str, now: Bench) -> Bench:
-    """The bench of a link; the strategies that it does not name are those of `now`.
+    """The bench of a link; the strategies that it does not name are those of `now`, or for another machine
+    those of them that are installed.
 
     >>> bench_of("nonsense", Session().bench)
     Traceback (most recent call last):
@@ -90,7 +91,9 @@ def bench_of(link: str, now: Bench) -> Bench:
         drive = machine_from(content["drive"])
         origin = machine_from(content["origin"]) if content["origin"] else drive
         parameters = content["parameters"]
-        given = {name: dict(parameters[name]) for name in now.controllers if name in parameters}
+        same = origin == now.origin
+        own = {name: one for name, one in now.controllers.items() if same or name in controller_names()}
+        given = {name: dict(parameters[name]) for name in own if name in parameters}
         selected, drawn = str(content["selected"]), frozenset(map(str, content["drawn"]))
         reference = _reference(content.get("reference"), now)
     except (KeyError, TypeError, ValueError, RecursionError, binascii.Error, zlib.error):
@@ -107,9 +110,9 @@ def bench_of(link: str, now: Bench) -> Bench:
     return Bench(
         drive,
         origin,
-        {**now.controllers, **made},
-        selected if selected in now.controllers else now.selected,
-        drawn & set(now.controllers),
+        {**own, **made},
+        next(one for one in (selected, now.selected, *own) if one in own),
+        drawn & own.keys(),
         reference,
     )
 

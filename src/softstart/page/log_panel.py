@@ -27,7 +27,7 @@ from softstart.page.sentences import clipped
 from softstart.page.session import Session
 
 LARGEST = 1000 * 1024  # bytes of a log; a request may have little more
-SHORTER = "cut the log to the start, or use softstart identify"
+SHORTER = "cut the log to the start"
 
 
 class LogPanel:

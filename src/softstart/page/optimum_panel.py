@@ -111,8 +111,9 @@ class OptimumPanel:
         assert found is not None
         self._use.set_visibility(False)
         try:
+            self._stale.check()
             self._session.add(tasks.label_of(found.best), tasks.player_of(found.best), select=False)
-        except InputError as error:  # the table is full
+        except InputError as error:
             self._sentence.set_text(" ".join(error.sentences))
         else:
             self._sentence.set_text(self._beside(found.best))

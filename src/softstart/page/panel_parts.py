@@ -16,7 +16,7 @@ from nicegui import app, context, ui
 from softstart.chain.machines import Machine
 from softstart.errors import MORE_MISTAKES, InputError
 from softstart.page.jobs import Job, Jobs, State
-from softstart.page.sentences import changed_since, sentence_of
+from softstart.page.sentences import changed_since, plain, sentence_of
 from softstart.page.session import Session
 from softstart.views.printed import NOTHING
 
@@ -166,7 +166,7 @@ def save(text: str, name: str) -> None:
 
 
 def few(sentences: Sequence[str]) -> list[str]:
-    """The first sentences, and how many there are beside them.
+    """The first sentences, without words of the command line, and how many there are beside them.
 
     >>> few(["a.", "b."]), few([f"{k}." for k in range(20_000)])[-2:]
     (['a.', 'b.'], ['11.', 'There are 19,988 more of them.'])
@@ -174,7 +174,10 @@ def few(sentences: Sequence[str]) -> list[str]:
     left = len(sentences) - MOST_SENTENCES
     if left > 0 and (rest := MORE_MISTAKES.fullmatch(sentences[-1])):  # an InputError counts some itself
         left += int(rest[1]) - 1
-    return [*sentences[:MOST_SENTENCES], *([f"There are {left:,} more of them."] if left > 0 else [])]
+    return [
+        *map(plain, sentences[:MOST_SENTENCES]),
+        *([f"There are {left:,} more of them."] if left > 0 else []),
+    ]
 
 
 def notify(sentence: str) -> None:
@@ -190,7 +193,7 @@ def guarded(act: Callable[[], Any]) -> Callable[[], Any]:
             act()
         except Exception as error:  # nobody who uses the page sees a traceback
             sentences = error.sentences if isinstance(error, InputError) else (sentence_of(error),)
-            for sentence in sentences:
+            for sentence in few(sentences):
                 ui.notify(sentence, type="negative", position="bottom-left", multi_line=True, timeout=8000)
 
     return acting
@@ -242,16 +245,21 @@ class StaleNote:
         self._drive, self._seen = drive, -1
         self.refresh()
 
-    def refresh(self) -> bool:
-        """Compare again where the session has changed; True if it has."""
+    def refresh(self) -> None:
+        """Compare again where the session has changed."""
         if self._drive is None or self._session.version == self._seen:
-            return False
+            return
         self._seen = self._session.version
         sentence = changed_since(self._drive, self._session.machine)
         self.stale = bool(sentence)
         self._label.set_text(sentence)
         self._label.set_visibility(self.stale)
-        return True
+
+    def check(self) -> None:
+        """Refuse what was computed for another machine: it is none of this one's strategies."""
+        now, drive = self._session.machine, self._drive
+        if drive is not None and drive.name != now.name and (sentence := changed_since(drive, now)):
+            raise InputError(f"{sentence[:-1]}: it is not added to the strategies.")
 
 
 def duration(seconds: float) -> str:
@@ -423,7 +431,7 @@ class JobView:
         self._troubles.clear()
         self._troubles.set_visibility(bool(sentences))
         with self._troubles:
-            for sentence in sentences:
+            for sentence in few(sentences):
                 ui.label(sentence).classes("trouble")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from typing import Any, NamedTuple
 
 from softstart.chain.machines import Machine, Values, values_of
@@ -33,9 +34,9 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
     "This did not work, and that is a mistake in softstart, not in your input (KeyError: 'x')."
     """
     if isinstance(error, InputError):
-        return " ".join(error.sentences)
+        return " ".join(map(plain, error.sentences))
     if isinstance(error, SimulationError):
-        return " ".join(str(error).split())
+        return plain(" ".join(str(error).split()))
     if isinstance(error, MemoryError):
         return "There is not enough memory for this."
     text = " ".join(str(error).split())
@@ -44,6 +45,16 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     log.debug("told the user: %s", what, exc_info=error)
     return otherwise.format(what)
+
+
+def plain(sentence: str) -> str:
+    """A sentence without the words of the command line, which a page does not have.
+
+    >>> plain("minimise = start_time: it is below 0; write --columns speed=NAME (softstart identify --plan).")
+    'it is below 0; write speed=NAME.'
+    """
+    text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)
+    return re.sub(r"( of)? --[a-z][\w-]*", "", text)
 
 
 def clipped(name: str) -> str:

@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from softstart.chain.machines import Machine, moved
-from softstart.chain.model import Chain, load_machine
+from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
-from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.page.machines import changed, machine_from, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
@@ -113,7 +112,7 @@ class Session:
     >>> round(session.result("direct").k_dyn, 3), session.version
     (4.865, 1)
     >>> session.undo()
-    >>> session.drive.gap
+    >>> session.machine.gap
     0.5
     """
 
@@ -122,7 +121,7 @@ class Session:
     ) -> None:
         drive = single(load_machine(drive) if isinstance(drive, str) else drive)
         names = list(ready_controller_names() if controllers is None else controllers)
-        selected = REFERENCE if REFERENCE in names or not names else names[0]
+        selected = _main(names)
         self._first = {name: make_controller(name) for name in names}
         self._bench = Bench(drive, drive, self._first, selected, frozenset((selected,)))
         self._past: list[Bench] = []
@@ -148,16 +147,6 @@ class Session:
     def machine(self) -> Machine:
         """The drive or the chain as it is now."""
         return self._bench.drive
-
-    @property
-    def drive(self) -> Drive:
-        """The drive as it is now; InputError if it is a chain, for what is done with drives alone."""
-        if isinstance(self.machine, Chain):
-            raise InputError(
-                f"{clipped(self.machine.name)} is a chain, and this takes a drive of two masses; reduce "
-                "it to one (softstart reduce), or load a drive."
-            )
-        return self.machine
 
     @property
     def origin(self) -> Machine:
@@ -220,7 +209,7 @@ class Session:
         >>> session.set("gap", "4 metres")
         Traceback (most recent call last):
         softstart.errors.InputError: gap = "4 metres": metres is a length, not an angle; ...
-        >>> session.drive.gap
+        >>> session.machine.gap
         0.5
         """
         self.set_all({path: value})
@@ -256,9 +245,12 @@ class Session:
         self.take(machine_from(text, where))
 
     def take(self, drive: Machine) -> None:
-        """Go over to another drive, or to a chain."""
+        """Go over to another drive or chain, without the optima and gains that were computed for this one."""
         drive = single(drive)
-        self._put(drive=drive, origin=drive)
+        own = {label: one for label, one in self.controllers.items() if label in self._first} or self._first
+        selected = self.selected if self.selected in own else _main(own)
+        drawn = self._bench.drawn.intersection(own)
+        self._put(drive=drive, origin=drive, controllers=own, selected=selected, drawn=drawn)
 
     def restore(self, bench: Bench) -> None:
         """Begin with a bench of before, or of somebody else; nothing can be undone then."""
@@ -489,6 +481,11 @@ class Session:
             near = nearest(label, list(self.controllers))
             hint = f"did you mean {near}?" if near else f"there are {', '.join(self.controllers)}."
             raise InputError(f'strategy "{clipped(label)}": there is no strategy of this name; {hint}')
+
+
+def _main(labels: Iterable[str]) -> str:
+    """The strategy that is selected first."""
+    return REFERENCE if REFERENCE in labels else next(iter(labels), REFERENCE)
 
 
 def _started(label: str, drive: Machine, controller: Controller, max_events: int) -> tuple[Strategy, bool]:

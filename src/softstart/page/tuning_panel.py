@@ -121,6 +121,7 @@ class TuningPanel:
 
     def _add(self, file: str) -> None:
         assert self._found is not None
+        self._stale.check()
         controller = controller_of(self._found.files[file], file)
         label = self._session.add(controller.name or file, controller)
         notify(f"{label} is among the strategies.")
@@ -170,7 +171,7 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
     if len(found[0]) * len(found[1]) > MOST_CELLS:
         raise InputError(
             f"Gaps and load inertias make {len(found[0]) * len(found[1])} cells, and the page tunes at most "
-            f"{MOST_CELLS}; take fewer, or softstart tune in a terminal."
+            f"{MOST_CELLS}; take fewer."
         )
     return found[0], found[1]
 

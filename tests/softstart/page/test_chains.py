@@ -205,10 +205,17 @@ def test_a_link_brings_the_chain_back_and_a_drive_replaces_it():
     assert frame["figure"]["k_dyn"] == simulate(other.drive, "direct").k_dyn
 
 
-def test_what_takes_two_masses_says_so_of_a_chain():
-    session, _, _ = screen_of(CHAIN)
-    with pytest.raises(InputError, match="is a chain, and this takes a drive of two masses"):
-        _ = session.drive
+@pytest.mark.parametrize("machines", [(CHAIN, CHAIN), (Drive.load("crane-4amtkf"), CHAIN)])
+def test_a_reference_stays_while_a_chain_is_loaded_and_in_its_link(machines):
+    session, screen, controls = screen_of(machines[0])
+    controls.take({"what": "reference", "kept": True})
+    session.take(machines[1])
+    k = simulate(machines[0], "direct").k_dyn
+    assert screen.first()["reference"]["k_dyn"] == k
+    other, opened, controls = screen_of(Drive.load("hoist-15kw"))
+    controls.take({"what": "hello", "kept": None, "link": links.link_of(session)})
+    assert opened.first()["reference"]["k_dyn"] == k
+    assert other.machine == machines[1]
 
 
 @pytest.mark.parametrize(

@@ -83,12 +83,12 @@ def test_the_last_step_of_a_hand_always_arrives_and_frames_never_pile_up():
     frames = [frame for number, frame in line.frames if number and "figure" in frame]
     assert len(frames) < 60  # coalesced
     assert frames[-1]["stamp"] == 395
-    assert frames[-1]["figure"]["k_dyn"] == simulate(session.drive, "direct").k_dyn
+    assert frames[-1]["figure"]["k_dyn"] == simulate(session.machine, "direct").k_dyn
     rows = {}
     for _, frame in line.frames:
         rows |= {row["name"]: row for row in frame.get("rows", [])}
     for name in session.controllers:
-        assert rows[name]["k_dyn"] == simulate(session.drive, name).k_dyn
+        assert rows[name]["k_dyn"] == simulate(session.machine, name).k_dyn
         assert rows[name]["worn"] == session.worn(name)
 
 
@@ -126,7 +126,7 @@ def test_the_map_arrives_at_rest_and_is_left_when_a_hand_moves():
         assert any(frame.get("map_is_old") for _, frame in line.frames)
         rows = rows_of_map(line)
         head = rows[8]["map"]
-        here = session.drive.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
+        here = session.machine.replace(gap=head["gaps"][6], load_inertia=head["inertias"][8])
         assert rows[8]["map_row"]["k"][6] == simulate(here, "direct").k_dyn
 
     asyncio.run(followed(session, hand))
@@ -188,7 +188,7 @@ def test_a_mistake_stays_beside_its_field_until_it_is_mended():
     assert "not an angle" in screen.first()["mistakes"]["shaft.gap"]
     controls.take({"what": "edit", "path": "load.torque", "text": "8"})
     assert list(screen.mistakes) == ["shaft.gap"]
-    assert session.drive.gap == 0.5
+    assert session.machine.gap == 0.5
     controls.take({"what": "edit", "path": "shaft.gap", "text": "4 deg"})
     assert not screen.mistakes
     assert screen.first()["fields"]["shaft.gap"][:3] == ["4", 21, "0.06981 rad"]
@@ -203,7 +203,7 @@ def test_a_mistake_that_is_taken_back_leaves_every_digit_of_the_drive():
     assert screen.mistakes
     controls.take({"what": "leave", "path": "shaft.stiffness"})
     assert not screen.mistakes
-    assert session.drive.stiffness == 368.4651234567
+    assert session.machine.stiffness == 368.4651234567
 
 
 def test_each_message_is_told_of_once_and_no_place_is_made_up():
@@ -222,15 +222,15 @@ def test_each_message_is_told_of_once_and_no_place_is_made_up():
 def test_a_page_loaded_anew_goes_on_with_the_bench_that_its_tab_has_kept():
     before = Session(controllers=["direct", "ramp"])
     before.set_all({"shaft.gap": 0.1 + 0.2, "name": 'my "own" drive'})
-    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), before.drive)
+    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), before.machine)
     before.add("ramp (robust)", tuned)
     (kept,) = [frame["keep"] for frame in Screen(before).at_rest() if frame and "keep" in frame]
     session = Session(controllers=["direct", "ramp"])
     controls, screen = controls_of(session)
     controls.take({"what": "hello", "kept": {**kept, "server": "of yesterday"}, "link": ""})
-    assert session.drive == session.origin != before.drive
+    assert session.machine == session.origin != before.machine
     controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
-    assert session.drive is before.drive
+    assert session.machine is before.machine
     assert session.controllers["ramp (robust)"] is tuned
     assert session.selected == "ramp (robust)"
     assert session.steps == (0, 0)
@@ -248,7 +248,7 @@ def test_a_tab_that_has_not_heard_of_the_last_change_gets_what_its_link_says():
     session = Session(controllers=["direct"])
     controls, _ = controls_of(session)
     controls.take({"what": "hello", "kept": kept, "link": kept["link"]})
-    assert session.drive.gap == 0.3
+    assert session.machine.gap == 0.3
 
 
 def test_a_slider_sets_exactly_the_value_that_its_field_shows():
@@ -310,7 +310,7 @@ def test_a_unit_that_was_typed_is_that_of_the_page_and_stays_at_a_gap_of_0():
     controls, screen = controls_of(session)
     assert screen.units.angle == "deg"
     controls.take({"what": "slide", "path": "shaft.gap", "position": 0})
-    assert (session.drive.gap, screen.units.angle) == (0.0, "deg")
+    assert (session.machine.gap, screen.units.angle) == (0.0, "deg")
 
 
 def test_parameters_of_the_selected_strategy_are_fields():
@@ -333,9 +333,8 @@ def test_parameters_of_the_selected_strategy_are_fields():
     controls.take({"what": "edit", "path": "strategy.time", "text": "200 ms"})
     assert session.controllers["ramp"].time == 0.2
     assert screen.first()["changed"] == ["ramp"]
-    assert (
-        session.result("ramp").k_dyn == simulate(session.drive, make_controller("ramp", {"time": 0.2})).k_dyn
-    )
+    ramp = make_controller("ramp", {"time": 0.2})
+    assert session.result("ramp").k_dyn == simulate(session.machine, ramp).k_dyn
     controls.take({"what": "slide", "path": "strategy.time", "position": 600})
     assert session.controllers["ramp"].time == screen.strategy_scales["time"].high
     controls.take({"what": "edit", "path": "strategy.time", "text": " "})
@@ -373,12 +372,12 @@ def test_reset_gives_the_value_of_the_drive_as_it_was_loaded():
     controls, _ = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.gap", "text": "1.5"})
     controls.take({"what": "reset", "path": "shaft.gap"})
-    assert session.drive == session.origin
+    assert session.machine == session.origin
 
 
 def test_tuned_values_are_marked_beside_the_default():
     session = Session(controllers=["ramp"])
-    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), session.drive)
+    tuned = RobustGains("robust", make_controller("ramp", {"time": 0.3}), session.machine)
     session.add("ramp (robust)", tuned, select=False)
     screen = Screen(session)
     session.result("ramp (robust)")
@@ -404,7 +403,7 @@ def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
     controls, screen = controls_of(session)
     controls.take({"what": "edit", "path": "shaft.gap", "text": ""})
     assert "empty" in screen.mistakes["shaft.gap"]
-    session.take(session.drive.replace(gap=0.005))
+    session.take(session.machine.replace(gap=0.005))
     assert not screen.first()["mistakes"]
     assert screen.scales["shaft.gap"].high == 0.02
     assert max(screen.axes.gaps) == 0.02

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import inspect
 import itertools
+import re
 import weakref
 from collections.abc import Iterator
 from typing import Any
@@ -190,3 +191,48 @@ def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> 
         'Gaps = "0,5x, 1x"',
         'Load inertias = "0,35"',
     ]
+
+
+def test_no_word_of_the_command_line_stands_on_the_page(client: Any) -> None:
+    """Labels, tips, choices and hints of all tabs; only the command that is offered for copying has them."""
+    from importlib import import_module
+
+    from softstart.page import tasks
+    from softstart.page.layout import PANELS
+    from softstart.page.panel_parts import few
+    from softstart.page.tuning_panel import grid_of
+
+    for _, module, name in PANELS:
+        getattr(import_module(f"softstart.page.{module}"), name)(Session(controllers=["direct"]), "A")
+    texts = [
+        str(text)
+        for one in client.elements.values()
+        if one.props.get("data-testid") != "command"
+        for text in (getattr(one, "text", ""), getattr(one, "content", ""), *one.props.values())
+    ]
+    assert len(texts) > 200
+    crane = Drive.load("crane-4amtkf")  # undamped: there is no life to tell of, and a remedy
+    texts += few([one for part in tasks.checked(crane, {}, progress=print).parts for one in part.sentences])
+    with pytest.raises(InputError) as told:
+        grid_of(crane, ",".join(f"{k}x" for k in range(1, 62)), "1x")
+    texts += few(told.value.sentences)
+    assert [text for text in texts if re.search(r"--[a-z]|softstart [a-z]|minimise", text)] == []
+
+
+def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
+    from softstart import optimize
+    from softstart.page import tasks
+    from softstart.page.optimum_panel import OptimumPanel
+
+    crane = Drive.load("crane-4amtkf")
+    session = Session(crane, controllers=["direct"])
+    panel = OptimumPanel(session, "A", Jobs())
+    panel._found = tasks.Gentlest(optimize(crane, "1.2x"), {})
+    session.take(Drive.load("hoist-15kw"))
+    panel._stale.show_for(crane)
+    panel._add()
+    assert list(session.controllers) == ["direct"]
+    assert "another drive is loaded now" in panel._sentence.text
+    session.undo()
+    panel._add()
+    assert len(session.controllers) == 2

@@ -30,7 +30,7 @@ class Failing(PlainController):
 def test_all_figures_are_those_of_compare_to_the_bit():
     session = Session()
     session.set_all({"shaft.gap": "0.7 rad", "shaft.damping": 0.4})
-    for row, strategy in zip(compare(session.drive).rows, session.strategies, strict=True):
+    for row, strategy in zip(compare(session.machine).rows, session.strategies, strict=True):
         assert strategy.name == row.run.controller.name
         assert strategy.k_dyn == row.run.k_dyn
         assert strategy.start_time == row.run.start_time
@@ -43,13 +43,13 @@ def test_set_takes_numbers_and_texts_and_counts_changes():
     calls = []
     stop = session.on_change(lambda: calls.append(session.version))
     session.set("shaft.gap", 0.1 + 0.2)
-    assert session.drive.gap == 0.1 + 0.2  # to the bit, not through a rounded text
+    assert session.machine.gap == 0.1 + 0.2  # to the bit, not through a rounded text
     session.set("target_speed", "880 rpm")
     stop()
     session.set("load.kind", "reactive")
     assert calls == [1, 2]
     assert session.version == 3
-    assert session.drive.load_kind == "reactive"
+    assert session.machine.load_kind == "reactive"
 
 
 def test_undo_and_redo_go_through_every_change():
@@ -71,7 +71,7 @@ def test_undo_and_redo_go_through_every_change():
         assert session.bench is bench
     session.undo()  # nothing is left
     assert session.bench is seen[0]
-    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
     for bench in seen[1:]:
         session.redo()
         assert session.bench is bench
@@ -91,11 +91,11 @@ def test_a_drag_is_one_step_and_results_follow_undo(monkeypatch):
     assert session.steps == (3, 0)
     session.undo()
     session.undo()
-    assert session.drive.gap == 0.8
-    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+    assert session.machine.gap == 0.8
+    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
     session.undo()
-    assert session.drive.gap == 0.5
-    assert session.result("direct").k_dyn == simulate(session.drive, "direct").k_dyn
+    assert session.machine.gap == 0.5
+    assert session.result("direct").k_dyn == simulate(session.machine, "direct").k_dyn
 
 
 def test_the_steps_that_can_be_undone_are_limited(monkeypatch):
@@ -125,7 +125,7 @@ def test_a_link_brings_back_drive_strategies_and_selection():
     session.select("shaped")
     other = Session()
     other.restore(bench_of(link_of(session), other.bench))
-    assert other.drive == session.drive
+    assert other.machine == session.machine
     assert other.origin == session.origin
     assert (other.selected, other.controllers["shaped"].shaper) == ("shaped", "zvd")
     assert set(other.shown) == {*session.shown} - {"mine"}
@@ -136,7 +136,7 @@ def test_a_reference_stays_while_drive_and_strategies_change_and_travels_in_the_
     session = Session()
     session.select("ramp")
     session.set("shaft.gap", "4 deg")
-    kept = simulate(session.drive, "ramp").k_dyn
+    kept = simulate(session.machine, "ramp").k_dyn
     session.keep_reference()
     session.set_parameter("time", "200 ms")
     session.set("shaft.gap", 1.0)
@@ -237,10 +237,10 @@ def test_a_link_cannot_name_code_or_a_file():
 )
 def test_a_mistake_is_a_sentence_and_changes_nothing(path, value, said):
     session = Session(controllers=["direct"])
-    before, known = session.drive, session.result("direct")
+    before, known = session.machine, session.result("direct")
     with pytest.raises(InputError, match=said):
         session.set(path, value)
-    assert session.drive is before
+    assert session.machine is before
     assert session.version == 0
     assert session.result("direct") is known
 
@@ -249,20 +249,20 @@ def test_several_changes_are_one_step_or_none():
     session = Session(controllers=["direct"])
     with pytest.raises(InputError):
         session.set_all({"shaft.gap": 1.0, "load.inertia": -1.0})
-    assert session.drive.gap == 0.5
+    assert session.machine.gap == 0.5
     session.set_all({"shaft.gap": 1.0, "load.inertia": 0.1})
-    assert (session.drive.gap, session.drive.J2, session.version) == (1.0, 0.1, 1)
+    assert (session.machine.gap, session.machine.J2, session.version) == (1.0, 0.1, 1)
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.text(max_size=40), st.text(max_size=40))
 def test_no_text_whatever_breaks_the_bench(path, text):
     session = Session(controllers=["direct"])
-    before = session.drive
+    before = session.machine
     for change in (lambda: session.set(path, text), lambda: session.load(text)):
         with contextlib.suppress(InputError):
             change()
-        assert session.drive is before or session.version > 0
+        assert session.machine is before or session.version > 0
         assert session.result("direct").k_dyn > 0.0
 
 
@@ -270,10 +270,10 @@ def test_load_takes_a_file_or_leaves_everything():
     session = Session(controllers=["direct"])
     other = Drive.load("nordin-servo-60kw")
     session.load(other.to_toml())
-    assert session.drive == session.origin == other
+    assert session.machine == session.origin == other
     with pytest.raises(InputError, match=r"mine.toml: \[shaft\]"):
         session.load(other.to_toml().replace("gap =", "gapp ="), where="mine.toml")
-    assert session.drive == other
+    assert session.machine == other
 
 
 def test_a_failing_controller_is_a_sentence_in_its_row():
@@ -295,7 +295,7 @@ def test_an_added_controller_joins_with_its_own_figures():
     session = Session(controllers=["direct"])
     soft = make_controller("ramp", {"time": "300 ms"})
     assert session.add("  ramp  300 ms ", soft, select=False) == "ramp 300 ms"
-    assert session.result("ramp 300 ms").k_dyn == simulate(session.drive, soft).k_dyn
+    assert session.result("ramp 300 ms").k_dyn == simulate(session.machine, soft).k_dyn
     assert session.shown == ("direct", "ramp 300 ms")
     for number in range(MAX_STRATEGIES - 2):
         session.add(f"more {number}", soft)
@@ -303,12 +303,30 @@ def test_an_added_controller_joins_with_its_own_figures():
         session.add("too many", soft)
 
 
+def test_what_was_computed_for_a_machine_does_not_survive_another_one():
+    session = Session(controllers=["direct", "ramp"])
+    session.select("ramp")
+    session.set_parameter("time", "200 ms")
+    session.add("optimum 0.4 s", make_controller("s-curve"))
+    session.set("gap", 1.0)
+    assert session.selected == "optimum 0.4 s"  # it stays while values of this machine change
+    link = link_of(Session("hoist-15kw"))
+    assert set(bench_of(link, session.bench).controllers) == {"direct", "ramp"}
+    session.take(Drive.load("hoist-15kw"))
+    assert (list(session.controllers), session.selected) == (["direct", "ramp"], "direct")
+    assert session.controllers["ramp"].time == 0.2
+    session.undo()
+    assert "optimum 0.4 s" in session.shown
+    session.undo()
+    assert set(bench_of(link_of(session), session.bench).controllers) == {"direct", "ramp", "optimum 0.4 s"}
+
+
 def test_the_selected_strategy_is_always_one_of_those_drawn():
     session = Session(controllers=["direct", "ramp"])
     session.show("direct", visible=False)
     assert session.shown == ("direct",)
     assert command_text(
-        session.drive, {label: session.controllers[label] for label in session.shown}
+        session.machine, {label: session.controllers[label] for label in session.shown}
     ).endswith("--controllers direct")
     session.select("ramp")
     assert session.shown == ("ramp",)

@@ -42,6 +42,7 @@ export class Figure {
     }
     if (figure.speed_unit && this.speed.textContent !== figure.speed_unit) this.speed.textContent = figure.speed_unit;
     this.said = figure.reached ? figure.position : figure.status;
+    this.failed = !figure.reached;
     this.tell();
   }
 
@@ -54,5 +55,6 @@ export class Figure {
   tell() {
     const text = [this.said, this.wrong].filter(Boolean).join(" ");
     if (this.status.textContent !== text) this.status.textContent = text;
+    this.status.classList.toggle("wrong", Boolean(this.failed || this.wrong));
   }
 }

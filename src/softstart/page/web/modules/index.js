@@ -96,6 +96,7 @@ export class Instrument {
       this.stamp = frame.stamp;
     }
     if (frame.recommendation !== undefined || frame.order) this.advise(frame.recommendation);
+    if (frame.recommendation !== undefined) this.table.rest();
     if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
     if (frame.fields) this.controls.show(frame.fields, frame.mistakes, frame.stamp);
     if (frame.keep) this.keep(frame.keep);

@@ -1,5 +1,5 @@
-// Strategies side by side: one is selected, any may be drawn. The gentlest is first once all are known; then the
-// order changes only when a heading is pressed.
+// Strategies side by side: one is selected, any may be drawn. They are in the order of a column, by K at first,
+// whenever the drive has come to rest: no row moves under a hand.
 import { element, fixed, significant } from "./numbers.js";
 
 // key, heading, its index, the text of a cell, what it is
@@ -38,6 +38,11 @@ export class Table {
     this.by = this.by === key ? "" : key;
     this.sorted = undefined;
     if (this.state) this.show(this.state);
+  }
+
+  // all values are those of the drive at rest
+  rest() {
+    this.sorted = undefined;
   }
 
   show(state) {
@@ -108,13 +113,16 @@ export class Table {
       const found = state.rows.get(name)?.[this.by];
       return typeof found === "number" ? found : Infinity;
     };
+    const focused = document.activeElement; // a row that is moved loses it
     const names = [...state.order];
     if (this.by === "name") names.sort();
     else if (this.by) names.sort((a, b) => value(a) - value(b) || 0);
-    for (const name of names) {
+    names.forEach((name, index) => {
       if (!this.lines.has(name)) this.lines.set(name, this.line(name));
-      this.body.append(this.lines.get(name).tr);
-    }
+      const { tr } = this.lines.get(name);
+      if (this.body.children[index] !== tr) this.body.insertBefore(tr, this.body.children[index] ?? null);
+    });
+    if (this.body.contains(focused)) focused.focus();
     for (const head of this.heads) {
       head.setAttribute("aria-sort", head.dataset.key === this.by ? "ascending" : "none");
     }
