@@ -46,6 +46,14 @@ from softstart.quantities import RefusedError, nearest, show
 simulation = late("softstart.chain.simulation")  # above this module; see softstart.late
 
 
+BRANCHES = (
+    "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
+    "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "
+    "inertias, stiffnesses and torques add (docs/howto/reduce-a-driveline.md)."
+)
+BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joins|ends|parent)\b)")
+
+
 @dataclass(frozen=True, init=False)
 class Chain:
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
@@ -166,7 +174,11 @@ class Chain:
         >>> Chain.from_toml(chain.to_toml()) == chain
         True
         """
-        found = read_document(text, TABLES, "a chain", where=where, also=also)
+        try:
+            found = read_document(text, TABLES, "a chain", where=where, also=also)
+        except InputError as error:
+            branched = [BRANCHES] if any(map(BRANCHING.search, error.sentences)) else []
+            raise InputError([*error.sentences, *branched]) from None
         before = f"{where}: " if where else ""
         wrong: list[str] = []
         start: dict[str, Any] = found["start"] or {}
@@ -467,7 +479,7 @@ def _mistakes(
     elif len(shafts) != len(masses) - 1:
         wrong.append(
             f"shaft: {len(masses)} masses in a row are joined by {len(masses) - 1} shafts, and there are "
-            f"{len(shafts)}."
+            f"{len(shafts)}. {BRANCHES}"
         )
     names = [mass.name for mass in masses]
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -551,12 +563,13 @@ class ChainArrays:
         low, high = sorted((self.motor, self.load))
         return range(low, high) if low < high else range(self.c.size)
 
-    def mean_torque(self, motor_torque: float) -> float:
-        """Mean torque of the shafts from motor to load, N m, while all masses speed up as one.
+    def mean_torques(self, motor_torque: float) -> Vector:
+        """Mean torque of each shaft, N m, while all masses speed up as one.
 
-        T_k = sum (J_i a + Mc_i) over the masses that shaft k drives, with a = (u - sum Mc)/sum J. The mean is
-        weighted by compliance: it is then M12avg = (u J2 + J1 Mc)/(J1 + J2) of [G](16) with J1 and J2 by the
-        lever rule, where the load torque is on the load mass.
+        T_k = sum (J_i a + Mc_i) over the masses that shaft k drives, with a = (u - sum Mc)/sum J.
+
+        >>> Chain.load("crane-4-mass").at_motor_shaft().mean_torques(62.0).round(2)
+        array([53.9 , 53.38, 52.34])
         """
         J, load = self.moving_J, float(self.Mc.sum())
         if self.held is None:
@@ -565,7 +578,15 @@ class ChainArrays:
             needed = self.Mc + np.where(np.isinf(self.J), motor_torque - load, 0.0)
         torques = np.cumsum(needed)[:-1]
         torques[self.motor :] = np.cumsum(needed[::-1])[::-1][1 + self.motor :]
-        path = list(self.path)
+        return torques
+
+    def mean_torque(self, motor_torque: float) -> float:
+        """Mean torque of the shafts from motor to load, N m: of `mean_torques`, weighted by compliance.
+
+        It is M12avg = (u J2 + J1 Mc)/(J1 + J2) of [G](16) with J1 and J2 by the lever rule, where the load
+        torque is on the load mass.
+        """
+        torques, path = self.mean_torques(motor_torque), list(self.path)
         weights = np.where(self.rigid, 0.0, 1.0 / self.c)[path]
         return float(np.average(torques[path], weights=weights if weights.any() else None))
 

@@ -507,7 +507,7 @@ def _pieces_swing_above(chain: Chain, wanted: Vector, factor: float) -> bool:
 def _refusals(chain: Chain, steps: list[Step], two: bool, wanted: Vector, factor: float) -> Iterator[str]:
     """Where the condition fails, and what to do."""
     w = float(wanted[-1])
-    remedy = f"; stop before that with --up-to {1.001 * w:.4g} in place of --to, or go on with --force"
+    remedy = f"; stop before that with --up-to {1.001 * w:.4g}, or go on with --force"
     if two and steps[0].kind != "modal" and wanted.size == 1:
         remedy = f"; --method modal keeps this frequency in two masses{remedy.replace(';', ',', 1)}"
     for step in steps:

@@ -245,6 +245,13 @@ class ChainRun(BaseRun):
         return np.asarray(stages.dynamic_coefficient(self.peak_torques, self.base_torque))
 
     @property
+    def shaft_factors(self) -> Vector:
+        """Largest |T| of each shaft over its own mean torque under full starting torque; NaN if that is 0."""
+        torque = math.nan if self.chain.motor is None else self.chain.motor.starting_torque
+        mean = np.abs(self.chain.at_motor_shaft().mean_torques(torque))
+        return self.peak_torques / np.where(mean > 0.0, mean, np.nan)
+
+    @property
     def utilisation(self) -> Vector:
         """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
         found: Vector = self.peak_torques / self.chain.at_motor_shaft().permissible
@@ -412,6 +419,7 @@ class ChainRun(BaseRun):
             "base_torque": self.base_torque if known else None,
             "k_dyn": self.k_dyn if known else None,
             "k_dyns": self.k_dyns.tolist() if known else None,
+            "shaft_factors": [None if math.isnan(one) else one for one in self.shaft_factors.tolist()],
             "worst_shaft": self.chain.shaft_names[self.worst_shaft],
             "utilisation": [None if math.isnan(one) else one for one in self.utilisation.tolist()],
             "peak_torque": self.peak_torque,

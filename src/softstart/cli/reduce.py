@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from softstart.chain import reduction, simulation
     from softstart.chain.reduction import Reduction
     from softstart.chain.simulation import TwoMassError
+    from softstart.chain.vibration import Vibration
     from softstart.views import chain_schemes
     from softstart.views import chains as views
 else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
@@ -132,16 +133,28 @@ def reduce(
     """Compute the natural frequencies of a chain, and reduce it to two masses.
 
     CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); by default the crane
-    drive as a chain of four masses. The reduced drive is an input of compare, optimize and tune. The error of
-    the reduction in K_dyn is computed from starts of both under the controllers of --verify and 128 torque
-    profiles.
+    drive as a chain of four masses. Masses are in a row; lump the branches of a branched train first. Where
+    the chain cannot be reduced as requested, its natural frequencies are shown nevertheless. The reduced
+    drive is an input of compare, optimize and tune. The error of the reduction in K_dyn is computed from
+    starts of both under the controllers of --verify and 128 torque profiles.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     with output_folder(out) as folder:
-        with working("reducing the chain ..."), named_as_options():
-            found = reduction.reduce_chain(chain, **asked)
-            beside = beside_it(found)
-        check(found, verify)
+        try:
+            with working("reducing the chain ..."), named_as_options():
+                found = reduction.reduce_chain(chain, **asked)
+                beside = beside_it(found)
+            check(found, verify)
+        except InputError as error:
+            refused = error.sentences
+            vibration = reduction.natural_vibration(chain.freed)
+            present(
+                lambda: {"chain": chain.name, "vibration": vibration.summary(), "refused": refused},
+                lambda to: _show_vibration(to, vibration),
+                as_json,
+                None,
+            )
+            raise
         off: TwoMassError | None = None
         if makes_drive(found) and not no_starts:
             with working("starting the drive and the chain ..."):
@@ -156,6 +169,12 @@ def reduce(
         as_json,
         out and f"{out}: report.md, the scheme, the figures, the tables and what it was reduced to",
     )
+
+
+def _show_vibration(to: Console, vibration: Vibration) -> None:
+    """The chain and its frequencies, where it is not reduced."""
+    print_lines(to, views.chain_lines(vibration.chain))
+    print_tables(to, [views.frequencies_table(vibration)])
 
 
 def _show(to: Console, found: Reduction, beside: Reduction | None, off: TwoMassError | None) -> None:

@@ -90,11 +90,12 @@ def figure_rows(run: ChainRun) -> list[list[str]]:
 
 
 def shaft_table(run: ChainRun) -> Table:
-    """K_dyn and largest torque of each shaft, at the motor shaft and at its own, and what it may carry."""
+    """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
     own = run.peak_torques / run.chain.at_motor_shaft().torque_ratio
     cells = {
         later("shaft"): list(run.chain.shaft_names),
         later("K"): [number(k, 4) for k in run.k_dyns.tolist()],
+        later("over its\nown mean"): [number(k, 4) for k in run.shaft_factors.tolist()],
         later("torque at\nmotor shaft\nN m"): column_of(run.peak_torques.tolist()),
         later("torque at\nown shaft\nN m"): column_of(own.tolist()),
         later("at s"): column_of(run.peak_times.tolist(), 5),

@@ -314,15 +314,16 @@ AT_THE_GAP = (
 
 
 def details(machine: Drive | Chain) -> tuple[Figure, ...]:
-    """The figures of what happens at the gap; of a chain K_dyn of each shaft, if it has several."""
+    """The figures of what happens at the gap; of a chain each shaft over its own mean torque."""
     if isinstance(machine, Drive):
         return AT_THE_GAP
 
     def of_shaft(k: int) -> Callable[[Row], float]:
-        return lambda row: float(row.run.k_dyns[k])
+        return lambda row: float(row.run.shaft_factors[k])
 
     names = machine.shaft_names if len(machine.shaft_names) > 1 else ()
-    shafts = (Figure("K\n" + name.replace(" - ", " -\n"), of_shaft(k), 3) for k, name in enumerate(names))
+    headings = ("over mean\n" + name.replace(" - ", " -\n") for name in names)
+    shafts = (Figure(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
     used = Figure(later("torque\nused %"), lambda row: row.run.used_torque, 1)
     return (*shafts, *([used] if machine.limits else []), AT_THE_GAP[-1])
 

@@ -212,6 +212,8 @@ def test_what_a_shaft_says_against_itself(change: str, reason: str) -> None:
         ("[start]\nload = 'hook'", "its masses are"),
         ("[[mass]]\ninertia = 1\nkind = 'reactive'\ntorque = -5", "[mass] 3, torque = -5.0: a reactive load"),
         ("[[mass]]\ninertia = 1", "joined by 2 shafts, and there are 1"),
+        ("[[shaft]]\nstiffness = 1", "more than two shafts, a branched train, is not covered: add a stiff"),
+        ("[[shaft]]\nfrom = 1", "make one of equal branches, whose inertias, stiffnesses and torques add"),
         ("[[shaft]]\nstiffness = 1\n[[mass]]\nname = 'drum'\ninertia = 1", "2 masses have this name"),
     ],
 )

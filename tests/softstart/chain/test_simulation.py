@@ -129,7 +129,7 @@ def test_gears_change_nothing_but_the_shaft_on_which_things_are_said():
 
 
 def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
-    """Each torque on its own shaft over what that may carry; K_dyn over the mean torque of the chain."""
+    """Each torque over what its shaft may carry, and over its own mean; K_dyn over that of the chain."""
     most = {"shaft[1].permissible_torque": 400.0, "shaft[3].permissible_torque": 2000.0}
     chain = Chain.load("crane-4-mass", also={"shaft[2].damping_ratio": 0.02, **most})
     run = simulate_chain(chain, "direct")
@@ -138,6 +138,9 @@ def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
     assert np.isnan(run.utilisation[1])
     assert run.k_dyn == pytest.approx(max(run.peak_torques) / chain.mean_torque, rel=1e-14)
     assert run.summary()["utilisation"][1] is None
+    masses = chain.at_motor_shaft()
+    needed = masses.J * (62.0 - masses.Mc.sum()) / masses.J.sum() + masses.Mc
+    assert run.shaft_factors * [sum(needed[k:]) for k in (1, 2, 3)] == pytest.approx(run.peak_torques)
     assert simulate_chain(chain, "direct", base=CRANE).k_dyn == pytest.approx(
         max(run.peak_torques) / float(metrics.base_torque(CRANE)), rel=1e-14
     )

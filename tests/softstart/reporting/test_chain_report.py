@@ -32,7 +32,7 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
         row = re.findall(rf'<tr[^>]*><th scope="row" class="text">{run.controller_name}</th>(.*?)</tr>', page)
         assert len(row) == 4  # page 1, times, shafts, beside the bound
         assert f">{run.k_dyn:.3f}<" in row[0]
-        assert re.findall(r">([\d.]+)<", row[2]) == [f"{k:.3f}" for k in run.k_dyns]
+        assert re.findall(r">([\d.]+)<", row[2]) == [f"{k:.3f}" for k in run.shaft_factors]
     for name in CHAIN.shaft_names:
         assert name in page
     assert page.count("<figure>") == 6
