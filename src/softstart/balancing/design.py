@@ -7,6 +7,10 @@ them, at the height h above the crank axis and the offset e sideways, and so has
     F_b = u w^2,    M_b = u w^2 (h sin(phi) + e cos(phi))      (throws together, u the imbalance of both)
 
 [B] uses h alone: with it only the sine of the first-order reaction torque can be balanced.
+
+Where the forces cancel between the cylinders, the couples about the middle of the crank often do not: the
+half that turns against the crank is balanced by one shaft with two opposite imbalances u, L apart, u L w^2;
+with a second shaft, or counterweights at the ends of the crank, the other half too.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ import numpy as np
 
 from softstart.arrays import Complex, Vector
 from softstart.balancing.engine import HIGHEST, Engine, moment_harmonic
-from softstart.balancing.parts import BalancerShaft
+from softstart.balancing.parts import CYCLE_ANGLE, TURN, BalancerShaft
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.quantities import to_si
@@ -49,6 +53,31 @@ def free_force(engine: Engine) -> complex:
     return force if abs(force) > NOTHING * scale else 0j
 
 
+def free_couple(engine: Engine, *, forward: bool = False) -> complex:
+    """First-order couple over w^2, in kg m^2, that turns against the crank, or with it if `forward`.
+
+    >>> round(abs(free_couple(Engine.load("vaz-11113"))), 5)
+    0.0
+    """
+    couple = engine.crank_shaking[1]
+    return complex((couple.forward if forward else couple.backward)[1])
+
+
+def couple_shaft(engine: Engine, *, forward: bool = False) -> tuple[BalancerShaft, ...]:
+    """The two imbalances of the shaft for that couple, as far apart as the outer cylinders."""
+    couple = -free_couple(engine, forward=forward)
+    ends = engine.cylinders.places[:: engine.cylinders.count - 1] if couple else ()
+    return tuple(
+        BalancerShaft(
+            abs(couple) / (ends[-1] - ends[0]),
+            1 if forward else -1,
+            float(np.angle(couple * along)) % TURN,
+            along=along,
+        )
+        for along in ends
+    )
+
+
 def arm(engine: Engine, speed: float, load: float | None = None, *, gas: bool = True) -> complex:
     """Height + i offset in m with which the first order of the reaction torque vanishes at this speed.
 
@@ -74,7 +103,7 @@ def two_shafts(engine: Engine, place: complex) -> tuple[BalancerShaft, BalancerS
     """
     force = -free_force(engine)
     half = 0.0 if engine.layout is None else 0.5 * engine.layout.spacing
-    phase = math.atan2(force.imag, force.real) % (2.0 * math.pi)
+    phase = math.atan2(force.imag, force.real) % TURN
     first, second = (
         BalancerShaft(0.5 * abs(force), -1, phase, place.real, place.imag + side * half) for side in (-1, 1)
     )
@@ -118,8 +147,8 @@ class Residual:
     about the crank axis and act on the housing, in N m: `first_order` is the amplitude at crank speed,
     `first_order_cosine` and `first_order_sine` its parts, `moment` the largest deviation from the mean with
     all orders to 24, sampled every half degree. Forces in N: `force` the largest at crank speed,
-    `all_forces` with all orders. `couple` in N m is the largest of first order about an axis across the
-    crank.
+    `all_forces` with all orders; `couple` and `all_couples` the same of the couple about an axis across the
+    crank, N m. `shafts` are those that do it, at the tuning speed.
     """
 
     name: str
@@ -133,6 +162,8 @@ class Residual:
     force: Vector
     all_forces: Vector
     couple: Vector
+    all_couples: Vector
+    shafts: tuple[BalancerShaft, ...]
 
     @property
     def first_order(self) -> Vector:
@@ -152,6 +183,7 @@ class Residual:
             "first_order_force": float(self.force[index]),
             "force": float(self.all_forces[index]),
             "first_order_couple": float(self.couple[index]),
+            "couple": float(self.all_couples[index]),
         }
 
 
@@ -160,7 +192,9 @@ class Balance:
     """An engine over its speed range at one load: as it is, and with the balancers designed for it.
 
     The first of `residuals` is the engine without balancer shafts; "own-shafts" follows if it has any; then,
-    if there is a first-order force for two shafts to balance, the designs of `softstart.balancing.design`.
+    if there is a first-order force for two shafts to balance, the designs of `softstart.balancing.design`;
+    then, if there is a first-order couple, "couple-shaft" and, where a part of it turns with the crank,
+    "two-couple-shafts".
     Speeds in rad/s; `shown` are those that were asked for.
     """
 
@@ -179,11 +213,11 @@ class Balance:
     @property
     def note(self) -> str:
         """Why no balancer was designed; empty if one was."""
-        if self.imbalance:
+        if self.imbalance or free_couple(self.engine) or free_couple(self.engine, forward=True):
             return ""
         return (
-            "The first-order inertia forces of the cylinders cancel one another: two shafts at crank speed "
-            "have nothing to balance, and no balancer was designed."
+            "The first-order inertia forces and couples of the cylinders cancel one another: shafts at crank "
+            "speed have nothing to balance, and no balancer was designed."
         )
 
     def residual(self, name: str) -> Residual:
@@ -198,33 +232,37 @@ class Balance:
         """The index of the tuning speed in `speeds`."""
         return int(np.argmin(np.abs(self.speeds - self.tuning_speed)))
 
-    def shafts(self, name: str) -> tuple[BalancerShaft, BalancerShaft]:
-        """The two shafts of a design at the tuning speed, as an engine takes them."""
-        one = self.residual(name)
-        if one.height is None or one.offset is None:
+    def shafts(self, name: str) -> tuple[BalancerShaft, ...]:
+        """The shafts of a design at the tuning speed, as an engine takes them."""
+        found = self.residual(name).shafts
+        if not found:
             raise InputError(f"{name}: no shafts were designed for it.")
-        return two_shafts(self.engine, complex(one.height[self.tuning_index], one.offset[self.tuning_index]))
+        return found
 
     def orders(self) -> list[dict[str, float]]:
         """The harmonics at the tuning speed, up to order 6, of what does not cancel; plain data.
 
-        Torques on the crank in N m as cosine and sine of `order` times the crank angle; the largest force in
-        N and couple in N m without balancer shafts.
+        Torques on the crank in N m (of the gas only with a pressure) as cosine and sine of `order` times the
+        crank angle; the largest force in N and couple in N m without balancer shafts.
         """
         engine, w = self.engine, self.tuning_speed
-        gas, inertia = engine.gas_harmonics(w, self.load), engine.inertia_harmonics * w**2
+        inertia = engine.inertia_harmonics * w**2
+        pressed = engine.gas is not None
+        gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
         force, couple = (one.largest * w**2 for one in engine.crank_shaking)
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
         for j in range(1, 13):
             whole, both = j % 2 == 0, gas[j] + inertia[j]
-            if abs(gas[j]) < tiny and abs(inertia[j]) < tiny and not (whole and force[j // 2] > tiny):
+            shaken = whole and (force[j // 2] > 0.0 or couple[j // 2] > 0.0)
+            if abs(gas[j]) <= tiny and abs(inertia[j]) <= tiny and not shaken:
                 continue
             rows.append(
                 {
                     "order": float(engine.orders[j]),
-                    "gas_cosine": float(gas[j].real),
-                    "gas_sine": float(-gas[j].imag),
+                    **(
+                        {"gas_cosine": float(gas[j].real), "gas_sine": float(-gas[j].imag)} if pressed else {}
+                    ),
                     "inertia_cosine": float(inertia[j].real),
                     "inertia_sine": float(-inertia[j].imag),
                     "torque": float(abs(both)),
@@ -238,6 +276,7 @@ class Balance:
         """Everything as plain data, for JSON."""
         engine = self.engine
         shown = [int(np.argmin(np.abs(self.speeds - speed))) for speed in self.shown]
+        work = None if engine.gas is None else engine.indicated_work(self.tuning_speed, self.load)
         return {
             "engine": engine.name,
             "source": engine.source,
@@ -248,11 +287,12 @@ class Balance:
             "throw_angles": list(engine.cylinders.throw_angles),
             "load": self.load,
             "tuning_speed": self.tuning_speed,
-            "mean_torque": float(engine.torque_harmonics(self.tuning_speed, self.load)[0].real),
-            "indicated_work": engine.indicated_work(self.tuning_speed, self.load),
+            "mean_torque": work and work / CYCLE_ANGLE,
+            "indicated_work": work,
             "speed_fluctuation": engine.speed_fluctuation(self.tuning_speed, self.load),
             "imbalance": self.imbalance,
             "force_per_speed_squared": self.imbalance * RPM**2,
+            "free_couple": abs(free_couple(engine)),
             "note": self.note,
             "orders": self.orders(),
             "designs": [
@@ -265,6 +305,8 @@ class Balance:
                     "largest_moment": float(one.moment.max()),
                     "largest_first_order_force": float(one.force.max()),
                     "largest_force": float(one.all_forces.max()),
+                    "largest_first_order_couple": float(one.couple.max()),
+                    "largest_couple": float(one.all_couples.max()),
                     "speeds": [one.row(i) for i in shown],
                 }
                 for one in self.residuals
@@ -300,6 +342,8 @@ def balance(
         Load, 0 to 1; by default that of the engine.
     tuning_speed : float or str, optional
         Speed at which the balancer is designed: rad/s, or text with a unit; by default that of the engine.
+
+    Without a gas pressure the moments are those of the inertia alone.
 
     Returns
     -------
@@ -344,11 +388,21 @@ def balance(
         residuals.append(_residual(engine, about, every, given, engine.shafts, moments))
     if force := free_force(engine):
         for design in DESIGNS:
+            if design.gas and engine.gas is None:
+                continue
             places = np.array([design.place(engine, float(w), tuning, given) for w in every])
             moments = nothing.copy()
             moments[:, 1] = [moment_harmonic(complex(one), -force, forward=False) for one in places]
-            shafts, about = two_shafts(engine, complex(places[0])), (design.name, design.about)
+            at_tuning = complex(places[int(np.argmin(np.abs(every - tuning)))])
+            shafts, about = two_shafts(engine, at_tuning), (design.name, design.about)
             residuals.append(_residual(engine, about, every, given, shafts, moments, places))
+    against, along = couple_shaft(engine), couple_shaft(engine, forward=True)
+    if against:
+        about = ("couple-shaft", "a shaft against the crank with two opposite imbalances")
+        residuals.append(_residual(engine, about, every, given, against, nothing))
+    if along:
+        about = ("two-couple-shafts", "a second one that turns with the crank")
+        residuals.append(_residual(engine, about, every, given, (*against, *along), nothing))
     return Balance(engine, given, tuning, every, asked, tuple(residuals))
 
 
@@ -376,7 +430,10 @@ def _residual(
 ) -> Residual:
     """What is left with the forces of these shafts and with these moments over w^2, a row a speed."""
     w2 = speeds**2
-    left = np.array([-engine.torque_harmonics(float(speed), load) for speed in speeds])
+    if engine.gas is None:
+        left = -np.outer(w2, engine.inertia_harmonics)
+    else:
+        left = np.array([-engine.torque_harmonics(float(speed), load) for speed in speeds])
     left[:, ::2] += w2[:, None] * moments
     left[:, 0] = 0.0  # the mean goes through the mounts whatever is done
     shaft_force, shaft_couple, _ = engine.shaft_shaking(shafts)
@@ -398,4 +455,6 @@ def _residual(
         force=force.largest[1] * w2,
         all_forces=np.abs(force.at(PHI[: PHI.size // 2])).max() * w2,
         couple=couple.largest[1] * w2,
+        all_couples=np.abs(couple.at(PHI[: PHI.size // 2])).max() * w2,
+        shafts=tuple(shafts),
     )

@@ -123,7 +123,10 @@ class Shaking:
     backward: Complex
 
     def __add__(self, other: Shaking) -> Shaking:
-        return Shaking(self.forward + other.forward, self.backward + other.backward)
+        scale = float(max(self.largest.max(), other.largest.max()))
+        return Shaking(
+            _clean(self.forward + other.forward, scale), _clean(self.backward + other.backward, scale)
+        )
 
     def at(self, phi: ArrayLike) -> Complex:
         """The vector at crank angles in rad, over w^2."""
@@ -179,7 +182,7 @@ def shaking_of_crank(
 
 
 def _clean(sums: Complex, scale: float) -> Complex:
-    """The sums over the cylinders, 0 where they cancel but for rounding."""
+    """The sums, 0 where they cancel but for rounding."""
     return np.where(np.abs(sums) < ROUNDING * scale, 0.0, sums)
 
 
@@ -192,6 +195,7 @@ def shaking_of_shafts(shafts: Sequence[BalancerShaft], highest: int) -> tuple[Sh
     ((-0.02+0j), -0.0006j)
     """
     vectors = np.zeros((2, 2, highest + 1), dtype=np.complex128)
+    scale = sum(shaft.imbalance * shaft.ratio**2 for shaft in shafts)
     moment = np.zeros(highest + 1, dtype=np.complex128)
     for shaft in shafts:
         q = int(abs(shaft.ratio))
@@ -200,7 +204,7 @@ def shaking_of_shafts(shafts: Sequence[BalancerShaft], highest: int) -> tuple[Sh
         vectors[0, side, q] += force
         vectors[1, side, q] += shaft.along * force
         moment[q] += moment_harmonic(shaft.place, force, forward=shaft.ratio > 0)
-    return Shaking(*vectors[0]), Shaking(*vectors[1]), moment
+    return Shaking(*_clean(vectors[0], scale)), Shaking(*vectors[1]), moment
 
 
 def moment_harmonic(place: complex, force: complex, *, forward: bool) -> complex:
@@ -223,8 +227,8 @@ class Engine:
         Bore, stroke, rod, spacing (m) and firing angles (rad).
     masses : Masses
         Masses of one cylinder, kg, and inertia of the crank, kg m^2.
-    gas : SimpleCycle or MeasuredCycle
-        Pressure in a cylinder over the cycle, Pa.
+    gas : SimpleCycle, MeasuredCycle or None
+        Pressure in a cylinder over the cycle, Pa; forces and couples do not need it.
     operation : Operation
         Speed range, rad/s, and load, 0 to 1.
     counterweights : Counterweights, optional
@@ -256,7 +260,7 @@ class Engine:
 
     cylinders: Cylinders
     masses: Masses
-    gas: SimpleCycle | MeasuredCycle
+    gas: SimpleCycle | MeasuredCycle | None
     operation: Operation
     counterweights: Counterweights = field(default_factory=Counterweights)
     shafts: tuple[BalancerShaft, ...] = ()
@@ -268,7 +272,7 @@ class Engine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "shafts", tuple(self.shafts))
         object.__setattr__(self, "assumed", tuple(self.assumed))
-        wrong = list(self.gas.refuse(self.cylinders))
+        wrong = [] if self.gas is None else list(self.gas.refuse(self.cylinders))
         if isinstance(self.gas, MeasuredCycle) and self.operation.load != 1.0:
             wrong.append(_fixed_load(self.operation.load))
         wrong += [
@@ -323,12 +327,11 @@ class Engine:
             ),
         }
         gas: Any = None
-        if (found["cycle"] is None) == (found["indicator"] is None):
-            how = "neither is there" if found["cycle"] is None else "both are there"
-            wrong.append(f"{before}[cycle], [indicator]: one of the two gives the pressure, and {how}.")
+        if found["cycle"] is not None and found["indicator"] is not None:
+            wrong.append(f"{before}[cycle], [indicator]: both give the pressure; leave one out.")
         elif found["cycle"] is not None:
             gas = part("[cycle]", SimpleCycle, found["cycle"])
-        else:
+        elif found["indicator"] is not None:
             row = found["indicator"]
             path = Path(folder) / row["file"]
             gas = part(
@@ -360,7 +363,7 @@ class Engine:
         if isinstance(self.gas, MeasuredCycle):
             about = {"file": INDICATOR_FILE, "crankcase_pressure": self.gas.crankcase_pressure}
             blocks.insert(1, (INDICATOR, about))
-        else:
+        elif self.gas is not None:
             blocks.insert(4, (CYCLE, self.gas.values()))
         kept = ((table, {k: v for k, v in given.items() if v != ""}) for table, given in blocks)
         return document_text(kept, units=False)
@@ -386,14 +389,21 @@ class Engine:
             raise InputError(f"load = {load}: it must be from 0 to 1.")
         return float(load)
 
+    @property
+    def _pressed(self) -> SimpleCycle | MeasuredCycle:
+        """The pressure; raises InputError where none is given."""
+        if self.gas is None:
+            raise InputError("[cycle], [indicator]: one of the two gives the gas torque; add one.")
+        return self.gas
+
     # ---- torques over the crank angle --------------------------------------------------------------------
 
     def pressure(self, theta: ArrayLike, speed: float, load: float | None = None) -> Vector:
         """Pressure in Pa in a cylinder, theta rad after its firing dead centre."""
         theta = np.asarray(theta, dtype=np.float64)
-        weights = self.gas.weights(self.cylinders, speed, self._load(load))
-        difference = weights @ self.gas.shapes(self.cylinders, theta.ravel())
-        found: Vector = difference.reshape(theta.shape) + self.gas.crankcase_pressure
+        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
+        difference = weights @ self._pressed.shapes(self.cylinders, theta.ravel())
+        found: Vector = difference.reshape(theta.shape) + self._pressed.crankcase_pressure
         return found
 
     def gas_torque(self, phi: ArrayLike, speed: float, load: float | None = None) -> Vector:
@@ -403,7 +413,7 @@ class Engine:
         found = np.zeros(phi.shape)
         for firing in self.cylinders.firing_angles:
             theta = np.mod(phi - firing, CYCLE_ANGLE)
-            difference = self.pressure(theta, speed, load) - self.gas.crankcase_pressure
+            difference = self.pressure(theta, speed, load) - self._pressed.crankcase_pressure
             found -= area * difference * crank.slope(theta)
         return found
 
@@ -438,8 +448,8 @@ class Engine:
 
     def gas_harmonics(self, speed: float, load: float | None = None) -> Complex:
         """C_q of the gas torque Re sum C_q exp(i q phi) in N m, q as in `orders`; [B](2) has z A and z B."""
-        weights = self.gas.weights(self.cylinders, speed, self._load(load))
-        one = torque_harmonics(self.gas, self.cylinders, HIGHEST)
+        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
+        one = torque_harmonics(self._pressed, self.cylinders, HIGHEST)
         found: Complex = (weights @ one) * self._turned
         return found
 
@@ -494,15 +504,16 @@ class Engine:
 
     def indicated_work(self, speed: float, load: float | None = None) -> float:
         """Work in J of the gas in one cycle of all cylinders: 4 pi times the mean torque."""
-        weights = self.gas.weights(self.cylinders, speed, self._load(load))
-        return float(self.cylinders.count * (weights @ shape_work(self.gas, self.cylinders)))
+        weights = self._pressed.weights(self.cylinders, speed, self._load(load))
+        return float(self.cylinders.count * (weights @ shape_work(self._pressed, self.cylinders)))
 
     def speed_fluctuation(self, speed: float, load: float | None = None) -> float | None:
         """Coefficient (w_max - w_min)/w against a constant load torque: excess work over inertia and w^2.
 
-        None without that inertia. It measures the error of the constant speed that is assumed everywhere.
+        None without that inertia or a pressure. It measures the error of the constant speed that is assumed
+        everywhere.
         """
-        if self.masses.inertia is None:
+        if self.masses.inertia is None or self.gas is None:
             return None
         phi = np.linspace(0.0, CYCLE_ANGLE, 7200, endpoint=False)
         orders = self.orders[1:]

@@ -84,7 +84,8 @@ def balance(*, engine: Engine, speeds: list[float] | None, as_json: bool, out: s
 
     ENGINE is a TOML file or the name of a shipped engine; by default the two-cylinder engine VAZ-11113 of the
     literature, some of whose parameters are assumed. The two-shaft balancer is tuned at one speed,
-    balancer.tuning_speed.
+    balancer.tuning_speed; a first-order couple is balanced by a shaft with two opposite imbalances. The
+    pressure ([cycle] or [indicator]) is only needed for the gas torque.
     """
     with output_folder(out) as folder:
         found = compute(engine, speeds)
@@ -117,7 +118,10 @@ def _write(found: Balance, folder: Path, command: str) -> None:
     ]
     write_rows(folder / "orders.csv", found.orders())
     write_rows(folder / "residuals.csv", residuals)
-    write_table(folder / "torque.csv", *views.torque_over_cycle(found))
+    numbers = "All numbers: [orders.csv](orders.csv), [residuals.csv](residuals.csv)"
+    if engine.gas is not None:
+        write_table(folder / "torque.csv", *views.torque_over_cycle(found))
+        numbers += ", torque over the cycle at the tuning speed [torque.csv](torque.csv)"
     parts = [
         f"# {markdown(engine.name)}: forces, moments and balancers",
         "\n".join(f"- {markdown(line)}" for line in views.engine_lines(found)[1:]),
@@ -125,8 +129,7 @@ def _write(found: Balance, folder: Path, command: str) -> None:
         *table_sections(views.tables(found)),
         *(f"![{stem}]({stem}.svg)" for stem in figures),
         *map(markdown, views.footnotes(found)),
-        "All numbers: [orders.csv](orders.csv), [residuals.csv](residuals.csv), torque over the cycle at the "
-        "tuning speed [torque.csv](torque.csv).",
+        f"{numbers}.",
     ]
     about = "on the engine of [engine.toml](engine.toml), which holds all changes. "
     write_report(folder, parts, command, f"{about}Source: {markdown(engine.source) or 'none given'}.")

@@ -146,8 +146,10 @@ def reduce(
                 beside = beside_it(found)
             check(found, verify)
         except InputError as error:
+            from softstart.chain.vibration import natural_vibration
+
             refused = error.sentences
-            vibration = reduction.natural_vibration(chain.freed)
+            vibration = natural_vibration(chain.freed)
             present(
                 lambda: {"chain": chain.name, "vibration": vibration.summary(), "refused": refused},
                 lambda to: _show_vibration(to, vibration),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30.0
 STEPS = 1440  # of the torque over the cycle: half degrees
+COUPLED = "couple-shaft", "two-couple-shafts"  # designs for the couple
 BARS = 6.0  # highest order in the bar chart
 STYLES = {
     "none": (COLOURS[6], DASHES[0]),
@@ -39,6 +41,8 @@ STYLES = {
     "variable-h": (COLOURS[2], DASHES[2]),
     "fixed-h-e": (COLOURS[3], DASHES[4]),
     "variable-h-e": (COLOURS[4], DASHES[5]),
+    "couple-shaft": (COLOURS[0], DASHES[1]),
+    "two-couple-shafts": (COLOURS[3], DASHES[2]),
 }
 
 
@@ -56,7 +60,9 @@ def engine_lines(found: Balance) -> list[str]:
 
     firing = ", ".join(short(math.degrees(angle)) for angle in cylinders.firing_angles)
     load = f"load {short(found.load)}{star('operation.load')}"
-    if isinstance(gas, MeasuredCycle):
+    if gas is None:
+        pressure = "none given, so only the inertia shakes"
+    elif isinstance(gas, MeasuredCycle):
         pressure = f"measured, {len(gas.angles)} points"
     else:
         mean = engine.indicated_work(found.tuning_speed, found.load) / engine.displacement
@@ -91,17 +97,19 @@ def engine_lines(found: Balance) -> list[str]:
 
 
 def tables(found: Balance) -> list[Table]:
-    """Orders, designs, and the first-order moment over the speeds."""
-    return [_orders(found), _designs(found), _speeds(found)]
+    """Orders, designs, and what is left of first order over the speeds: moment, and couple if any."""
+    others = [one for one in found.residuals if not one.name.endswith(COUPLED)]
+    shown = [_orders(found), _designs(found), _speeds(found, "moment", "first_order", others)]
+    coupled = any(one.couple.any() for one in found.residuals)
+    return [*shown, _speeds(found, "couple", "couple", found.residuals)] if coupled else shown
 
 
 def _orders(found: Balance) -> Table:
     """The orders at the tuning speed."""
-    rows = found.orders()
+    rows, keys = found.orders(), ("cosine", "sine") if found.engine.gas else ()
     cells = {
         "order": [f"{row['order']:g}" for row in rows],
-        "gas\ncos": column_of([row["gas_cosine"] for row in rows]),
-        "gas\nsin": column_of([row["gas_sine"] for row in rows]),
+        **{f"gas\n{key[:3]}": column_of([row[f"gas_{key}"] for row in rows]) for key in keys},
         "inertia\nsin": column_of([row["inertia_sine"] for row in rows]),
         "torque\nN m": column_of([row["torque"] for row in rows]),
         "force\nN": column_of([row["force"] for row in rows]),
@@ -126,6 +134,9 @@ def _designs(found: Balance) -> Table:
         "force\nN": column_of([float(one.force[i]) for one in all_of]),
         "all orders\nN": column_of([float(one.all_forces[i]) for one in all_of]),
     }
+    if any(one.all_couples[i] > 0.0 for one in all_of):
+        cells["couple\nN m"] = column_of([float(one.couple[i]) for one in all_of])
+        cells["couple, all\nN m"] = column_of([float(one.all_couples[i]) for one in all_of])
     title = f"Left on the housing at {found.tuning_speed / RPM:.6g} rpm, first and all orders"
     return Table.of(title, cells, ("balancer",))
 
@@ -134,26 +145,47 @@ def _mm_at(values: Vector | None, index: int) -> float | None:
     return None if values is None else 1e3 * float(values[index])
 
 
-def _speeds(found: Balance) -> Table:
-    """The first-order moment over the speeds asked for."""
+def _speeds(found: Balance, what: str, key: str, residuals: Sequence[Residual]) -> Table:
+    """What is left over the speeds asked for."""
     where = [int(np.argmin(np.abs(found.speeds - speed))) for speed in found.shown]
     cells = {"speed\nrpm": [f"{found.speeds[i] / RPM:.6g}" for i in where]}
-    for one in found.residuals:
-        cells[one.name.replace("-", "\n", 1)] = [number(float(one.first_order[i]), 1) for i in where]
-    return Table.of("First-order moment left on the housing, N m", cells)
+    for one in residuals:
+        cells[one.name.replace("-", "\n", 1)] = [number(float(getattr(one, key)[i]), 1) for i in where]
+    return Table.of(f"First-order {what} left on the housing, N m", cells)
 
 
 def conclusion(found: Balance) -> str:
-    """What the balancer of [B] does here."""
-    if found.note:
-        return found.note
+    """What the balancer of [B] does here, and what the shafts for the couples do."""
+    sentences = [_of_forces(found)] if found.imbalance else []
+    if coupled := [one for one in found.residuals if one.name.endswith(COUPLED)]:
+        i, (shaft, other, *second) = found.tuning_index, coupled[-1].shafts
+        before, *left = (one.couple[i] for one in (found.residuals[0], *coupled))
+        text = (
+            f"One shaft against the crank with two opposite imbalances of {shaft.imbalance:.4g} kg m, "
+            f"{1e3 * (other.along - shaft.along):.4g} mm apart, takes the first-order couple at "
+            f"{found.tuning_speed / RPM:.6g} rpm from {before:.4g} to {left[0]:.4g} N m"
+        )
+        if second:
+            text += f"; a second one with {second[0].imbalance:.4g} kg m that turns with the crank, or "
+            text += f"counterweights at its ends, to {left[1]:.4g} N m"
+        sentences.append(f"{text}.")
+    return " ".join(sentences) or found.note
+
+
+def _of_forces(found: Balance) -> str:
     i, rpm = found.tuning_index, f"{found.tuning_speed / RPM:.6g} rpm"
-    none, fixed, inertia, both = (
-        found.residual(name) for name in ("none", "fixed-h", "inertia-only", "fixed-h-e")
-    )
+    none, inertia = found.residual("none"), found.residual("inertia-only")
+    start = f"Two shafts of {found.imbalance:.4g} kg m together at h = "
+    if found.engine.gas is None:
+        return (
+            f"{start}{_mm(inertia, i)} mm take the first-order force from {none.force[i]:.4g} to "
+            f"{inertia.force[i]:.4g} N and the first-order moment of the inertia at {rpm} from "
+            f"{none.first_order[i]:.4g} to {inertia.first_order[i]:.4g} N m."
+        )
+    fixed, both = found.residual("fixed-h"), found.residual("fixed-h-e")
     assert both.offset is not None
     return (
-        f"Two shafts of {found.imbalance:.4g} kg m together at h = {_mm(fixed, i)} mm take the first-order "
+        f"{start}{_mm(fixed, i)} mm take the first-order "
         f"force from {none.force[i]:.4g} to {fixed.force[i]:.4g} N and the first-order moment at {rpm} from "
         f"{none.first_order[i]:.4g} to {fixed.first_order[i]:.4g} N m; designed for the inertia alone (h = "
         f"{_mm(inertia, i)} mm) they leave {inertia.first_order[i]:.4g} N m. Moved sideways by "
@@ -172,6 +204,8 @@ def footnotes(found: Balance) -> list[str]:
         f"{designs}. At most: over all speeds.",
         "The crank turns at constant speed; the moments are those that alternate, about the crank axis.",
     ]
+    if found.engine.cylinders.count > 1 and not found.engine.cylinders.spacing:
+        notes.append("The couples are not known: they need the spacing of the cylinders.")
     if found.engine.assumed:
         notes.append(f"Assumed: {', '.join(found.engine.assumed)}.")
     return notes
@@ -195,7 +229,7 @@ def torque_over_cycle(found: Balance) -> tuple[tuple[str, ...], list[list[float]
 def figures(found: Balance) -> dict[str, Any]:
     """All figures by the stem of their file: torque over crank angle, residuals over speed, forces."""
     return {
-        "torque": torque_figure(found),
+        **({} if found.engine.gas is None else {"torque": torque_figure(found)}),
         "residual": residual_figure(found),
         "forces": force_figure(found),
     }
@@ -269,9 +303,10 @@ def residual_figure(found: Balance) -> Any:
     rpm = found.speeds / RPM
     designed = [one for one in found.residuals if one.height is not None]
     with drawing():
-        rows = 3 if designed else 2
+        coupled = found.residuals if any(one.couple.any() for one in found.residuals) else ()
+        rows = 2 + bool(designed) + bool(coupled)
         figure, panels = new_figure(rows, 1, (8.0, 3.1 * rows), sharex=True)
-        moment, force = panels[0], panels[-1]
+        moment, force = panels[0], panels[-1 - bool(coupled)]
         for one in found.residuals:
             colour, dash = STYLES[one.name]
             moment.plot(rpm, one.first_order, color=colour, ls=dash, label=one.name, clip_on=False, zorder=3)
@@ -280,9 +315,13 @@ def residual_figure(found: Balance) -> Any:
         if designed:
             _arms(panels[1], found)
         _forces(force, found)
+        for one in coupled:
+            colour, dash = STYLES[one.name]
+            panels[-1].plot(rpm, one.couple, color=colour, ls=dash, label=one.name)
+            panels[-1].set_ylabel("couple of first order\non the housing, N m")
         for axes in panels:
             axes.axvline(found.tuning_speed / RPM, color=GREY, lw=0.9, ls=":")
-        force.set_xlabel("crank speed, rpm     (dotted: tuning speed)")
+        panels[-1].set_xlabel("crank speed, rpm     (dotted: tuning speed)")
         force.set_xlim(rpm[0], rpm[-1])
         entitle(figure, _title(found, f"what is left, load {found.load:g}"))
         handles, labels = moment.get_legend_handles_labels()
@@ -297,7 +336,7 @@ def _arms(axes: Axes, found: Balance) -> None:
         if one.height is not None and one.name in ("inertia-only", "fixed-h", "variable-h"):
             colour, dash = STYLES[one.name]
             axes.plot(rpm, 1e3 * np.abs(one.height), color=colour, ls=dash)
-    last = found.residuals[-1]
+    last = found.residual("variable-h-e")
     if last.offset is not None:
         colour, dash = STYLES[last.name]
         axes.plot(rpm, 1e3 * np.abs(last.offset), color=colour, ls=dash, label="sideways |e(n)|")

@@ -140,11 +140,35 @@ def test_the_middle_of_the_shafts_counts_not_their_distance():
     assert one[2] == pytest.approx(other[2], abs=1e-18)
 
 
+@pytest.mark.parametrize(
+    "throws", [(0, 240, 120), (0, 90, 270, 180), (0, 180), (0, 90), (0, 270, 135, 360, 50)], ids=str
+)
+def test_couples_count_like_forces(throws):
+    """sum m r w^2 A_n exp(i n alpha) z over the cylinders; shafts take the first order, half each."""
+    made = replace(engine(firing_angles=np.radians(throws)), gas=None)
+    w, r, z = 6000.0 * RPM, 0.042, np.array(made.cylinders.places)
+    A = {1: 1.0, 2: 0.3 + 0.3**3 / 4 + 15 * 0.3**5 / 128 + 0.3**7 * 35 / 512, 4: -(0.3**3) / 4}
+    exact = {n: abs(0.5 * r * w**2 * A[n] * np.exp(1j * n * np.radians(throws)) @ z) for n in A}
+    found = balance(made)
+    told = {row["order"]: row["couple"] for row in found.orders()}
+    for n, couple in exact.items():
+        assert told.get(n, 0.0) == pytest.approx(couple, rel=2e-4 if n < 4 else 0.1, abs=1e-9)
+    i = found.tuning_index
+    half, none = (found.residual(name) for name in ("couple-shaft", "two-couple-shafts"))
+    assert half.couple[i] == pytest.approx(0.5 * exact[1], rel=1e-12)
+    assert none.couple[i] < 1e-12 * exact[1]
+    assert none.force == pytest.approx(found.residual("none").force, rel=1e-12)
+    fitted = replace(made, shafts=found.shafts("couple-shaft"), counterweights=HALF)
+    assert balance(fitted).residual("own-shafts").couple[i] < 1e-12 * exact[1]
+
+
 def test_a_four_cylinder_engine_has_nothing_for_two_shafts_at_crank_speed():
     made = engine((1, 3, 4, 2))
     found = balance(made)
     assert [one.name for one in found.residuals] == ["none"]
     assert "nothing to balance" in found.note
+    with pytest.raises(InputError, match="gives the gas torque; add one"):
+        replace(made, gas=None).torque(PHI, 300.0)
     assert free_force(made) == 0.0
     with pytest.raises(InputError, match="no shafts were designed"):
         found.shafts("none")

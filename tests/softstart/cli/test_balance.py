@@ -102,6 +102,32 @@ def test_an_engine_with_a_measured_pressure_and_without_a_free_force(run, place)
     assert Engine.load(place / "four" / "engine.toml") == Engine.load(place / "four.toml")
 
 
+def test_couples_of_three_cylinders_without_gas_data(run, place):
+    """Textbook, three throws at 120 degrees: sqrt(3) m r w^2 a = 1094 N m, lambda times that = 324 N m."""
+    (place / "three.toml").write_text("""
+[cylinders]
+bore = "72 mm"
+stroke = "80 mm"
+rod_length = "135 mm"
+spacing = "80 mm"
+firing_order = [1, 3, 2]
+[masses]
+reciprocating = "0.5 kg"
+[operation]
+lowest_speed = "1000 rpm"
+highest_speed = "6000 rpm"
+""")
+    code, out, err = run("balance", "three.toml", "--out", "three")
+    assert (code, err) == (0, "")
+    assert "takes the first-order couple at 6000 rpm from 1094 to 547 N m" in " ".join(out.split())
+    found = json.loads(run("balance", "three.toml", "--json").out)
+    couples = {row["order"]: row["couple"] for row in found["orders"]}
+    assert couples[1.0] == pytest.approx(1094.0, abs=0.5)
+    assert couples[2.0] == pytest.approx(324.0 * (1 + (40 / 135) ** 2 / 4), rel=2e-3)  # A_2, not lambda alone
+    assert found["indicated_work"] is None
+    assert not (place / "three" / "torque.csv").exists()
+
+
 ONE_SENTENCE = {
     "engine": (["vaz-1111"], ["did you mean vaz-11113?"]),
     "folder": (["folder"], ["this is a directory"]),
