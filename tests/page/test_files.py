@@ -36,7 +36,7 @@ torque = 7.16
 target_sped = 92
 """
 SHEET = {
-    "motor.power": "3 kW", "motor.speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
+    "motor.rated_power": "3 kW", "motor.rated_speed": "1430 rpm", "motor.inertia": "0.0119 kg*m^2",
     "load.mass": "12 t", "load.radius": "157.5 mm", "gear.ratio": "31.5",
     "gear.stiffness": "25 N*m/arcmin", "gear.backlash": "15 arcmin", "name": "gantry",
 }  # fmt: skip
@@ -187,7 +187,7 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     before = page.locator(".drive-name").inner_text()
     page.get_by_test_id("sheet-use").click()
     trouble = page.get_by_test_id("sheet-trouble")
-    trouble.get_by_text("[motor] power is missing").wait_for()
+    trouble.get_by_text("[motor] rated_power is missing").wait_for()
     comes_to(page.locator(".drive-name").inner_text, before)
     assert page.get_by_test_id("sheet-load-reeving").is_hidden()
     for path, text in SHEET.items():

@@ -170,7 +170,7 @@ class Shaft(ParameterSet):
         default="before", choices=get_args(Side),
     )  # fmt: skip
     efficiency: Number = parameter(
-        "shaft.efficiency", "1", "efficiency of the gear", "0.97", "from 0 to 1", default=1.0
+        "shaft.efficiency", "1", "efficiency of the gear", "0.97", "above 0 and at most 1", default=1.0
     )
     restitution: MaybeNumber = parameter(
         "shaft.restitution", "1", "restitution of a rigid gap", "0.8", "from 0 to 1", default=None
@@ -205,8 +205,6 @@ class Shaft(ParameterSet):
                 f"damping = {self.damping!r} and damping_ratio = {self.damping_ratio!r}: both give the "
                 "damping; leave one out."
             )
-        if self.efficiency == 0.0:
-            wrong.append("efficiency = 0: the efficiency of the gear must be above 0.")
         if wrong:
             return wrong
         if backlash is not None:

@@ -11,7 +11,17 @@ import click
 from softstart.cli.commands import Command
 from softstart.cli.completion import files_only, table_keys
 from softstart.cli.options import changes_option, json_option, read_changes
-from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
+from softstart.drive.data_sheet import (
+    ABOUT,
+    INSTEAD,
+    MACHINES,
+    TYPICAL,
+    USUAL,
+    DataSheet,
+    echo,
+    if_empty,
+    typed,
+)  # fmt: skip
 from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.input.files import write_whole
@@ -22,8 +32,11 @@ from softstart.views.terminal import console, print_json, sentence
 # asked only where the other one was answered
 AFTER = {
     "coupling_diameter": "coupling_play",
+    "efficiency": "ratio",
     "play_diameter": "output_play",
     "shaft_length": "shaft_diameter",
+    "rope_diameter": "rope_length",
+    "rope_modulus": "rope_length",
 }
 FIRST = ("name", "source", "machine")
 
@@ -32,7 +45,7 @@ FIRST = ("name", "source", "machine")
 @click.argument("sheet", required=False, metavar="[SHEET]", shell_complete=files_only(".toml"))
 @changes_option(
     lambda: table_keys(DataSheet.TABLES),
-    "Set a value of the data sheet, for example motor.power='3 kW' or gear.ratio=31.5.",
+    "Set a value of the data sheet, for example motor.rated_power='3 kW' or gear.ratio=31.5.",
 )
 @click.option(
     "--out",
@@ -49,8 +62,8 @@ def init(
     """Create a drive file from data sheet values.
 
     Asks for the values of rating plate, gearbox, shaft and load, and refers them to the motor shaft; comments
-    in the file state the origin of each value. SHEET is a TOML file with the values; --template prints one
-    to fill in.
+    in the file state the origin of each value, and what is assumed. SHEET is a TOML file with the values;
+    --template prints one to fill in.
     """
     if template:
         click.echo(template_text(), nl=False)
@@ -80,26 +93,26 @@ def init(
 
 def asked(given: Mapping[str, object]) -> DataSheet:
     """The data sheet from answers on standard input; what is in `given` by path is not asked."""
-    answers: dict[str, object] = {}
-    for p in sorted(DataSheet.PARAMETERS.values(), key=lambda p: p.name not in FIRST):
-        machine = answers.get("load.machine", given.get("load.machine"))
-        after = DataSheet.PARAMETERS[AFTER[p.name]] if p.name in AFTER else None
+    answers, parameters = dict(given), DataSheet.PARAMETERS
+
+    def known(name: str) -> bool:
+        """Whether this was answered or given, and is more than 0."""
+        try:
+            return bool(read_value(parameters[name], answers[parameters[name].path]))
+        except (KeyError, RefusedError):
+            return False
+
+    for p in sorted(parameters.values(), key=lambda p: p.name not in FIRST):
+        machine = answers.get("load.machine")
         if p.path in given or machine not in ABOUT.get(p.name, (machine,)):
             continue
-        if after is not None and not _number(after, answers.get(after.path, given.get(after.path))):
+        if (p.name in AFTER and not known(AFTER[p.name])) or (p.name in INSTEAD and known(INSTEAD[p.name])):
             continue
-        answer = _answer(p, needed=p.required or (machine != "rotor" and p.name in ("mass", "radius")))
+        own = ("output_inertia",) if machine == "rotor" else ("mass", "radius")
+        answer = _answer(p, needed=p.required or p.name in ("rated_torque", *own))
         if answer:
             answers[p.path] = answer
-    return DataSheet.from_settings({**answers, **given})
-
-
-def _number(p: Parameter, written: object) -> float:
-    """What was answered or given; 0 for nothing, and for what will be refused."""
-    try:
-        return 0.0 if written is None else float(read_value(p, written))
-    except RefusedError:
-        return 0.0
+    return DataSheet.from_settings(answers)
 
 
 def _answer(p: Parameter, needed: bool) -> str:
@@ -113,7 +126,7 @@ def _answer(p: Parameter, needed: bool) -> str:
                 f"the answers end before {p.place} ({p.meaning}); give it with --set {p.path}={p.example}, "
                 "or in a file (softstart init --template prints one)."
             )
-        text = line.strip()
+        text = typed(p, line)
         if not text and not needed:
             return ""
         try:
@@ -123,21 +136,24 @@ def _answer(p: Parameter, needed: bool) -> str:
         except RefusedError as refusal:
             click.echo("  " + Wording(style="toml").refused(p, text, refusal), err=True)
             continue
+        if said := echo(p, line):
+            click.echo(f"  {said}", err=True)
         return text
 
 
 def question(p: Parameter, needed: bool = False) -> str:
-    """The question for one parameter, with what Enter stands for.
+    """The question for one parameter, with the unit of a bare number and what Enter stands for.
 
     >>> question(DataSheet.PARAMETERS["backlash"])
-    'backlash of the gears at the output, as 15 arcmin [none]: '
+    'backlash of the gears at the output in arcmin, as 15 [none]: '
     """
-    hint = f" ({TYPICAL[p.name]})" if p.name in TYPICAL else ""
-    words = ", ".join(p.choices)
-    example = f" ({words})" if words else f", as {p.example.strip(chr(34))}"
-    nothing = "usual" if p.name in TYPICAL else "none" if p.unit != "1" else "not given"
-    default = "" if needed or p.required else f" [{p.default or nothing}]"
-    return f"{p.meaning}{example}{hint}{default}: "
+    unit = USUAL.get(p.name, p.unit)
+    example = p.example.strip('"').removesuffix(f" {unit}")
+    hint = f" ({TYPICAL[p.name][1]})" if p.name in TYPICAL else ""
+    asks = f"{p.meaning}{f' in {unit}' if unit not in ('', '1') else ''}, as {example}{hint}"
+    if p.choices:
+        asks = f"{p.meaning}: {'; '.join(f'{word} ({MACHINES[word]})' for word in p.choices)}"
+    return f"{asks}{'' if needed or p.required else f' [{if_empty(p)}]'}: "
 
 
 def template_text() -> str:
@@ -148,8 +164,12 @@ def template_text() -> str:
         for p in table.parameters:
             only = f"only for {', '.join(ABOUT[p.name])}" if p.name in ABOUT else ""
             need = "needed" if p.required else only
-            said = (p.meaning, ", ".join(p.choices), TYPICAL.get(p.name, ""), need)
-            about = "; ".join(text for text in said if text)
+            words = "; ".join(f"{word}: {MACHINES[word]}" for word in p.choices)
+            nothing = "none" if p.required else if_empty(p)
+            nothing = "" if nothing == "none" else f"without it {nothing}"
+            about = "; ".join(
+                filter(None, (p.meaning, words, TYPICAL.get(p.name, ("", ""))[1], need, nothing))
+            )
             row = f"{p.key} = {p.example}"
             rows.append(f"{'' if p.required else '# '}{row}  # {about}")
         blocks.append("\n".join([f"[{table.name}]", *rows] if table.name else rows))

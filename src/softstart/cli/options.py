@@ -9,7 +9,7 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,11 +21,12 @@ from softstart.cli.commands import Reading, did_you_mean
 from softstart.cli.completion import Keys, controllers, drive_keys, files_only, names_or_files, parameters
 from softstart.cli.completion import settings as settings_of
 from softstart.drive import Drive, library
+from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError, Mistakes
-from softstart.input.files import refusal_of
+from softstart.input.files import read_text, refusal_of
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
-from softstart.quantities import to_si, whole_number
+from softstart.quantities import RefusedError, to_si, whole_number
 
 if TYPE_CHECKING:
     from softstart.chain import simulation
@@ -74,7 +75,19 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes; of a chain the two masses that stand for it."""
     if is_chain(name):
         return two_masses(Chain.load(name, also=read_changes(settings)), name)
-    drive = Drive.load(name)
+    sheet = _data_sheet(name)
+    if sheet is None:
+        drive = Drive.load(name)
+    else:  # its own keys are those of the sheet, at their own parts
+        paths = {path for p in DataSheet.PARAMETERS.values() for path in (p.path, p.formerly)}
+        own = [one for one in settings if one.partition("=")[0].strip() in paths]
+        settings = [one for one in settings if one not in own]
+        drive = DataSheet.from_toml(sheet, where=name, also=read_changes(own)).drive
+        print(
+            f'"{name}" is a data sheet, read as the drive that follows from it; "softstart init {name} '
+            '--out FILE" writes that drive.',
+            file=sys.stderr,
+        )
     if settings:
         drive = drive.with_settings(settings)
     if drive.shape != ():
@@ -83,6 +96,16 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
             "one at a time; give one value a key (softstart.simulate in Python takes batches)."
         )
     return drive
+
+
+def _data_sheet(name: str) -> str | None:
+    """The text of the file of this name, if it is a data sheet."""
+    if name in drive_names() or refusal_of(name) is not None:
+        return None
+    with suppress(RefusedError, ValueError):  # told by the reader of drives
+        text = read_text(name)
+        return text if DataSheet.describes(tomllib.loads(text)) else None
+    return None
 
 
 def two_masses(chain: Chain, name: str) -> Drive:

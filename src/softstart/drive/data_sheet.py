@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
@@ -12,34 +13,77 @@ from softstart.drive.model import Drive
 from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import text_of
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
-from softstart.input.parameters import Wording
+from softstart.input.parameters import Mistake, Parameter, Wording, read_value
+from softstart.quantities import RefusedError
 
-__all__ = ["TYPICAL", "DataSheet", "Machine"]
+__all__ = [
+    "ABOUT",
+    "INSTEAD",
+    "MACHINES",
+    "TYPICAL",
+    "USUAL",
+    "DataSheet",
+    "Machine",
+    "echo",
+    "if_empty",
+    "typed",
+]
 
 Machine = Literal["hoist", "travel", "belt", "rotor"]
+MACHINES: Mapping[str, str] = {
+    "hoist": "a load on ropes",
+    "travel": "a crane, trolley or vehicle on wheels",
+    "belt": "a belt conveyor",
+    "rotor": "slewing gear, fan, rotary table: anything that turns about the output axis",
+}
 
 GRAVITY = 9.80665  # m/s^2
 STEEL = 79.3e9  # N/m^2, shear modulus
 RESISTANCE = {"travel": 0.008, "belt": 0.02}  # share of the weight
-ROLLING = ("travel", "belt")
+METAL = 0.46  # metallic cross-section of a rope over its diameter squared, EN 12385: class 6x36, steel core
 
-# what to write where a number is not known, and where it is from
-TYPICAL: Mapping[str, str] = {
-    "starting_ratio": "1.5 is what inverters allow for a minute in their heavy-duty rating; at the "
-    "mains 2 to 3, by the data sheet of the motor",
-    "efficiency": "0.97 to 0.98 for each stage of spur, helical or bevel gears",
-    "resistance": "travel on rolling bearings 0.006 to 0.01, usually 0.008; belts 0.016 to 0.03, usually "
-    "0.02, DIN 22101",
-    "damping_ratio": "0.02 for gears and steel shafts; with an elastomer coupling 0.06, psi/(4 pi) by its "
-    "catalogue",
-}
+# what is filled in where a number is not given, and where that is from
+TYPICAL: Mapping[str, tuple[str, str]] = {
+    "starting_ratio": ("1.5", "1.5 is what inverters allow for a minute in their heavy-duty rating; at the "
+                       "mains 2 to 3, by the data sheet of the motor"),
+    "efficiency": ("0.95", "0.97 to 0.98 for each stage of spur, helical or bevel gears"),
+    "rope_modulus": ("100 GPa", "90 to 120 GPa on the metallic cross-section, 0.46 d^2, of a rope in use"),
+    "resistance": ("0.008, of a belt 0.02", "travel on rolling bearings 0.006 to 0.01; belts 0.016 to 0.03, "
+                   "DIN 22101"),
+    "damping_ratio": ("0.02", "0.02 for gears and steel shafts; with an elastomer coupling 0.06, psi/(4 pi) "
+                      "by its catalogue"),
+}  # fmt: skip
+# the unit that a bare number has at the prompt and in the form, where it is not that of SI; in a file such a
+# number is refused
+USUAL: Mapping[str, str] = {
+    "rated_power": "kW",
+    "rated_speed": "rpm",
+    "torque_lag": "ms",
+    "backlash": "arcmin",
+    "rope_modulus": "GPa",
+    **dict.fromkeys(
+        ("coupling_play", "coupling_diameter", "shaft_diameter", "shaft_length", "output_play",
+         "play_diameter", "rope_diameter"), "mm",
+    ),
+}  # fmt: skip
 # parameters that say something about these machines only
 ABOUT: Mapping[str, tuple[Machine, ...]] = {
     "mass": ("hoist", "travel", "belt"),
     "radius": ("hoist", "travel", "belt"),
-    "reeving": ("hoist",),
     "resistance": ("travel", "belt"),
+    **dict.fromkeys(
+        ("reeving", "rope_stiffness", "rope_length", "rope_diameter", "rope_modulus"), ("hoist",)
+    ),
 }
+# parameters that need not be given where the other one is
+INSTEAD: Mapping[str, str] = {
+    "rated_torque": "rated_power",
+    "starting_ratio": "starting_torque",
+    "maximum_ratio": "maximum_torque",
+    "rope_length": "rope_stiffness",
+}
+FORMER = {"power": "rated_power", "speed": "rated_speed"}  # keywords of former versions
+_BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 
 
 class _Entry(NamedTuple):
@@ -57,7 +101,12 @@ class DataSheet(ParameterSet):
     them are J/(i^2 eta), c/(i^2 eta) and M/(i eta) at the motor shaft, a backlash i times as wide.
     Stiffnesses in series add by their reciprocals, backlashes directly. A mass m on a radius r is m r^2; a
     rope that is reeved n times makes the radius r/n. A steel shaft of diameter D and length L has
-    c = G pi D^4/(32 L), G = 79.3e9 N/m^2.
+    c = G pi D^4/(32 L), G = 79.3e9 N/m^2. One fall of a rope of diameter d and length L has k = E 0.46 d^2/L;
+    n falls on the radius r/n store k n (r/n)^2 angle^2/2, so that they have c = k r^2/n at the drum.
+
+    In a file and in `from_settings` a bare number is refused where people seldom mean SI (`USUAL`): speed,
+    power, backlash, plays, diameters, lag. As an argument every number is in SI. An efficiency of 10 to 100
+    is read as per cent. `assumed` lists what nobody gave and is filled in.
 
     Parameters
     ----------
@@ -70,39 +119,55 @@ class DataSheet(ParameterSet):
 
     References
     ----------
-    docs/howto/own-drive.md derives the same numbers by hand.
+    docs/howto/own-drive.md derives the same numbers by hand. Metallic cross-section of a rope: EN 12385-4,
+    class 6x36 with steel core, C = 0.46.
 
     Examples
     --------
     >>> sheet = DataSheet(
-    ...     machine="hoist", power="15 kW", speed="970 rpm", motor_inertia=0.17, ratio=45, mass="6300 kg",
-    ...     radius="0.2 m", reeving=4, gear_stiffness="2 kN*m/arcmin", backlash="7 arcmin",
+    ...     machine="hoist", rated_power="15 kW", rated_speed="970 rpm", motor_inertia=0.17, ratio=45,
+    ...     mass="6300 kg", radius="0.2 m", reeving=4, gear_stiffness="2 kN*m/arcmin", backlash="7 arcmin",
     ... )
     >>> drive = sheet.drive
     >>> round(drive.Mc, 1), round(drive.gap, 4), drive.start_position
     (72.3, 0.0916, 'hanging')
+    >>> drive.assumed
+    'starting torque 1.5 times the rated torque; efficiency 0.95; rigid rope; damping ratio 0.02'
     """
 
     WHAT: ClassVar[str] = "a data sheet"
 
     name: str = parameter("name", "", "name of the drive", '"hoist A"', "one line", default="unnamed drive")
     source: str = parameter(
-        "source", "", "where the numbers are from", '"data sheets"', "one line", default="data sheets"
+        "source", "", "where the numbers are from", '"motor plate"', "one line", default="data sheets"
     )
     machine: Machine = parameter(
         "load.machine", "", "kind of the machine", '"travel"', choices=get_args(Machine)
     )
-    power: Number = parameter("motor.power", "W", "rated power", '"3 kW"', "above 0")
-    speed: Number = parameter("motor.speed", "rad/s", "rated speed", '"1430 rpm"', "above 0")
+    rated_power: MaybeNumber = parameter(
+        "motor.rated_power", "W", "rated power", '"3 kW"', "above 0", default=None, formerly="motor.power"
+    )
+    rated_torque: MaybeNumber = parameter(
+        "motor.rated_torque", "N*m", "rated torque", '"20 N*m"', "above 0", default=None
+    )
+    rated_speed: Number = parameter(
+        "motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0", formerly="motor.speed"
+    )
     motor_inertia: Number = parameter(
-        "motor.inertia", "kg*m^2", "inertia of the rotor", '"0.0119 kg*m^2"', "above 0"
+        "motor.inertia", "kg*m^2", "inertia of the motor's own rotor", '"0.0119 kg*m^2"', "above 0"
     )
     added_inertia: Number = parameter(
         "motor.added_inertia", "kg*m^2", "inertia of brake disc, fan and coupling on the motor shaft",
         '"0.0066 kg*m^2"', "0 or more", default=0.0,
     )  # fmt: skip
+    starting_torque: MaybeNumber = parameter(
+        "motor.starting_torque", "N*m", "starting torque", '"44 N*m"', "above 0", default=None
+    )
     starting_ratio: Number = parameter(
-        "motor.starting_ratio", "1", "starting torque over rated torque", "1.5", "above 0", default=1.5
+        "motor.starting_ratio", "1", "starting torque over rated torque", "2.2", "above 0", default=1.5
+    )
+    maximum_torque: MaybeNumber = parameter(
+        "motor.maximum_torque", "N*m", "largest torque", '"52 N*m"', "above 0", default=None
     )
     maximum_ratio: MaybeNumber = parameter(
         "motor.maximum_ratio", "1", "largest torque over rated torque", "2.6", "above 0", default=None
@@ -115,61 +180,42 @@ class DataSheet(ParameterSet):
         "above 0", default=None,
     )  # fmt: skip
     coupling_play: Number = parameter(
-        "coupling.play",
-        "m",
-        "play of the coupling along its circumference",
-        '"0.1 mm"',
-        "0 or more",
+        "coupling.play", "m", "play of the coupling along its circumference", '"0.1 mm"', "0 or more",
         default=0.0,
-    )
+    )  # fmt: skip
     coupling_diameter: MaybeNumber = parameter(
-        "coupling.diameter",
-        "m",
-        "diameter on which the coupling has its play",
-        '"60 mm"',
-        "above 0",
+        "coupling.diameter", "m", "diameter on which the coupling has its play", '"60 mm"', "above 0",
         default=None,
-    )
+    )  # fmt: skip
     ratio: Number = parameter(
         "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=1.0
     )
     efficiency: Number = parameter(
-        "gear.efficiency", "1", "efficiency of all gears", "0.95", "above 0", default=0.95
+        "gear.efficiency", "1", "efficiency of all gears", "0.94", "above 0 and at most 1", default=0.95
     )
     gear_stiffness: MaybeNumber = parameter(
-        "gear.stiffness",
-        "N*m/rad",
-        "stiffness of the gears at the output",
-        '"25 N*m/arcmin"',
-        "above 0",
+        "gear.stiffness", "N*m/rad", "stiffness of the gears at the output", '"25 N*m/arcmin"', "above 0",
         default=None,
-    )
+    )  # fmt: skip
     backlash: Number = parameter(
         "gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"', "0 or more", default=0.0
     )
     shaft_diameter: MaybeNumber = parameter(
-        "output.diameter",
-        "m",
-        "diameter of the steel shaft behind the gears",
-        '"55 mm"',
-        "above 0",
+        "output.diameter", "m", "diameter of the steel shaft behind the gears", '"55 mm"', "above 0",
         default=None,
-    )
+    )  # fmt: skip
     shaft_length: MaybeNumber = parameter(
-        "output.length", "m", "its length", '"0.9 m"', "above 0", default=None
-    )
+        "output.length", "m", "length of the steel shaft behind the gears", '"900 mm"', "above 0",
+        default=None,
+    )  # fmt: skip
     output_play: Number = parameter(
         "output.play", "m", "play of couplings and open gears behind it, along the circumference", '"0.4 mm"',
         "0 or more", default=0.0,
     )  # fmt: skip
     play_diameter: MaybeNumber = parameter(
-        "output.play_diameter",
-        "m",
-        "diameter on which they have this play",
-        '"120 mm"',
-        "above 0",
+        "output.play_diameter", "m", "diameter on which they have this play", '"120 mm"', "above 0",
         default=None,
-    )
+    )  # fmt: skip
     mass: MaybeNumber = parameter(
         "load.mass", "kg", "mass that is moved", '"12000 kg"', "above 0", default=None
     )
@@ -177,13 +223,27 @@ class DataSheet(ParameterSet):
         "load.radius", "m", "radius of wheel or drum", '"0.1575 m"', "above 0", default=None
     )
     reeving: Number = parameter(
-        "load.reeving", "1", "ropes that carry the load for one that is wound", "2", "above 0", default=1.0
+        "load.reeving", "1", "falls of rope that carry the load for one that is wound", "2", "above 0",
+        default=1.0,
+    )  # fmt: skip
+    rope_stiffness: MaybeNumber = parameter(
+        "rope.stiffness", "N/m", "stiffness of one fall of the rope", '"0.8 MN/m"', "above 0", default=None
     )
+    rope_length: MaybeNumber = parameter(
+        "rope.length", "m", "length of one fall of the rope", '"12 m"', "above 0", default=None
+    )
+    rope_diameter: MaybeNumber = parameter(
+        "rope.diameter", "m", "nominal diameter of the rope", '"14 mm"', "above 0", default=None
+    )
+    rope_modulus: Number = parameter(
+        "rope.modulus", "Pa", "modulus of the rope on its metallic cross-section", '"105 GPa"', "above 0",
+        default=100e9,
+    )  # fmt: skip
     resistance: MaybeNumber = parameter(
-        "load.resistance", "1", "resistance to motion over weight", "0.008", "0 or more", default=None
+        "load.resistance", "1", "resistance to motion over weight", "0.008", "from 0 to 1", default=None
     )
     output_inertia: Number = parameter(
-        "load.inertia", "kg*m^2", "inertia of drum, wheels or rotor at the output", '"1.2 kg*m^2"',
+        "load.inertia", "kg*m^2", "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"',
         "0 or more", default=0.0,
     )  # fmt: skip
     output_torque: Number = parameter(
@@ -191,7 +251,7 @@ class DataSheet(ParameterSet):
     )
     motors: Number = parameter("load.motors", "1", "motors that share the load", "2", "above 0", default=1.0)
     damping_ratio: Number = parameter(
-        "shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.02", "from 0 to 1", default=0.02
+        "shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03", "from 0 to 1", default=0.02
     )
 
     # making one -------------------------------------------------------------------------------------------
@@ -203,81 +263,188 @@ class DataSheet(ParameterSet):
 
     @classmethod
     def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
-        """A data sheet from the tables [motor], [coupling], [gear], [output], [shaft] and [load]."""
+        """A data sheet from the tables of a TOML text: [load], [motor], [coupling], [gear], [output], ..."""
         return cls._from_document(
             parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where, also
         )
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, object]) -> Self:
-        """A data sheet from values by path, as {"motor.power": "3 kW", "gear.ratio": 31.5}."""
+        """A data sheet from values by path, as {"motor.rated_power": "3 kW", "gear.ratio": 31.5}."""
         return cls._from_document({}, "", settings)
 
-    def to_toml(self) -> str:
-        """The data sheet as a file that `load` reads, in SI.
+    @classmethod
+    def describes(cls, document: Mapping[str, Any]) -> bool:
+        """Whether TOML tables are those of a data sheet, not of a drive: by a key that no drive has.
 
-        >>> sheet = DataSheet(machine="rotor", power=1e3, speed=150, motor_inertia=0.01, output_inertia=0.1,
-        ...     coupling_stiffness=900)
+        >>> DataSheet.describes({"load": {"machine": "hoist"}}), DataSheet.describes({"load": {"torque": 7}})
+        (True, False)
+        """
+
+        def paths(parameters: Mapping[str, Parameter]) -> set[str]:
+            return {path for p in parameters.values() for path in (p.path, p.formerly)}
+
+        own = paths(cls.PARAMETERS) - paths(Drive.PARAMETERS)
+        tables = {name: keys for name, keys in document.items() if isinstance(keys, dict)}
+        of_drive = {"stiffness", "gap"} & tables.get("shaft", {}).keys()
+        return not of_drive and any(f"{name}.{key}" in own for name, keys in tables.items() for key in keys)
+
+    def to_toml(self) -> str:
+        """The data sheet as a file that `load` reads.
+
+        >>> sheet = DataSheet(machine="rotor", rated_power=1e3, rated_speed=150, motor_inertia=0.01,
+        ...     output_inertia=0.1, coupling_stiffness=900)
         >>> DataSheet.from_toml(sheet.to_toml()) == sheet
         True
         """
-        return document_text((table, self.given()) for table in self.TABLES)
+        units = {name: f" {self.PARAMETERS[name].unit}" for name in USUAL}
+        given = {
+            name: f"{value!r}{units[name]}" if name in units else value
+            for name, value in self.given().items()
+        }
+        return document_text((table, given) for table in self.TABLES)
+
+    def _fill(
+        self,
+        given: Mapping[str, object],
+        wording: Wording,
+        mistakes: Iterable[Mistake],
+        known: Mapping[str, Any] | None = None,
+    ) -> None:
+        """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
+        given = {FORMER.get(name, name): value for name, value in given.items()}
+        wrong = list(mistakes)
+        for name in USUAL if wording.style == "toml" else ():
+            p, number = self.PARAMETERS[name], _bare(given.get(name))
+            if float(number or 0.0) != 0.0:
+                reason = (
+                    f'no unit; write "{number} {USUAL[name]}" or, if {p.unit} is meant, "{number} {p.unit}"'
+                )
+                wrong.append(Mistake(wording.refused(p, given[name], RefusedError(reason))))
+        share = _bare(given.get("efficiency"))
+        per_cent = share and 10.0 <= float(share) <= 100.0
+        vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
+        super()._fill(given | {"efficiency": f"{share} %"} if per_cent else given, wording, wrong, known)
+
+    def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
+        given, of = vars(self)["_given"], self.PARAMETERS
+        by_ratio = "starting_torque" not in given or "maximum_ratio" in given
+        if by_ratio and not {"rated_power", "rated_torque"} & given:
+            yield wording.missing(of["rated_power"], f", or {wording.label(of['rated_torque'])} in its place")
 
     def contradictions(self) -> Iterator[str]:
-        """What is missing for this machine, and what stands alone."""
-        if self.machine != "rotor":
-            for name in ("mass", "radius"):
-                if getattr(self, name) is None:
-                    p = self.PARAMETERS[name]
-                    yield (
-                        f"{p.place} is missing: a {self.machine} needs the {p.meaning}; "
-                        f"write for example {p.key} = {p.example}."
-                    )
-        elif self.output_inertia == 0.0:
-            yield (
-                "[load] inertia is missing: a rotor needs its inertia; write for example "
-                'inertia = "1.2 kg*m^2".'
-            )
+        """What is missing for this machine, what contradicts something else, and what stands alone."""
+        given, of = self.given(), self.PARAMETERS
+        for name in ("output_inertia",) if self.machine == "rotor" else ("mass", "radius"):
+            if not getattr(self, name):
+                p = of[name]
+                yield (
+                    f"{p.place} is missing: a {self.machine} needs the {p.meaning}; "
+                    f"write for example {p.key} = {p.example}."
+                )
         for name, machines in ABOUT.items():
-            if name in self.given() and self.machine not in machines:
-                place = self.PARAMETERS[name].place
-                yield f"{place} is for a {' or '.join(machines)}, and this is a {self.machine}; leave it out."
-        pairs = (
+            if name in given and self.machine not in machines:
+                yield (
+                    f"{of[name].place} is for a {' or '.join(machines)}, and this is a {self.machine}; "
+                    "leave it out."
+                )
+        for one, other in (
             ("coupling_play", "coupling_diameter"),
             ("output_play", "play_diameter"),
             ("shaft_length", "shaft_diameter"),
             ("shaft_diameter", "shaft_length"),
-        )
-        for one, other in pairs:
+            ("rope_length", "rope_diameter"),
+            ("rope_diameter", "rope_length"),
+        ):
             if getattr(self, one) and not getattr(self, other):
-                p, q = self.PARAMETERS[one], self.PARAMETERS[other]
+                p, q = of[one], of[other]
                 yield f"{p.place} says nothing without {q.place}; write for example {q.key} = {q.example}."
+        yield from self._said_twice()
         if not self._stiffnesses:
             yield (
-                "nothing here is elastic: give [coupling] stiffness, [gear] stiffness, or [output] diameter "
-                "and length of a shaft, as far as they are known."
+                "nothing here is elastic: give [coupling] stiffness, [gear] stiffness, [output] diameter "
+                "and length of a shaft, or [rope] stiffness of a hoist, as far as they are known."
             )
+
+    def _said_twice(self) -> Iterator[str]:
+        """Pairs of values that say the same thing, and not the same value."""
+        given, of, rated = self.given(), self.PARAMETERS, self.rated
+        for name, other in INSTEAD.items():
+            if not {name, other} <= given.keys():
+                continue
+            if name == "rope_length":
+                yield "[rope] stiffness and [rope] length both say how stiff the rope is; leave one out."
+                continue
+            first = given[name] * (self.rated_speed if name == "rated_torque" else rated or math.nan)
+            if abs(first - given[other]) > 0.05 * given[other]:
+                p, q = of[name], of[other]
+                yield (
+                    f"{p.place} = {given[name]:.5g} and {q.place} = {given[other]:.5g} {q.unit} contradict "
+                    f"each other: the first makes {first:.5g} {q.unit}; leave one out."
+                )
+
+    # what is filled in ------------------------------------------------------------------------------------
+
+    @cached_property
+    def assumed(self) -> dict[str, str]:
+        """What nobody gave and is filled in, by parameter, as it is said; and what was read as per cent."""
+        given, found = self.given(), dict[str, str]()
+        if not {"starting_torque", "starting_ratio"} & given.keys():
+            found["starting_ratio"] = f"starting torque {self.starting_ratio:g} times the rated torque"
+        if "efficiency" not in given and "ratio" in given:
+            found["efficiency"] = f"efficiency {self.efficiency:g}"
+        if not {"coupling_play", "backlash", "output_play"} & given.keys():
+            found["backlash"] = "no backlash"
+        if self.machine == "hoist" and not {"rope_stiffness", "rope_length"} & given.keys():
+            found["rope"] = "rigid rope"
+        if "rope_diameter" in given:
+            more = "" if "rope_modulus" in given else f"modulus {self.rope_modulus / 1e9:g} GPa on a "
+            found["rope_modulus"] = f"rope {more}metallic cross-section of {METAL:g} d^2"
+        if self.machine in RESISTANCE and "resistance" not in given:
+            found["resistance"] = f"resistance {RESISTANCE[self.machine]:g} of the weight"
+        if "damping_ratio" not in given:
+            found["damping_ratio"] = f"damping ratio {self.damping_ratio:g}"
+        read: dict[str, str] = vars(self)["_read"]
+        return found | read
+
+    def _mark(self, name: str) -> str:
+        return ", assumed" if name in self.assumed else ""
 
     # at the motor shaft -----------------------------------------------------------------------------------
 
     @property
-    def rated_torque(self) -> float:
-        """Rated power over rated speed, N m."""
-        return self.power / self.speed
+    def rated(self) -> float | None:
+        """Rated torque, or rated power over rated speed, N m; None where neither is given."""
+        if self.rated_torque is not None or self.rated_power is None:
+            return self.rated_torque
+        return self.rated_power / self.rated_speed
+
+    @property
+    def _eta(self) -> float:
+        """The efficiency; 1 where there are no gears."""
+        return self.efficiency if {"efficiency", "ratio"} & self.given().keys() else 1.0
+
+    @property
+    def _arm(self) -> float:
+        """Radius on which the load moves with the output, m."""
+        return (self.radius or 0.0) / self.reeving
 
     @cached_property
     def _stiffnesses(self) -> dict[str, float]:
         """By part, N m/rad at the motor shaft."""
-        behind = self.ratio**2 * self.efficiency
-        found = {}
+        behind = self.ratio**2 * self._eta
+        rope, found = self.rope_stiffness, {}
+        if self.rope_length and self.rope_diameter:
+            rope = self.rope_modulus * METAL * self.rope_diameter**2 / self.rope_length
         if self.coupling_stiffness is not None:
             found["coupling"] = self.coupling_stiffness
         if self.gear_stiffness is not None:
             found["gears"] = self.gear_stiffness / behind
         if self.shaft_diameter and self.shaft_length:
-            found["output shaft"] = (
-                STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length) / behind
-            )
+            twist = STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length)
+            found["output shaft"] = twist / behind
+        if rope:
+            found[f"rope{self._mark('rope_modulus')}"] = rope * self.reeving * self._arm**2 / behind
         return found
 
     @cached_property
@@ -299,104 +466,107 @@ class DataSheet(ParameterSet):
         J = [f"{inertia:.5g} kg m^2 at the output"] if inertia else []
         M = [f"{torque:.5g} N m at the output"] if torque else []
         if self.machine != "rotor":
-            assert self.mass is not None
-            assert self.radius is not None
-            arm = self.radius / self.reeving if self.machine == "hoist" else self.radius
-            inertia += self.mass * arm**2
-            J.insert(0, f"{self.mass:.5g} kg on a radius of {arm:.5g} m")
-            if self.machine == "hoist":
-                share, what = 1.0, "the weight"
-            else:
-                known = self.resistance is not None
-                share = self.resistance if self.resistance is not None else RESISTANCE[self.machine]
-                what = f"{share:.5g} of the weight{'' if known else ', assumed'}"
-            torque += share * self.mass * GRAVITY * arm
+            mass, arm = self.mass or 0.0, self._arm
+            inertia += mass * arm**2
+            J.insert(0, f"{mass:.5g} kg on a radius of {arm:.5g} m")
+            share, what = 1.0, "the weight"
+            if self.machine != "hoist":
+                share = RESISTANCE[self.machine] if self.resistance is None else self.resistance
+                what = f"{share:.5g} of the weight{self._mark('resistance')}"
+            torque += share * mass * GRAVITY * arm
             M.insert(0, f"{what} on {arm:.5g} m")
         return inertia, ", ".join(J), torque, ", ".join(M) or "none"
 
     def entries(self) -> dict[str, list[_Entry]]:
         """The lines of the drive file by table: key, value as TOML, and what it is from."""
-        i, eta = self.ratio, self.efficiency
+        i, eta, rated = self.ratio, self._eta, self.rated
         stiffness = 1.0 / sum(1.0 / one for one in self._stiffnesses.values())
-        through = f"through {i:.5g}:1, efficiency {eta:.5g}" if i != 1.0 or eta != 1.0 else "no gears"
+        through = "no gears"
+        if i != 1.0 or eta != 1.0:
+            through = f"through {i:.5g}:1, efficiency {eta:.5g}{self._mark('efficiency')}"
         shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
         at_output, inertia_from, torque, torque_from = self._load
         J1 = self.motor_inertia + self.added_inertia
         J2 = at_output / (i**2 * eta) / self.motors
         Mc = torque / (i * eta) / self.motors
         damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * J1 * J2 / (J1 + J2))
-        rated = self.rated_torque
-        speed = f"{self.speed * 30.0 / math.pi:.6g} rpm"
+        speed = f'"{self.rated_speed * 30.0 / math.pi:.6g} rpm"'
+        hoist = self.machine == "hoist"
+        rope = "; rope assumed rigid" if "rope" in self.assumed else ""
 
         def parts(found: Mapping[str, float]) -> str:
-            return ", ".join(f"{part} {value:.4g}" for part, value in found.items())
+            return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in found.items())
 
-        def line(key: str, number: float, unit: str, about: str) -> _Entry:
-            return _Entry(key, f'"{number:.5g} {unit}"', about)
+        def line(key: str, number: float | None, unit: str, about: str) -> list[_Entry]:
+            return [] if number is None else [_Entry(key, f'"{number:.5g} {unit}"', about)]
+
+        def of_ratio(torque: float | None, ratio: float | None, mark: str = "") -> tuple[float | None, str]:
+            if torque is not None or ratio is None or rated is None:
+                return torque, "data sheet"
+            return ratio * rated, f"{ratio:.5g} times the rated torque{mark}"
 
         rotor = f"rotor {self.motor_inertia:.5g}"
         more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
-        motor = [
-            line("inertia", J1, "kg*m^2", rotor + more),
-            line("starting_torque", self.starting_ratio * rated, "N*m",
-                 f"{self.starting_ratio:.5g} times the rated torque"),
-        ]  # fmt: skip
-        if self.maximum_ratio is not None:
-            motor.append(
-                line("maximum_torque", self.maximum_ratio * rated, "N*m", f"{self.maximum_ratio:.5g} times")
-            )
-        motor.append(line("rated_power", self.power / 1e3, "kW", "plate"))
-        motor.append(_Entry("rated_speed", f'"{speed}"', "plate"))
-        if self.torque_lag:
-            motor.append(line("torque_lag", 1e3 * self.torque_lag, "ms", "of the inverter"))
-        start = [_Entry("target_speed", f'"{speed}"', "rated speed")]
-        if self.machine == "hoist":
-            start = [
+        starting, starting_from = of_ratio(
+            self.starting_torque, self.starting_ratio, self._mark("starting_ratio")
+        )
+        largest, largest_from = of_ratio(self.maximum_torque, self.maximum_ratio)
+        position = [_Entry("position", '"unknown"', "every figure is the worst of both flanks and mid-gap")]
+        if hoist:
+            position = [
                 _Entry("position", '"hanging"', "the brake holds the motor, the load winds up the shaft"),
                 _Entry("brake", '"motor"', ""),
                 _Entry("release", '"torque"', "torque proving"),
-                *start,
             ]
-        elif self._gaps:
-            start.insert(
-                0, _Entry("position", '"unknown"', "every figure is the worst of both flanks and mid-gap")
-            )
-        load = [
-            line("inertia", J2, "kg*m^2", f"{inertia_from}; {through}{shared}"),
-            line("torque", Mc, "N*m", f"{torque_from}; {through}{shared}"),
-            _Entry("kind", '"active"' if self.machine == "hoist" else '"reactive"',
-                   "a load that hangs" if self.machine == "hoist" else "friction"),
-        ]  # fmt: skip
+        assumed = "; ".join(self.assumed.values())
+        source = self.source + (" and assumed values" if assumed and "source" not in self.given() else "")
         return {
-            "": [_Entry("name", literal(self.name), ""), _Entry("source", literal(self.source), "")],
-            "motor": motor,
-            "shaft": [
-                line(
-                    "stiffness", stiffness, "N*m/rad", f"in series, at the motor: {parts(self._stiffnesses)}"
-                ),
-                line("damping", damping, "N*m*s/rad", f"damping ratio {self.damping_ratio:.5g}"),
-                line(
-                    "gap",
-                    sum(self._gaps.values()),
-                    "rad",
-                    f"at the motor: {parts(self._gaps) or 'none given'}",
-                ),
+            "": [
+                _Entry("name", literal(self.name), ""),
+                _Entry("source", literal(source), ""),
+                *([_Entry("assumed", literal(assumed), "")] if assumed else []),
             ],
-            "load": load,
-            "start": start,
-        }
+            "motor": [
+                *line("inertia", J1, "kg*m^2", rotor + more),
+                *line("starting_torque", starting, "N*m", starting_from),
+                *line("maximum_torque", largest, "N*m", largest_from),
+                *line("rated_power", self.rated_power and self.rated_power / 1e3, "kW", "plate"),
+                *line("rated_torque", self.rated_torque, "N*m", "plate"),
+                _Entry("rated_speed", speed, "plate"),
+                *line("torque_lag", 1e3 * self.torque_lag or None, "ms", "of the inverter"),
+            ],
+            "gear": [_Entry("ratio", f"{i:.5g}", "")] if "ratio" in self.given() else [],
+            "shaft": [
+                *line("stiffness", stiffness, "N*m/rad", f"in series, {parts(self._stiffnesses)}{rope}"),
+                *line(
+                    "damping", damping, "N*m*s/rad",
+                    f"damping ratio {self.damping_ratio:.5g}{self._mark('damping_ratio')}",
+                ),
+                *line("gap", sum(self._gaps.values()), "rad",
+                      parts(self._gaps) if self._gaps else f"none given{self._mark('backlash')}"),
+            ],
+            "load": [
+                *line("inertia", J2, "kg*m^2", f"{inertia_from}; {through}{shared}"),
+                *line("torque", Mc, "N*m", f"{torque_from}; {through}{shared}"),
+                _Entry("kind", '"active"', "a load that hangs") if hoist
+                else _Entry("kind", '"reactive"', "friction"),
+            ],
+            "start": [
+                *(position if hoist or self._gaps else []), _Entry("target_speed", speed, "rated speed")
+            ],
+        }  # fmt: skip
 
     def drive_toml(self) -> str:
         """The drive file: every number at the motor shaft, with what it is from in a comment."""
         blocks = []
         for table, lines in self.entries().items():
-            wide = max(len(f"{key} = {value}") for key, value, about in lines if about or not table)
+            wide = max((len(f"{key} = {value}") for key, value, about in lines if about), default=0)
             rows = [
                 f"{f'{key} = {value}':{wide}}  # {about}" if about else f"{key} = {value}"
                 for key, value, about in lines
             ]
-            blocks.append("\n".join([f"[{table}]", *rows] if table else rows))
-        return "\n\n".join(blocks) + "\n"
+            blocks.append("\n".join([f"[{table}]", *rows] if table else rows) if rows else "")
+        return "\n\n".join(filter(None, blocks)) + "\n"
 
     @cached_property
     def drive(self) -> Drive:
@@ -406,3 +576,51 @@ class DataSheet(ParameterSet):
     def summary(self) -> dict[str, Any]:
         """The parameters as plain data, for JSON."""
         return self.values()
+
+
+# what is typed -------------------------------------------------------------------------------------------
+
+
+def _bare(value: object) -> str:
+    """A number without a unit as it is written; "" for anything else."""
+    text = str(value).strip()
+    return text if not isinstance(value, bool) and _BARE.fullmatch(text) else ""
+
+
+def typed(p: Parameter, text: str) -> str:
+    """What is typed at a prompt or in a form for one parameter: a bare number has its usual unit.
+
+    >>> [typed(DataSheet.PARAMETERS[name], "95") for name in ("backlash", "mass", "efficiency", "ratio")]
+    ['95 arcmin', '95 kg', '95 %', '95']
+    """
+    number, unit = _bare(text), USUAL.get(p.name, p.unit)
+    if p.name == "efficiency" and number and float(number) >= 10.0:
+        unit = "%"
+    return f"{number} {unit}" if number and unit not in ("", "1") else text.strip()
+
+
+def if_empty(p: Parameter) -> str:
+    """What is used where nothing is typed for a parameter.
+
+    >>> [if_empty(DataSheet.PARAMETERS[name]) for name in ("efficiency", "backlash", "rated_power", "motors")]
+    ['0.95, assumed', 'none', 'by rated torque', '1']
+    """
+    if p.name in TYPICAL:
+        return f"{TYPICAL[p.name][0]}, assumed"
+    other = next((name for name, instead in INSTEAD.items() if instead == p.name), "")
+    if other:
+        return f"by {DataSheet.PARAMETERS[other].meaning}"
+    return f"{p.default:g}" if isinstance(p.default, float) and p.default else p.default or "none"
+
+
+def echo(p: Parameter, text: str) -> str:
+    """What is typed for one parameter, with its value in SI; "" for a word or a plain number.
+
+    >>> [echo(DataSheet.PARAMETERS[name], "1460") for name in ("rated_speed", "mass", "ratio")]
+    ['1460 rpm = 152.9 rad/s', '1460 kg', '']
+    """
+    written = typed(p, text)
+    if not p.unit or _bare(written):
+        return ""
+    value = f"{float(f'{read_value(p, written):.4g}'):.10g} {p.unit}".removesuffix(" 1")
+    return written if written.endswith(f" {p.unit}") else f"{written} = {value}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args, overload
 
@@ -309,7 +310,14 @@ class Drive(ParameterSet):
 
     @classmethod
     def from_tables(cls, document: Mapping[str, Any], *, where: str = "") -> Self:
-        """A drive from the tables of a document, {"shaft": {"gap": 0.5}, ...}; `where` as in `from_toml`."""
+        """A drive from the tables of a document, {"shaft": {"gap": 0.5}, ...}; `where` as in `from_toml`.
+
+        The tables of a data sheet give the drive that follows from it (`softstart.DataSheet`).
+        """
+        from softstart.drive.data_sheet import DataSheet
+
+        if DataSheet.describes(document):
+            document = tomllib.loads(DataSheet._from_document(dict(document), where).drive_toml())
         return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------

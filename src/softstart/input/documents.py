@@ -35,6 +35,7 @@ __all__ = [
     "placed",
     "read_document",
     "read_table",
+    "renamed",
     "table_text",
 ]
 
@@ -214,8 +215,9 @@ def changed(
     document: dict[str, Any], changes: Mapping[str, object], tables: Sequence[Table], what: str
 ) -> Iterator[str]:
     """Put changes by path into the document; a sentence for each that cannot be."""
+    former = {p.formerly: p.path for table in tables for p in table.parameters if p.formerly}
     for path, value in changes.items():
-        yield from _changed(document, path, value, tables, what)
+        yield from _changed(document, former.get(path, path), value, tables, what)
 
 
 def _changed(
@@ -256,7 +258,7 @@ def placed(
     go. The keys within the rows of [[tables]] are not looked at.
     """
     reader = _Reader(tables, what, wording)
-    for key, value in _renamed(document, tables).items():
+    for key, value in renamed(document, tables).items():
         reader.take_top(key, value)
     for table in tables:
         reader.count(table)
@@ -265,14 +267,15 @@ def placed(
     return reader.given, reader.mistakes
 
 
-def _renamed(document: Mapping[str, Any], tables: Sequence[Table]) -> Mapping[str, Any]:
+def renamed(document: Mapping[str, Any], tables: Sequence[Table]) -> Mapping[str, Any]:
     """The document with keys of former versions under their present names, where these are not given."""
     for parameter in (p for table in tables for p in table.parameters if p.formerly):
         name, _, key = parameter.formerly.rpartition(".")
         old, new = document.get(name), document.get(parameter.table, {})
         if isinstance(old, dict) and key in old and isinstance(new, dict) and parameter.key not in new:
-            rest = {one: value for one, value in old.items() if one != key}
-            document = {**document, name: rest, parameter.table: {**new, parameter.key: old[key]}}
+            document = {**document, name: {one: value for one, value in old.items() if one != key}}
+            table = document.get(parameter.table, {})
+            document = {**document, parameter.table: {**table, parameter.key: old[key]}}
     return document
 
 

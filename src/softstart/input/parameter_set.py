@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from softstart.errors import InputError
-from softstart.input.documents import Table, changed, placed
+from softstart.input.documents import Table, changed, placed, renamed
 from softstart.input.parameters import (
     REQUIRED,
     Limit,
@@ -234,6 +234,7 @@ class ParameterSet:
     ) -> Self:
         """From the tables of a TOML document, after the changes of `also` ({path: value})."""
         wording = Wording(where, style="toml")
+        document = dict(renamed(document, cls.TABLES))
         wrong = [Mistake(one) for one in changed(document, also or {}, cls.TABLES, cls.WHAT)]
         content, mistakes = placed(document, cls.TABLES, cls.WHAT, wording)
         given = {

@@ -27,8 +27,9 @@ LEAST, MOST = 1e-30, 1e30
 LONGEST_LINE = 120  # letters of a name: more leave no room for the figure below it
 
 Limit = Literal[
-    "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "a whole number, 0 or more", "one line"
-]
+    "any", "above 0", "0 or more", "0 or less", "from 0 to 1", "above 0 and at most 1",
+    "a whole number, 0 or more", "one line",
+]  # fmt: skip
 
 # each holds for a number and, element by element, for an array
 LIMITS: dict[str, Callable[[Any], Any]] = {
@@ -36,6 +37,7 @@ LIMITS: dict[str, Callable[[Any], Any]] = {
     "0 or more": lambda x: x >= 0.0,
     "0 or less": lambda x: x <= 0.0,
     "from 0 to 1": lambda x: (x >= 0.0) & (x <= 1.0),
+    "above 0 and at most 1": lambda x: (x > 0.0) & (x <= 1.0),
     "a whole number, 0 or more": lambda x: (x >= 0.0) & (x % 1.0 == 0.0),
 }
 

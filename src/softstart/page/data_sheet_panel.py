@@ -7,13 +7,14 @@ from typing import Any
 
 from nicegui import ui
 
-from softstart.drive.data_sheet import ABOUT, TYPICAL, DataSheet
+from softstart.drive.data_sheet import ABOUT, MACHINES, TYPICAL, USUAL, DataSheet, echo, if_empty, typed
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
 from softstart.page.panel_parts import action, box, choice, few, field, guarded, hint, notify, save
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
+from softstart.quantities import RefusedError
 
 TITLES = {
     "load": "Machine",
@@ -21,6 +22,7 @@ TITLES = {
     "coupling": "Coupling on the motor shaft",
     "gear": "Gearbox",
     "output": "Behind the gearbox",
+    "rope": "Rope",
     "shaft": "Damping",
 }
 
@@ -32,8 +34,9 @@ class DataSheetPanel:
         self._session = session
         self._fields: dict[str, Any] = {}
         hint(
-            "Each number as its data sheet gives it, at its own part; all are referred to the motor shaft "
-            "here. What is not known stays empty; marked fields are needed."
+            "Each number as its data sheet gives it, at its own part, in the unit beside its name or with "
+            "another one; all are referred to the motor shaft here. Grey text in a field is an example. What "
+            "is not known stays empty: below the field stands what is used then. Marked fields are needed."
         )
         tables = {table.name: table.parameters for table in DataSheet.TABLES}
         for name, title in {"": "", **TITLES}.items():
@@ -65,7 +68,8 @@ class DataSheetPanel:
         written = {
             p.path: text
             for p in DataSheet.PARAMETERS.values()
-            if machine in ABOUT.get(p.name, (machine,)) and (text := str(self._fields[p.name].value).strip())
+            if machine in ABOUT.get(p.name, (machine,))
+            and (text := typed(p, str(self._fields[p.name].value)))
         }
         self._troubles.clear()
         try:
@@ -95,12 +99,27 @@ class DataSheetPanel:
 
 
 def made(p: Parameter) -> Any:
-    """The field of one parameter, with an example of what to write in it."""
+    """The field of one parameter with an example; below it its value in SI, or what is used without."""
     needed = p.required or p.name in ("mass", "radius")
-    label = p.meaning[0].upper() + p.meaning[1:] + (" *" if needed else "")
+    unit = USUAL.get(p.name, p.unit)
+    label = p.meaning[0].upper() + p.meaning[1:] + (f", {unit}" if unit not in ("", "1") else "")
     name = f"sheet-{p.path.replace('.', '-') or p.name}"
     if p.choices:
-        return choice(label, list(p.choices), p.example.strip('"'), name)
-    example = p.example.strip('"')
-    one = field(label, "", name, f"{example}; {TYPICAL[p.name]}" if p.name in TYPICAL else example)
+        words = {word: f"{word}: {about}" for word, about in MACHINES.items()}
+        return choice(f"{label} *", words, p.example.strip('"'), name)
+    example = "such as " + p.example.strip('"').removesuffix(f" {unit}")
+    one = field(label + (" *" if needed else ""), "", name, TYPICAL.get(p.name, ("", example))[1])
+    with one.parent_slot.parent:
+        note = ui.label().props(f'data-testid="{name}-note"')
+
+    def say() -> None:
+        text = str(one.value)
+        try:
+            said = echo(p, text) if text.strip() else "" if needed else f"empty: {if_empty(p)}"
+        except RefusedError as refusal:
+            said = refusal.reason
+        note.set_text(said)
+
+    say()
+    one.on_value_change(say)
     return one.props(f'placeholder="{example}" maxlength=200')

@@ -11,10 +11,32 @@ import pytest
 from softstart import DataSheet, Drive
 
 ANSWERS = [
-    "gantry", "", "travel", "3 kW", "1430 rpm", "0.0119", "0.0066", "2.2", "2.6", "2 ms", "1500", "0",
-    "31.5", "0.94", "25 N*m/arcmin", "15 arcmin", "55 mm", "0.9 m",
-    "", "12 t", "157.5 mm", "", "1.2", "", "", "",
+    "gantry", "", "travel", "3", "1430", "0.0119", "0.0066", "", "2.2", "", "2.6", "2 ms", "1500", "0",
+    "31.5", "0.94", "25 N*m/arcmin", "15", "55", "900",
+    "", "12 t", "0.1575", "", "1.2", "", "", "",
 ]  # fmt: skip
+POWER = "rated power in kW, as 3 [by rated torque]: "
+SLEWING = {
+    "load.machine": "rotor", "motor.rated_power": "15", "motor.rated_speed": "1460", "motor.inertia": "0.09",
+    "motor.starting_torque": "240", "gear.ratio": "38", "gear.efficiency": "1", "gear.stiffness": "1.1e6",
+    "gear.backlash": "8", "load.inertia": "290", "load.torque": "900",
+}  # fmt: skip
+UNITS = {"motor.rated_power": "15 kW", "motor.rated_speed": "1460 1/min", "gear.backlash": "8 arcmin"}
+BY_HAND = """
+[motor]
+inertia = "0.09 kgm2"
+starting_torque = "240 Nm"
+[shaft]
+stiffness = 761.77
+damping = 0.27523
+gap = 0.08843
+[load]
+inertia = 0.20083
+torque = 23.684
+kind = "reactive"
+[start]
+target_speed = "1460 rpm"
+"""
 
 
 @pytest.fixture
@@ -32,9 +54,12 @@ def test_answers_make_a_drive_that_every_command_takes(run, typed, place):
     code, out, err = run("init", "--ask", "--out", "mine.toml")
     assert code == 0
     assert "softstart compare mine.toml" in out
-    assert err.count("rated power, as 3 kW: ") == 1
+    assert err.count(POWER) == 1
+    assert "1430 rpm = 149.7 rad/s" in err  # a bare number, echoed
+    assert "15 arcmin = 0.004363 rad" in err
+    assert "rotor (slewing gear, fan, rotary table: anything that turns about the output axis)" in err
     assert "diameter on which the coupling" not in err  # there is no play
-    assert "ropes that carry" not in err  # nor ropes
+    assert "fall" not in err  # nor ropes
     drive = Drive.load("mine.toml")
     assert (drive.name, drive.load_kind) == ("gantry", "reactive")
     assert run("simulate", "mine.toml", "--controller", "ramp", "--json").code == 0
@@ -47,12 +72,12 @@ def test_answers_make_a_drive_that_every_command_takes(run, typed, place):
 
 
 def test_a_wrong_answer_is_asked_again(run, typed):
-    typed(*ANSWERS[:3], "3 N", "much", "", *ANSWERS[3:])
+    typed(*ANSWERS[:3], "3 N", "much", "2,2", *ANSWERS[3:])
     code, out, err = run("init", "--ask")
     assert code == 0
-    assert err.count("rated power, as 3 kW: ") == 4
+    assert err.count(POWER) == 4
     assert "N is a force, not a power" in err
-    assert "it is needed" in err
+    assert 'use a decimal point: "2.2"' in err
     typed(*ANSWERS)
     assert run("init", "--ask").out == out
 
@@ -68,7 +93,7 @@ def test_an_end_of_the_answers_names_the_one_that_is_missing(run, typed, nothing
     typed(*ANSWERS[:5])
     code, out, err = run("init", "--ask", "--out", "mine.toml")
     assert (code, out) == (2, "")
-    assert "the answers end before [motor] inertia (inertia of the rotor)" in err
+    assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in err
     assert "--set motor.inertia=" in err
     nothing_left()
 
@@ -77,8 +102,8 @@ def test_a_sheet_in_a_file(run, place):
     code, out, _ = run("init", "--template")
     assert code == 0
     filled = "".join(
-        line.removeprefix("# ") + "\n" for line in out.splitlines() if not line.startswith("# reeving")
-    )
+        line.removeprefix("# ") + "\n" for line in out.splitlines() if "only for hoist;" not in f"{line};"
+    ).replace("[rope]", "")
     (place / "sheet.toml").write_text(filled)
     code, out, err = run("init", "sheet.toml", "--json")
     assert (code, err) == (0, "")
@@ -94,5 +119,51 @@ def test_without_a_terminal_it_asks_for_nothing(run, typed):
     typed()
     code, out, err = run("init")
     assert (code, out) == (2, "")
-    for missing in ("[load] machine", "[motor] power", "[motor] speed", "[motor] inertia"):
+    for missing in ("[load] machine", "[motor] rated_power", "[motor] rated_speed", "[motor] inertia"):
         assert f"{missing} is missing" in err
+
+
+def test_the_slewing_crane_is_the_same_by_every_way_in(run, typed, place):
+    """Prompt, --set, data sheet given to compare, form and a drive file by hand: one K_dyn."""
+    typed("", "", "rotor", "15", "1460", "0.09", "", "240", "", "", "", "", "", "38", "1", "1.1e6", "8", "",
+          "", "290", "900", "", "")  # fmt: skip
+    assert run("init", "--ask", "--out", "asked.toml").code == 0
+    settings = [word for path, text in (SLEWING | UNITS).items() for word in ("--set", f"{path}={text}")]
+    assert run("init", *settings, "--out", "set.toml").code == 0
+    (place / "sheet.toml").write_text(DataSheet.from_settings(SLEWING | UNITS).to_toml())
+    (place / "hand.toml").write_text(BY_HAND)
+    pytest.importorskip("nicegui")
+    from nicegui import Client
+    from nicegui.page import page
+
+    from softstart.page.data_sheet_panel import DataSheetPanel
+    from softstart.page.session import Session
+
+    with Client(page("/never-opened")) as client:
+        panel = DataSheetPanel(Session(controllers=["direct"]), "A")
+        for name, p in DataSheet.PARAMETERS.items():
+            panel._fields[name].value = SLEWING.get(p.path, "")
+        (place / "form.toml").write_text(panel.sheet().drive_toml())
+        client.delete()
+    found = []
+    for name in ("asked", "set", "sheet", "form", "hand"):
+        drive = Drive.load(f"{name}.toml")
+        assert (drive.J2, drive.c, drive.gap, drive.Mc) == (0.20083, 761.77, 0.08843, 23.684)
+        assert drive.assumed == ("" if name == "hand" else "damping ratio 0.02")
+        code, out, err = run("simulate", f"{name}.toml", "--controller", "direct", "--json")
+        assert (code, "is a data sheet" in err) == (0, name == "sheet")
+        found.append(json.loads(out)["k_dyn"])
+    assert set(found) == {found[0]}
+    assert found[0] == pytest.approx(2.246, abs=5e-4)
+
+
+def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
+    (place / "sheet.toml").write_text(DataSheet.from_settings(SLEWING | UNITS).to_toml())
+    more = ("--set", "load.inertia=580", "--set", "gear.backlash=16 arcmin", "--set", "load_torque=20")
+    code, out, _ = run("simulate", "sheet.toml", "--controller", "direct", *more)
+    assert code == 0
+    assert "J2 = 0.40166 kg m2, Mc = 20 N m" in out
+    assert "gap = 0.17686 rad" in out
+    assert "assumed: damping ratio 0.02" in out
+    code, _, err = run("simulate", "sheet.toml", "--controller", "direct", "--set", "gear.backlash=16")
+    assert (code, 'write "16 arcmin"' in err) == (2, True)

@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from softstart import DataSheet, Drive, InputError
 
 GANTRY = {
-    "load.machine": "travel", "motor.power": "3 kW", "motor.speed": "1430 rpm",
+    "load.machine": "travel", "motor.rated_power": "3 kW", "motor.rated_speed": "1430 rpm",
     "motor.inertia": "0.0119 kg*m^2", "motor.added_inertia": 0.0066, "motor.starting_ratio": 2.2,
     "motor.maximum_ratio": 2.6, "motor.torque_lag": "2 ms", "coupling.stiffness": 1500,
     "coupling.play": "0.1 mm",
@@ -31,7 +32,7 @@ def test_the_example_of_the_page_comes_out_as_by_hand():
     found = dict(re.findall(r"^\| ([^|]+) \| [^|]+ \| ([0-9. ]+) ", PAGE.read_text(encoding="utf-8"), re.M))
     drive = sheet.drive
     for what, number in {
-        "rated torque": sheet.rated_torque,
+        "rated torque": sheet.rated,
         "Ms": drive.Ms,
         "maximum torque": drive.maximum_torque,
         "J1": drive.J1,
@@ -60,9 +61,9 @@ def test_work_and_energy_are_those_at_the_output(
     """The power that lifts, the kinetic energy and the wound-up energy are those of the load over eta."""
     speed = 100.0
     sheet = DataSheet(
-        machine="hoist", power=power, speed=speed, motor_inertia=0.1, starting_ratio=50.0, ratio=ratio,
-        efficiency=efficiency, mass=mass, radius=radius, reeving=reeving, gear_stiffness=stiffness,
-        backlash=backlash,
+        machine="hoist", rated_power=power, rated_speed=speed, motor_inertia=0.1, starting_ratio=50.0,
+        ratio=ratio, efficiency=efficiency, mass=mass, radius=radius, reeving=reeving,
+        gear_stiffness=stiffness, backlash=backlash,
     )  # fmt: skip
     if mass * 9.80665 * radius / reeving / (ratio * efficiency) > 0.999 * 50.0 * power / speed:
         with pytest.raises(InputError, match="torque"):  # a weight that this motor does not lift
@@ -90,7 +91,7 @@ def test_parts_in_series(stiffnesses, plays):
     """The softest part decides, and every part makes it softer and the gap wider."""
     coupling, gears, _ = stiffnesses
     sheet = DataSheet(
-        machine="rotor", power=1e3, speed=100.0, motor_inertia=0.1, output_inertia=1.0,
+        machine="rotor", rated_power=1e3, rated_speed=100.0, motor_inertia=0.1, output_inertia=1.0,
         efficiency=1.0, ratio=1.0, coupling_stiffness=coupling, gear_stiffness=gears,
         coupling_play=plays[0], coupling_diameter=0.1, output_play=plays[1], play_diameter=0.2,
     )  # fmt: skip
@@ -107,10 +108,90 @@ def test_motors_share_the_load():
     assert two.c == one.c
 
 
-def test_a_file_and_back():
+HOIST = {
+    "load.machine": "hoist", "motor.rated_power": "15 kW", "motor.rated_speed": "1460 rpm",
+    "motor.inertia": 0.35, "motor.starting_torque": 240, "gear.ratio": 40, "gear.efficiency": 1,
+    "gear.stiffness": "90.84 kNm/rad", "gear.backlash": "8 arcmin", "load.mass": "5 t",
+    "load.radius": 0.2, "load.reeving": 2, "shaft.damping_ratio": "2 %",
+}  # fmt: skip
+
+
+METAL = "metallic cross-section of 0.46 d^2"
+ROPE = {"rope.length": "14.72 m", "rope.diameter": "16 mm"}  # 0.46 (16 mm)^2 100 GPa/14.72 m = 0.8 MN/m
+
+
+@pytest.mark.parametrize(
+    ("rope", "fall", "frequency", "assumed"),
+    [
+        ({}, 1e15, 7.08, "rigid rope"),
+        ({"rope.stiffness": "0.8 MN/m"}, 0.8e6, 2.74, ""),  # 1.6 MN/m of two falls
+        (ROPE, 0.8e6, 2.74, f"rope modulus 100 GPa on a {METAL}"),
+        (ROPE | {"rope.modulus": "50 GPa"}, 0.4e6, 2.014, f"rope {METAL}"),
+    ],
+)
+def test_a_rope_makes_a_hoist_softer(rope, fall, frequency, assumed):
+    """Against the free vibration of motor, drum without mass and load, in their own coordinates."""
+    drive = DataSheet.from_settings(HOIST | rope).drive
+    assert drive.Omega / (2 * math.pi) == pytest.approx(frequency, abs=0.005)
+    assert drive.assumed == assumed
+    i, r, n, m, gears, J1 = 40.0, 0.2, 2.0, 5000.0, 90.84e3, 0.35
+    # angle of the gears, and lift of the load that each fall lags behind, by motor, drum and load
+    strain = np.array([[1 / i, -1.0, 0.0], [0.0, r / n, -1.0]])
+    K = strain.T @ np.diag([gears, n * fall]) @ strain
+    K = K[np.ix_([0, 2], [0, 2])] - np.outer(K[[0, 2], 1], K[1, [0, 2]]) / K[1, 1]
+    assert pytest.approx(K[0, 0] / J1 + K[1, 1] / m, rel=3e-4) == drive.Omega**2
+
+
+@pytest.mark.parametrize(
+    ("given_", "efficiency"), [("95 %", 0.95), (95, 0.95), ("95", 0.95), (0.95, 0.95), (100, 1.0), (1, 1.0)]
+)
+def test_an_efficiency_is_a_share_or_per_cent(given_, efficiency):
+    sheet = DataSheet.from_settings(HOIST | {"gear.efficiency": given_})
+    assert sheet.efficiency == efficiency
+    assert ("is 95 %" in sheet.drive.assumed) == (given_ in (95, "95"))
+
+
+def test_what_nobody_gave_is_marked():
+    least = {
+        "load.machine": "belt", "motor.rated_torque": 20, "motor.rated_speed": "1430 rpm",
+        "motor.inertia": 0.01, "gear.ratio": 20, "gear.stiffness": 1e5, "load.mass": 900, "load.radius": 0.2,
+    }  # fmt: skip
+    sheet = DataSheet.from_settings(least)
+    assert sheet.drive.assumed.split("; ") == [
+        "starting torque 1.5 times the rated torque", "efficiency 0.95", "no backlash",
+        "resistance 0.02 of the weight", "damping ratio 0.02",
+    ]  # fmt: skip
+    assert sheet.drive.source == "data sheets and assumed values"
+    marked = {line.split(" = ")[0] for line in sheet.drive_toml().splitlines() if ", assumed" in line}
+    assert marked == {"starting_torque", "inertia", "torque", "gap", "damping"}
+    known = {
+        "motor.starting_torque": 30, "gear.efficiency": 0.95, "load.resistance": 0.02,
+        "shaft.damping_ratio": 0.02, "gear.backlash": 0,
+    }  # fmt: skip
+    sheet = DataSheet.from_settings(least | known)
+    assert (sheet.drive.assumed, sheet.drive.source) == ("", "data sheets")
+    assert "assumed" not in sheet.drive_toml()
+
+
+def test_a_machine_without_gears_loses_nothing_in_them():
+    drive = DataSheet(
+        machine="rotor", rated_power=1e3, rated_speed=100, motor_inertia=0.1, output_inertia=1,
+        coupling_stiffness=900,
+    ).drive  # fmt: skip
+    assert (drive.J2, drive.gear_ratio) == (1.0, None)
+    assert "efficiency" not in drive.assumed
+
+
+def test_a_file_and_back(tmp_path):
     sheet = DataSheet.from_settings(GANTRY)
     assert DataSheet.from_toml(sheet.to_toml()) == sheet
     assert sheet.drive == Drive.from_toml(sheet.drive_toml())
+    (tmp_path / "sheet.toml").write_text(sheet.to_toml())  # a data sheet where a drive is asked for
+    assert Drive.load(tmp_path / "sheet.toml") == sheet.drive
+    former = sheet.to_toml().replace("rated_power", "power").replace("rated_speed", "speed")
+    assert DataSheet.from_toml(former) == sheet
+    named = {"rated_power": "power", "rated_speed": "speed"}
+    assert DataSheet(**{named.get(name, name): value for name, value in sheet.given().items()}) == sheet
 
 
 @pytest.mark.parametrize(
@@ -119,6 +200,27 @@ def test_a_file_and_back():
         ({"load.mass": None}, "[load] mass is missing: a travel needs the mass that is moved"),
         ({"load.machine": "lift"}, "[load] machine"),
         ({"motor.power": "3 N"}, "N is a force, not a power"),
+        (
+            {"motor.rated_power": None},
+            "[motor] rated_power is missing: the rated power is needed, or [motor] rated_torque",
+        ),
+        (
+            {"gear.backlash": 9},
+            '[gear] backlash = 9: no unit; write "9 arcmin" or, if rad is meant, "9 rad".',
+        ),
+        ({"motor.power": "15"}, '[motor] rated_power = "15": no unit; write "15 kW" or, if W'),
+        ({"motor.rated_speed": 1430.0}, 'write "1430.0 rpm" or, if rad/s is meant'),
+        ({"motor.torque_lag": 2}, 'write "2 ms" or, if s is meant'),
+        ({"gear.efficiency": 1.2}, "the efficiency of all gears must be above 0 and at most 1"),
+        ({"gear.efficiency": 0}, "must be above 0 and at most 1"),
+        ({"motor.starting_torque": 60}, "[motor] starting_ratio = 2.2 and [motor] starting_torque = 60 N*m"),
+        ({"motor.rated_torque": 30}, "the first makes 4492.5 W; leave one out"),
+        ({"rope.stiffness": 8e5}, "[rope] stiffness is for a hoist"),
+        (
+            HOIST | {"rope.stiffness": 8e5, "rope.length": 9, "rope.diameter": "9 mm"},
+            "both say how stiff the rope is",
+        ),
+        (HOIST | {"rope.length": 9}, "[rope] length says nothing without [rope] diameter"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
         ({"output.length": None}, "[output] diameter says nothing without [output] length"),
         ({"gear.ratio": -1}, "must be above 0"),
@@ -137,7 +239,8 @@ def test_a_file_and_back():
     ],
 )
 def test_what_is_wrong_is_said_with_a_remedy(changes, sentence):
-    given_ = {path: value for path, value in (GANTRY | changes).items() if value is not None}
+    own = HOIST if changes.keys() >= HOIST.keys() else GANTRY
+    given_ = {path: value for path, value in (own | changes).items() if value is not None}
     with pytest.raises(InputError) as refused:
         _ = DataSheet.from_settings(given_).drive
     assert sentence in str(refused.value)
