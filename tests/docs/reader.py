@@ -24,7 +24,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-from tests.docs.shown import among, difference, named
+from tests.docs.shown import among, difference, named, rewritten
 from tests.docs.steps import Step
 
 ROOT = Path(__file__).parents[2]
@@ -130,6 +130,9 @@ class Reader:
     took: list[tuple[float, float, str]] = field(default_factory=list)
     python: str = ""
     typed: bool = False
+    rewritten: dict[int, tuple[str, str]] = field(
+        default_factory=dict
+    )  # by line: what stands there, what should
 
     def do(self, step: Step) -> None:
         """One step."""
@@ -150,7 +153,7 @@ class Reader:
         if step.text.startswith("make"):
             # CI makes them; here it is enough that make knows how
             words = step.text.split("#")[0].split()
-            return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0, None)
+            return _ended(_run([words[0], "-n", *words[1:]], ROOT), 0)
         shell = not self.typed or bool(SHELL.search(step.text.partition("#")[0]))
         self.typed = True
         words = ["bash", "-c", step.text] if shell else shlex.split(step.text, comments=True)
@@ -159,7 +162,7 @@ class Reader:
         done = _run(words, self.folder)
         missing = [one for one in named(step.text.rpartition("#")[2].strip()) if not among(one, done.stdout)]
         said = f"not printed: {', '.join(missing)}" if missing else ""
-        return _ended(done, step.exit_code, step.output) or said
+        return self._ended(done, step) or said
 
     def _python(self, step: Step) -> str:
         code = step.text
@@ -167,14 +170,30 @@ class Reader:
             name = self.folder / "session.txt"
             name.write_text(code, encoding="utf-8")
             words = ["-m", "doctest", "-o", "ELLIPSIS", "-o", "NORMALIZE_WHITESPACE", str(name)]
-            return _ended(_run([sys.executable, *words], self.folder), 0, None)
+            return _ended(_run([sys.executable, *words], self.folder), 0)
         code = self.python + "\n" + code if step.continued else code
         name = self.folder / "_page_script.py"
         name.write_text(code, encoding="utf-8")
         self.python = code
         if step.long:
             return _watched([sys.executable, str(name)], self.folder, step.output)
-        return _ended(_run([sys.executable, str(name)], self.folder), 0, step.output)
+        return self._ended(_run([sys.executable, str(name)], self.folder), step)
+
+    def _ended(self, done: subprocess.CompletedProcess[str], step: Step) -> str:
+        """What is wrong with a command that has ended."""
+        printed = done.stdout + ("\n" + done.stderr if step.exit_code else "")
+        problem = _ended(done, step.exit_code)
+        if problem or step.output is None or not (problem := difference(step.output, printed)):
+            return problem
+        self.rewritten[step.shown] = step.output, rewritten(step.output, printed)
+        return problem
+
+    def rewrite(self, page: Path) -> None:
+        """Let the page show what its commands print."""
+        lines = page.read_text(encoding="utf-8").splitlines()
+        for line, (old, new) in sorted(self.rewritten.items(), reverse=True):
+            lines[line - 1 : line - 1 + len(old.splitlines())] = [one.rstrip() for one in new.splitlines()]
+        page.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _used() -> float:
@@ -236,12 +255,11 @@ def _run(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.CompletedProcess(words, code, out, err)
 
 
-def _ended(done: subprocess.CompletedProcess[str], code: int, shown: str | None) -> str:
+def _ended(done: subprocess.CompletedProcess[str], code: int) -> str:
     if done.returncode != code:
         last = "\n    ".join(done.stderr.strip().splitlines()[-6:])
         return f"exit code {done.returncode} instead of {code}: {last}"
-    printed = done.stdout + ("\n" + done.stderr if code else "")
-    return difference(shown, printed) if shown is not None else ""
+    return ""
 
 
 def _watched(words: list[str], folder: Path, shown: str | None) -> str:
@@ -263,7 +281,7 @@ def _watched(words: list[str], folder: Path, shown: str | None) -> str:
                 if process.returncode == 0:
                     return "ended by itself: it is not long, take the mark away"
                 return f"exit code {process.returncode} at once: {err[-500:]}"
-        missing = difference(shown, _all_of(out)) if shown is not None else ""
+        missing = difference(shown, _all_of(out), ended=False) if shown is not None else ""
     if err is None:
         return "does not end after Ctrl-C"
     expected = (INTERRUPTED, 1, -signal.SIGINT) if words[0] == sys.executable else (INTERRUPTED,)
@@ -275,7 +293,7 @@ def _watched(words: list[str], folder: Path, shown: str | None) -> str:
 def _seen(process: Process, seconds: float, out: IO[str], shown: str | None) -> bool:
     """Whether a long command has been watched long enough."""
     if shown is not None:
-        return not difference(shown, _all_of(out)) or seconds > PRINTED
+        return not difference(shown, _all_of(out), ended=False) or seconds > PRINTED
     own, together = _work_of(process)
     imports = 0.0 if isinstance(process, subprocess.Popen) else SEEN - SEEN_WARM
     return seconds > WATCHED or own + imports > SEEN or together + imports > SEEN_TOGETHER

@@ -1,4 +1,4 @@
-"""Whether a program printed what a page shows: words alike, numbers within the digits shown."""
+"""Whether a page shows what a program prints: all lines, words alike, numbers within the digits shown."""
 
 from __future__ import annotations
 
@@ -8,25 +8,54 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 SKIP = "..."
 
 
-def difference(shown: str, printed: str) -> str:
-    """The first line that was not printed, or not after the one before it; nothing if all were.
+def difference(shown: str, printed: str, ended: bool = True) -> str:
+    """The first line that is only shown or only printed; nothing if the page shows the output whole.
 
-    Lines may be left out; `...` says so to the reader, and at the end of a line skips the rest of it.
+    A line `...` stands for any lines, at the end of a line for the rest of it; a program that has not
+    `ended` may print more.
 
-    >>> difference("K 0.91\\n...\\nend ...", "first\\nK 0.9092\\nmore\\nend of it")
+    >>> difference("K 0.91\\n...\\nend ...", "K 0.9092\\nmore\\nend of it")
     ''
-    >>> difference("K 0.93", "K 0.9092")
-    'not printed: K 0.93'
-    >>> difference("c\\na", "a\\nb\\nc")
-    'not printed after the line before it: a'
+    >>> difference("K 0.93", "K 0.9092"), difference("a\\nc", "a\\nb\\nc"), difference("a", "a\\nb")
+    ('not printed: K 0.93', 'not shown: b', 'not shown: b')
+    >>> difference("a", "a\\nb", ended=False), difference("...\\nb", "a\\nb"), difference("a\\n...\\na", "a")
+    ('', '', 'not printed: a')
     """
-    left = iter(printed.splitlines())
-    wanted = [line for line in (one.strip() for one in shown.splitlines()) if line and line != SKIP]
-    for line in wanted:
-        if not any(alike(line, one.strip()) for one in left):
-            elsewhere = any(alike(line, one.strip()) for one in printed.splitlines())
-            return f"not printed{' after the line before it' if elsewhere else ''}: {line}"
-    return ""
+    left, skips = _lines(printed), False
+    for line in _lines(shown):
+        if line == SKIP:
+            skips = True
+            continue
+        at = next((i for i, one in enumerate(left) if alike(line, one)), None)
+        if at is None:
+            return f"not printed: {line}"
+        if at and not skips:
+            return f"not shown: {left[0]}"
+        left, skips = left[at + 1 :], False
+    return f"not shown: {left[0]}" if left and ended and not skips else ""
+
+
+def rewritten(shown: str, printed: str) -> str:
+    """What a page shows of this output: whole, or from each `...` to the line that stood after it.
+
+    >>> rewritten("a 1\\n...\\nend 2", "a 3\\nb\\nend 4"), rewritten("a", "b")
+    ('a 3\\n...\\nend 4', 'b')
+    """
+    lines, kept = printed.rstrip().splitlines(), list[str]()
+    wanted = shown.splitlines()
+    while wanted and SKIP in wanted:
+        count = wanted.index(SKIP)
+        after = next((one for one in wanted[count + 1 :] if one.strip()), None)
+        mark = NUMBER.sub("#", " ".join(after.split())) if after else None
+        rest = lines[count:]
+        at = next((i for i, one in enumerate(rest) if NUMBER.sub("#", " ".join(one.split())) == mark), None)
+        kept += [*lines[:count], SKIP]
+        lines, wanted = [] if at is None else rest[at:], wanted[count + 1 :]
+    return "\n".join([*kept, *lines])
+
+
+def _lines(text: str) -> list[str]:
+    return [one.strip() for one in text.splitlines() if one.strip()]
 
 
 def alike(shown: str, printed: str) -> bool:

@@ -12,7 +12,7 @@ Comments on the lines before a block speak to this runner and are not shown:
     <!-- not run: reason -->     nothing of it is run
 
 A command whose own comment names a time of half a minute or more (`# all numbers, about 50 s`) is long, too.
-A `text` block right after commands or Python is what the last of them prints.
+A `text` block right after commands or Python is all that the last of them prints, but for lines `...`.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ class Step:
     long: bool = False
     continued: bool = False
     output: str | None = None
+    shown: int = 0  # the line where `output` begins
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def steps(text: str) -> list[Step]:
                 Step("python", code, block.line, long="long:" in marks, continued="continued" in marks)
             )
         elif block.language == "text" and block.after and found and found[-1].kind != "file":
-            found[-1] = replace(found[-1], output="\n".join(block.lines))
+            found[-1] = replace(found[-1], output="\n".join(block.lines), shown=block.line)
     return [
         replace(s, long=False) if s.long and _needed(s, found[i + 1 :]) else s for i, s in enumerate(found)
     ]

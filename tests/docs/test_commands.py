@@ -1,4 +1,7 @@
-"""Every command and every Python block of the pages runs as its page says (`make docs-commands`)."""
+"""Every command and every Python block of the pages runs as its page says (`make docs-commands`).
+
+With `--rewrite` the pages are changed to show what is printed; look at the changes.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,16 @@ LONGEST_FIRST = sorted(TO_DO, key=lambda name: -len(TO_DO[name]))  # none is lef
 
 
 @pytest.mark.parametrize("name", LONGEST_FIRST)
-def test_page(name: str, tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
+def test_page(
+    name: str,
+    tmp_path: Path,
+    record_property: Callable[[str, object], None],
+    request: pytest.FixtureRequest,
+) -> None:
     reader = Reader(tmp_path, name)
     for step in TO_DO[name]:
         reader.do(step)
     record_property("took", reader.took)
+    if request.config.getoption("--rewrite"):
+        reader.rewrite(PAGES[name])
     assert not reader.wrong, "\n".join(["", *reader.wrong])

@@ -18,7 +18,7 @@ from softstart.errors import InputError, SimulationError, listed
 from softstart.input.files import write_whole
 from softstart.quantities import Units
 from softstart.reporting import document
-from softstart.reporting.first_page import answer, tiles, verdicts
+from softstart.reporting.first_page import answer, for_customer, tiles, to_check, verdicts
 from softstart.reporting.limit import Limit, chain_limit, how_near, limit_figure
 from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.project import Project
@@ -252,12 +252,10 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
         if limits
         else tag(
             "p",
-            (
-                "Neither passed nor failed: the chain's file permits no torque. Give the permissible_torque "
-                "of a shaft there, and this page says what passes, with the margin."
-            ),
+            "Neither passed nor failed: no permissible torque is agreed for a shaft of this chain.",
             class_="verdict",
         ),
+        to_check(report.drive),
         _table(_gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), "Strategies on this chain", best),
     )
 
@@ -291,11 +289,11 @@ def _strategies(report: ChainReport) -> Html:
     if report.drive.limits:
         shafts, others = shafts[:-1], (*shafts[-1:], *others)
     notes = [
-        *starts.notes(report.comparison),
+        *map(for_customer, starts.notes(report.comparison)),
         *(f"{name} could not be examined: {reason}" for name, reason in report.failed),
     ]
     return html(
-        tag("p", report.comparison.recommendation.text),
+        tag("p", for_customer(report.comparison.recommendation.text)),
         _table(rows, (*starts.QUICK, *others), "How quick, and how often gaps close", best),
         _table(rows, shafts, "K_dyn of each shaft", best) if 1 < count <= MOST_SHAFTS else None,
         tag("ul", joined(tag("li", one) for one in notes), class_="notes"),
@@ -369,13 +367,12 @@ def _on_optimum(limit: Limit) -> list[str]:
         (
             f"In {digits(p.start_time_bound)} s, the start time of the chosen strategy, the gentlest start "
             f"found has K_dyn {fixed(p.k_dyn, 3)}: by linear programs on the exact start of the chain, from "
-            "the torque of that strategy. It is simulated exactly, and not proved the gentlest; softstart "
-            "optimize writes its torque."
+            "the torque of that strategy. It is simulated exactly, and not proved the gentlest."
         )
         for p in limit.found
     ]
     if limit.missing and limit.budget > 0.0:
-        notes.append(f"No optimum was found within the {short(limit.budget)} s given (more: --budget).")
+        notes.append(f"No optimum was found within the {short(limit.budget)} s of search.")
     return notes
 
 
@@ -409,7 +406,7 @@ def _life(report: ChainReport) -> Html:
     try:
         found = chain_fatigue([row.run for row in rows])
     except InputError as error:
-        return html(title, tag("p", f"Not counted: {' '.join(error.sentences)}"))
+        return html(title, tag("p", f"Not counted: {for_customer(' '.join(error.sentences))}"))
     shown = lives.chain_tables(found)[1] if len(report.drive.shafts) <= MOST_SHAFTS else None
     notes = [lives.chain_conclusion(found), *lives.chain_notes(found)]
     return html(title, shown and printed(shown), tag("p", " ".join(notes)))
@@ -459,6 +456,5 @@ def _validity(chain: Chain) -> Html:
             "The equations are solved as Taylor series from event to event; peaks are located, not read off "
             "a grid."
         ),
-        "Not in this report: maps over wear and load; the page (softstart serve) draws them.",
     ]
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")

@@ -14,7 +14,7 @@ from softstart.reporting.robustness import RobustnessMap
 from softstart.reporting.strategies import realisable
 from softstart.start.comparison import REFERENCE
 from softstart.start.recommendation import SLOW, Recommendation, Row
-from softstart.views.printed import digits, fixed, short, units_of
+from softstart.views.printed import fixed, short
 
 MOST_MAPS = 4
 
@@ -155,24 +155,17 @@ def choice_section(choice: Choice, answer: str) -> Html:
         )
     )
     order = sorted(choice.candidates, key=lambda one: (one.row.effort.order, one.row.run.k_dyn))
-    units = units_of(choice.candidates[0].row.run.drive)
     rows = [
-        [
-            one.name, one.row.run.controller.summary, one.row.effort.meaning, fixed(one.worst, 3),
-            digits(units.shown(one.map.worst_at[0], "rad"), 3), digits(one.map.worst_at[1], 3), one.verdict,
-        ]
+        [one.name, one.row.run.controller.summary, one.row.effort.meaning, fixed(one.worst, 3), one.verdict]
         for one in order
-    ]  # fmt: skip
+    ]
     strong = [index for index, one in enumerate(order) if one.row in choice.recommendation.shown]
-    heads = (
-        f"strategy | what it does | takes | worst K_dyn on the map | at gap, {units.angle} | and J2, "
-        "kg m² | verdict"
-    ).split(" | ")
+    heads = ["strategy", "what it does", "takes", "worst K_dyn on the map", "verdict"]
     return html(
         tag("p", answer),
         tag("p", rule, " ", never),
         table(
             heads, rows, caption="Every strategy before the rule, in the order of effort",
-            text_columns=(0, 1, 2, 6), strong=strong, class_="words",
+            text_columns=(0, 1, 2, 4), strong=strong, class_="words",
         ),
     )  # fmt: skip

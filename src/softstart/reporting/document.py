@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from softstart.drive import Drive
 from softstart.errors import listed
 from softstart.reporting.choice import Candidate, Choice, choice_section
 from softstart.reporting.drive_section import drive_section
-from softstart.reporting.first_page import before_after_picture, before_and_after, first_page
+from softstart.reporting.first_page import before_after_picture, before_and_after, first_page, for_customer
 from softstart.reporting.limit import limit_section
 from softstart.reporting.markup import (
     Figures,
@@ -36,7 +37,6 @@ from softstart.views.printed import digits, fixed, short, units_of
 
 SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
-BREAKS = ("recommendation", "strategies", "drive", "limit", "robustness", "sheets")  # begin a printed page
 LONGEST = 70  # letters of a name in the head of a page
 GUARD = "default-src 'none'; style-src 'unsafe-inline'"  # whatever stands in the file, nothing is loaded
 
@@ -98,7 +98,7 @@ def _document(report: Report) -> str:
             "Parameter sheets for the inverter",
             sheet_section(drive, report.sheets, report.resolution, best, choice.role),
         ),
-        *life_chapter(report.lives, figures),
+        *life_chapter(report.lives),
         ("validity", "What this report assumes, and where it holds", validity_section(drive, project)),
         ("provenance", "About this document", provenance_section(report.provenance, project)),
     ]
@@ -140,7 +140,6 @@ def page(
                 tag("h2", f"{number}. {title}"),
                 content,
                 id=key,
-                class_="page" if key in BREAKS else None,
             )
             for number, (key, title, content) in enumerate(sections, start=1)
         ),
@@ -182,10 +181,7 @@ def validity_section(drive: Drive, project: Project) -> Html:
         )
     )
     notes = [
-        (
-            "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model; for "
-            "several gaps or masses use softstart compare with a chain."
-        ),
+        "Two masses, one elastic shaft, one gap. Elastic modes above the first are not in the model.",
         motor_sentence(float(drive.minimum_torque), float(drive.maximum_torque), float(drive.torque_lag)),
         f"Contact law: {drive.contact_law}; {damping}.",
         load,
@@ -201,8 +197,7 @@ def validity_section(drive: Drive, project: Project) -> Html:
         ),
         (
             "The equations are solved in closed form from event to event; peaks are located, not read off a "
-            "grid. The figures are as good as the data: check gap, stiffness and inertias first where "
-            "measured starts differ."
+            "grid. The figures are as good as the data, above all gap, stiffness and inertias."
         ),
     ]
     guessed = [one.parameter for one in project.sources if one.origin == "guessed"]
@@ -210,43 +205,29 @@ def validity_section(drive: Drive, project: Project) -> Html:
         notes.append(
             f"Guessed, so to be checked before the values of the sheets are used: {listed(guessed)}."
         )
-    elif not project.sources:
-        notes.append(
-            "Where each value of the drive is from (data sheet, drawing, measured, identified, guessed) "
-            "is not stated; [[source]] in the file of --project does."
-        )
+    elif not (project.sources or drive.source):
+        notes.append("Where the values of the drive are from is not stated.")
     return tag("ul", joined(tag("li", one) for one in notes), class_="notes")
 
 
 def motor_sentence(least: float, most: float, lag: float) -> str:
     """What stands for the motor: its torques (N m) and the lag of its torque (s)."""
-    values = {"least": short(least), "most": short(most), "lag": short(1e3 * lag)}
-    if lag:
-        return (
-            "The motor is a source of torque from {least} to {most} N m that follows its demand with "
-            "a lag of {lag} ms. Currents, fluxes and a motor started directly at the mains are not in "
-            "the model."
-        ).format(**values)
+    follows = f"with a lag of {short(1e3 * lag)} ms" if lag else "without lag"
     return (
-        "The motor is a source of torque from {least} to {most} N m that follows its demand without "
-        "lag. Currents, fluxes and a motor started directly at the mains are not in the model."
-    ).format(**values)
+        f"The motor is a source of torque from {short(least)} to {short(most)} N m that follows its demand "
+        f"{follows}. Currents, fluxes and a motor started directly at the mains are not in the model."
+    )
 
 
 def provenance_section(about: Provenance, project: Project, chain: bool = False) -> Html:
     """Revisions, approval, versions, date, command, and the drive's file with all changes."""
     signed = [
-        ["made by", project.author],
-        ["checked by", project.checked],
-        ["approved by", project.approved],
+        ["made by", project.author, ""],
+        ["checked by", project.checked, ""],
+        ["approved by", project.approved, ""],
     ]
-    signed = [[role, who or "\N{EN DASH}", ""] for role, who in signed]
-    rows = [
-        ["date", about.made],
-        ["softstart", tag("code", about.softstart)],
-        ["Python", tag("code", about.python)],
-        ["libraries", tag("code", ", ".join(f"{name} {version}" for name, version in about.libraries))],
-    ]
+    libraries = ", ".join(f"{name} {version}" for name, version in about.libraries)
+    made = tag("code", f"softstart {about.softstart}, Python {about.python}; {libraries}")
     revisions = [[one.number, one.date, one.author, one.change] for one in project.revisions]
     return html(
         table(
@@ -263,25 +244,26 @@ def provenance_section(about: Provenance, project: Project, chain: bool = False)
             caption="Approval",
             text_columns=range(3),
             class_="signed",
-        ),
-        table(["what", "which"], rows, caption="Made with", text_columns=(0, 1)),
-        tag("p", "The command that made this report:", class_="lead") if about.command else None,
-        tag("pre", about.command, class_="command") if about.command else None,
+        )
+        if any(who for _, who, _ in signed)
+        else None,
+        tag("p", f"Made on {about.made} with ", made, ".", class_="small"),
+        tag("p", "Command: ", tag("code", about.command)) if about.command else None,
         tag(
             "p",
-            "The chain as a file for softstart, with all changes (chain.toml):"
+            "The chain as a file for softstart, with all changes, SI units unless stated:"
             if chain
-            else "The drive as a file for softstart, with all changes (drive.toml):",
+            else "The drive as a file for softstart, with all changes, SI units unless stated:",
             class_="lead",
         ),
-        tag("pre", about.drive_toml, class_="file"),
+        tag("pre", re.sub(r" *#[^\"\n]*$", "", about.drive_toml, flags=re.MULTILINE), class_="file"),
     )
 
 
 def answer(report: Report) -> str:
     """The paragraph at the head of the report."""
     best = report.choice.chosen
-    text = report.choice.recommendation.text
+    text = for_customer(report.choice.recommendation.text)
     if best is None:
         return text
     sentences = [
@@ -342,7 +324,7 @@ def _after_rounding(report: Report, one: Candidate) -> str:
     if sheet is None:
         return ""
     if sheet.rounded is None:
-        return "But its values cannot be set in the steps given (section 7)."
+        return "But its values cannot be set in the steps given."
     exact, rounded = sheet.exact, sheet.rounded
     if math.isnan(rounded.start_time):
         return "But rounded to the steps given, its values do not bring the load to its target speed."
@@ -354,7 +336,7 @@ def _after_rounding(report: Report, one: Candidate) -> str:
         )
     if not max(sheet.worst_k_dyn / exact.k_dyn, sheet.slowest / exact.start_time) - 1.0 <= HARMED:
         if sheet.variants and math.isnan(sheet.worst_k_dyn + sheet.slowest):
-            return "But with values half a step off, the load may not reach its target speed (section 7)."
+            return "But with values half a step off, the load may not reach its target speed."
         if sheet.variants:
             return (
                 f"With values half a step off, K_dyn may be {fixed(sheet.worst_k_dyn, 3)} and the "
@@ -366,9 +348,6 @@ def _after_rounding(report: Report, one: Candidate) -> str:
 def style(header: str, footer: str, paper: str) -> str:
     """The style sheet with what stands at the head and the foot of each printed page."""
     header = header if len(header) <= LONGEST else header[: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    values = {"HEADER": css_string(header), "FOOTER": css_string(footer), "PAPER": paper}
     sheet = Path(__file__).with_name("style.css").read_text("utf-8")
-    return (
-        sheet.replace("HEADER", css_string(header))
-        .replace("FOOTER", css_string(footer))
-        .replace("PAPER", paper)
-    )
+    return re.sub("|".join(values), lambda found: values[found[0]], sheet)

@@ -15,9 +15,15 @@ from softstart.reporting.markup import Figures, Html, html, table, tag
 from softstart.reporting.project import Project
 from softstart.reporting.resolution import rated_torque
 from softstart.start import metrics
+from softstart.start.fatigue import HOURS_PER_YEAR
 from softstart.views import chain_schemes
-from softstart.views.printed import NOTHING, RPM, digits, short, unit, units_of
+from softstart.views.printed import RPM, digits, short, unit, units_of
 
+AT_OUTPUT = {  # exponent of the gear ratio that brings a value from the motor shaft to the output shaft
+    **dict.fromkeys(("N*m", "N*m/s"), 1),
+    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), 2),
+    **dict.fromkeys(("rad", "rad/s"), -1),
+}
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
 _ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
@@ -41,96 +47,74 @@ def drive_section(drive: Drive, project: Project, figures: Figures) -> Html:
     )
     return html(
         figures.shown("scheme", lambda: scheme(drive, "scheme"), caption),
-        tag("h3", "Data"),
         _data(drive, project),
         tag("p", f"Source of the data: {drive.source}.") if drive.source else None,
-        tag("h3", "What follows from them"),
         _derived(drive),
     )
 
 
 def _data(drive: Drive, project: Project) -> Html:
-    """What is known of the drive and from where; in a sentence what is at its default."""
-    rows, absent, defaults = [], list[str](), list[str]()
-    sourced, units = bool(project.sources), units_of(drive)
+    """What is known of the drive and from where; in a sentence what is absent."""
+    rows, absent = [], list[str]()
+    sourced, units, ratio = bool(project.sources), units_of(drive), drive.gear_ratio
     for parameter in PARAMETERS.values():
         value = getattr(drive, parameter.name)
         if value is None or value == "" or parameter.name in HIDDEN:
+            continue
+        source = project.source_of(parameter.path)
+        if value == parameter.default and not source:
+            absent += [parameter.meaning] if value == 0.0 else []
             continue
         values = value if isinstance(value, tuple) else (value,)
         seen = [units.shown(one, parameter.unit) if isinstance(one, float) else one for one in values]
         text = ", ".join(short(one) if isinstance(one, float) else str(one) for one in seen)
         of, other = unit(units.of(parameter.unit)), ""
         if isinstance(value, str):
-            pass
+            of = ""
+        elif parameter.path == "limits.life":
+            hours = value / 3600.0
+            text, of, other = digits(hours / HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
         elif of != unit(parameter.unit):
             other = f"{digits(value)} {unit(parameter.unit)}"
         elif parameter.unit == "rad/s":
             other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif parameter.unit == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
-        source = project.source_of(parameter.path)
-        if value == parameter.default and not source:
-            shown = text if isinstance(value, str) else f"{text} {of}".strip()
-            meaning = parameter.meaning
-            (absent if value in (0.0, math.inf) else defaults).append(
-                meaning if value == 0.0 else f"{meaning}: {shown}"
-            )
-            continue
-        rows.append(
-            [
-                parameter.meaning,
-                parameter.symbol,
-                text,
-                "" if isinstance(value, str) else of.replace(" ", "\N{NO-BREAK SPACE}"),
-                other,
-                *([source or "not stated"] if sourced else []),
-            ]
-        )
-    heads = [
-        *["parameter", "symbol", "value", "unit", "that is"],
-        *(["source"] if sourced else []),
-    ]
+        power = AT_OUTPUT.get(parameter.unit)
+        there = ""
+        if power is not None and ratio is not None and isinstance(seen[0], float):
+            there = f"{digits(seen[0] * float(ratio) ** power)} {of}"
+        row = [parameter.meaning, parameter.symbol, text, of.replace(" ", "\N{NO-BREAK SPACE}"), other]
+        rows.append([*row, *([there] if ratio else []), *([source or "not stated"] if sourced else [])])
+    heads = ["parameter", "symbol", "value", "unit", "that is"]
+    heads += [*(["at the output shaft"] if ratio else []), *(["source"] if sourced else [])]
+    texts = [index for index, head in enumerate(heads) if head in ("parameter", "symbol", "unit", "source")]
+    none = f"Not given, and therefore none: {'; '.join(absent)}." if absent else None
+    behind = (
+        f"At the output shaft: torques times the gear ratio i = {short(float(ratio))}, inertias, stiffness "
+        "and damping times i², angles and speeds divided by i; without losses."
+        if ratio
+        else None
+    )
     return html(
         table(
-            heads,
-            rows,
-            caption="Data of the drive, at the motor shaft",
-            text_columns=(0, 1, 3, 5)[: 3 + sourced],
+            heads, rows, caption="Data of the drive, at the motor shaft", text_columns=texts, class_="data"
         ),
-        tag(
-            "p",
-            (
-                f"Not given, and therefore none: {'; '.join(absent) or NOTHING}. At their defaults: "
-                f"{'; '.join(defaults) or NOTHING}."
-            ),
-            class_="small",
-        ),
+        *(tag("p", one, class_="small") for one in (behind, none) if one),
     )
 
 
 def _derived(drive: Drive) -> Html:
     (rated, basis), units = rated_torque(drive), units_of(drive)
-    rows = [
-        [
-            "mean shaft torque under the starting torque: K_dyn = 1",
-            digits(float(metrics.base_torque(drive))),
-            "N m",
-        ],
-        ["elastic frequency with the gap closed", digits(float(drive.Omega) / (2.0 * math.pi)), "Hz"],
-        ["elastic period", digits(1e3 * float(drive.elastic_period)), "ms"],
-        [
-            "twist of the shaft under the starting torque",
-            digits(units.shown(float(drive.Ms / drive.c), "rad")),
-            units.angle,
-        ],
-        [
-            f"100 % of torque in the parameter sheets: the {basis}",
-            digits(rated),
-            "N m",
-        ],
+    mean, twist = float(metrics.base_torque(drive)), units.shown(float(drive.Ms / drive.c), "rad")
+    found = [
+        f"mean shaft torque under the starting torque (K_dyn = 1) {digits(mean)} N m",
+        f"elastic frequency with the gap closed {digits(float(drive.Omega) / (2.0 * math.pi))} Hz",
+        f"elastic period {digits(1e3 * float(drive.elastic_period))} ms",
+        f"twist of the shaft under the starting torque {digits(twist)} {units.angle}",
+        f"100 % of torque in the parameter sheets: the {basis}, {digits(rated)} N m",
     ]
-    return table(["figure", "value", "unit"], rows, caption="Derived figures", text_columns=(0, 2))
+    return tag("p", f"What follows from them: {'; '.join(found)}.")
 
 
 def scheme(drive: Drive, prefix: str) -> Html:

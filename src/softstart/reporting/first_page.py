@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
+from softstart.chain.model import Chain
+from softstart.drive import Drive
+from softstart.drive.doubts import doubts
 from softstart.drive.limits import Limits
 from softstart.errors import listed
 from softstart.reporting.choice import Choice
-from softstart.reporting.markup import Figures, Html, html, inlined, table, tag
-from softstart.reporting.strategies import before_after_figure
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, table, tag
+from softstart.reporting.strategies import OUTPUT, before_after_figure, outputs
 from softstart.start.comparison import REFERENCE, Comparison
 from softstart.start.recommendation import Recommendation, Row
 from softstart.views.fatigue import factor
-from softstart.views.printed import NOTHING, digits, fixed, percent
+from softstart.views.printed import NOTHING, at_output, digits, fixed, percent
 
 if TYPE_CHECKING:
     from softstart.reporting.result import Report
@@ -41,7 +45,7 @@ def answer(
 ) -> str:
     """What the chosen strategy does to a `torque`, and what it costs; why there is none, else."""
     if best is None or direct is None:
-        return recommendation.text
+        return for_customer(recommendation.text)
     named = recommendation.recommended is not None
     what = f"Recommended: {best.name}." if named else f"Gentlest start: {best.name}."
     run, hard = best.run, direct.run
@@ -52,6 +56,28 @@ def answer(
         f"{digits(hard.peak_torque)} N m under direct start, {share_saved(best, direct)} less; the "
         f"start takes {digits(run.start_time)} s instead of {digits(hard.start_time)} s."
     )
+
+
+def for_customer(text: str) -> str:
+    """A text without what it tells the author to give.
+
+    >>> for_customer("It depends on the machine: give [limits] in the drive file. Give more. Nothing damps.")
+    'It depends on the machine. Nothing damps.'
+    """
+    return re.sub(r"(?:[:;] give|\. Give) [^.;]*(?=\.)", "", text)
+
+
+def to_check(machine: Drive | Chain) -> Html | None:
+    """What is assumed of the machine, and what is doubtful in its data; None where nothing is."""
+    assumed = [one for one in getattr(machine, "assumed", "").split("; ") if one]
+    lists = [("Assumed, to be confirmed:", assumed), ("To be checked in the data:", doubts(machine))]
+    parts = [
+        part
+        for title, items in lists
+        if items
+        for part in (tag("p", tag("b", title)), tag("ul", joined(tag("li", one) for one in items)))
+    ]
+    return tag("section", *parts, class_="check") if parts else None
 
 
 def share_saved(row: Row, direct: Row | None) -> str:
@@ -77,13 +103,11 @@ def first_page(report: Report, figures: Figures) -> Html:
         if (limits := report.choice.recommendation.limits)
         else tag(
             "p",
-            (
-                "Neither passed nor failed: the drive file has no limits. Give the permissible shaft torque, "
-                "the longest start time or the life in [limits], and this page says what passes, with the "
-                "margin."
-            ),
+            "Neither passed nor failed: no permissible shaft torque, longest start time or life is agreed "
+            "for this machine.",
             class_="verdict",
         ),
+        to_check(report.drive),
         _choices(report),
     )
 
@@ -109,7 +133,7 @@ def _gained(report: Report) -> tuple[str, str, str]:
     """What it gains in life."""
     gain = report.life_gain
     if gain is None:
-        how = "needs a damping above 0 in the drive file"
+        how = "the damping of the shaft is not known"
         return "life of the shaft line", "not given", how
     how = f"over that of direct, S-N slope {report.life_slope:g}"
     return "life of the shaft line", f"× {factor(gain)}", how
@@ -118,11 +142,13 @@ def _gained(report: Report) -> tuple[str, str, str]:
 def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> Html:
     """Figures side by side, each beside that of direct: peak, called `torque`, time, a third one, K_dyn."""
     run, hard = best.run, direct.run
+    output = at_output(run.drive, run.peak_torque)
     shown = [
         (
             torque,
             f"{digits(run.peak_torque)} N m",
-            f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less",
+            f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"
+            + (f"; {output} N m at the output shaft" if output else ""),
         ),
         (
             "costs in time",
@@ -146,6 +172,15 @@ def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> H
     )
 
 
+def margin_of(share: float) -> str:
+    """What is left of a limit; how often it is used up where that is more than twice.
+
+    >>> margin_of(0.347), margin_of(-0.5), margin_of(-107.6)
+    ('34.7\N{NO-BREAK SPACE}%', '\N{MINUS SIGN}50.0\N{NO-BREAK SPACE}%', '109 times the limit')
+    """
+    return percent(share) if not share < -1.0 else f"{1.0 - share:.3g} times the limit"
+
+
 def verdicts(limits: Limits, rows: list[Row]) -> Html:
     """Pass or fail of direct and of the chosen strategy, limit by limit, in the worst case."""
     cells = []
@@ -157,7 +192,7 @@ def verdicts(limits: Limits, rows: list[Row]) -> Html:
                     f"{margin.name}, {margin.unit}",
                     digits(margin.value),
                     digits(margin.limit),
-                    percent(margin.share),
+                    margin_of(margin.share),
                     (margin.case or AS_IT_IS),
                     tag(
                         "b",
@@ -187,6 +222,7 @@ def _choices(report: Report) -> Html:
             row.name,
             row.effort.meaning,
             digits(row.run.peak_torque),
+            *outputs(row),
             share_saved(row, direct),
             fixed(row.run.k_dyn, 3),
             digits(row.run.start_time),
@@ -195,7 +231,15 @@ def _choices(report: Report) -> Html:
     ]
     best = choice.chosen.row if choice.chosen else None
     return table(
-        ["strategy", "takes", "peak torque, N m", "less than direct", "K_dyn", "start time, s"],
+        [
+            "strategy",
+            "takes",
+            "peak torque, N m",
+            *OUTPUT[: len(outputs(rows[0]))],
+            "less than direct",
+            "K_dyn",
+            "start time, s",
+        ],
         cells,
         caption="What more effort buys",
         text_columns=(0, 1),

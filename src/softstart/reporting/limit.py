@@ -341,25 +341,22 @@ def filled(choice: Choice) -> list[Row]:
 
 def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
     """Each strategy beside the bound, the optimum and the gentlest start known in its own start time."""
-    in_doubt = any(limit.optimum_at(row.run.start_time) is None for row in found)
-    in_doubt = in_doubt and isinstance(drive, Drive)
-    heads = said("strategy | start time, s | K_dyn | lower bound at that time").split(" | ")
-    heads += [said("optimum at that time"), said("times the optimum")] if limit.found else []
-    heads += [said("gentlest start known in that time")] if in_doubt else []
-    heads.append(said("times the bound"))
-    rows = []
+    rows, bounded = [], bool(limit.bounds)
     for row in ordered(found):
-        run, bound = row.run, bound_at(drive, row.run.start_time)
-        cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3), fixed(bound, 3)]
-        if limit.found:
-            best = limit.optimum_at(run.start_time)
-            cells.append(fixed(best.k_dyn if best else None, 3))
-            cells.append(fixed(run.k_dyn / best.k_dyn if best and best.k_dyn else None, 2))
-        if in_doubt:
-            cells.append(fixed(limit.gentlest_known(run.start_time, found), 3))
-        rows.append([*cells, fixed(run.k_dyn / bound if bound else None, 2)])
+        run, best = row.run, limit.optimum_at(row.run.start_time)
+        bound, known = bound_at(drive, run.start_time), limit.gentlest_known(run.start_time, found)
+        is_best = best is not None and known is not None and best.k_dyn == known
+        cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3)]
+        cells += [fixed(bound, 3)] if bounded else []
+        cells += [fixed(known, 3) + (said(" (optimum)") if is_best else "")]
+        cells += [fixed(run.k_dyn / known if known else None, 2)]
+        rows.append(cells + ([fixed(run.k_dyn / bound if bound else None, 2)] if bounded else []))
+    heads = [said("strategy"), said("start time, s"), "K_dyn"]
+    heads += [said("lower bound at that time")] if bounded else []
+    heads += [said("lowest known in that time"), said("times the lowest known")]
+    heads += [said("times the bound")] if bounded else []
     caption = said("How near each strategy comes to the limit in its own start time")
-    return table(heads, rows, caption=caption, class_="names")
+    return table(heads, rows, caption=caption, class_="names near")
 
 
 def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
@@ -473,9 +470,9 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
     notes = []
     if limit.missing:
         ended = (
-            said("none was found within the {budget} s given (more: --budget)", budget=short(limit.budget))
+            said("none was found within {budget} s of search", budget=short(limit.budget))
             if limit.budget
-            else said("none was looked for (--budget 0)")
+            else said("none was looked for")
         )
         if gave_up := limit.gave_up:
             ended = said(
@@ -485,8 +482,7 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
             )
         notes.append(
             said(
-                "For {times} no optimum is shown: {reason}, and {ended}. The lower bound holds all the "
-                "same. A longer search: softstart pareto.",
+                "For {times} no optimum is shown: {reason}, and {ended}. The lower bound holds nevertheless.",
                 times=_times(limit.missing),
                 reason=_why_hard(drive),
                 ended=ended,

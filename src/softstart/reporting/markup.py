@@ -54,7 +54,7 @@ def tag(name: str, /, *parts: Part, **attributes: str | None) -> Html:
 
 def joined(parts: Iterable[Part], between: str = "\n") -> Html:
     """Parts with a separator between them."""
-    return Html(escape(between).join(html(one) for one in parts if one is not None))
+    return Html(html(between).join(html(one) for one in parts if one is not None))
 
 
 def table(

@@ -174,19 +174,10 @@ def _read(key: str, value: object) -> dict[str, float | None]:
         if not share > 0.0:
             raise InputError(f"{key}: a step is above 0; write {example}.")
         return {"torque_share": share, "torque": None} if key == "torque" else {"share": share}
-    number = _hertz(shown) if key == "frequency" else float(to_si(value, unit, name=key))
+    number = float(to_si(value, unit, name=key))
     if not number > 0.0:
         raise InputError(f"{key}: a step is above 0; write {example}.")
     return {key: number}
-
-
-def _hertz(shown: str) -> float:
-    """A frequency in Hz; the units of a drive file know none, as pint would make them speeds."""
-    plain = shown[:-2] if shown.lower().endswith("hz") else shown
-    try:
-        return float(to_si(plain, "1", name="frequency"))
-    except InputError:
-        raise InputError('frequency: this is no frequency in Hz; write "0.1 Hz" or 0.1.') from None
 
 
 def _step(value: object) -> bool:

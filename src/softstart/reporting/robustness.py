@@ -14,7 +14,7 @@ from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.quantities import Units
-from softstart.reporting.markup import Figures, Html, html, inlined, printed, tag
+from softstart.reporting.markup import Figures, Html, html, inlined, joined, printed, tag
 from softstart.reporting.strategies import K_DYN, SMALL, WIDE, name_in_figure
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
@@ -149,7 +149,7 @@ def maps_picture(drive: Drive, shown: Sequence[Mapped]) -> Html:
     return inlined(maps_figure([(one.name, one.map) for one in shown], nominal, units), "maps", title)
 
 
-def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[str, str, Html]]:
+def life_chapter(found: Fatigue | str | None) -> list[tuple[str, str, Html]]:
     """Key, title and content of the chapter on the life of the shaft line; none where it is not asked for."""
     if found is None:
         return []
@@ -157,16 +157,10 @@ def life_chapter(found: Fatigue | str | None, figures: Figures) -> list[tuple[st
         content = tag("p", f"Lives cannot be given. {found}")
     else:
         shown = lives.fatigue_table(found, sorted(found.rows, key=lambda row: -row.relative))
-        title = "Cycles of one start, and life over that of direct"
         content = html(
             tag("p", lives.conclusion(found)),
             printed(shown, caption="Life of the shaft line under each strategy"),
-            figures.shown(
-                "life",
-                lambda: inlined(lives.fatigue_figure(found), "life", title),
-                f"{title}. Rainflow cycles of the shaft torque.",
-            ),
-            *(tag("p", one) for one in lives.notes(found)),
+            tag("ul", joined(tag("li", one) for one in lives.notes(found)), class_="notes"),
         )
     return [("life", "How long the shaft line lasts", content)]
 
@@ -185,7 +179,7 @@ def maps_figure(
     gaps = [units.shown(one, "rad") for one in first.gaps]
     inertia, gap = _thousand(first.inertias), _thousand(gaps)
     with drawing():
-        size = (WIDE, 0.35 + down * (0.75 + 0.31 * max(rows, 2)))
+        size = (WIDE, 0.35 + down * (0.66 + 0.22 * max(rows, 2)))
         figure, axes = new_figure(down, 2, size, squeeze=False)
         drawn: Any = None
         for panel, (name, one) in zip(axes.flat, shown, strict=False):

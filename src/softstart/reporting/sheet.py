@@ -7,6 +7,7 @@ import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,14 @@ from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError, listed
 from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
-from softstart.reporting.strategies import ORDINARY, kind_of
+from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
 from softstart.start import metrics
 from softstart.start.batch import array_starts, figures
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.views.printed import RPM, decimals_of, digits, fixed, short, unit
+from softstart.views.printed import RPM, at_output, decimals_of, digits, fixed, short, unit
 
 AnyRun = Run | ChainRun
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
@@ -459,42 +460,37 @@ FUNCTIONS = {
 }
 
 
+@cache
+def _at_inverters() -> dict[str, Any]:
+    """Names of functions in manuals, and what a parameter means at an inverter."""
+    return tomllib.loads(Path(__file__).with_name("inverters.toml").read_text("utf-8"))
+
+
 def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
     """Where inverters have what the sheets name: names as public manuals print them, and no others."""
-    text = (Path(__file__).with_name("inverters.toml")).read_text("utf-8")
     low = min(float(np.min(_motor_torque(sheet.rounded or sheet.exact))) for sheet in sheets)
     asked = [key for key in FUNCTIONS if key != "braking" or low < 0.0]
     asked = [key for key in asked if key != "preload" or drive.brake == "motor"]
     rows, sources = list[list[Part]](), list[Part]()
-    for number, family in enumerate(tomllib.loads(text)["family"], start=1):
-        named = [key for key in asked if key in family]
-        rows += [
-            [
-                f"{family['name']} [{number}]" if key == named[0] else "",
-                FUNCTIONS[key],
-                tag("code", family[key]),
-            ]
-            for key in named
-        ]
+    for number, family in enumerate(_at_inverters()["family"], start=1):
+        lines = [html(f"{FUNCTIONS[key]}: ", tag("code", family[key])) for key in asked if key in family]
+        rows += [[f"{family['name']} [{number}]", joined(lines, tag("br"))]] if lines else []
         sources.append(tag("code", f"[{number}] {family['source']}."))
     return tag(
         "section",
-        tag("h3", "Where to set it"),
         table(
-            ["inverter", "function", "name in its manual"],
+            ["inverter", "functions, with the names in its manual"],
             rows,
-            caption="Names of these functions",
-            text_columns=(0, 1, 2),
+            caption="Where to set it: names of these functions in manuals",
+            text_columns=(0, 1),
             class_="words",
         ),
         tag(
             "p",
             (
-                "Only names that a public manual prints; what is missing was not found there. The ramps of "
-                "the sheets are ramps of torque. The acceleration ramps of inverters (ramp times, S-curves "
-                "of speed) are ramps of the speed reference and do not replace them: make them shorter than "
-                "the start, so that they do not limit it. Check the names against the manual of your "
-                "firmware."
+                "Names as public manuals print them; check them against the manual of the firmware. The "
+                "ramps of the sheets are ramps of torque. The acceleration ramps of inverters (ramp times, "
+                "S-curves of speed) do not replace them: make those shorter than the start."
             ),
             " ",
             joined(sources, " "),
@@ -506,7 +502,7 @@ def _families(sheets: Sequence[Sheet], drive: Drive) -> Html:
 def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
     rows = [_setting(one, drive) for one in sheet.settings]
     role = role or "for an ordinary inverter"
-    heads = ["parameter", "meaning", "set to", "unit", "that is", "exact"]
+    heads = ["parameter", "meaning, and what it is at the inverter", "set to", "unit", "that is", "exact"]
     return tag(
         "section",
         tag("h3", f"{sheet.name} ({role})"),
@@ -521,16 +517,18 @@ def _sheet(sheet: Sheet, role: str, drive: Drive) -> Html:
         else None
         if rows
         else tag("p", "This strategy has no parameters."),
-        _outcome(sheet),
+        _outcome(sheet, drive),
         tag("ul", joined(tag("li", one) for one in _notes(sheet, drive)), class_="notes"),
         class_="sheet",
     )
 
 
-def _setting(one: Setting, drive: Drive) -> list[str]:
+def _setting(one: Setting, drive: Drive) -> list[Part]:
     name = one.name.replace("_", " ")
+    explained = _at_inverters()["setting"].get(one.name)
+    note = tag("small", f"; {explained}") if explained else None
     if isinstance(one.exact, str) or isinstance(one.rounded, str):
-        return [name, one.meaning, str(one.rounded), "", "", str(one.exact)]
+        return [name, html(one.meaning, note), str(one.rounded), "", "", str(one.exact)]
     value, exact, step, shown = one.rounded, one.exact, one.step, unit(one.unit)
     other = ""
     if one.unit == "s":
@@ -549,10 +547,17 @@ def _setting(one: Setting, drive: Drive) -> list[str]:
         meaning = f"{meaning} of the control code"
         digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
         most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
-        return [name, meaning, f"≤ {short(float(f'{most:.3g}'))}", shown, "", short(float(f"{value:.5g}"))]
+        return [
+            name,
+            html(meaning, note),
+            f"≤ {short(float(f'{most:.3g}'))}",
+            shown,
+            "",
+            short(float(f"{value:.5g}")),
+        ]
     if one.step is None:
         meaning, text = f"{meaning} (not rounded)", short(float(f"{value:.4g}"))
-    return [name, meaning, text, shown, other, short(float(f"{exact:.5g}"))]
+    return [name, html(meaning, note), text, shown, other, short(float(f"{exact:.5g}"))]
 
 
 def _multiple(value: float | None, step: float | None) -> str:
@@ -574,23 +579,24 @@ def _multiple(value: float | None, step: float | None) -> str:
     return fixed(value, min(enough, max(6 - order, 0)))
 
 
-def _outcome(sheet: Sheet) -> Html:
+def _outcome(sheet: Sheet, drive: Drive) -> Html:
     if sheet.rounded is None:
         return tag("p", f"The start with the rounded values could not be made: {sheet.failure}")
     exact, rounded = sheet.exact, sheet.rounded
-    rows = [
-        ["exact values", fixed(exact.k_dyn, 4), digits(exact.peak_torque), digits(exact.start_time, 5)],
-        ["rounded values, as in the sheet", fixed(rounded.k_dyn, 4), digits(rounded.peak_torque),
-         digits(rounded.start_time, 5)],
-    ]  # fmt: skip
+    starts = {
+        "exact values": (exact.k_dyn, exact.peak_torque, exact.start_time),
+        "rounded values, as in the sheet": (rounded.k_dyn, rounded.peak_torque, rounded.start_time),
+    }
     if sheet.variants:
         peak = sheet.worst_k_dyn * exact.peak_torque / exact.k_dyn if exact.k_dyn > 0.0 else math.nan
-        rows.append(
-            ["worst with the values half a step off", fixed(sheet.worst_k_dyn, 4), digits(peak),
-             digits(sheet.slowest, 5)]
-        )  # fmt: skip
+        starts["worst with the values half a step off"] = sheet.worst_k_dyn, peak, sheet.slowest
+    rows = [
+        [name, fixed(k_dyn, 4), digits(peak), *filter(None, [at_output(drive, peak)]), digits(time, 5)]
+        for name, (k_dyn, peak, time) in starts.items()
+    ]
+    output = OUTPUT if drive.gear_ratio is not None else ()
     return table(
-        ["start with", "K_dyn", "peak torque, N m", "start time, s"], rows,
+        ["start with", "K_dyn", "peak torque, N m", *output, "start time, s"], rows,
         caption=f"{sheet.name}: started again after rounding",
     )  # fmt: skip
 
@@ -619,7 +625,7 @@ def _notes(sheet: Sheet, drive: Drive) -> list[str]:
     notes = []
     if sheet.moved:
         moved = listed([name.replace("_", " ") for name in sheet.moved])
-        notes.append(f"Not at the nearest step, which would break the rule of section 1: {moved}.")
+        notes.append(f"Not at the nearest step, which would break the rule of the recommendation: {moved}.")
     if sheet.variants:
         notes.append(
             f"Half a step off: {sheet.variants} starts, all combinations of half a step down or up."

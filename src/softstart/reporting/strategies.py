@@ -20,14 +20,14 @@ from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
-from softstart.views.printed import digits, fixed, short, units_of
+from softstart.views.printed import at_output, digits, fixed, short, units_of
 from softstart.views.starts import INTERVALS_NOTE, clipped_torque, position_notes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
-ACROSS, AT_ONCE = 3, 18  # panels side by side, and in one figure: what a page holds
+ACROSS, AT_ONCE = 4, 20  # panels side by side, and in one figure: what a page holds
 LATE = 1.6  # times the median start time, up to which traces are shown
 GREY, SMALL = "#666666", 8.5
 WIDE = 7.1  # inches: what an A4 page holds
@@ -56,23 +56,35 @@ def ordered(rows: Sequence[Row]) -> list[Row]:
     return sorted(rows, key=lambda row: (math.isnan(row.run.start_time), float(f"{row.run.k_dyn:.9g}")))
 
 
+OUTPUT = ("at the output, N m",)  # heading of the peak torque there
+LIMITS, FLAG = "limits, least margin", "flag"
+
+
+def outputs(row: Row) -> list[str]:
+    """The peak torque at the output shaft, N m; nothing where no gear ratio is known."""
+    return [one for one in [at_output(row.run.drive, row.run.peak_torque)] if one]
+
+
 def strategies_section(
     drive: Drive, compared: Sequence[Row], chosen: Sequence[Row], failed: Sequence[tuple[str, str]]
 ) -> Html:
     """The table of strategies and what its columns mean; the rows in `chosen` stand out."""
     rows = ordered(compared)
-    limited = any(row.against_limits for row in rows)
-    cells = []
-    for row in rows:
-        run, name = row.run, label_of(row.run.controller)
-        cells.append([
-            name, fixed(run.k_dyn, 3) + _interval(row), fixed(row.k_dyn_worn_gap, 3),
-            fixed(row.k_dyn_light_load, 3), digits(run.peak_torque), digits(run.start_time),
-            digits(run.settled_time), fixed(row.time_lost, _decimals(run.start_time)),
-            str(run.contacts),
-            *([row.against_limits.replace(" ", "\N{NO-BREAK SPACE}")] if limited else []),
-            ", ".join(flag.word for flag in row.flags),
-        ])  # fmt: skip
+    columns = {
+        "strategy": [label_of(row.run.controller) for row in rows],
+        "K_dyn": [fixed(row.run.k_dyn, 3) + _interval(row) for row in rows],
+        f"K_dyn, gap × {short(WORN_GAP)}": [fixed(row.k_dyn_worn_gap, 3) for row in rows],
+        f"K_dyn, J2 × {short(LIGHT_INERTIA)}": [fixed(row.k_dyn_light_load, 3) for row in rows],
+        "peak torque, N m": [digits(row.run.peak_torque) for row in rows],
+        OUTPUT[0]: [at_output(drive, row.run.peak_torque) for row in rows],
+        "start time, s": [digits(row.run.start_time) for row in rows],
+        "settled, s": [digits(row.run.settled_time) for row in rows],
+        "later, s": [fixed(row.time_lost, _decimals(row.run.start_time)) for row in rows],
+        "contacts": [str(row.run.contacts) for row in rows],
+        LIMITS: [row.against_limits.replace(" ", "\N{NO-BREAK SPACE}") for row in rows],
+        FLAG: [", ".join(flag.word for flag in row.flags) for row in rows],
+    }
+    columns = {heading: cells for heading, cells in columns.items() if any(cells)}
     strong = [rows.index(row) for row in chosen]
     base = float(metrics.base_torque(drive))
     notes = [
@@ -90,7 +102,15 @@ def strategies_section(
             f"Settled: from then on the load speed is never more than {short(100.0 * SETTLED_BAND)} % below "
             "the target. Later: start time beyond that of direct start."
         ),
-        *([_limits_note(rows[0])] if limited else []),
+        *(
+            [
+                f"At the output: torque at the motor shaft times the ratio {short(float(drive.gear_ratio))}, "
+                "without losses."
+            ]
+            if drive.gear_ratio is not None
+            else []
+        ),
+        *([_limits_note(rows[0])] if LIMITS in columns else []),
         *([INTERVALS_NOTE] if rows[0].intervals else []),
         *position_notes([row.run for row in rows]),
         *(
@@ -111,22 +131,10 @@ def strategies_section(
         *(f"{name} could not be examined: {reason}" for name, reason in failed),
     ]
     first = table(
-        [
-            "strategy",
-            "K_dyn",
-            f"K_dyn, gap × {short(WORN_GAP)}",
-            f"K_dyn, J2 × {short(LIGHT_INERTIA)}",
-            "peak torque, N m",
-            "start time, s",
-            "settled, s",
-            "later, s",
-            "contacts",
-            *(["limits, least margin"] if limited else []),
-            "flag",
-        ],
-        cells,
+        list(columns),
+        list(zip(*columns.values(), strict=True)),
         caption="Strategies on this drive, the gentlest first",
-        text_columns=(0, 9, 10) if limited else (0, 9),
+        text_columns=[index for index, one in enumerate(columns) if one in ("strategy", LIMITS, FLAG)],
         strong=strong,
         class_="names",
     )

@@ -75,6 +75,17 @@ def units_of(machine: Drive | Chain) -> Units:
     return Units.read(machine.units, map(float, gaps), map(float, speeds))
 
 
+def at_output(machine: Drive | Chain, torque: float) -> str:
+    """A torque at the output shaft of the gear, N m, without losses: ratio times that at the motor shaft.
+
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> at_output(crane.replace(gear_ratio=38.0), 169.7), at_output(crane, 169.7)
+    ('6449', '')
+    """
+    ratio = getattr(machine, "gear_ratio", None)
+    return "" if ratio is None else digits(float(ratio) * torque)
+
+
 def percent(share: float, decimals: int = 1) -> str:
     """A share in per cent.
 

@@ -11,6 +11,7 @@ from softstart.processes import Progress
 from softstart.reporting import report
 from softstart.reporting.choice import choice_section
 from softstart.reporting.document import answer
+from softstart.reporting.first_page import for_customer
 from softstart.reporting.limit import bound_at, limit, limit_section, optima
 from softstart.reporting.markup import Figures
 from softstart.reporting.robustness import robustness
@@ -52,7 +53,9 @@ def test_verdicts_are_those_of_the_one_rule(hostile):
     assert choice.chosen.row is said.best[-1]
     assert choice.role == "gentlest unbeaten"
     assert choice.ordinary.worst == min(choice.of(name).worst for name in ("ramp", "s-curve"))
-    assert answer(hostile).startswith(said.text)
+    assert answer(hostile).startswith(for_customer(said.text))
+    assert said.text.endswith(": give [limits] in the drive file.")  # which is for the author
+    assert "[limits]" not in answer(hostile)
     section = choice_section(choice, answer(hostile))
     assert "no limits, so nothing says which peak is low enough" in section
 

@@ -1,6 +1,7 @@
 """Page 1 and what a report says of itself: verdicts are the margins, names and sources those of the file."""
 
 import base64
+import html
 import re
 import tomllib
 from pathlib import Path
@@ -8,12 +9,15 @@ from pathlib import Path
 import pytest
 
 from softstart import Drive, fatigue, reporting
+from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.reporting import Project, document, report, sheet
 from softstart.reporting.first_page import before_and_after, headline
+from softstart.reporting.markup import css_string
 from softstart.views.fatigue import factor
 
-from .test_page import Page
+from .conftest import untypeset
+from .test_page import Page, rows_of
 
 HOIST = Drive.load("hoist-15kw").replace(permissible_torque=180.0, permissible_start_time=0.25)
 ABOUT = """
@@ -82,8 +86,38 @@ def test_without_damping_no_life_is_given_and_without_limits_nothing_passes():
     made = report("crane-4amtkf", controllers=["shaped"], budget=0.0)
     assert made.life_gain is None
     text = "".join(Page(made.to_html()).text)
-    assert "needs a damping above 0" in text
+    assert "the damping of the shaft is not known" in text
     assert "Neither passed nor failed" in text
+
+
+GEARED = HOIST.replace(
+    name="PAPER crane, FOOTER", gear_ratio=38.0, gap=4.0, assumed="efficiency 0.95; damping ratio 0.02",
+    permissible_torque=260.0, starts_per_hour=60, required_life="20000 h", fatigue_slope=5,
+    fatigue_torque=200, fatigue_cycles=2e6,
+)  # fmt: skip
+
+
+def test_a_customer_reads_output_torques_years_and_doubts_and_nothing_that_is_for_the_author():
+    made = report(GEARED, controllers=["ramp", "shaped"], budget=0.0)
+    page = made.to_html()
+    read = Page(page)
+    text = " ".join("".join(read.text).replace("\xa0", " ").split()).partition(" as a file for softstart")[0]
+    for name, shown in rows_of(read, "at the output, N m").items():
+        peak = made.row(name).run.peak_torque
+        assert float(shown["at the output, N m"]) == pytest.approx(38.0 * peak, rel=1e-3)
+    data = rows_of(read, "at the output shaft")
+    there = {name: row["at the output shaft"] for name, row in data.items()}
+    assert there["inertia of the load at the motor shaft"] == "93.86 kg m²"  # 38² J2
+    assert there["total angular gap"] == "0.1053 rad"  # 4 rad at the motor
+    assert data["time of operation that the shaft line must last"]["value"] == "2.28"  # years of 8766 h
+    assert doubts(GEARED)
+    for sentence in (*doubts(GEARED), "efficiency 0.95", "damping ratio 0.02"):
+        assert sentence in untypeset(page).replace("\xa0", " ") or sentence in text, sentence
+    assert re.findall(r"--\w+|\[limits|[Gg]ive |softstart (?:compare|pareto|serve|optimize)", text) == []
+    assert not [row for one in read.tables for row in one[1:] if set(row[1:]) <= {"\N{EN DASH}", ""}]
+    (style,) = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
+    assert "@page { size: A4;" in style
+    assert f"@top-left {{ content: {css_string(GEARED.name)};" in style
 
 
 def test_where_no_strategy_keeps_the_limits_the_nearest_one_is_shown():
@@ -115,7 +149,8 @@ def test_decimal_commas_stand_in_text_and_figures_and_in_no_command(made, page):
     assert re.search(r"<text[^>]*>0,\d+</text>", page)
     assert "04.005 Motoring Current Limit" in "".join(read.text)
     assert Drive.from_toml(made.provenance.drive_toml) == made.drive
-    assert made.provenance.drive_toml in "".join(read.text)
+    (file,) = re.findall(r'<pre class="file">(.*?)</pre>', page, re.DOTALL)
+    assert Drive.from_toml(html.unescape(file)) == made.drive
 
 
 def test_pictures_that_are_drawn_beforehand_are_those_drawn_later(made):
