@@ -38,11 +38,17 @@ def difference(shown: str, printed: str, ended: bool = True) -> str:
 def rewritten(shown: str, printed: str) -> str:
     """What a page shows of this output: whole, or from each `...` to the line that stood after it.
 
+    The first paragraph, the machine, is left out where the page leaves it out.
+
     >>> rewritten("a 1\\n...\\nend 2", "a 3\\nb\\nend 4"), rewritten("a", "b")
     ('a 3\\n...\\nend 4', 'b')
+    >>> rewritten("K 1", "crane\\n  motor\\n\\nK 2\\nnext")
+    '...\\n\\nK 2\\nnext'
     """
     lines, kept = printed.rstrip().splitlines(), list[str]()
     wanted = shown.splitlines()
+    if lines[0] not in wanted and wanted[0] != SKIP and "" in lines:
+        kept, lines = [SKIP, ""], lines[lines.index("") + 1 :]
     while wanted and SKIP in wanted:
         count = wanted.index(SKIP)
         after = next((one for one in wanted[count + 1 :] if one.strip()), None)

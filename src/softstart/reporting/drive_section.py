@@ -17,13 +17,8 @@ from softstart.reporting.resolution import rated_torque
 from softstart.start import metrics
 from softstart.start.fatigue import HOURS_PER_YEAR
 from softstart.views import chain_schemes
-from softstart.views.printed import RPM, digits, short, unit, units_of
+from softstart.views.printed import RPM, at_output, digits, short, unit, units_of
 
-AT_OUTPUT = {  # exponent of the gear ratio that brings a value from the motor shaft to the output shaft
-    **dict.fromkeys(("N*m", "N*m/s"), 1),
-    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), 2),
-    **dict.fromkeys(("rad", "rad/s"), -1),
-}
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
 _AXIS, _TALLEST, _LEAST = 150.0, 170.0, 60.0  # px
 _ANGLES, _LEAST_COIL, _SHORTEST_SHAFT, _LEAST_GAP = 260.0, 40.0, 150.0, 8.0  # px
@@ -80,10 +75,8 @@ def _data(drive: Drive, project: Project) -> Html:
             other = f"{short(float(f'{value * RPM:.6g}'))} rpm"
         elif parameter.unit == "rad":
             other = f"{short(float(f'{math.degrees(value):.4g}'))}°"
-        power = AT_OUTPUT.get(parameter.unit)
-        there = ""
-        if power is not None and ratio is not None and isinstance(seen[0], float):
-            there = f"{digits(seen[0] * float(ratio) ** power)} {of}"
+        there = at_output(drive, seen[0], parameter.unit) if isinstance(seen[0], float) else ""
+        there = f"{there} {of}" if there else ""
         row = [parameter.meaning, parameter.symbol, text, of.replace(" ", "\N{NO-BREAK SPACE}"), other]
         rows.append([*row, *([there] if ratio else []), *([source or "not stated"] if sourced else [])])
     heads = ["parameter", "symbol", "value", "unit", "that is"]

@@ -19,6 +19,11 @@ UNITS = {
     "N*m/s": "N m/s",
     "1": "",
 }
+AT_OUTPUT = {  # exponent of the gear ratio that brings a value from the motor shaft to the output shaft
+    **dict.fromkeys(("N*m", "N*m/s"), 1),
+    **dict.fromkeys(("kg*m^2", "N*m/rad", "N*m*s/rad"), 2),
+    **dict.fromkeys(("rad", "rad/s"), -1),
+}
 RPM = 30.0 / math.pi  # of one rad/s
 
 
@@ -75,15 +80,19 @@ def units_of(machine: Drive | Chain) -> Units:
     return Units.read(machine.units, map(float, gaps), map(float, speeds))
 
 
-def at_output(machine: Drive | Chain, torque: float) -> str:
-    """A torque at the output shaft of the gear, N m, without losses: ratio times that at the motor shaft.
+def at_output(machine: Drive | Chain, value: float, unit: str = "N*m") -> str:
+    """A value of the motor shaft at the output shaft of the gear, without losses; "" where it has none there.
+
+    Torque times i, inertia, stiffness and damping times i^2, angle and speed divided by i; the `unit` is that
+    of the parameter, the value may be in another one of its kind.
 
     >>> crane = Drive.load("crane-4amtkf")
-    >>> at_output(crane.replace(gear_ratio=38.0), 169.7), at_output(crane, 169.7)
-    ('6449', '')
+    >>> geared = crane.replace(gear_ratio=38.0)
+    >>> at_output(geared, 169.7), at_output(geared, 0.20083, "kg*m^2"), at_output(crane, 169.7)
+    ('6449', '290.0', '')
     """
-    ratio = getattr(machine, "gear_ratio", None)
-    return "" if ratio is None else digits(float(ratio) * torque)
+    ratio, power = getattr(machine, "gear_ratio", None), AT_OUTPUT.get(unit)
+    return "" if ratio is None or power is None else digits(float(ratio) ** power * value)
 
 
 def percent(share: float, decimals: int = 1) -> str:

@@ -15,6 +15,7 @@ from softstart.late import late
 from softstart.views.drawing import drawing, entitle, new_figure, save_figure
 from softstart.views.markdown import markdown, markdown_table, write_columns, write_drive_report
 from softstart.views.numbers import Table, column_of, first_of, short
+from softstart.views.printed import at_output
 from softstart.views.starts import machine_lines
 from softstart.views.terminal import fits, print_conclusion, print_lines, print_tables, sentence
 
@@ -249,6 +250,8 @@ def set_table(tuning: Tuning) -> Table:
         "robust": [short(value) for value in found.gains.values()],
         "unit": ["" if units[name] == "1" else units[name].replace("*", " ") for name in found.gains],
     }
+    there = [at_output(tuning.drive, value, units[name]) for name, value in found.gains.items()]
+    columns |= {"robust, at\nthe output": there} if any(there) else {}
     return Table.of("One set for all", columns, ("parameter", "unit"))
 
 
@@ -367,6 +370,16 @@ def notes(tuning: Tuning) -> list[str]:
     if tuning.price is not None and any("optimum" in str(name) for name in tuning.price):
         found.append(
             "Optimum: the cell's drive, its motor without lag, dead time and noise; terminal reached."
+        )
+    drive, q = tuning.drive, tuning.question
+    if isinstance(drive, Drive) and drive.gear_ratio is not None:
+        gaps, inertias = (
+            " to ".join(dict.fromkeys(at_output(drive, one, unit) for one in (axis[0], axis[-1])))
+            for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
+        )
+        found.append(
+            f"At the output shaft, ratio {short(float(drive.gear_ratio))}, without losses: gaps {gaps} rad, "
+            f"load inertias {inertias} kg m2; a torque there is the ratio times that at the motor."
         )
     found.append(f"{tuning.starts:,} starts.")
     return found
