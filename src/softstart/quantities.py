@@ -23,30 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
-from softstart.late import late
 
 if TYPE_CHECKING:
     import pint
-else:
-    pint = late("pint")
 
 __all__ = [
-    "OTHER_NOUNS",
-    "QUANTITIES",
-    "RefusedError",
-    "Units",
-    "Value",
-    "doubtful_comma",
-    "nearest",
-    "parse",
-    "read_unit",
-    "shortest",
-    "show",
-    "to_si",
-    "values_in",
-    "whole_number",
-    "with_points",
-]
+    "OTHER_NOUNS", "QUANTITIES", "RefusedError", "Units", "Value", "doubtful_comma", "nearest", "parse",
+    "read_unit", "shortest", "show", "to_si", "values_in", "whole_number", "with_points",
+]  # fmt: skip
 
 Value = float | NDArray[np.float64]
 
@@ -230,6 +214,8 @@ def _is_product(text: str) -> bool:
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Any]:
+    import pint
+
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None)
     registry.load_definitions([line for line in _DEFINITIONS.splitlines() if line])
     return registry

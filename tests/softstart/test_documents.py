@@ -4,7 +4,6 @@ import pytest
 
 from softstart.errors import InputError
 from softstart.input.documents import Table, read_document, read_table
-from softstart.input.files import text_of
 from softstart.input.parameters import Parameter
 
 TOP = Table("", (Parameter("name", "", "name", '"my chain"', default="unnamed"),))
@@ -108,11 +107,3 @@ def test_values_from_python_are_checked_alike():
         "inertia = -1: the inertia must be above 0.",
         'knid = "free": there is no parameter knid; did you mean kind?',
     )
-
-
-def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(InputError, match="this is a directory"):
-        text_of(tmp_path, "a chain")
-    (tmp_path / "latin.toml").write_bytes("name = 'Getriebe für'".encode("latin-1"))
-    with pytest.raises(InputError, match="not UTF-8 text"):
-        text_of(tmp_path / "latin.toml", "a chain")

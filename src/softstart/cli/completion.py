@@ -1,24 +1,16 @@
-"""`softstart completion`, and what the Tab key makes of the words of a command line in bash, zsh and fish.
-
-Click's own scripts are not used, since most words here do not end where a shell ends them: after
-`load.inertia=` or `drives/` no space may follow, bash splits words at `=` and `:`, and a value may be joined
-to its option, as in `--controllers=direct,ra`. The shell passes the line up to the cursor in COMP_LINE and
-gets back whole words; one that ends in `=`, `/`, `:` or `.` goes on. Nothing here raises: at worst there is
-no completion.
-"""
+"""What the Tab key makes of the words of a command line, for click's own scripts (`softstart completion`)."""
 
 from __future__ import annotations
 
 import ast
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem, ShellComplete, add_completion_class, split_arg_string
+from click.shell_completion import CompletionItem, get_completion_class
 
 from softstart.cli.commands import Command, did_you_mean
 from softstart.drive import PARAMETERS
@@ -171,144 +163,12 @@ def _with_unit(meaning: str, unit: Any) -> str:
     return f"{meaning}, {unit}" if unit and unit != "1" else meaning
 
 
-# the shells ----------------------------------------------------------------------------------------------
-
-BASH = """\
-# softstart in bash: put this into ~/.local/share/bash-completion/completions/softstart, or into ~/.bashrc
-_softstart_completion() {
-    local IFS=$'\\n' line="${COMP_LINE:0:COMP_POINT}" breaks="${COMP_WORDBREAKS//[^=:]/}" word cut=""
-    word="${line##*[[:space:]]}"
-    if [[ -n $breaks && $word == *[$breaks]* ]]; then
-        cut="${word%"${word##*[$breaks]}"}"  # bash replaces only what stands behind the last = or :
-    fi
-    COMPREPLY=()
-    for word in $(COMP_LINE="$line" _SOFTSTART_COMPLETE=bash_complete "$1" 2>/dev/null); do
-        [[ $word == *[=/:.] ]] && compopt -o nospace
-        COMPREPLY+=("${word#"$cut"}")
-    done
-}
-complete -o nosort -F _softstart_completion softstart
-"""
-
-ZSH = """\
-#compdef softstart
-# softstart in zsh: put this as _softstart into a folder of $fpath, or into ~/.zshrc after compinit
-_softstart_completion() {
-    local line
-    local -a going done
-    for line in "${(@f)$(COMP_LINE="${(j: :)words[1,CURRENT-1]} $PREFIX" _SOFTSTART_COMPLETE=zsh_complete \\
-            ${(Q)words[1]} 2>/dev/null)}"; do
-        case $line in
-            "") ;;
-            *(=|/|:|.)|*(=|/|\\\\:|.):*) going+=("$line") ;;
-            *) done+=("$line") ;;
-        esac
-    done
-    (( $#done )) && _describe -V softstart done -U
-    (( $#going )) && _describe -V softstart going -U -S ''
-}
-if [[ $zsh_eval_context[-1] == loadautofunc ]]; then
-    _softstart_completion "$@"
-else
-    compdef _softstart_completion softstart
-fi
-"""
-
-FISH = """\
-# softstart in fish: put this into ~/.config/fish/completions/softstart.fish
-function __softstart_completion
-    set -l line (commandline -cp)
-    env COMP_LINE="$line" _SOFTSTART_COMPLETE=fish_complete softstart 2>/dev/null
-end
-complete --command softstart --no-files --keep-order --arguments "(__softstart_completion)"
-"""
-
-SPECIAL = re.compile(r"""([\s"'`$&|;<>()*?\[\]!\\])""")
-
-
-class _Shell(ShellComplete):
-    """Reads the line up to the cursor, returns whole words."""
-
-    def source(self) -> str:
-        """The script as it is: click would format its per cent signs."""
-        return self.source_template
-
-    def get_completion_args(self) -> tuple[list[str], str]:
-        """The words before the last one, without the command's own name; and the last one."""
-        line = os.environ.get("COMP_LINE", "")
-        words = split_arg_string(line)
-        if not words or (line[-1:].isspace() and line[-2:-1] != "\\"):
-            words.append("")
-        while len(words) > 1 and re.fullmatch(r"\w+=.*", words[0]):  # settings of the environment
-            words.pop(0)
-        return words[1:-1], words[-1] if len(words) > 1 else ""
-
-    def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem]:
-        """What the last word may become; a value written as --option=value with its option."""
-        try:
-            found = super().get_completions(args, incomplete)
-        except (click.UsageError, InputError):
-            return []  # the line is wrong before its last word
-        option, equals, _ = incomplete.partition("=")
-        if equals and option.startswith("--"):
-            for item in found:
-                item.value = f"{option}={item.value}"
-        return found
-
-
-class Bash(_Shell):
-    """Words alone, with what is special to a shell escaped."""
-
-    name = "bash"
-    source_template = BASH
-
-    def format_completion(self, item: CompletionItem) -> str:
-        """One word a line."""
-        return SPECIAL.sub(r"\\\1", item.value)
-
-
-class Zsh(_Shell):
-    """Words and what they mean, a colon between."""
-
-    name = "zsh"
-    source_template = ZSH
-
-    def format_completion(self, item: CompletionItem) -> str:
-        """One word a line, its colons escaped, and its meaning."""
-        word = item.value.replace(":", "\\:")
-        return f"{word}:{_one_line(item)}" if item.help else word
-
-
-class Fish(_Shell):
-    """Words and what they mean, a tabulator between."""
-
-    name = "fish"
-    source_template = FISH
-
-    def format_completion(self, item: CompletionItem) -> str:
-        """One word a line, and its meaning."""
-        return f"{item.value}\t{_one_line(item)}" if item.help else str(item.value)
-
-
-def _one_line(item: CompletionItem) -> str:
-    return " ".join(str(item.help).split())
-
-
-SHELLS: dict[str, type[_Shell]] = {one.name: one for one in (Bash, Zsh, Fish)}
-
-
-def register_shells() -> None:
-    """Make click answer the Tab key by these classes."""
-    for shell in SHELLS.values():
-        add_completion_class(shell)
-
-
 @click.command(cls=Command)
 @click.argument("shell", metavar="[bash|zsh|fish]", required=False)
 def completion(shell: str | None) -> None:
     """Print the script for completion with the Tab key.
 
-    By default it is for the shell that runs. Its first line names the file to put it in; to try it at once:
+    By default it is for the shell that runs. To try it at once:
 
     \b
       eval "$(softstart completion bash)"
@@ -316,7 +176,9 @@ def completion(shell: str | None) -> None:
       softstart completion fish | source
     """
     asked = shell or Path(os.environ.get("SHELL", "")).name
-    if asked not in SHELLS:
+    made = get_completion_class(asked)
+    if made is None:
         reason = "there is no completion for this shell" if shell else "the environment names no such shell"
-        raise InputError(f'shell = "{asked}": {reason}; {did_you_mean(asked, SHELLS)}')
-    print(SHELLS[asked](click.get_current_context().command, {}, "softstart", "").source(), end="")
+        raise InputError(f'shell = "{asked}": {reason}; {did_you_mean(asked, ("bash", "zsh", "fish"))}')
+    root = click.get_current_context().find_root().command
+    print(made(root, {}, "softstart", "_SOFTSTART_COMPLETE").source())

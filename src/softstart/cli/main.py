@@ -9,6 +9,7 @@ import threading
 import time
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import TextIO
 
@@ -16,11 +17,8 @@ import click
 
 from softstart.cli.commands import cli, usage_sentence
 from softstart.errors import DamagedWarning, InputError, SimulationError
-from softstart.late import late
 from softstart.processes import end_now
 from softstart.views.numbers import printable
-
-completion = late("softstart.cli.completion")
 
 DONE, FAILED, BAD_INPUT, NO_SOLUTION, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141
 DEBUG = "SOFTSTART_TRACEBACK"
@@ -97,8 +95,9 @@ def _failed(error: BaseException) -> int:
 
 def _run(arguments: list[str]) -> int:
     if "_SOFTSTART_COMPLETE" in os.environ:
-        completion.register_shells()
-        cli.main(arguments, prog_name="softstart")
+        with suppress(InputError, click.UsageError):  # the line is wrong before its last word
+            cli.main(arguments, prog_name="softstart")
+        return DONE
     try:
         with cli.make_context("softstart", list(arguments), obj=tuple(arguments)) as context:
             cli.invoke(context)

@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
+from typing import Any, ClassVar, Literal, Self, get_args
 
 from softstart.drive.model import Drive
 from softstart.input.documents import document_text, literal, parsed
@@ -17,17 +17,8 @@ from softstart.input.parameters import Mistake, Parameter, Wording, read_value
 from softstart.quantities import RefusedError
 
 __all__ = [
-    "ABOUT",
-    "INSTEAD",
-    "MACHINES",
-    "TYPICAL",
-    "USUAL",
-    "DataSheet",
-    "Machine",
-    "echo",
-    "if_empty",
-    "typed",
-]
+    "ABOUT", "INSTEAD", "MACHINES", "TYPICAL", "USUAL", "DataSheet", "Machine", "echo", "if_empty", "typed",
+]  # fmt: skip
 
 Machine = Literal["hoist", "travel", "belt", "rotor"]
 MACHINES: Mapping[str, str] = {
@@ -86,12 +77,14 @@ FORMER = {"power": "rated_power", "speed": "rated_speed"}  # keywords of former 
 _BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 
 
-class _Entry(NamedTuple):
-    """One line of a drive file: the key, its value as TOML, and what it is from."""
+def _maybe(path: str, unit: str, meaning: str, example: str) -> Any:
+    """A quantity above 0 that need not be given."""
+    return parameter(path, unit, meaning, example, "above 0", default=None)
 
-    key: str
-    value: str
-    about: str
+
+def _nothing(path: str, unit: str, meaning: str, example: str) -> Any:
+    """A quantity that is 0 where it is not given."""
+    return parameter(path, unit, meaning, example, "0 or more", default=0.0)
 
 
 class DataSheet(ParameterSet):
@@ -147,94 +140,68 @@ class DataSheet(ParameterSet):
     rated_power: MaybeNumber = parameter(
         "motor.rated_power", "W", "rated power", '"3 kW"', "above 0", default=None, formerly="motor.power"
     )
-    rated_torque: MaybeNumber = parameter(
-        "motor.rated_torque", "N*m", "rated torque", '"20 N*m"', "above 0", default=None
-    )
+    rated_torque: MaybeNumber = _maybe("motor.rated_torque", "N*m", "rated torque", '"20 N*m"')
     rated_speed: Number = parameter(
         "motor.rated_speed", "rad/s", "rated speed", '"1430 rpm"', "above 0", formerly="motor.speed"
     )
     motor_inertia: Number = parameter(
         "motor.inertia", "kg*m^2", "inertia of the motor's own rotor", '"0.0119 kg*m^2"', "above 0"
     )
-    added_inertia: Number = parameter(
-        "motor.added_inertia", "kg*m^2", "inertia of brake disc, fan and coupling on the motor shaft",
-        '"0.0066 kg*m^2"', "0 or more", default=0.0,
-    )  # fmt: skip
-    starting_torque: MaybeNumber = parameter(
-        "motor.starting_torque", "N*m", "starting torque", '"44 N*m"', "above 0", default=None
+    added_inertia: Number = _nothing(
+        "motor.added_inertia",
+        "kg*m^2",
+        "inertia of brake disc, fan and coupling on the motor shaft",
+        '"0.0066 kg*m^2"',
     )
+    starting_torque: MaybeNumber = _maybe("motor.starting_torque", "N*m", "starting torque", '"44 N*m"')
     starting_ratio: Number = parameter(
         "motor.starting_ratio", "1", "starting torque over rated torque", "2.2", "above 0", default=1.5
     )
-    maximum_torque: MaybeNumber = parameter(
-        "motor.maximum_torque", "N*m", "largest torque", '"52 N*m"', "above 0", default=None
+    maximum_torque: MaybeNumber = _maybe("motor.maximum_torque", "N*m", "largest torque", '"52 N*m"')
+    maximum_ratio: MaybeNumber = _maybe("motor.maximum_ratio", "1", "largest torque over rated torque", "2.6")
+    torque_lag: Number = _nothing("motor.torque_lag", "s", "lag of the torque behind its demand", '"2 ms"')
+    coupling_stiffness: MaybeNumber = _maybe(
+        "coupling.stiffness", "N*m/rad", "stiffness of the coupling on the motor shaft", '"1500 N*m/rad"'
     )
-    maximum_ratio: MaybeNumber = parameter(
-        "motor.maximum_ratio", "1", "largest torque over rated torque", "2.6", "above 0", default=None
+    coupling_play: Number = _nothing(
+        "coupling.play", "m", "play of the coupling along its circumference", '"0.1 mm"'
     )
-    torque_lag: Number = parameter(
-        "motor.torque_lag", "s", "lag of the torque behind its demand", '"2 ms"', "0 or more", default=0.0
+    coupling_diameter: MaybeNumber = _maybe(
+        "coupling.diameter", "m", "diameter on which the coupling has its play", '"60 mm"'
     )
-    coupling_stiffness: MaybeNumber = parameter(
-        "coupling.stiffness", "N*m/rad", "stiffness of the coupling on the motor shaft", '"1500 N*m/rad"',
-        "above 0", default=None,
-    )  # fmt: skip
-    coupling_play: Number = parameter(
-        "coupling.play", "m", "play of the coupling along its circumference", '"0.1 mm"', "0 or more",
-        default=0.0,
-    )  # fmt: skip
-    coupling_diameter: MaybeNumber = parameter(
-        "coupling.diameter", "m", "diameter on which the coupling has its play", '"60 mm"', "above 0",
-        default=None,
-    )  # fmt: skip
     ratio: Number = parameter(
         "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=1.0
     )
     efficiency: Number = parameter(
         "gear.efficiency", "1", "efficiency of all gears", "0.94", "above 0 and at most 1", default=0.95
     )
-    gear_stiffness: MaybeNumber = parameter(
-        "gear.stiffness", "N*m/rad", "stiffness of the gears at the output", '"25 N*m/arcmin"', "above 0",
-        default=None,
-    )  # fmt: skip
-    backlash: Number = parameter(
-        "gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"', "0 or more", default=0.0
+    gear_stiffness: MaybeNumber = _maybe(
+        "gear.stiffness", "N*m/rad", "stiffness of the gears at the output", '"25 N*m/arcmin"'
     )
-    shaft_diameter: MaybeNumber = parameter(
-        "output.diameter", "m", "diameter of the steel shaft behind the gears", '"55 mm"', "above 0",
-        default=None,
-    )  # fmt: skip
-    shaft_length: MaybeNumber = parameter(
-        "output.length", "m", "length of the steel shaft behind the gears", '"900 mm"', "above 0",
-        default=None,
-    )  # fmt: skip
-    output_play: Number = parameter(
-        "output.play", "m", "play of couplings and open gears behind it, along the circumference", '"0.4 mm"',
-        "0 or more", default=0.0,
-    )  # fmt: skip
-    play_diameter: MaybeNumber = parameter(
-        "output.play_diameter", "m", "diameter on which they have this play", '"120 mm"', "above 0",
-        default=None,
-    )  # fmt: skip
-    mass: MaybeNumber = parameter(
-        "load.mass", "kg", "mass that is moved", '"12000 kg"', "above 0", default=None
+    backlash: Number = _nothing("gear.backlash", "rad", "backlash of the gears at the output", '"15 arcmin"')
+    shaft_diameter: MaybeNumber = _maybe(
+        "output.diameter", "m", "diameter of the steel shaft behind the gears", '"55 mm"'
     )
-    radius: MaybeNumber = parameter(
-        "load.radius", "m", "radius of wheel or drum", '"0.1575 m"', "above 0", default=None
+    shaft_length: MaybeNumber = _maybe(
+        "output.length", "m", "length of the steel shaft behind the gears", '"900 mm"'
     )
+    output_play: Number = _nothing(
+        "output.play", "m", "play of couplings and open gears behind it, along the circumference", '"0.4 mm"'
+    )
+    play_diameter: MaybeNumber = _maybe(
+        "output.play_diameter", "m", "diameter on which they have this play", '"120 mm"'
+    )
+    mass: MaybeNumber = _maybe("load.mass", "kg", "mass that is moved", '"12000 kg"')
+    radius: MaybeNumber = _maybe("load.radius", "m", "radius of wheel or drum", '"0.1575 m"')
     reeving: Number = parameter(
         "load.reeving", "1", "falls of rope that carry the load for one that is wound", "2", "above 0",
         default=1.0,
     )  # fmt: skip
-    rope_stiffness: MaybeNumber = parameter(
-        "rope.stiffness", "N/m", "stiffness of one fall of the rope", '"0.8 MN/m"', "above 0", default=None
+    rope_stiffness: MaybeNumber = _maybe(
+        "rope.stiffness", "N/m", "stiffness of one fall of the rope", '"0.8 MN/m"'
     )
-    rope_length: MaybeNumber = parameter(
-        "rope.length", "m", "length of one fall of the rope", '"12 m"', "above 0", default=None
-    )
-    rope_diameter: MaybeNumber = parameter(
-        "rope.diameter", "m", "nominal diameter of the rope", '"14 mm"', "above 0", default=None
-    )
+    rope_length: MaybeNumber = _maybe("rope.length", "m", "length of one fall of the rope", '"12 m"')
+    rope_diameter: MaybeNumber = _maybe("rope.diameter", "m", "nominal diameter of the rope", '"14 mm"')
     rope_modulus: Number = parameter(
         "rope.modulus", "Pa", "modulus of the rope on its metallic cross-section", '"105 GPa"', "above 0",
         default=100e9,
@@ -242,12 +209,11 @@ class DataSheet(ParameterSet):
     resistance: MaybeNumber = parameter(
         "load.resistance", "1", "resistance to motion over weight", "0.008", "from 0 to 1", default=None
     )
-    output_inertia: Number = parameter(
-        "load.inertia", "kg*m^2", "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"',
-        "0 or more", default=0.0,
-    )  # fmt: skip
-    output_torque: Number = parameter(
-        "load.torque", "N*m", "further torque of the load at the output", '"20 N*m"', "0 or more", default=0.0
+    output_inertia: Number = _nothing(
+        "load.inertia", "kg*m^2", "inertia of drum, wheels or turning machine at the output", '"1.2 kg*m^2"'
+    )
+    output_torque: Number = _nothing(
+        "load.torque", "N*m", "further torque of the load at the output", '"20 N*m"'
     )
     motors: Number = parameter("load.motors", "1", "motors that share the load", "2", "above 0", default=1.0)
     damping_ratio: Number = parameter(
@@ -305,11 +271,7 @@ class DataSheet(ParameterSet):
         return document_text((table, given) for table in self.TABLES)
 
     def _fill(
-        self,
-        given: Mapping[str, object],
-        wording: Wording,
-        mistakes: Iterable[Mistake],
-        known: Mapping[str, Any] | None = None,
+        self, given: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake], *known: Any
     ) -> None:
         """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
         given = {FORMER.get(name, name): value for name, value in given.items()}
@@ -317,14 +279,13 @@ class DataSheet(ParameterSet):
         for name in USUAL if wording.style == "toml" else ():
             p, number = self.PARAMETERS[name], _bare(given.get(name))
             if float(number or 0.0) != 0.0:
-                reason = (
-                    f'no unit; write "{number} {USUAL[name]}" or, if {p.unit} is meant, "{number} {p.unit}"'
-                )
+                meant = f"or, if {p.unit} is meant, "
+                reason = f'no unit; write "{number} {USUAL[name]}" {meant}"{number} {p.unit}"'
                 wrong.append(Mistake(wording.refused(p, given[name], RefusedError(reason))))
         share = _bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
-        super()._fill(given | {"efficiency": f"{share} %"} if per_cent else given, wording, wrong, known)
+        super()._fill(given | {"efficiency": f"{share} %"} if per_cent else given, wording, wrong, *known)
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         given, of = vars(self)["_given"], self.PARAMETERS
@@ -477,96 +438,82 @@ class DataSheet(ParameterSet):
             M.insert(0, f"{what} on {arm:.5g} m")
         return inertia, ", ".join(J), torque, ", ".join(M) or "none"
 
-    def entries(self) -> dict[str, list[_Entry]]:
-        """The lines of the drive file by table: key, value as TOML, and what it is from."""
-        i, eta, rated = self.ratio, self._eta, self.rated
+    def _lines(self) -> dict[str, tuple[str, str]]:
+        """The drive file by parameter of a drive: the value as TOML, and what it is from."""
+        i, eta, rated, mark = self.ratio, self._eta, self.rated, self._mark
         stiffness = 1.0 / sum(1.0 / one for one in self._stiffnesses.values())
         through = "no gears"
         if i != 1.0 or eta != 1.0:
-            through = f"through {i:.5g}:1, efficiency {eta:.5g}{self._mark('efficiency')}"
+            through = f"through {i:.5g}:1, efficiency {eta:.5g}{mark('efficiency')}"
         shared = f", shared by {self.motors:.5g} motors" if self.motors != 1.0 else ""
-        at_output, inertia_from, torque, torque_from = self._load
+        inertia, inertia_from, torque, torque_from = self._load
         J1 = self.motor_inertia + self.added_inertia
-        J2 = at_output / (i**2 * eta) / self.motors
+        J2 = inertia / (i**2 * eta) / self.motors
         Mc = torque / (i * eta) / self.motors
         damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * J1 * J2 / (J1 + J2))
         speed = f'"{self.rated_speed * 30.0 / math.pi:.6g} rpm"'
-        hoist = self.machine == "hoist"
-        rope = "; rope assumed rigid" if "rope" in self.assumed else ""
+        hoist, gap = self.machine == "hoist", sum(self._gaps.values())
+        assumed = "; ".join(self.assumed.values())
+        unsaid = assumed and "source" not in self.given()
+        more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
 
         def parts(found: Mapping[str, float]) -> str:
             return "at the motor: " + ", ".join(f"{part} {value:.4g}" for part, value in found.items())
 
-        def line(key: str, number: float | None, unit: str, about: str) -> list[_Entry]:
-            return [] if number is None else [_Entry(key, f'"{number:.5g} {unit}"', about)]
+        def si(number: float | None, unit: str) -> str:
+            return "" if number is None else f'"{number:.5g} {unit}"'
 
-        def of_ratio(torque: float | None, ratio: float | None, mark: str = "") -> tuple[float | None, str]:
+        def of_ratio(torque: float | None, ratio: float | None, mark: str) -> tuple[str, str]:
             if torque is not None or ratio is None or rated is None:
-                return torque, "data sheet"
-            return ratio * rated, f"{ratio:.5g} times the rated torque{mark}"
+                return si(torque, "N*m"), "data sheet"
+            return si(ratio * rated, "N*m"), f"{ratio:.5g} times the rated torque{mark}"
 
-        rotor = f"rotor {self.motor_inertia:.5g}"
-        more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
-        starting, starting_from = of_ratio(
-            self.starting_torque, self.starting_ratio, self._mark("starting_ratio")
-        )
-        largest, largest_from = of_ratio(self.maximum_torque, self.maximum_ratio)
-        position = [_Entry("position", '"unknown"', "every figure is the worst of both flanks and mid-gap")]
-        if hoist:
-            position = [
-                _Entry("position", '"hanging"', "the brake holds the motor, the load winds up the shaft"),
-                _Entry("brake", '"motor"', ""),
-                _Entry("release", '"torque"', "torque proving"),
-            ]
-        assumed = "; ".join(self.assumed.values())
-        source = self.source + (" and assumed values" if assumed and "source" not in self.given() else "")
-        return {
-            "": [
-                _Entry("name", literal(self.name), ""),
-                _Entry("source", literal(source), ""),
-                *([_Entry("assumed", literal(assumed), "")] if assumed else []),
-            ],
-            "motor": [
-                *line("inertia", J1, "kg*m^2", rotor + more),
-                *line("starting_torque", starting, "N*m", starting_from),
-                *line("maximum_torque", largest, "N*m", largest_from),
-                *line("rated_power", self.rated_power and self.rated_power / 1e3, "kW", "plate"),
-                *line("rated_torque", self.rated_torque, "N*m", "plate"),
-                _Entry("rated_speed", speed, "plate"),
-                *line("torque_lag", 1e3 * self.torque_lag or None, "ms", "of the inverter"),
-            ],
-            "gear": [_Entry("ratio", f"{i:.5g}", "")] if "ratio" in self.given() else [],
-            "shaft": [
-                *line("stiffness", stiffness, "N*m/rad", f"in series, {parts(self._stiffnesses)}{rope}"),
-                *line(
-                    "damping", damping, "N*m*s/rad",
-                    f"damping ratio {self.damping_ratio:.5g}{self._mark('damping_ratio')}",
-                ),
-                *line("gap", sum(self._gaps.values()), "rad",
-                      parts(self._gaps) if self._gaps else f"none given{self._mark('backlash')}"),
-            ],
-            "load": [
-                *line("inertia", J2, "kg*m^2", f"{inertia_from}; {through}{shared}"),
-                *line("torque", Mc, "N*m", f"{torque_from}; {through}{shared}"),
-                _Entry("kind", '"active"', "a load that hangs") if hoist
-                else _Entry("kind", '"reactive"', "friction"),
-            ],
-            "start": [
-                *(position if hoist or self._gaps else []), _Entry("target_speed", speed, "rated speed")
-            ],
+        found = {
+            "name": (literal(self.name), ""),
+            "source": (literal(f"{self.source} and assumed values" if unsaid else self.source), ""),
+            "assumed": (literal(assumed) if assumed else "", ""),
+            "motor_inertia": (si(J1, "kg*m^2"), f"rotor {self.motor_inertia:.5g}{more}"),
+            "starting_torque": of_ratio(self.starting_torque, self.starting_ratio, mark("starting_ratio")),
+            "maximum_torque": of_ratio(self.maximum_torque, self.maximum_ratio, ""),
+            "rated_power": (si(self.rated_power and self.rated_power / 1e3, "kW"), "plate"),
+            "rated_torque": (si(self.rated_torque, "N*m"), "plate"),
+            "rated_speed": (speed, "plate"),
+            "torque_lag": (si(1e3 * self.torque_lag or None, "ms"), "of the inverter"),
+            "gear_ratio": (f"{i:.5g}" if "ratio" in self.given() else "", ""),
+            "stiffness": (si(stiffness, "N*m/rad"),
+                          f"in series, {parts(self._stiffnesses)}"
+                          f"{'; rope assumed rigid' if 'rope' in self.assumed else ''}"),
+            "damping": (si(damping, "N*m*s/rad"),
+                        f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
+            "gap": (si(gap, "rad"), parts(self._gaps) if gap else f"none given{mark('backlash')}"),
+            "load_inertia": (si(J2, "kg*m^2"), f"{inertia_from}; {through}{shared}"),
+            "load_torque": (si(Mc, "N*m"), f"{torque_from}; {through}{shared}"),
+            "load_kind": ('"active"', "a load that hangs") if hoist else ('"reactive"', "friction"),
+            "target_speed": (speed, "rated speed"),
         }  # fmt: skip
+        if hoist:
+            found |= {
+                "start_position": ('"hanging"', "the brake holds the motor, the load winds up the shaft"),
+                "brake": ('"motor"', ""),
+                "release": ('"torque"', "torque proving"),
+            }
+        elif gap:
+            found["start_position"] = ('"unknown"', "every figure is the worst of both flanks and mid-gap")
+        return found
 
     def drive_toml(self) -> str:
         """The drive file: every number at the motor shaft, with what it is from in a comment."""
-        blocks = []
-        for table, lines in self.entries().items():
+        blocks, found = [], self._lines()
+        for table in Drive.TABLES:
+            lines = [(p.key, *found[p.name]) for p in table.parameters if found.get(p.name, ("",))[0]]
             wide = max((len(f"{key} = {value}") for key, value, about in lines if about), default=0)
             rows = [
                 f"{f'{key} = {value}':{wide}}  # {about}" if about else f"{key} = {value}"
                 for key, value, about in lines
             ]
-            blocks.append("\n".join([f"[{table}]", *rows] if table else rows) if rows else "")
-        return "\n\n".join(filter(None, blocks)) + "\n"
+            if rows:
+                blocks.append("\n".join([f"[{table.name}]", *rows] if table.name else rows))
+        return "\n\n".join(blocks) + "\n"
 
     @cached_property
     def drive(self) -> Drive:
@@ -609,7 +556,7 @@ def if_empty(p: Parameter) -> str:
         return f"{TYPICAL[p.name][0]}, assumed"
     other = next((name for name, instead in INSTEAD.items() if instead == p.name), "")
     if other:
-        return f"by {DataSheet.PARAMETERS[other].meaning}"
+        return f"by {DataSheet.PARAMETERS[other].key.replace('_', ' ')}"
     return f"{p.default:g}" if isinstance(p.default, float) and p.default else p.default or "none"
 
 

@@ -26,18 +26,9 @@ MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer 
 _DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
 
 __all__ = [
-    "Table",
-    "changed",
-    "document_text",
-    "literal",
-    "made",
-    "parsed",
-    "placed",
-    "read_document",
-    "read_table",
-    "renamed",
-    "table_text",
-]
+    "Table", "changed", "document_text", "literal", "made", "parsed", "placed", "read_document",
+    "read_table", "renamed", "table_text",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, dataclass_transform
 
 import numpy as np
 import numpy.typing as npt
@@ -31,64 +31,26 @@ from softstart.input.parameters import (
 from softstart.quantities import Value, nearest, show
 
 __all__ = [
-    "MaybeNumber",
-    "MaybeNumbers",
-    "MaybeSeries",
-    "Number",
-    "Numbers",
-    "NumbersOrWord",
-    "ParameterSet",
-    "Series",
-    "like",
-    "meant_by",
-    "parameter",
-]
+    "MaybeNumber", "MaybeNumbers", "MaybeSeries", "Number", "Numbers", "NumbersOrWord", "ParameterSet",
+    "Series", "like", "meant_by", "parameter",
+]  # fmt: skip
 
 if TYPE_CHECKING:
-    # To type checkers a field is a descriptor: given as a number, a text with a unit or an array of these,
-    # and read as a number in SI.
-    class Number:
-        """A float; given as a number or as text with a unit."""
+    Read_co = TypeVar("Read_co", covariant=True)
 
-        def __get__(self, one: object, owner: Any) -> float: ...
-        def __set__(self, one: object, given: float | str | None) -> None: ...
+    class Given(Generic[Read_co]):
+        """A field to type checkers: given as numbers or texts with units, and read in SI."""
 
-    class MaybeNumber:
-        """A float, or None where it is not given."""
-
-        def __get__(self, one: object, owner: Any) -> float | None: ...
-        def __set__(self, one: object, given: float | str | None) -> None: ...
-
-    class Numbers:
-        """A float or an array."""
-
-        def __get__(self, one: object, owner: Any) -> Value: ...
-        def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
-
-    class NumbersOrWord:
-        """A float, an array, or one of the parameter's words."""
-
-        def __get__(self, one: object, owner: Any) -> Value | str: ...
-        def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
-
-    class MaybeNumbers:
-        """A float, an array, or None where it is not given."""
-
-        def __get__(self, one: object, owner: Any) -> Value | None: ...
-        def __set__(self, one: object, given: npt.ArrayLike | None) -> None: ...
-
-    class Series:
-        """Several numbers."""
-
-        def __get__(self, one: object, owner: Any) -> tuple[float, ...]: ...
+        def __get__(self, one: object, owner: Any) -> Read_co: ...
         def __set__(self, one: object, given: Sequence[float | str] | npt.ArrayLike | None) -> None: ...
 
-    class MaybeSeries:
-        """Several numbers, or None where they are not given."""
-
-        def __get__(self, one: object, owner: Any) -> tuple[float, ...] | None: ...
-        def __set__(self, one: object, given: Sequence[float | str] | npt.ArrayLike | None) -> None: ...
-
+    Number = Given[float]
+    MaybeNumber = Given[float | None]
+    Numbers = Given[Value]
+    MaybeNumbers = Given[Value | None]
+    NumbersOrWord = Given[Value | str]
+    Series = Given[tuple[float, ...]]
+    MaybeSeries = Given[tuple[float, ...] | None]
 else:
     Number, MaybeNumber, Numbers, MaybeNumbers = float, float | None, Value, Value | None
     NumbersOrWord = Value | str

@@ -12,15 +12,8 @@ import numpy as np
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED",
-    "Limit",
-    "Mistake",
-    "Parameter",
-    "Wording",
-    "read_value",
-    "read_values",
-    "sentences_of",
-]
+    "REQUIRED", "Limit", "Mistake", "Parameter", "Wording", "read_value", "read_values", "sentences_of",
+]  # fmt: skip
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
 LEAST, MOST = 1e-30, 1e30

@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from softstart.drive.data_sheet import ABOUT, MACHINES, TYPICAL, USUAL, DataSheet, echo, if_empty, typed
+from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
@@ -15,6 +16,7 @@ from softstart.page.panel_parts import action, box, choice, few, field, guarded,
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
+from softstart.views.printed import unit as printed
 
 TITLES = {
     "load": "Machine",
@@ -71,21 +73,20 @@ class DataSheetPanel:
             if machine in ABOUT.get(p.name, (machine,))
             and (text := typed(p, str(self._fields[p.name].value)))
         }
-        self._troubles.clear()
+        found: DataSheet | None = None
         try:
             found = DataSheet.from_settings(written)
-            _ = found.drive
+            title, sentences = "Check these values.", doubts(found.drive)
         except InputError as error:
-            self._troubles.set_visibility(True)
-            self._text.set_visibility(False)
-            with self._troubles:
-                ui.label("There is no drive yet.").classes("trouble-title")
-                for sentence in few(error.sentences):
-                    ui.label(sentence).classes("trouble")
-            return None
-        self._troubles.set_visibility(False)
-        self._text.set_text(found.drive_toml())
-        self._text.set_visibility(True)
+            found, title, sentences = None, "There is no drive yet.", list(error.sentences)
+        self._troubles.clear()
+        self._troubles.set_visibility(bool(sentences))
+        with self._troubles:
+            ui.label(title).classes("trouble-title")
+            for sentence in few(sentences):
+                ui.label(sentence).classes("trouble")
+        self._text.set_visibility(found is not None)
+        self._text.set_text("" if found is None else found.drive_toml())
         return found
 
     def _use(self) -> None:
@@ -102,7 +103,7 @@ def made(p: Parameter) -> Any:
     """The field of one parameter with an example; below it its value in SI, or what is used without."""
     needed = p.required or p.name in ("mass", "radius")
     unit = USUAL.get(p.name, p.unit)
-    label = p.meaning[0].upper() + p.meaning[1:] + (f", {unit}" if unit not in ("", "1") else "")
+    label = p.meaning[0].upper() + p.meaning[1:] + (f", {printed(unit)}" if unit not in ("", "1") else "")
     name = f"sheet-{p.path.replace('.', '-') or p.name}"
     if p.choices:
         words = {word: f"{word}: {about}" for word, about in MACHINES.items()}

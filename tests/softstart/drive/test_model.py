@@ -11,8 +11,6 @@ import typing
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, TABLES, Drive
 from softstart.errors import InputError
@@ -87,18 +85,6 @@ def test_the_same_drive_in_other_units(crane):
     )
     assert other == crane
     assert hash(other) == hash(crane)
-
-
-@settings(deadline=None)  # the first example imports pint
-@given(
-    scale=st.sampled_from([("deg", math.pi / 180), ("arcmin", math.pi / 10800), ("turn", 2 * math.pi)]),
-    gap=st.floats(1e-4, 1e2),
-)
-def test_a_change_of_unit_changes_nothing(scale, gap):
-    unit, size = scale
-    drive = Drive(**CRANE | {"gap": f"{gap!r} {unit}", "stiffness": f"{gap!r} N*m/{unit}"})
-    assert drive.gap == pytest.approx(gap * size, rel=1e-15)
-    assert drive.stiffness == pytest.approx(gap / size, rel=1e-15)
 
 
 def test_replace_follows_and_checks(crane):
