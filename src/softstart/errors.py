@@ -6,8 +6,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
-from softstart.language import said
-
 MORE_MISTAKES = re.compile(r"(\d+) more things are wrong\.")
 MOST, LONGEST = 30, 1500  # sentences of one error, and letters of one sentence: more would fill pages
 
@@ -101,4 +99,4 @@ def listed(words: Sequence[str]) -> str:
     """
     if len(words) < 2:
         return "".join(words)
-    return said("{words} and {last}", words=", ".join(words[:-1]), last=words[-1])
+    return f"{', '.join(words[:-1])} and {words[-1]}"

@@ -18,7 +18,6 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive import Drive
-from softstart.language import later
 from softstart.plant.exchange import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
 Kind = Literal["quantity", "text", "object"]
@@ -88,12 +87,12 @@ class Effort(Enum):
     def meaning(self) -> str:
         """What is needed, in words."""
         return {
-            Effort.CONTACTOR: later("a contactor"),
-            Effort.RAMPS: later("an inverter with torque ramps"),
-            Effort.STEPS: later("an inverter with torque steps"),
-            Effort.CODE: later("code of your own in the inverter"),
-            Effort.ENCODER: later("code of your own in the inverter, and an encoder"),
-            Effort.SENSOR: later("a sensor that drives do not have"),
+            Effort.CONTACTOR: "a contactor",
+            Effort.RAMPS: "an inverter with torque ramps",
+            Effort.STEPS: "an inverter with torque steps",
+            Effort.CODE: "code of your own in the inverter",
+            Effort.ENCODER: "code of your own in the inverter, and an encoder",
+            Effort.SENSOR: "a sensor that drives do not have",
         }[self]
 
 

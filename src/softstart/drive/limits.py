@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softstart.input.parameters import Parameter, Wording
-from softstart.language import later
 
 __all__ = ["INFORMATIVE_TABLES", "Limits", "SNCurve", "contradicting_limits", "limits_of"]
 
@@ -133,10 +132,10 @@ class Limits:
     def each(self) -> tuple[Limit, ...]:
         """The limits that there are; of the life the share in per cent that the starts asked for use."""
         found = (
-            Limit(later("shaft torque"), "N m", "peak_torque", self.shaft_torque),
-            Limit(later("permissible torque"), "%", "used_torque", self.used_torque),
-            Limit(later("start time"), "s", "start_time", self.start_time),
-            Limit(later("used life"), "%", "used_life", None if self.life is None else 100.0),
+            Limit("shaft torque", "N m", "peak_torque", self.shaft_torque),
+            Limit("permissible torque", "%", "used_torque", self.used_torque),
+            Limit("start time", "s", "start_time", self.start_time),
+            Limit("used life", "%", "used_life", None if self.life is None else 100.0),
         )
         return tuple(one for one in found if one.most is not None)
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.vibration import Vibration, natural_vibration
-from softstart.language import later, said
 
 _AXIS, _TALLEST, _THICK = 215.0, 150.0, 16.0  # px: height of the shaft axis, tallest disc, thickness of discs
 _SHORTEST, _SPRING, _GAP, _LEAST_GAP = 44.0, 420.0, 90.0, 3.0  # px: springs, and what all gaps share
@@ -26,8 +25,8 @@ _FOLDED, _LONGEST = 18, 28  # letters: longer names are folded at the joints of 
 _SHAPE, _SWING = 430.0, 60.0  # px: zero line of the shape, its largest amplitude
 _INK, _STEEL, _RED, _BLUE, _GREY = "#1d2733", "#b9c6d3", "#c2403a", "#2f6da8", "#6b7785"
 _FOOT = (
-    later("At the motor shaft: inertias in kg m2 below the discs, stiffnesses in N m/rad and gaps in rad."),
-    later(
+    "At the motor shaft: inertias in kg m2 below the discs, stiffnesses in N m/rad and gaps in rad.",
+    (
         "Disc height goes with the fourth root of inertia, spring length with compliance, gaps with their "
         "angle."
     ),
@@ -56,7 +55,7 @@ def scheme_svg(chain: Chain) -> str:
         tops.append(_AXIS - 0.5 * float(tall[k]) - 8.0)
         parts.append(text(middle, bottom + 18.0, _number(float(arrays.J[k])), size=11))
         if k == arrays.motor and chain.motor is not None:
-            parts += _arrow(middle, bottom + 30.0, said("motor"), _RED)
+            parts += _arrow(middle, bottom + 30.0, "motor", _RED)
         if arrays.Mc[k] != 0.0:
             parts += _arrow(middle, bottom + 30.0, f"Mc {_number(float(arrays.Mc[k]))} N m", _BLUE)
         x += _THICK
@@ -68,15 +67,13 @@ def scheme_svg(chain: Chain) -> str:
     width = max(x + 110.0, right + 10.0, 1010.0)
     heading = [text(24.0, 30.0, chain.name, 16, anchor="start")]
     if chain.assumed:
-        assumed = said("assumed: {values}", values=chain.assumed)
+        assumed = f"assumed: {chain.assumed}"
         folded = textwrap.wrap(assumed, int((width - 48.0) / _LETTER), max_lines=2, placeholder=" ...")
         heading += [
             text(24.0, 49.0 + _LINE * i, line, 12, _GREY, anchor="start", whole=assumed)
             for i, line in enumerate(folded)
         ]
-    foot = [
-        text(24.0, 523.0 + 15.0 * i, said(line), 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)
-    ]
+    foot = [text(24.0, 523.0 + 15.0 * i, line, 11, _GREY, anchor="start") for i, line in enumerate(_FOOT)]
     return (
         f'<svg class="scheme" xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="550" '
         f'viewBox="0 0 {width:.0f} 550" font-family="DejaVu Sans, Helvetica, Arial, sans-serif">\n'
@@ -110,7 +107,7 @@ def _folded(name: str) -> list[str]:
     """A long name in lines; of many merged masses the first and the last."""
     lines = name.split(" + ") if len(name) > _FOLDED else [name]
     if len(lines) > 4:
-        lines = [lines[0], said("{count} more", count=len(lines) - 2), lines[-1]]
+        lines = [lines[0], f"{len(lines) - 2} more", lines[-1]]
     return [_cut(line) for line in lines]
 
 
@@ -145,7 +142,7 @@ def _shaft(parts: list[str], x: float, chain: Chain, arrays: ChainArrays, k: int
     if arrays.gap[k] > 0.0:
         opening = _LEAST_GAP + _GAP * float(arrays.gap[k] / arrays.gap.sum())
         x = _jaws(parts, x, opening)
-        labels.append(said("gap {gap}", gap=_number(float(arrays.gap[k]))))
+        labels.append(f"gap {_number(float(arrays.gap[k]))}")
     if geared and shaft.side == "before":
         x = _gear(parts, x, shaft.ratio, shaft.efficiency)
     for i, label in enumerate(labels):
@@ -210,10 +207,8 @@ def _shape(vibration: Vibration, middles: list[float]) -> list[str]:
         parts.append(
             f'<circle cx="{x:.1f}" cy="{_SHAPE}" r="4.5" fill="white" stroke="{_RED}" stroke-width="2"/>'
         )
-        parts.append(text(x, _SHAPE + 20.0, said("node"), size=10, colour=_RED))
-    shape = said(
-        "first elastic shape, {frequency} Hz, gaps closed", frequency=_number(float(vibration.frequency[1]))
-    )
+        parts.append(text(x, _SHAPE + 20.0, "node", size=10, colour=_RED))
+    shape = f"first elastic shape, {_number(float(vibration.frequency[1]))} Hz, gaps closed"
     parts.append(text(middles[0], _SHAPE + 72.0, shape, size=12, colour=_BLUE, anchor="start"))
     return parts
 

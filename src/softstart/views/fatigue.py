@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.drive import Drive
-from softstart.language import later, said
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import (
@@ -38,9 +37,9 @@ if TYPE_CHECKING:
     from softstart.chain.fatigue import ChainFatigue, ShaftLife
 
 SPECTRUM = ("range N m", "mean N m", "count")
-EQUIVALENT = later(
-    "Equivalent torque: one cycle of it from 0 and back in each start does the same damage (rainflow cycles "
-    "after ASTM E1049, Miner's rule, without an endurance limit)."
+EQUIVALENT = (
+    "Equivalent torque: one cycle of it from 0 and back in each start does the same damage "
+    "(rainflow cycles after ASTM E1049, Miner's rule, without an endurance limit)."
 )
 
 
@@ -64,25 +63,25 @@ def counted(value: float) -> str:
 def fatigue_table(found: Fatigue, rows: Sequence[Life], title: str = "") -> Table:
     """The strategies and what they do to the shaft line."""
     cells = {
-        later("strategy"): [row.run.controller_name for row in rows],
-        later("K_dyn"): [number(row.run.k_dyn, 3) for row in rows],
-        later("start\ntime s"): column_of([row.run.start_time for row in rows]),
-        later("equivalent\ntorque N m"): column_of([row.equivalent_torque for row in rows]),
-        later("life over\ndirect"): [factor(row.relative) for row in rows],
+        "strategy": [row.run.controller_name for row in rows],
+        "K_dyn": [number(row.run.k_dyn, 3) for row in rows],
+        "start\ntime s": column_of([row.run.start_time for row in rows]),
+        "equivalent\ntorque N m": column_of([row.equivalent_torque for row in rows]),
+        "life over\ndirect": [factor(row.relative) for row in rows],
     }
     if found.estimate:
-        cells[later("half\ndamping")] = [factor(row.relative_range[0]) for row in rows]
-        cells[later("twice\ndamping")] = [factor(row.relative_range[1]) for row in rows]
+        cells["half\ndamping"] = [factor(row.relative_range[0]) for row in rows]
+        cells["twice\ndamping"] = [factor(row.relative_range[1]) for row in rows]
     if found.curve.points:
-        cells[later("starts to\nfailure")] = [counted(row.starts) for row in rows]
+        cells["starts to\nfailure"] = [counted(row.starts) for row in rows]
         if found.drive.limits.starts_per_hour is not None:
-            cells[later("years")] = [counted(row.years) for row in rows]
+            cells["years"] = [counted(row.years) for row in rows]
     if not math.isnan(found.worn_gap):
-        cells[later("life over\ndirect, worn")] = [factor(row.worn_relative) for row in rows]
+        cells["life over\ndirect, worn"] = [factor(row.worn_relative) for row in rows]
         if any(not math.isnan(row.worn_hours) for row in rows):
-            cells[later("years,\nworn")] = [counted(row.worn_years) for row in rows]
-    cells[later("impacts")] = [str(row.impacts) for row in rows]
-    cells[later("their\nenergy J")] = column_of([row.impact_energy for row in rows], 3)
+            cells["years,\nworn"] = [counted(row.worn_years) for row in rows]
+    cells["impacts"] = [str(row.impacts) for row in rows]
+    cells["their\nenergy J"] = column_of([row.impact_energy for row in rows], 3)
     return Table.of(title, cells, ("strategy",))
 
 
@@ -93,48 +92,39 @@ def conclusion(found: Fatigue) -> str:
     best = max(reaching, key=lambda row: row.worn_relative if worn else row.relative)
     name = best.run.controller_name
     if name == REFERENCE:
-        return said("Longest life: direct while the gap wears.") if worn else said("Longest life: direct.")
+        return "Longest life: direct while the gap wears." if worn else "Longest life: direct."
     values = {"name": name, "life": factor(best.worn_relative if worn else best.relative)}
     text = (
-        said("Longest life: {name}, {life} times that of direct while the gap wears", **values)
+        "Longest life: {name}, {life} times that of direct while the gap wears".format(**values)
         if worn
-        else said("Longest life: {name}, {life} times that of direct", **values)
+        else "Longest life: {name}, {life} times that of direct".format(**values)
     )
     years = best.worn_years if worn else best.years
-    return (
-        f"{text}." if math.isnan(years) else said("{life}, {years} years.", life=text, years=counted(years))
-    )
+    return f"{text}." if math.isnan(years) else f"{text}, {counted(years)} years."
 
 
 def notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     drive, limits = found.drive, found.drive.limits
     if found.curve.slope is None:
-        curve = said(
-            "The S-N curve has the {points} points of limits.fatigue.", points=len(found.curve.points)
-        )
+        curve = f"The S-N curve has the {len(found.curve.points)} points of limits.fatigue."
     elif found.slope_given:
-        curve = said("Slope of the S-N curve: m = {slope}.", slope=short(found.curve.slope))
+        curve = f"Slope of the S-N curve: m = {short(found.curve.slope)}."
     else:
-        curve = said(
-            "Slope of the S-N curve: m = {slope}, that of pitting of case-hardened gears (ISO 6336-2), as "
-            "neither --slope nor limits.fatigue is given.",
-            slope=short(found.curve.slope),
+        curve = (
+            f"Slope of the S-N curve: m = {short(found.curve.slope)}, that of pitting of "
+            "case-hardened gears (ISO 6336-2), as neither --slope nor limits.fatigue is given."
         )
-    text = [f"{said(EQUIVALENT)} {curve}"]
+    text = [f"{EQUIVALENT} {curve}"]
     ratio = f"{100.0 * found.damping_ratio:.2g} %"
     if found.estimate:
         parts = " and ".join(f"{count} {name}" for name, count in found.estimate.items())
         text.append(
-            said(
-                "The damping is ESTIMATED: a ratio of {ratio} from {parts} (1 % a pair of gears, 0.5 % a "
-                "coupling, at most 6 %). The columns beside show the life with half and with twice of it.",
-                ratio=ratio,
-                parts=parts,
-            )
+            f"The damping is ESTIMATED: a ratio of {ratio} from {parts} (1 % a pair of gears, 0.5 % a "
+            "coupling, at most 6 %). The columns beside show the life with half and with twice of it."
         )
     else:
-        text.append(said("Damping ratio of the shaft: {ratio}.", ratio=ratio))
+        text.append(f"Damping ratio of the shaft: {ratio}.")
     if not math.isnan(found.worn_gap):
         error = max(row.wear_error for row in found.rows)
         values = {
@@ -143,48 +133,33 @@ def notes(found: Fatigue) -> list[str]:
             "error": f"{float(f'{100.0 * error:.1g}'):g}",
         }
         text.append(
-            said(
+            (
                 "Worn: the gap grows in proportion to time from {new} to {worn} rad over the life, and "
-                "Miner's rule adds the damage; error of the sum at most {error} %.",
-                **values,
-            )
+                "Miner's rule adds the damage; error of the sum at most {error} %."
+            ).format(**values)
             if limits.life is None
-            else said(
-                "Worn: the gap grows in proportion to time from {new} to {worn} rad over {years:.3g} years, "
-                "and Miner's rule adds the damage; error of the sum at most {error} %.",
-                years=limits.life / 3600.0 / HOURS_PER_YEAR,
-                **values,
-            )
+            else (
+                "Worn: the gap grows in proportion to time from {new} to {worn} rad over {years:.3g} "
+                "years, and Miner's rule adds the damage; error of the sum at most {error} %."
+            ).format(years=limits.life / 3600.0 / HOURS_PER_YEAR, **values)
         )
     if limits.starts_per_hour is not None and found.curve.points:
-        text.append(
-            said(
-                "Years of 8766 h with {starts_per_hour} starts in each hour.",
-                starts_per_hour=short(float(limits.starts_per_hour)),
-            )
-        )
+        text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
     if limits.starts is not None and limits.starts_per_hour is not None and found.curve.points:
         asked, worn = limits.starts / limits.starts_per_hour, not math.isnan(found.worn_gap)
         names: dict[bool, list[str]] = {True: [], False: []}
         for row in found.rows:
             names[(row.worn_hours if worn else row.hours) >= asked].append(row.run.controller_name)
-        kept = said(
-            "The life asked for, {starts:.3g} starts, is reached by: {names}",
-            starts=limits.starts,
-            names=", ".join(names[True]) or said("none"),
+        kept = (
+            f"The life asked for, {limits.starts:.3g} starts, is reached by: "
+            f"{', '.join(names[True]) or 'none'}"
         )
-        text.append(
-            said("{kept}; not by: {names}.", kept=kept, names=", ".join(names[False]))
-            if names[False]
-            else f"{kept}."
-        )
+        text.append(f"{kept}; not by: {', '.join(names[False])}." if names[False] else f"{kept}.")
     worst = [
         f"{row.run.controller_name} {row.run.position}" for row in found.rows if len(drive.positions) > 1
     ]
     if worst:
-        text.append(
-            said("The start position is unknown: most damage is done from {worst}.", worst=", ".join(worst))
-        )
+        text.append(f"The start position is unknown: most damage is done from {', '.join(worst)}.")
     return text
 
 
@@ -195,18 +170,18 @@ def chain_tables(found: ChainFatigue) -> list[Table]:
 
     def table(title: str, cell: Callable[[ShaftLife], str]) -> Table:
         columns = {name: [cell(row[k]) for row in found.rows] for k, name in enumerate(shafts)}
-        return Table.of(title, {later("strategy"): names, **columns}, ("strategy",))
+        return Table.of(title, {"strategy": names, **columns}, ("strategy",))
 
     tables = [
         table(
-            said("Damage-equivalent torque at the motor shaft, N m"),
+            "Damage-equivalent torque at the motor shaft, N m",
             lambda one: number(one.equivalent_torque, 1),
         ),
-        table(said("Life over that under direct"), lambda one: factor(one.relative)),
+        table("Life over that under direct", lambda one: factor(one.relative)),
     ]
     if any(not math.isnan(life.used) for row in found.rows for life in row):
         tables.append(
-            table(said("Largest torque, % of the permissible one"), lambda one: number(100.0 * one.used, 1))
+            table("Largest torque, % of the permissible one", lambda one: number(100.0 * one.used, 1))
         )
     return tables
 
@@ -217,38 +192,28 @@ def chain_conclusion(found: ChainFatigue) -> str:
     best = max(least, key=lambda life: life.relative)
     name = best.run.controller_name
     if name == REFERENCE:
-        return said("Longest life of the shaft that gains least: direct.")
+        return "Longest life of the shaft that gains least: direct."
     shaft = found.chain.shaft_names[best.shaft]
     life = factor(best.relative)
-    return said(
-        "Longest life: {name}; the shaft that gains least, {shaft}, has {life} times that under direct.",
-        name=name,
-        shaft=shaft,
-        life=life,
-    )
+    return f"Longest life: {name}; the shaft that gains least, {shaft}, has {life} times that under direct."
 
 
 def chain_notes(found: ChainFatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     slope = short(found.slope)
     curve = (
-        said("Slope of the S-N curve: m = {slope}.", slope=slope)
+        f"Slope of the S-N curve: m = {slope}."
         if found.slope_given
-        else said(
-            "Slope of the S-N curve: m = {slope}, that of pitting of case-hardened gears (ISO 6336-2).",
-            slope=slope,
-        )
+        else f"Slope of the S-N curve: m = {slope}, that of pitting of case-hardened gears (ISO 6336-2)."
     )
-    text = [f"{said(EQUIVALENT)} {curve}"]
+    text = [f"{EQUIVALENT} {curve}"]
     worst = [
         f"{row[0].run.controller_name} {', '.join(sorted({life.run.position for life in row}))}"
         for row in found.rows
         if len(found.chain.positions) > 1
     ]
     if worst:
-        text.append(
-            said("The start position is unknown: most damage is done from {worst}.", worst="; ".join(worst))
-        )
+        text.append(f"The start position is unknown: most damage is done from {'; '.join(worst)}.")
     return text
 
 
@@ -289,9 +254,9 @@ def fatigue_figure(found: Fatigue) -> Any:
         left.legend(fontsize=8)
         head(
             left,
-            said("cycles of one start"),
-            said("range of the shaft torque, N m"),
-            said("cycles of at least this range"),
+            "cycles of one start",
+            "range of the shaft torque, N m",
+            "cycles of at least this range",
         )
         for index, row in enumerate(rows):
             if math.isfinite(row.relative):
@@ -304,11 +269,11 @@ def fatigue_figure(found: Fatigue) -> Any:
         right.invert_yaxis()
         slope = "" if found.curve.slope is None else f", m = {short(found.curve.slope)}"
         damping = (
-            said("damping ratio {percent:.2g} % (estimated)", percent=100.0 * found.damping_ratio)
+            f"damping ratio {100.0 * found.damping_ratio:.2g} % (estimated)"
             if found.estimate
-            else said("damping ratio {percent:.2g} %", percent=100.0 * found.damping_ratio)
+            else f"damping ratio {100.0 * found.damping_ratio:.2g} %"
         )
-        head(right, f"{damping}{slope}", "", said("life over that of direct"))
+        head(right, f"{damping}{slope}", "", "life over that of direct")
         entitle(figure, found.drive.name)
     return figure
 
