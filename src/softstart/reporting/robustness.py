@@ -200,7 +200,7 @@ def maps_figure(
             panel.set_xticks(
                 range(columns), [f"{v / inertia:.3g}" for v in first.inertias], fontsize=SMALL - 0.5
             )
-            panel.set_yticks(range(rows), [f"{v / gap:.3g}" for v in gaps], fontsize=SMALL - 0.5)
+            panel.set_yticks(range(rows), [f"{v / gap:.4g}" for v in gaps], fontsize=SMALL - 0.5)
             panel.tick_params(length=0)
         for panel in axes.flat[len(shown) :]:
             panel.set_axis_off()
@@ -218,7 +218,7 @@ def maps_figure(
 
 def _thousand(values: Sequence[float]) -> float:
     """The power of a thousand in whose multiples small or large numbers are short, 1 for usual ones."""
-    if max(values) == 0.0 or (values[0] >= 1e-2 and max(values) < 1e3):
+    if max(values) == 0.0 or (values[0] >= 1e-2 and max(values) < 1e4):
         return 1.0
     return 1e3 ** math.floor(math.log10(max(values)) / 3.0)
 
