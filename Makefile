@@ -1,10 +1,11 @@
 # softstart: two commands do everything on a machine with Python 3.11+ and make.
 #   make compare        the main job on the crane drive: table, plots, report in results/
-#   make test           the whole test suite
+#   make test           the test suite, five minutes on two cores; without the slow tests
 #   make serve          the interactive page, in the browser
 # and for those who work on it (CONTRIBUTING.md):
 #   make check                 lint, types, layers and the tests of what has changed: under two minutes
 #   make lint types layers     ruff, mypy, import-linter
+#   make slow                  the tests that `make test` leaves out: each takes 2 s of processor time or more
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': some of them
 #   make pictures              the pictures of the README (needs chromium)
@@ -23,13 +24,16 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 unexport PYTHONDONTWRITEBYTECODE  # hundreds of processes: each would compile all modules and rewrite all tests anew
 
-.PHONY: compare test check fuzz everything floors serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
+.PHONY: compare test slow check fuzz everything floors serve lint types layers page pictures package package-check package-test benchmark docs docs-commands clean
 
 compare: $(VENV)/.installed
 	$(BIN)/softstart compare --out results
 
 test: $(VENV)/.installed-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal  # a worker a core: more threads spin
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"  # a worker a core
+
+slow: $(VENV)/.installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m slow
 
 check: $(VENV)/.installed-dev lint types layers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python .ci/touched.py | xargs $(BIN)/python -m pytest -q -n auto -m "not slow"

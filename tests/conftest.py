@@ -136,32 +136,18 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
         gc.enable()
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Slow tests first in each worker, so that none is left for the end."""
-    items[:] = dealt(items, getattr(config, "workerinput", {}).get("workercount", 1))
+SLOW = (  # docstrings whose example takes some seconds
+    "softstart.optimal.chains.problem.ChainProblem.casadi",
+    "softstart.optimal.result.RobustOptimum",
+    "softstart.optimal.robust.solving.optimize_robust",
+)
 
 
-def dealt(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
-    """The tests in an order whose `workers` equal shares begin with files that hold slow tests.
-
-    pytest-xdist gives each worker one share, and the worker that is done first a part of the end of another
-    one's share. Files stay together, since their tests share fixtures.
-    """
-    files: dict[str, list[pytest.Item]] = {}
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A docstring cannot carry a mark."""
     for item in items:
-        files.setdefault(item.nodeid.partition("::")[0], []).append(item)
-    slow = {name: sum(one.get_closest_marker("slow") is not None for one in files[name]) for name in files}
-    hands: list[list[str]] = [[] for _ in range(workers)]
-    for name in sorted((name for name in files if slow[name]), key=lambda name: -slow[name]):
-        min(hands, key=lambda hand: sum(slow[one] for one in hand)).append(name)
-    rest = [item for name in files if not slow[name] for item in files[name]]
-    found: list[pytest.Item] = []
-    for i, hand in enumerate(hands):
-        for name in hand:
-            found += sorted(files[name], key=lambda one: one.get_closest_marker("slow") is None)
-        fill = max(0, len(items) * (i + 1) // workers - len(found))
-        found, rest = found + rest[:fill], rest[fill:]
-    return found + rest
+        if item.name in SLOW:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def test_estimates_stay_close(gap: float, J2: float, lag: float, kind: Any) -> N
 def test_rounding_alone_is_never_a_contact() -> None:
     """Five standard deviations are enough for the encoder's rounding, at every phase and speed."""
     rng = np.random.default_rng(6)
-    for _ in range(40):
+    for _ in range(15):
         drive = random_drive(rng, load_kind="reactive")
         gap = 30 * drive.gap + 5 * drive.Ms / drive.c
         wide = drive.replace(gap=gap, start_position=rng.uniform(0, 1e-3) * gap)

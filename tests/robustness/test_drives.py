@@ -380,7 +380,7 @@ def judged(seed: int, number: int) -> tuple[str, list[str]]:
 @pytest.mark.parametrize("block", range(4))
 def test_extreme_drives(block: int) -> None:
     judged(0, 0)  # compiled and loaded
-    found = {number: judged(0, number) for number in range(6 * block, 6 * block + 6)}
+    found = {number: judged(0, number) for number in range(6 * block, 6 * block + 3)}
     assert not {number: wrong for number, (_, wrong) in found.items() if wrong}
     assert "oracle" in {how for how, _ in found.values()}
 

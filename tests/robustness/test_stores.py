@@ -395,6 +395,7 @@ def attacked(damages: int, kills: int, seed: int, limit: float) -> tuple[Counter
     return counts, violations
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc and forks")
 def test_damaged_stores_and_kills() -> None:
     """A few of each, in a process of its own: forks and threads do not go together."""

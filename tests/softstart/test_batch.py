@@ -130,7 +130,7 @@ def test_comparison_rows_are_the_single_starts() -> None:
 def test_strides_over_repeated_contacts_keep_every_bit(strategy: str, kind: str, until: float | None) -> None:
     """A batch takes repeated contacts in one stride, a recorded start goes through each: the same bits."""
     rng = np.random.default_rng(11)
-    count = 400
+    count = 100
     drives = CRANE.replace(
         load_kind=kind,
         gap=rng.uniform(0.01, 4.0, count),

@@ -247,6 +247,7 @@ def test_other_units_of_torque_scale_what_they_must_and_nothing_else(found, log:
         assert value == pytest.approx(right[strategy][0], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_start_alone_leaves_the_gap_unknown_and_names_what_would_tell_it() -> None:
     start = made_up_log(TRUTH, "start", log_period=2e-3, ripple=1.0, seed=4)
     alone = identify(start, GUESS, searches=3)
@@ -370,7 +371,7 @@ def test_a_clipped_torque_is_noticed(log: Log) -> None:
     assert any("something else moves this drive" in n for n in identify(clipped, TRUTH, searches=1).notes)
 
 
-@pytest.mark.parametrize("wrong", ["cut", "rpm"])
+@pytest.mark.parametrize("wrong", [pytest.param("cut", marks=pytest.mark.slow), "rpm"])
 def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -> None:
     kept = np.r_[0:150, 200 : log.time.size] if wrong == "cut" else np.arange(log.time.size)
     time, torque = log.time[: kept.size], log.torque[kept]
@@ -384,6 +385,7 @@ def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -
     assert any(told in note for note in notes)
 
 
+@pytest.mark.slow
 def test_a_filtered_speed_is_named_or_found(log: Log) -> None:
     fine = np.linspace(0.0, float(log.time[-1]), 16 * (log.time.size - 1) + 1)
     profile = TorqueProfile(np.repeat(log.time, 2)[1:], np.repeat(log.torque, 2)[:-1])
@@ -499,7 +501,7 @@ def loads(one: Experiment, position: float) -> Run:
     return simulate(drive, make_controller("profile", {"profile": one.profile}), until=one.end)
 
 
-@pytest.mark.slow  # a design takes some 200 torques
+@pytest.mark.slow
 def test_the_planned_torque_tells_no_less_and_keeps_its_limits(planned: Plan) -> None:
     one = planned["planned"]
     standard = [one for one in planned.experiments if one.found_by == "standard"]
@@ -542,7 +544,7 @@ def test_the_travel_is_that_of_a_simulation(load_kind: str) -> None:
     assert found[0] == pytest.approx(np.max(np.abs(angles - angles[0])), rel=1e-4)
 
 
-@pytest.mark.slow  # of the same design
+@pytest.mark.slow
 @pytest.mark.parametrize("position", [-0.04, -0.013, 0.0, 0.04])
 def test_a_load_that_is_to_rest_does_not_move_at_all(planned: Plan, position: float) -> None:
     one = planned["planned, load at rest"]
@@ -554,7 +556,7 @@ def test_a_load_that_is_to_rest_does_not_move_at_all(planned: Plan, position: fl
     made_up_log(TRUTH, one, log_period=8e-3, ripple=0.2)  # a log that `identify` would take
 
 
-@pytest.mark.slow  # a design takes some 200 torques
+@pytest.mark.slow
 def test_hardly_a_random_torque_within_the_limits_tells_more_than_the_planned_one(planned: Plan) -> None:
     one, generator = planned["planned"], np.random.default_rng(7)
     bench = _Bench(TRUTH, 8e-3, 1.0, NAMES, "angle", (), lambda _: None)

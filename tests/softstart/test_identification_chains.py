@@ -105,6 +105,7 @@ def test_a_second_gap_at_a_middle_mass_is_noticed_or_does_no_harm_at_the_motor(
         assert max(map(float, each)) < 1.15 * own
 
 
+@pytest.mark.slow
 def test_a_second_gap_between_heavy_masses_is_noticed() -> None:
     also = {
         "mass[4].kind": "reactive", "start.position": "mid-gap", "shaft[1].stiffness": 400.0,
@@ -116,7 +117,7 @@ def test_a_second_gap_between_heavy_masses_is_noticed() -> None:
     assert any("something else moves this drive (a second gap" in note for note in notes)
 
 
-@pytest.mark.slow  # a fit of two masses to a chain that rattles
+@pytest.mark.slow
 def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
     """The page's second example: the pinion, a fifteenth of the rotor, rattles between soft shafts."""
     also = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)} | {

@@ -81,7 +81,6 @@ def test_uneven_samples_are_fitted_as_even_ones_are(log: Log) -> None:
     assert found["gap"].half_width < 0.03
 
 
-@pytest.mark.slow  # two logs are fitted together
 def test_logs_with_clocks_and_sampling_of_their_own_are_fitted_together(log: Log) -> None:
     end = float(log.time[-1])
     each = []

@@ -234,11 +234,6 @@ def test_what_another_process_cannot_load() -> None:
 
 
 SCRIPTS = {
-    "tune": (
-        "from softstart import tune\n"
-        "tuned = tune('crane-4amtkf', 'ramp', ['1x'], ['1x', '2x'], generations=2, restarts=1)\n"
-        "print(tuned.robust.cells.k_dyn.size)\n"
-    ),
     "tune a controller of its own": (
         "from dataclasses import dataclass\n"
         "from softstart import Command, PlainController, tune\n"
@@ -254,13 +249,6 @@ SCRIPTS = {
     "sweep": (
         "from softstart import sweep\n"
         "print(sweep('crane-4amtkf', 'ramp', {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
-    ),
-    "sweep a controller of its own": (
-        "from softstart import Command, PlainController, sweep\n"
-        "class Half(PlainController):\n"
-        "    def step(self, measured, state):\n"
-        "        return Command(31.0 if measured.time < 0.1 else 62.0, measured.time + 0.01)\n"
-        "print(sweep('crane-4amtkf', Half(), {'gap': [0.5, 1.0]}, chunk=1).k_dyn.size)\n"
     ),
 }  # fmt: skip
 

@@ -160,10 +160,9 @@ def test_limits_that_nothing_keeps():
 
 @pytest.mark.parametrize(
     "drive",
-    [CRANE, CRANE.replace(permissible_torque=130.0, permissible_start_time=0.6),
-     HOIST.replace(permissible_torque=170.0), CRANE.replace(permissible_torque=20.0)],
-    ids=["none", "crane", "hoist", "too low"],
-)  # fmt: skip
+    [CRANE, CRANE.replace(permissible_torque=130.0, permissible_start_time=0.6)],
+    ids=["none", "crane"],
+)
 def test_compare_page_and_report_say_the_same(drive):
     found = compare(drive)
     said = found.recommendation.text

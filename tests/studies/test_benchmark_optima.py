@@ -137,7 +137,6 @@ def peer(name):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [peer("rockit"), peer("gekko"), peer("dymos")])
 def test_a_peer_solves_the_long_start(name):
     task = crane_task(LONG)

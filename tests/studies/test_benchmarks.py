@@ -43,7 +43,6 @@ def test_python_control_as_it_comes_is_the_same_start_but_coarse():
 
 
 @needs_diffrax
-@pytest.mark.slow
 def test_diffrax_and_softstart_agree():
     # in a process of its own: it switches jax to 64 bits for good
     here, child = Here(), Child()

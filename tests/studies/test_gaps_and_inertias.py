@@ -22,13 +22,15 @@ PART = Extent(
 )
 
 
+pytestmark = pytest.mark.slow  # all wait for the study
+
+
 @pytest.fixture(scope="module")
 def grid():
     (one,) = grids(PART, lambda text: None)
     return one
 
 
-@pytest.mark.slow  # with the study that all tests of this file share
 @pytest.mark.parametrize("name", ["ramp", "acceleration-delay"])
 def test_every_cell_is_a_start_that_can_be_repeated(grid, name):
     tuning = grid.tunings[name]

@@ -43,6 +43,9 @@ PART = Extent(
 )
 
 
+pytestmark = pytest.mark.slow  # all wait for the study
+
+
 @pytest.fixture(scope="module")
 def found():
     """A part of the study; profiles for several gaps, slow to find, have a stand-in."""
@@ -91,7 +94,6 @@ def test_start_times_of_a_front_are_all_feasible_and_in_order():
 # what is found -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow  # with the study that all tests of this file share
 def test_profiles_are_those_of_the_anchor_and_end_in_step(found):
     short, start = found.profiles
     assert (short.run, short.point.status) == (None, "INFEASIBLE")
@@ -132,7 +134,6 @@ def test_a_stricter_terminal_is_never_gentler(found):
     assert last.k_dyn >= one.at("synchronous", last.start_time_bound).k_dyn
 
 
-@pytest.mark.slow
 def test_one_profile_for_several_gaps_is_in_time_and_above_the_own_optima(hasty_search):
     (one,) = sensor.sensed(Extent(sensor_multiples=(1.2,), sensor_gaps=(0.5, 0.6)), lambda text: None)
     for robust in (one.worth.blind, one.worth.reacting):

@@ -22,7 +22,7 @@ from softstart.optimal.chains.problem import ChainProblem, momentum_bound
 from softstart.views.chain_schemes import scheme_svg
 
 SEEDS = settings(
-    max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 BALANCE = 1e-11  # of the energy that moves
 

@@ -14,7 +14,7 @@ from softstart.chain import Chain
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 8))
-@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_random_chains(seed, count):
     """Gaps, damping, all contact laws, friction on any mass, lag, slew limit, excitation, motor anywhere."""
     run, oracle = both(**random_chain(np.random.default_rng(seed), count))
@@ -26,7 +26,7 @@ def test_random_chains(seed, count):
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 6))
-@settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=4, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_random_chains_with_a_rigid_gap(seed, count):
     """The same with one gap that closes by impacts; the oracle cannot follow impacts that pile up."""
     drawn = random_chain(np.random.default_rng(seed), count, rigid=True)

@@ -15,7 +15,6 @@ ANCHOR = ("optimize", *SIXTY, "--start-time", "0.2883042")
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
-@pytest.mark.slow
 def test_an_unknown_position_is_named_with_what_a_sensor_is_worth(run, hasty_search):
     code, out, err = run("optimize", *SIXTY, "--set", "start.position=unknown", "--start-time", "1.3x")
     assert (code, err) == (0, "")
@@ -151,6 +150,7 @@ def test_too_short_a_start_time(run, nothing_left, output):
     nothing_left()
 
 
+@pytest.mark.slow
 def test_other_aims_and_bounds(run):
     code, out, err = run("optimize", *SIXTY, "--minimise", "start_time", "--max-k-dyn", "1.2", "--json")
     assert (code, err) == (0, "")

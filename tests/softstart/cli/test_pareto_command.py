@@ -110,6 +110,7 @@ def test_points_of_another_drive_are_refused(run, place, begun):
     assert {path.name: path.read_bytes() for path in (place / "front").iterdir()} == before
 
 
+@pytest.mark.slow
 def test_who_computes_changes_nothing(run, finished):
     assert {point.method for point in finished[0].points if point.found} == {"closed-form", "lp"}
 

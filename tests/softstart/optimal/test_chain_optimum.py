@@ -56,6 +56,7 @@ def test_the_claim_is_the_exact_replay(crane):
     assert float(again.at(0.42)["w"][-1]) >= damped().target_speed * (1.0 - 1e-6)
 
 
+@pytest.mark.slow
 def test_searches_around_a_start_keep_the_time_and_the_better_one():
     """Also from where a few programs have led; without time nothing is tried."""
     search = Search(ChainProblem(damped(), 0.42), Player(damped()))
@@ -96,7 +97,6 @@ def test_no_strategy_as_quick_is_gentler(crane):
         assert run.start_time > 0.4201 or run.k_dyn > crane.k_dyn
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("terminal", ["reached", "synchronous", "steady"])
 def test_without_gaps_the_answer_is_the_optimum(terminal):
     """One linear program is then the whole problem, so that a finer trust region changes nothing."""
@@ -112,7 +112,6 @@ def test_without_gaps_the_answer_is_the_optimum(terminal):
         np.testing.assert_allclose(state["T"], 20.0, atol=1e-4)
 
 
-@pytest.mark.slow
 def test_lag_and_rate_limit_are_kept():
     chain = without_gaps(torque_lag=4e-3, torque_rate=1500.0)
     best = optimize(chain, 0.3, seeds=["s-curve"], tolerance=1e-3)

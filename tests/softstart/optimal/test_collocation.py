@@ -191,7 +191,14 @@ def test_starts_of_no_known_class_are_refused_with_a_reason(changes, word):
 
 @pytest.mark.parametrize(
     ("given", "options"),
-    [({}, {}), ({"torque_lag": 0.005, "damping": 0.5, "torque_rate": 2500.0}, {"terminal": "reached"})],
+    [
+        ({}, {}),
+        pytest.param(
+            {"torque_lag": 0.005, "damping": 0.5, "torque_rate": 2500.0},
+            {"terminal": "reached"},
+            marks=pytest.mark.slow,
+        ),
+    ],
 )
 def test_the_program_of_casadi_is_that_of_the_method(given: dict[str, float], options: Any) -> None:
     """Solved by IPOPT with its own settings on the first mesh; the method refines it."""

@@ -38,6 +38,7 @@ def test_least_heat_lies_a_little_above_what_momentum_demands():
     assert path.w2 == pytest.approx(60.0, rel=3e-6)
 
 
+@pytest.mark.slow
 def test_a_bound_on_k_dyn_costs_heat_and_is_kept():
     free = solve(Problem(CRANE, start_time=0.2883, minimise="heat"), max_refinements=1)
     bound = solve(Problem(CRANE, start_time=0.2883, minimise="heat", k_dyn=0.95), max_refinements=2)
@@ -48,7 +49,7 @@ def test_a_bound_on_k_dyn_costs_heat_and_is_kept():
     assert heat_of(run, bound.end_time) == pytest.approx(bound.claimed, rel=1e-4)
 
 
-@pytest.mark.parametrize("load_kind", ["active", "reactive"])
+@pytest.mark.parametrize("load_kind", ["active", pytest.param("reactive", marks=pytest.mark.slow)])
 def test_the_heat_has_a_lower_bound_behind_a_lag_and_with_friction_too(load_kind):
     """On the conveyor's like the mesh was off by 0.17 % in a K_dyn that was to be kept."""
     drive = CRANE.replace(torque_lag=0.004, damping=0.5, load_kind=load_kind)
@@ -66,6 +67,7 @@ def test_the_heat_has_a_lower_bound_behind_a_lag_and_with_friction_too(load_kind
         assert best.heat_at_least == pytest.approx(exact, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_bound_on_heat_costs_k_dyn_and_is_kept():
     gentle = solve(Problem(CRANE, start_time=0.32), max_refinements=1)
     run = replay(CRANE, gentle.profile, gentle.end_time)
@@ -84,6 +86,7 @@ def test_least_start_time_under_a_k_dyn_is_the_inverse_of_least_k_dyn_under_a_st
     assert path.peak / Problem(CRANE, start_time=0.26).base_torque == pytest.approx(k_dyn, rel=3e-4)
 
 
+@pytest.mark.slow
 def test_a_torque_speed_curve_is_obeyed_all_along_and_costs():
     corners = ((0.0, 62.0), (30.0, 62.0), (70.0, 30.0))
     problem = Problem(CRANE, start_time=0.33, torque_speed=corners)

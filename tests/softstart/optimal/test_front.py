@@ -247,6 +247,7 @@ def test_a_controller_that_never_starts_has_no_ratio():
     assert one.summary()["optimum_status"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("drive", "most"),
     [

@@ -68,12 +68,11 @@ def test_too_short_a_start_time() -> None:
     assert verdict.summary()["status"] == "INFEASIBLE"
 
 
-@pytest.mark.parametrize("share", [1.0005, 1.002, 1.007])
-def test_hardly_enough_time_is_enough(share: float) -> None:
+def test_hardly_enough_time_is_enough() -> None:
     """A wide gap leaves a window of a millisecond for the contact: it must be found."""
     worn = CRANE.replace(gap=2.0)
     shortest = shortest_start_time(Problem(worn, 1.0, "reached"))
-    best = optimize(worn, share * shortest, terminal="reached")
+    best = optimize(worn, 1.0005 * shortest, terminal="reached")
     assert 1.8 < best.k_dyn < 2.0
     assert best.gap_percent < 0.3
 
@@ -184,7 +183,6 @@ def random_problem(seed: int) -> Problem:
 TENS = (1,) if settings.default.derandomize else range(5)  # `make fuzz` takes all fifty
 
 
-@pytest.mark.slow
 @pytest.mark.hypothesis
 @pytest.mark.parametrize("tens", TENS)
 def test_random_drives(tens: int) -> None:
@@ -194,7 +192,7 @@ def test_random_drives(tens: int) -> None:
     comes and whether the methods agree.
     """
     gaps = []
-    for seed in range(10 * tens, 10 * tens + 10):
+    for seed in range(10 * tens, 10 * tens + (4 if settings.default.derandomize else 10)):
         problem = random_problem(seed)
         assert problem.start_time is not None
         best = optimize(problem.drive, problem.start_time, terminal=problem.terminal)
@@ -226,7 +224,6 @@ OTHERS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_no_shipped_controller_is_gentler_in_its_own_time(name: str) -> None:
     """Who is harder than the optimum of a shorter time is harder than that of its own, which is no higher."""
@@ -319,6 +316,7 @@ def test_auto_ends_where_the_bound_is_near():
     assert best.gap_percent < 0.5
 
 
+@pytest.mark.slow
 def test_confirm_solves_the_casadi_problem_from_its_own_guess():
     best = optimize(DAMPED, 0.28, confirm=True)
     assert [one.method for one in best.tried] == ["lp", "collocation"]

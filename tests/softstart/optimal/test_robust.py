@@ -52,7 +52,6 @@ def optima(alone: RobustOptimum, nested: list[RobustOptimum], worth: SensorWorth
     return [alone, *nested, worth.reacting]
 
 
-@pytest.mark.slow  # with the optima that all tests of this file share
 def test_one_scenario_is_the_single_optimum(alone: RobustOptimum) -> None:
     assert alone.k_dyn == pytest.approx(ALONE, rel=SEARCH)
     assert alone.k_dyn >= ALONE * (1.0 - 1e-7)  # nothing is better than the best

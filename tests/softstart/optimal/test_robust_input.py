@@ -61,7 +61,9 @@ def test_order_of_scenarios_changes_nothing() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"damping": 2.0, "contact_law": "modelica", "load_kind": "reactive"},
+        pytest.param(
+            {"damping": 2.0, "contact_law": "modelica", "load_kind": "reactive"}, marks=pytest.mark.slow
+        ),
         {"torque_lag": 0.005},
         {"torque_rate": 4000.0},
         {"minimum_torque": -30.0, "starting_torque": 50.0},

@@ -23,7 +23,7 @@ from softstart.optimal.whole_dual import Dual, Start, _freely, _take, _value
 from softstart.start.run import Run
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-TORQUES = 250  # for each class
+TORQUES = 100  # for each class
 CURVE = ((0.0, 62.0), (30.0, 60.0), (80.0, 20.0))
 STEEP = ((0.0, 62.0), (12.0, 55.0), (70.0, 10.0))  # less torque before the contact already
 
@@ -161,6 +161,24 @@ def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[
             closest = min(closest, (run.peak_torque - paid - proved) / drive.Ms)
     assert starts > 15
     assert closest >= -1e-9
+
+
+@pytest.mark.parametrize(("given", "options"), CLASSES)
+def test_no_durations_within_a_cell_prove_less_than_it(
+    given: dict[str, Any], options: dict[str, Any]
+) -> None:
+    """Wide cells, whose curvature counts, against the durations in them on a finer grid."""
+    start = Start(Problem(CRANE.replace(gap=0.5, **given), 0.3, **options), 30)
+    fine = start.refined(1)
+    by = _Program(start, counted(start, 3.0, 3.0, 15.0)).solve(math.inf)
+    assert by is not None
+    cells, parts = _Cells(start, start.rests), fine.n // start.n
+    proved, finer = Dual(start, by).cells(cells.i, cells.k, start.rests), Dual(fine, by.on(fine))
+    for i, k in np.ndindex(parts + 1, parts + 1 if start.open else 1):
+        inside = np.array([parts * cells.i + i, parts * cells.k + k])
+        some = (inside.sum(axis=0) <= fine.n) & (inside[0] > 0)
+        found = finer.nodes(*inside[:, some], start.rests)
+        assert np.all(found >= proved[some] - 1e-9 * CRANE.Ms)
 
 
 def counted(start: Start, gap: float, winding: float, contact: float) -> tuple[int, int, int]:
@@ -327,7 +345,6 @@ def test_the_weight_of_the_demand_is_what_the_bound_gains_by_it(
     assert times.max() == pytest.approx(start.h * (gap + winding + contact + start.tail))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("end", [0.2883042, 0.27])
 def test_it_is_below_the_closed_form(end: float) -> None:
     """An ideal torque on an undamped shaft, whose optimum is known exactly."""

@@ -78,6 +78,7 @@ def test_the_least_start_time_is_the_root_of_the_formula(k_dyn: float) -> None:
     assert momentum_bound(Problem(CRANE, 0.9999 * best.kept.at_least)).k_dyn > k_dyn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("drive", "k_dyn", "others"),
     [
@@ -111,20 +112,20 @@ def test_a_least_start_time_where_collocation_does_not_converge() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_k_dyn_that_no_start_has_is_refused() -> None:
     with pytest.raises(InfeasibleError, match=r"no start of Crane .* with K_dyn of 0.1 or less was found"):
         optimize(CRANE, minimise="start_time", k_dyn=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "drive",
     [
         IN_TIME,
-        HELD.replace(torque_lag=0.005),
+        pytest.param(HELD.replace(torque_lag=0.005), marks=pytest.mark.slow),
         TOO_LATE,
         CRANE.replace(permissible_torque=60.0),
-        CRANE.replace(permissible_torque=45.0, load_kind="reactive"),
+        pytest.param(CRANE.replace(permissible_torque=45.0, load_kind="reactive"), marks=pytest.mark.slow),
     ],
 )
 def test_nothing_keeps_the_limits_in_less_time(drive: Drive) -> None:

@@ -59,6 +59,7 @@ class Heard:
         self.parts.append(value)
 
 
+@pytest.mark.slow
 def test_checks_are_those_of_compare_fatigue_and_optimize() -> None:
     """Each figure against the function that a reader can call: positions, margins, life, quickest start."""
     drive = CRANE.with_settings(["limits.shaft_torque=70", "shaft.damping=0.3"])
@@ -201,7 +202,11 @@ def test_in_a_crowd_of_strategies_no_name_stands_on_another() -> None:
         assert not any(abs(y - v) < 11.4 and x < u + w and u < x + wide for u, v, w in places[k + 1 :])
 
 
-@pytest.mark.parametrize("machine", [CRANE, Chain.load("crane-4-mass")], ids=["drive", "chain"])
+@pytest.mark.parametrize(
+    "machine",
+    [CRANE, pytest.param(Chain.load("crane-4-mass"), marks=pytest.mark.slow)],
+    ids=["drive", "chain"],
+)
 def test_tuned_gains_come_as_files(machine: Drive | Chain) -> None:
     heard = Heard()
     grid = grid_of(machine, "1x", "1x")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from tests.oracle import integrate, random_case
 from tests.softstart.plant.pieces import Pieces
 
@@ -22,8 +23,8 @@ KINDS = {
     "motor starts": "motor-starts",
     "motor stops": "motor-stops",
 }
-BLOCKS = 20
 DRIVES_PER_BLOCK = 25
+BLOCKS = 8 if settings.default.derandomize else 20  # `make fuzz` takes all
 
 
 def case(seed: int) -> dict[str, Any]:
@@ -74,6 +75,7 @@ def brake_of(drawn: dict[str, Any]) -> dict[str, Any]:
     return {"brake": "motor", "release": "torque" if math.isinf(release) else release} if release else {}
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_peaks_events_and_final_state(block: int) -> None:
     for seed in range(block * DRIVES_PER_BLOCK, (block + 1) * DRIVES_PER_BLOCK):
@@ -98,7 +100,8 @@ def case_with_friction(seed: int) -> dict[str, Any]:
     return drawn
 
 
-@pytest.mark.parametrize("block", range(8))
+@pytest.mark.hypothesis
+@pytest.mark.parametrize("block", range(BLOCKS // 2))
 def test_friction_of_motor_and_load(block: int) -> None:
     for seed in range(20_000 + block * DRIVES_PER_BLOCK, 20_000 + (block + 1) * DRIVES_PER_BLOCK):
         compare_with_oracle(case_with_friction(seed), seed)

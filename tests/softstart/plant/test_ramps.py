@@ -47,6 +47,7 @@ def ramped(seed: int) -> dict[str, Any]:
     return drawn | {"torque_pieces": lines}
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_ramps_against_the_oracle(block: int) -> None:
     """All contact laws, both kinds of load, with and without lag, rate limit and damping."""

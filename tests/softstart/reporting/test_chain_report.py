@@ -39,7 +39,7 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
 
 
 def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made):
-    """The optimum lies between bound and strategy; rounded values give the figures of `simulate_chain`."""
+    """Rounded values give the figures of `simulate_chain`."""
     gentle = simulate_chain(CHAIN, "take-up")
     assert bound_at(CHAIN, gentle.start_time) < gentle.k_dyn
     (sheet,) = made.sheets
@@ -48,6 +48,10 @@ def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made)
     assert sheet.rounded.k_dyn == pytest.approx(again.k_dyn, rel=1e-12)
     assert sheet.worst_k_dyn >= sheet.rounded.k_dyn
     assert sheet.variants == 2 * len(sheet.varied) + 2
+
+
+@pytest.mark.slow
+def test_the_optimum_lies_between_bound_and_strategy():
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.05" for k in (1, 2, 3)})
     best = report_chain(damped, controllers=["take-up"], budget=15.0)
     (optimum,) = best.limit.found

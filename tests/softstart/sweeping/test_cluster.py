@@ -62,6 +62,7 @@ def cluster(tmp_path_factory):
     made.close()
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_is_named(cluster, monkeypatch):
     for worker in cluster.workers:
         worker.kill()

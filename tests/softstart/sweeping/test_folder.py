@@ -27,6 +27,7 @@ GRID = {"gap": [0.5, 1.0, 2.0], "load_inertia": [0.1, 0.2]}
 OPTIONS = {"workers": 1, "chunk": 2}
 
 
+@pytest.mark.slow
 def test_killed_at_random_instants_it_goes_on(sweeping, uninterrupted, tmp_path):
     folder = tmp_path / "results"
     instants = random.Random(7)

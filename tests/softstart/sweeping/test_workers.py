@@ -55,6 +55,7 @@ class Deadly(PlainController):
 """
 
 
+@pytest.mark.slow
 def test_a_chunk_that_kills_its_process_is_an_error_that_keeps_the_rest(tmp_path):
     (tmp_path / "mine.py").write_text(DEADLY)
     name = f"{tmp_path / 'mine.py'}:Deadly"
@@ -91,6 +92,7 @@ print(next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) /
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="memory is told by Linux")
 def test_memory_does_not_grow_with_the_grid(tmp_path):
     peaks = []

@@ -42,7 +42,6 @@ def test_most_controllers_can_be_tuned():
 # item 1: nowhere worse than the defaults ------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", TUNABLE)
 def test_tuned_per_cell_is_never_worse_than_the_defaults(name):
     tuned = tune(CRANE, name, **GRID, **(SMALL | {"restarts": 1}))
@@ -418,7 +417,6 @@ def test_smoothing_costs_at_most_a_thousandth_and_makes_the_schedule_smoother(tm
 # the margin to the limits -----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("position", ["mid-gap", "unknown"])
 @pytest.mark.parametrize("name", ["ramp", "current-limit-feedback"])
 def test_a_tuned_margin_is_never_below_that_of_the_defaults(name, position):
