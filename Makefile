@@ -7,13 +7,13 @@
 #   make lint types layers     ruff, mypy, import-linter
 #   make slow                  the tests that `make test` leaves out: each takes 2 s of processor time or more
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
-#   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': some of them
+#   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': its speed
 #   make pictures              the pictures of the README (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
-#   make docs docs-commands    the documentation, warnings are errors; every command shown in it is run, on WORKERS
-#                              cores (2)
-#   make package               sdist and wheel into dist/; package-check looks at both, package-test runs the
-#                              whole suite from both, each in an empty folder
+#   make docs                  the documentation, warnings are errors; GALLERY=0: without running its examples
+#   make docs-commands         every command shown in it is run, on WORKERS cores (2); ONLY='-m slow': long pages
+#   make package               sdist and wheel into dist/; package-check looks into both and installs the wheel,
+#                              package-test runs all tests from both, each in an empty folder
 #   make benchmark             speed and optima beside other packages
 PYTHON ?= python3
 WORKERS ?= 2
@@ -67,7 +67,8 @@ serve: $(VENV)/.installed-ui
 	$(BIN)/softstart serve
 
 page: $(VENV)/.installed-page
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page $(ONLY)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/page --page -m "not slow and not alone" \
+		-o cache_dir=.pytest_cache/page $(ONLY)
 
 pictures: $(VENV)/.installed-page
 	SOFTSTART_PICTURES=docs/_static $(BIN)/python -m pytest -q tests/page/test_pictures.py --page
@@ -77,7 +78,8 @@ docs: $(VENV)/.installed-docs
 	@echo "open docs/_build/html/index.html"
 
 docs-commands: $(VENV)/.installed-test
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n $(WORKERS) --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests/docs --docs-commands -n $(WORKERS) --dist worksteal \
+		-m "not slow" $(ONLY)
 
 package: $(VENV)/.installed-package
 	rm -rf dist

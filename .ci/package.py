@@ -1,11 +1,10 @@
 """Does what is shipped hold all it must, and does it work where the repository is not?
 
-    python .ci/package.py dist            contents and metadata of both; the wheel in a new environment: the
-                                          main job and a part of the tests
-    python .ci/package.py dist --whole    and the whole suite from both, each in an empty folder
+    python .ci/package.py dist            contents and metadata of both; the wheel in a new environment
+    python .ci/package.py dist --whole    the main job there, and all tests from both, each in an empty folder
 
 `dist` is the folder with one sdist and one wheel, as `make package` leaves it. Only the standard library,
-twine and, for the short check, the libraries of the tests are needed here.
+twine and, for the short check, the libraries of the workbench are needed here.
 """
 
 from __future__ import annotations
@@ -30,11 +29,6 @@ PACKAGES = {
     "softstart_controllers": HERE / "controllers" / "softstart_controllers",
     "softstart_studies": HERE / "studies" / "softstart_studies",
 }
-QUICK = (
-    "tests/softstart/drive",
-    "tests/softstart/test_quantities.py",
-    "tests/validation/test_gerasymiak_subbotin.py",
-)
 BESIDES_TESTS = ("docs", "README.md", "CHANGELOG.md", "CITATION.cff", "pyproject.toml")  # what tests may read
 CHECKOUT_ONLY = ("softstart_studies/benchmarks/",)  # not in the wheel
 CACHES = ("__pycache__", ".pyc", ".nbi", ".nbc", ".mypy_cache", ".hypothesis", ".venv/")
@@ -53,13 +47,14 @@ def main() -> int:
     look_into_sdist(sdist)
     with tempfile.TemporaryDirectory(prefix="softstart-package-") as name:
         folder = Path(name)
-        unpacked = unpack(sdist, folder)
         python = installed(wheel, folder / "venv", given.whole)
         works_alone(python, folder)
-        suite_of_wheel(python, unpacked, folder, given.whole)
         if given.whole:
+            unpacked = unpack(sdist, folder)
+            main_job(python, folder)
+            suite_of_wheel(python, unpacked, folder)
             print("== the suite of the unpacked sdist, in an environment of its own", flush=True)
-            run(["make", "test"], where=unpacked)
+            run(["make", "test", "slow"], where=unpacked)
     print("the packages are good")
     return 0
 
@@ -132,23 +127,28 @@ def installed(wheel: Path, folder: Path, whole: bool) -> Path:
 
 
 def works_alone(python: Path, folder: Path) -> None:
-    """In an empty folder the installed command compares strategies; what runs is the wheel's."""
+    """In an empty folder the installed command knows drives, controllers and studies; all is the wheel's."""
     empty = folder / "empty"
     empty.mkdir()
     where = run([python, "-c", "import softstart; print(softstart.__file__)"], where=empty, kept=True).strip()
     check("site-packages" in where, f"softstart is taken from {where}, not from the wheel.")
-    found = json.loads(run([python.parent / "softstart", "compare", "--json"], where=empty, kept=True))
-    for one_start in found["strategies"]:
-        print(f"  {one_start['controller']:24} K_dyn {one_start['k_dyn']:.3f}")
-    check(len(found["strategies"]) > 5, "softstart compare does not find its controllers.")
+    for word, known in (("drives", "crane-4amtkf"), ("controllers", "take-up")):
+        told = run([python.parent / "softstart", word], where=empty, kept=True)
+        check(known in told, f"softstart {word} does not list {known}.")
     names = "from softstart.study import study_names; print(*study_names())"
     studies = run([python, "-c", names], where=empty, kept=True)
     check("paper-g" in studies, "softstart study does not find its studies.")
     check("benchmark" not in studies, f"softstart study lists what is not installed: {studies}")
-    check(not list(empty.iterdir()), "softstart compare --json leaves files behind.")
+    check(not list(empty.iterdir()), "the commands leave files behind.")
 
 
-def suite_of_wheel(python: Path, unpacked: Path, folder: Path, whole: bool) -> None:
+def main_job(python: Path, folder: Path) -> None:
+    """The installed command compares strategies."""
+    found = json.loads(run([python.parent / "softstart", "compare", "--json"], where=folder, kept=True))
+    check(len(found["strategies"]) > 5, "softstart compare does not find its controllers.")
+
+
+def suite_of_wheel(python: Path, unpacked: Path, folder: Path) -> None:
     """The tests of the sdist on the installed wheel, where no source is near."""
     place = folder / "tests of the wheel"
     place.mkdir()
@@ -158,13 +158,8 @@ def suite_of_wheel(python: Path, unpacked: Path, folder: Path, whole: bool) -> N
             shutil.copytree(unpacked / name, place / name)
         elif (unpacked / name).exists():
             shutil.copy(unpacked / name, place / name)
-    parts = (
-        ["tests", "--pyargs", *PACKAGES]
-        if whole
-        else [*QUICK, "--few-kernels", "--pyargs", "softstart.drive"]
-    )
-    workers = ["-n", "auto", "--dist", "worksteal"] if whole else []
-    run([python, "-m", "pytest", "-q", *workers, *parts], where=place)
+    workers = ["-n", "auto", "--dist", "worksteal"]
+    run([python, "-m", "pytest", "-q", *workers, "tests", "--pyargs", *PACKAGES], where=place)
 
 
 def unpack(sdist: Path, folder: Path) -> Path:

@@ -63,7 +63,7 @@ sphinx_gallery_conf = {
     "image_scrapers": (gallery_figures.scraper,),
     "capture_repr": (),
     "reset_modules": (),
-    "plot_gallery": True,
+    "plot_gallery": os.environ.get("GALLERY") != "0",
     "abort_on_example_error": False,
     "only_warn_on_example_error": False,
     "download_all_examples": False,

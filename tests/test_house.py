@@ -54,4 +54,8 @@ def test_no_module_reaches_itself() -> None:
     while free := [name for name, targets in left.items() if not targets & left.keys()]:
         for name in free:
             del left[name]
-    assert not left, f"these import one another, or what does: {', '.join(sorted(left))}"
+    # what is left are circles and what imports them; drop what nothing left imports
+    while free := [n for n in left if not any(n in targets for m, targets in left.items() if m != n)]:
+        for name in free:
+            del left[name]
+    assert not left, f"these import one another: {', '.join(sorted(left))}"

@@ -14,10 +14,25 @@ from tests.docs.steps import pages, steps
 
 PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages(ROOT)}
 TO_DO = {name: found for name, page in PAGES.items() if (found := steps(page.read_text(encoding="utf-8")))}
-LONGEST_FIRST = sorted(TO_DO, key=lambda name: -len(TO_DO[name]))  # none is left for the end
+SLOW = (  # those that take longest: `make docs-commands ONLY='-m slow'`
+    "docs/benchmarks.md",
+    "docs/gaps-and-inertias.md",
+    "docs/howto/add-a-controller.md",
+    "docs/howto/choose-a-strategy.md",
+    "docs/howto/from-a-log.md",
+    "docs/howto/read-a-report.md",
+    "docs/identification.md",
+    "docs/optimal-starts.md",
+    "docs/paper-r.md",
+    "docs/real-starts.md",
+    "docs/several-gaps.md",
+    "docs/sweeps.md",
+    "docs/tuning.md",
+)
+PARTS = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in TO_DO]
 
 
-@pytest.mark.parametrize("name", LONGEST_FIRST)
+@pytest.mark.parametrize("name", PARTS)
 def test_page(
     name: str,
     tmp_path: Path,

@@ -45,6 +45,7 @@ class Server:
             MARK: self.mark,
             "OPENBLAS_NUM_THREADS": "1",
             "PYTHONDONTWRITEBYTECODE": "1",
+            "SOFTSTART_BUDGET": "2",
         }
         with self.log.open("w", encoding="utf-8") as stream:
             self.process = subprocess.Popen(

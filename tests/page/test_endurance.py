@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from tests.page.conftest import at_rest
 
 TABS = 10
@@ -43,6 +44,7 @@ def sockets(pid: int) -> int:
     return sum(os.readlink(link).startswith("socket:") for link in links)
 
 
+@pytest.mark.slow
 def test_ten_tabs_that_are_dragged(visit: Any, start_server: Callable[..., Any]) -> None:
     server = start_server()
     pid = server.process.pid

@@ -384,6 +384,7 @@ def test_requests_of_junk(own: Any) -> None:
                 line.close()
 
 
+@pytest.mark.slow
 def test_tabs_that_close_in_the_middle_of_a_job(own: Any) -> None:
     """Several at once, some without a word; what they asked for ends with them."""
     chance = random.Random(SEED)

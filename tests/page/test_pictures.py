@@ -6,9 +6,11 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import pytest
 from PIL import Image
 from tests.page.conftest import SOFTSTART, at_rest
 
+pytestmark = pytest.mark.slow  # nothing of the page is judged
 LARGEST = 90_000  # bytes: they are part of every clone
 COLOURS = 128
 

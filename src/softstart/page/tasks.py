@@ -7,6 +7,7 @@ gives back plain data.
 from __future__ import annotations
 
 import math
+import os
 import re
 import tempfile
 import time
@@ -423,7 +424,9 @@ def ready(machine: Chain, *, progress: Progress) -> Chain:
 def report(
     drive: Machine, controllers: Sequence[str | Controller], command: str, *, progress: Progress
 ) -> str:
-    """The report for a customer, as one HTML text."""
+    """The report for a customer, as one HTML text; SOFTSTART_BUDGET, in s, is its `budget`."""
     progress(0.0, "starting the drive")
+    budget = os.environ.get("SOFTSTART_BUDGET")
+    options = {"command": command} | ({"budget": float(budget)} if budget else {})
     made: Any = reporting.report_chain if isinstance(drive, Chain) else reporting.report
-    return str(made(drive, controllers=controllers, progress=progress, command=command).to_html())
+    return str(made(drive, controllers=controllers, progress=progress, **options).to_html())

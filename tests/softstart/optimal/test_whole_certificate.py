@@ -23,7 +23,7 @@ from softstart.optimal.whole_dual import Dual, Start, _freely, _take, _value
 from softstart.start.run import Run
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-TORQUES = 100  # for each class
+TORQUES = 250  # for each class
 CURVE = ((0.0, 62.0), (30.0, 60.0), (80.0, 20.0))
 STEEP = ((0.0, 62.0), (12.0, 55.0), (70.0, 10.0))  # less torque before the contact already
 
@@ -113,7 +113,7 @@ def test_no_start_is_gentler_than_its_cell(given: dict[str, Any], options: dict[
     drive = CRANE.replace(gap=0.5, **given)
     problem = Problem(drive, 0.3, **options)
     assert not not_certified(problem)
-    start, longer = Start(problem, 600), Start(replace(problem, start_time=0.32), 500)
+    start, longer = Start(problem, 300), Start(replace(problem, start_time=0.32), 320)
     rng = np.random.default_rng(15)
     starts, closest = 0, math.inf
     duals: list[tuple[Dual, Any]] = []
