@@ -235,7 +235,7 @@ def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
     assert float(found.k_dyn[1]) == run.k_dyn
     alone = simulate(plain.replace(gap=0.0), "ramp")
     assert float(found.k_dyn[0]) == alone.k_dyn
-    notes = starts.notes(compare(plain, ["ramp"]))
+    notes = starts.remarks(compare(plain, ["ramp"]))
     assert any(f"ramp {run.position}" in note for note in notes)
     assert any("give start.position" in note for note in notes)
     chain = Chain.from_drive(plain)

@@ -18,11 +18,11 @@ from softstart.plugins import CONTROLLERS, registered
 
 # name: the module in this package that defines it, and the first sentence of its help
 COMMANDS = {
-    "compare": ("starts", "Compare controllers on a drive or a chain."),
+    "compare": ("starts", "Compare strategies on a drive or a chain."),
     "simulate": ("starts", "Simulate one start of a drive or a chain."),
     "fatigue": (
         "starts",
-        "Estimate the fatigue life of the shaft line under each controller.",
+        "Estimate the fatigue life of the shaft line under each strategy.",
     ),
     "optimize": (
         "optimize",
@@ -239,7 +239,7 @@ class Commands(Command, click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command asked for; an unknown one is a UsageError in one sentence."""
         name, known = args[0], self.list_commands(ctx)
-        if name not in known and not name.startswith("-"):
+        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
             near = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
             hint = (None if near else _by_subject(name)) or did_you_mean(name, known, "softstart ")
             raise click.UsageError(f'there is no command "{name}"; {hint}', ctx)

@@ -26,7 +26,8 @@ else:
 
 LOOSE_MODULE = "softstart_loose_"  # how softstart.controller.finding names modules of loose files
 EVERY = 30.0  # s between two lines of progress in a pipe
-COMPILING = "compiling the simulation kernel: this may take half a minute, once, and is kept on disk ..."
+COMPILING = "compiling, once: a minute or two at the first command after installation, less at others ..."
+_SAID: list[str] = []  # what this process has said of it
 
 
 Progress = Callable[[str], None]
@@ -65,13 +66,11 @@ def _seldom() -> Progress:
 @contextmanager
 def _announced(status: Status | None) -> Iterator[None]:
     class Notice(event.Listener):
-        """Speaks when numba compiles for the first time; what comes from its cache is not compiled."""
-
-        said = False
+        """Speaks when this process compiles for the first time; what comes from numba's cache is not."""
 
         def on_start(self, event: event.Event) -> None:
-            if not self.said:
-                self.said = True
+            if not _SAID:
+                _SAID.append(COMPILING)
                 if status is not None:
                     status.console.print(f"softstart: {COMPILING}")
                 else:

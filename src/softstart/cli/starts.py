@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from softstart.cli.commands import Command, Reading, typed
 from softstart.cli.options import (
     check_name,
     command_line,
+    controller_names,
     controller_option,
     drive_argument,
     fitted_to_option,
@@ -33,8 +35,8 @@ from softstart.late import late
 from softstart.quantities import whole_number
 from softstart.views.markdown import output_folder
 from softstart.views.terminal import (
-    fits,
     present,
+    print_commands,
     print_conclusion,
     print_figures,
     print_lines,
@@ -63,10 +65,10 @@ SHOWN = 24  # rows of stages and events shown; files and JSON hold all
 
 strategies_option = controller_option(
     "--controllers", "A,B,...",
-    "Controllers, separated by commas. Default: all installed ones that need no parameter.",
+    "Strategies, separated by commas. Default: all installed ones that need no parameter.",
 )  # fmt: skip
 params_option = param_option(
-    "Set a parameter of a controller, for example ramp.time='0.2 s'. May be repeated.", "controllers"
+    "Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.", "controllers"
 )
 
 
@@ -98,6 +100,7 @@ def _cases(text: str, option: str) -> tuple[str, ...]:
     help="Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. "
     "Default: both.",
 )
+@click.option("--details", is_flag=True, help="Also show times, events, and what each column means.")
 @json_option
 @out_option("Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.")
 def compare(
@@ -108,14 +111,15 @@ def compare(
     params: dict[str, dict[str, str]],
     until: float | None,
     worst_case: tuple[str, ...] | None,
+    details: bool,
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Compare controllers on a drive or a chain.
+    """Compare strategies on a drive or a chain.
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
-    drive of the literature. A controller is a name (see: softstart controllers), path/to/file.py:Class, or a
+    drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, or a
     file of tuned gains.
     """
     with output_folder(out) as folder:
@@ -131,34 +135,49 @@ def compare(
 
     present(
         comparison.summary,
-        lambda to: _show_comparison(to, comparison, by_peak=controllers is None),
+        lambda to: _show_comparison(to, comparison, controllers is None, details),
         as_json,
         out and f"{out}: report.md, figures, traces and the table",
     )
 
 
-def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None:
+def _show_comparison(to: Console, comparison: Comparison, by_peak: bool, details: bool) -> None:
     rows = list(comparison.rows)
     if by_peak:
         rows.sort(key=lambda row: row.run.k_dyn)
     best = [rows.index(row) for row in comparison.recommendation.shown]
     print_lines(to, starts.machine_lines(comparison.drive, comparison.fitted_to))
     to.print()
-    gentle, quick, at_the_gap = starts.GENTLE, starts.QUICK, starts.details(comparison.drive)
-    what = "Events at the gap" if at_the_gap == starts.AT_THE_GAP else "Shafts"
-    uncertain = starts.INTERVALS if rows[0].intervals else ()
-    parts: list[tuple[str, tuple[starts.Figure, ...]]] = [("", (*gentle, *uncertain, *quick, *at_the_gap))]
-    if not fits(to, starts.comparison_table(rows)):
-        parts = [("K_dyn and start times", (*gentle, *quick)), (what, at_the_gap)]
-        if not fits(to, starts.comparison_table(rows, parts[0][1])):
-            parts[:1] = [("K_dyn", gentle), ("Start times", quick)]
-        if uncertain:
-            parts.insert(1, ("Intervals of 95 %", uncertain))
-    for index, (title, figures) in enumerate(parts):
-        if index:
-            to.print()
+    print_table(to, starts.comparison_table(rows, (*starts.GENTLE, *starts.QUICK)), bold=best)
+    more: list[tuple[str, tuple[starts.Figure, ...]]] = []
+    if rows[0].intervals:
+        more.append(("Intervals of 95 %", starts.INTERVALS))
+    if details:
+        events = "Events in the backlash" if isinstance(comparison.drive, Drive) else "Shafts"
+        more += [("Times", starts.TIMES), (events, starts.details(comparison.drive))]
+    for title, figures in more:
+        to.print()
         print_table(to, starts.comparison_table(rows, figures, title), bold=best)
-    print_conclusion(to, [comparison.recommendation.text], starts.notes(comparison))
+    legend = starts.definitions(comparison) if details else [f"{starts.LEGEND} More: --details."]
+    print_conclusion(to, [comparison.recommendation.text], [*legend, *starts.remarks(comparison)])
+    print_commands(to, _next_steps(comparison))
+
+
+def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
+    """Commands for the same machine that lead on, each with what it gives."""
+    from softstart.tuning.ranges import tunable
+
+    machine = [typed("drive"), *(word for one in typed("settings") for word in ("--set", one))]
+    chosen = comparison.recommendation
+    best = chosen.recommended or (chosen.best[-1] if chosen.best else None)
+    steps: list[tuple[str, list[str], str]] = []
+    if not (chosen.recommended or comparison.rows[0].intervals):
+        known = len(comparison.drive.positions) == 1
+        steps.append(("optimize", [], "the lowest possible K_dyn" if known else "the best fixed profile"))
+    if best is not None and best.name in controller_names() and tunable(best.run.controller):
+        steps.append(("tune", ["--controller", best.name], "gains for other gaps and loads"))
+    steps.append(("report", ["--out", "report.html"], "all results in one file"))
+    return [(shlex.join(["softstart", name, *machine, *options]), gives) for name, options, gives in steps]
 
 
 @click.command(cls=Command)
@@ -166,13 +185,13 @@ def _show_comparison(to: Console, comparison: Comparison, by_peak: bool) -> None
 @controller_option(
     "--controller",
     "NAME",
-    "A controller's name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).",
+    "A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml, .csv).",
     required=True,
     read=lambda name, option: check_name(
         name, option, "several are compared: softstart compare --controllers "
     ),
 )
-@param_option("Set a parameter of the controller, for example time='200 ms'. May be repeated.")
+@param_option("Set a parameter of the strategy, for example time='200 ms'. May be repeated.")
 @set_option
 @fitted_to_option
 @until_option
@@ -305,7 +324,7 @@ def fatigue(
     as_json: bool,
     out: str | None,
 ) -> None:
-    """Estimate the fatigue life of the shaft line under each controller.
+    """Estimate the fatigue life of the shaft line under each strategy.
 
     DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
     drive of the literature. Cycles are counted by the rainflow method. The tables [limits] and

@@ -256,7 +256,7 @@ def _first_page(report: ChainReport, figures: Figures) -> Html:
             class_="verdict",
         ),
         to_check(report.drive),
-        _table(_gentlest_first(report), (*starts.GENTLE, starts.QUICK[0]), "Strategies on this chain", best),
+        _table(_gentlest_first(report), (*starts.GENTLE, *starts.QUICK), "Strategies on this chain", best),
     )
 
 
@@ -289,12 +289,12 @@ def _strategies(report: ChainReport) -> Html:
     if report.drive.limits:
         shafts, others = shafts[:-1], (*shafts[-1:], *others)
     notes = [
-        *map(for_customer, starts.notes(report.comparison)),
+        *map(for_customer, (*starts.definitions(report.comparison), *starts.remarks(report.comparison))),
         *(f"{name} could not be examined: {reason}" for name, reason in report.failed),
     ]
     return html(
         tag("p", for_customer(report.comparison.recommendation.text)),
-        _table(rows, (*starts.QUICK, *others), "How quick, and how often gaps close", best),
+        _table(rows, (*starts.TIMES, *others), "How quick, and how often gaps close", best),
         _table(rows, shafts, "K_dyn of each shaft", best) if 1 < count <= MOST_SHAFTS else None,
         tag("ul", joined(tag("li", one) for one in notes), class_="notes"),
     )

@@ -21,7 +21,7 @@ from softstart.start.recommendation import Row
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, drawing, new_figure, shade_open_gap
 from softstart.views.printed import at_output, digits, fixed, short, units_of
-from softstart.views.starts import INTERVALS_NOTE, clipped_torque, position_notes
+from softstart.views.starts import INTERVALS_NOTE, row_remarks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,22 +112,7 @@ def strategies_section(
         ),
         *([_limits_note(rows[0])] if LIMITS in columns else []),
         *([INTERVALS_NOTE] if rows[0].intervals else []),
-        *position_notes([row.run for row in rows]),
-        *(
-            f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
-            for row in rows
-            if row.flags and not math.isnan(row.run.start_time)
-        ),
-        *(
-            f"{label_of(row.run.controller)}: {row.run.status.value}"
-            for row in rows
-            if math.isnan(row.run.start_time)
-        ),
-        *(
-            f"{row.run.controller_name}, torque cut off: {clipped}."
-            for row in rows
-            if (clipped := clipped_torque(row.run))
-        ),
+        *row_remarks(rows),
         *(f"{name} could not be examined: {reason}" for name, reason in failed),
     ]
     first = table(

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive, Limit, Limits
-from softstart.language import later, said
 from softstart.start.fatigue import worst_damage
 from softstart.start.run import BaseRun, Run
 
@@ -25,10 +24,7 @@ HARDER: Final = 1.001  # times the K_dyn of `direct`
 BETTER: Final = 0.999  # times the K_dyn of a quicker strategy: less is no gain
 ALIKE: Final = 1.0 + 1e-4  # times the time of another: as quick
 ENDS: Final = ("lower", "upper")  # of an interval, in names of figures
-CASES: Final = (
-    later("gap x4"),
-    later("J2 x0.4"),
-)  # the worst case is that of the drive as it is and of these
+CASES: Final = ("gap x4", "J2 x0.4")  # the worst case is that of the drive as it is and of these
 
 
 @dataclass(frozen=True)
@@ -105,18 +101,12 @@ class Margin:
 
     def __str__(self) -> str:
         """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)"."""
-        figures = {"name": said(self.name), "value": self.value, "unit": self.unit, "limit": self.limit}
+        case = f" with {self.case}" if self.case else ""
         if math.isnan(self.value):
-            text = said("no {name}", **figures)
-        else:
-            text = said("{name} {value:.4g} {unit} of {limit:.4g} {unit}", **figures)
-        if self.case:
-            text = said("{limit} with {case}", limit=text, case=said(self.case))
-        if math.isnan(self.value):
-            return said("{limit}, as the load does not reach its speed", limit=text)
-        if self.kept:
-            return said("{limit} (margin {percent:.3g} %)", limit=text, percent=100.0 * self.share)
-        return said("{limit} ({percent:.3g} % over)", limit=text, percent=-100.0 * self.share)
+            return f"no {self.name}{case}, as the load does not reach its speed"
+        percent = 100.0 * self.share
+        left = f"margin {percent:.3g} %" if self.kept else f"{-percent:.3g} % over"
+        return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{case} ({left})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +197,7 @@ class Row:
         if least is None:
             return ""
         left = "-" if math.isnan(least.share) else f"{100.0 * least.share:.1f} %"
-        return said("kept {left}", left=left) if least.kept else said("exceeded {left}", left=left)
+        return f"{'kept' if least.kept else 'exceeded'} {left}"
 
     def summary(self) -> dict[str, Any]:
         """The figures of the run and of this row under the names used everywhere."""
@@ -236,31 +226,20 @@ def flags(run: BaseRun, direct: BaseRun | None) -> tuple[Flag, ...]:
     limit on the start time, which then decides.
     """
     if math.isnan(run.start_time):
-        return (Flag(said("no start"), said("does not reach the target speed")),)
+        return (Flag("no start", "does not reach the target speed"),)
     found = []
     if math.isnan(run.settled_time):
-        text = said(
-            "the load falls below its speed again, not settled within {end:.4g} s", end=run.settling_end
-        )
-        found.append(Flag(said("not settled"), text))
+        text = f"the load falls below its speed again, not settled within {run.settling_end:.4g} s"
+        found.append(Flag("not settled", text))
     if direct is None:
         return tuple(found)
     slower = run.settled_time / direct.settled_time
     if slower > SLOW and run.drive.limits.start_time is None:
-        found.append(
-            Flag(
-                said("slow x{times:.3g}", times=slower),
-                said("takes {times:.3g} times as long as direct start", times=slower),
-            )
-        )
+        found.append(Flag(f"slow x{slower:.3g}", f"takes {slower:.3g} times as long as direct start"))
     harder = run.k_dyn / direct.k_dyn
     if harder > HARDER:
-        text = said(
-            "harder than direct start, K_dyn {k_dyn:.3f} against {direct:.3f}",
-            k_dyn=run.k_dyn,
-            direct=direct.k_dyn,
-        )
-        found.append(Flag(said("harder x{times:.3g}", times=harder), text))
+        text = f"harder than direct start, K_dyn {run.k_dyn:.3f} against {direct.k_dyn:.3f}"
+        found.append(Flag(f"harder x{harder:.3g}", text))
     return tuple(found)
 
 
@@ -298,9 +277,9 @@ class Recommendation:
         if refused:
             return refused
         if self.limits:
-            more = said("keeps the limits, with more effort or less margin")
-            return said("recommended") if row is self.recommended else more
-        return said("unbeaten") if row in self.best else said("another one is gentler and quicker")
+            more = "keeps the limits, with more effort or less margin"
+            return "recommended" if row is self.recommended else more
+        return "unbeaten" if row in self.best else "another one is gentler and quicker"
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""
@@ -343,59 +322,30 @@ def unchecked_life(drive: Any) -> str:
     if limits.life is None:
         return ""
     if limits.fatigue is None or not limits.fatigue.points:
-        return said("The life is not checked: [limits.fatigue] has no point of an S-N curve.")
-    return (
-        ""
-        if drive.d > 0.0
-        else said("The life is not checked: without damping the shaft swings for all time.")
-    )
+        return "The life is not checked: [limits.fatigue] has no point of an S-N curve."
+    damped = drive.d > 0.0
+    return "" if damped else "The life is not checked: without damping the shaft swings for all time."
 
 
 def _without_limits(drive: Any, rows: Sequence[Row], best: tuple[Row, ...]) -> Recommendation:
+    limits = checked_limits(drive)
     if not best:
-        return Recommendation(
-            said("None is recommended: {reasons}.", reasons=_refused(rows)), None, best, checked_limits(drive)
-        )
+        return Recommendation(f"None is recommended: {_refused(rows)}.", None, best, limits)
     first = best[0]
-    parts = [
-        said(
-            "{name}, K_dyn {k_dyn:.3f} in {time:.4g} s",
-            name=first.name,
-            k_dyn=first.run.k_dyn,
-            time=first.run.settled_time,
-        )
-    ]
+    parts = [f"{first.name}, K_dyn {first.run.k_dyn:.3f} in {first.run.settled_time:.4g} s"]
     for before, row in pairwise(best):
         less, longer = before.run.k_dyn - row.run.k_dyn, row.run.settled_time - before.run.settled_time
         parts.append(
-            said(
-                "{name}, {k_dyn:.3f} in {time:.4g} s ({less:.3f} less for {more:.3g} ms, {each:.2g} per ms)",
-                name=row.name,
-                k_dyn=row.run.k_dyn,
-                time=row.run.settled_time,
-                less=less,
-                more=1e3 * longer,
-                each=1e-3 * less / longer,
-            )
+            f"{row.name}, {row.run.k_dyn:.3f} in {row.run.settled_time:.4g} s ({less:.3f} less for "
+            f"{1e3 * longer:.3g} ms, {1e-3 * less / longer:.2g} per ms)"
         )
-    named = "; ".join(parts)
-    if len(best) > 1:
-        text = said(
-            "No other strategy beats these in K_dyn and time at once: {strategies}.", strategies=named
-        )
-    else:
-        text = said(
-            "No other strategy beats this one in K_dyn and time at once: {strategies}.", strategies=named
-        )
-    enough = (
-        said("Which one is enough depends on what the machine withstands: give [limits] in the drive file.")
-        if isinstance(drive, Drive)
-        else said(
-            "Which one is enough depends on what the machine withstands: give shafts their "
-            "permissible_torque."
-        )
+    these = "these" if len(best) > 1 else "this one"
+    give = "[limits] in the drive file" if isinstance(drive, Drive) else "shafts their permissible_torque"
+    text = (
+        f"No other strategy beats {these} in K_dyn and time at once: {'; '.join(parts)}. Which one is enough "
+        f"depends on what the machine withstands: give {give}."
     )
-    return Recommendation(f"{text} {enough}", None, best, checked_limits(drive))
+    return Recommendation(text, None, best, limits)
 
 
 def _refused(rows: Sequence[Row]) -> str:
@@ -407,7 +357,7 @@ def _why_not(row: Row, limits: Limits) -> str:
     if row.flags:
         return row.flags[0].text
     if row.effort is Effort.SENSOR:
-        return said(Effort.SENSOR.meaning)
+        return Effort.SENSOR.meaning
     broken = [one for one in row.margins(limits) if not one.kept]
     return str(min(broken, key=lambda one: one.share)) if broken else ""
 
@@ -422,29 +372,20 @@ def _with_limits(
     passing = [row for row in able if all(one.kept for one in row.margins(limits))]
     if not passing:
         nearest = max(able, key=least, default=None)
-        text = (
-            said(
-                "No strategy keeps the limits. Nearest: {name}, {reason}.",
-                name=nearest.name,
-                reason=_why_not(nearest, limits),
-            )
-            if nearest
-            else said("No strategy keeps the limits. {reasons}.", reasons=_refused(rows))
-        )
+        reason = f"Nearest: {nearest.name}, {_why_not(nearest, limits)}" if nearest else _refused(rows)
+        text = f"No strategy keeps the limits. {reason}."
         return Recommendation(text, None, best, limits)
     effort = min(row.effort.order for row in passing)
     chosen = max((row for row in passing if row.effort.order == effort), key=least)
     margins = _capital("; ".join(map(str, chosen.margins(limits))))
-    text = said(
-        "Recommended: {name}, the simplest strategy that keeps the limits ({effort}). {margins}.",
-        name=chosen.name,
-        effort=said(chosen.effort.meaning),
-        margins=margins,
+    text = (
+        f"Recommended: {chosen.name}, the simplest strategy that keeps the limits ({chosen.effort.meaning}). "
+        f"{margins}."
     )
     simpler = sorted((row for row in rows if row.effort.order < effort), key=lambda row: row.effort.order)
     if simpler:
         reasons = "; ".join(f"{row.name}, {_why_not(row, limits)}" for row in simpler)
-        text = " ".join((text, said("Simpler ones do not: {reasons}.", reasons=reasons)))
+        text = f"{text} Simpler ones do not: {reasons}."
     return Recommendation(text, chosen, best, limits)
 
 

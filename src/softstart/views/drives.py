@@ -69,7 +69,7 @@ def controllers_set_up(drive: Drive | None, fitted_to: Any) -> str:
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> controllers_set_up(crane.replace(gap=2.0), crane)
-    'controllers are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
+    'strategies are set up for "Crane travel drive 4AMTKF(H)112L6": shaft.gap 0.5 there, 2 here'
     """
     found = []
     for parameter in PARAMETERS.values() if drive is not None else ():
@@ -83,7 +83,7 @@ def controllers_set_up(drive: Drive | None, fitted_to: Any) -> str:
     most = 6
     more = f", and {len(found) - most} more" if len(found) > most else ""
     differs = ": " + "; ".join(found[:most]) + more if found else ""
-    return f'controllers are set up for "{printable(fitted_to.name)}"{differs}'
+    return f'strategies are set up for "{printable(fitted_to.name)}"{differs}'
 
 
 def _set(value: object) -> str:

@@ -25,8 +25,10 @@ def of_run(run: Any) -> str:
 def of_comparison(comparison: Comparison) -> str:
     """The table of the strategies, the gentlest first, and what is recommended."""
     rows = sorted(comparison.rows, key=lambda row: row.run.k_dyn)
-    notes = [comparison.recommendation.text, *starts.notes(comparison)]
-    return _cell(comparison.drive.name, [starts.comparison_table(rows)], None, notes)
+    about = *starts.definitions(comparison), *starts.remarks(comparison)
+    return _cell(
+        comparison.drive.name, [starts.comparison_table(rows)], None, [comparison.recommendation.text, *about]
+    )
 
 
 def of_optimum(best: Any) -> str:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.drive.doubts import doubts
-from softstart.language import later, said
 from softstart.start.comparison import Comparison
 from softstart.start.metrics import SETTLED_BAND
 from softstart.start.recommendation import Row, checked_limits
@@ -102,12 +101,11 @@ def position_notes(runs: Sequence[Run | ChainRun]) -> list[str]:
         return []
     drive = runs[0].drive
     unnamed = isinstance(drive, Drive) and "start_position" not in drive.given()
-    text = said(
+    text = (
         "The start position is unknown: each figure is the worst of both flanks and mid-gap. K_dyn is "
-        "largest from: {positions}.",
-        positions=", ".join(worst),
+        f"largest from: {', '.join(worst)}."
     )
-    known = said("Friction holds the load anywhere; give start.position if it is always the same.")
+    known = "Friction holds the load anywhere; give start.position if it is always the same."
     return [f"{text} {known}" if unnamed else text]
 
 
@@ -123,16 +121,8 @@ def clipped_torque(run: Any) -> str:
     infinite = math.isinf(excess)
     if not infinite and (run.controller.saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
         return ""
-    figures = {"least": short(low), "most": short(high), "time": short(time)}
-    if infinite:
-        return said(
-            "the demand is infinite beyond the limits {least} and {most} N m, for {time} s", **figures
-        )
-    return said(
-        "the demand is up to {excess} N m beyond the limits {least} and {most} N m, for {time} s",
-        excess=short(excess),
-        **figures,
-    )
+    over = "infinite" if infinite else f"up to {short(excess)} N m"
+    return f"the demand is {over} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
 
 
 def outcome(run: Run | ChainRun) -> str:
@@ -279,10 +269,10 @@ def share_lost(row: Row) -> float:
 
 
 GENTLE = (
-    Figure(later("K_dyn"), lambda row: row.run.k_dyn, 3),
-    Figure(later("K\ngap x4"), lambda row: row.k_dyn_worn_gap, 3),
-    Figure(later("K\nJ2 x0.4"), lambda row: row.k_dyn_light_load, 3),
-    Figure(later("peak\nN m"), lambda row: row.run.peak_torque),
+    Figure("K_dyn", lambda row: row.run.k_dyn, 3),
+    Figure("K\nworn", lambda row: row.k_dyn_worn_gap, 3),
+    Figure("K\nlight", lambda row: row.k_dyn_light_load, 3),
+    Figure("peak\nN m", lambda row: row.run.peak_torque),
 )
 
 
@@ -291,25 +281,27 @@ def _end(name: str, index: int) -> Callable[[Row], float]:
 
 
 INTERVALS = (
-    Figure(later("K_dyn\nfrom"), _end("k_dyn", 0), 3),
-    Figure(later("K_dyn\nto"), _end("k_dyn", 1), 3),
-    Figure(later("peak to\nN m"), _end("peak_torque", 1)),
-    Figure(later("start\ntime to s"), _end("start_time", 1)),
+    Figure("K_dyn\nfrom", _end("k_dyn", 0), 3),
+    Figure("K_dyn\nto", _end("k_dyn", 1), 3),
+    Figure("peak to\nN m", _end("peak_torque", 1)),
+    Figure("start\ntime to s", _end("start_time", 1)),
 )
 QUICK = (
-    Figure(later("start\ntime s"), lambda row: row.run.start_time),
-    Figure(later("settled\ns"), lambda row: row.run.settled_time),
-    Figure(later("start\nlater s"), lambda row: row.time_lost, digits=3),
-    Figure(later("settled\nlater s"), lambda row: row.settled_lost, digits=3),
-    Figure(later("settled\nlater %"), share_lost, 1),
+    Figure("settled\ns", lambda row: row.run.settled_time),
+    Figure("later\n%", share_lost, 1),
+)
+TIMES = (
+    Figure("start\ntime s", lambda row: row.run.start_time),
+    Figure("start\nlater s", lambda row: row.time_lost, digits=3),
+    Figure("settled\nlater s", lambda row: row.settled_lost, digits=3),
 )
 AT_THE_GAP = (
-    Figure(later("first\ncontact\ns"), lambda row: row.run.first_contact, digits=3),
-    Figure(later("u at\ncontact\nN m"), lambda row: row.run.torque_at_contact, digits=3),
-    Figure(later("stage 1\ns"), lambda row: row.run.stage_durations[0], digits=3),
-    Figure(later("stage 2\ns"), lambda row: row.run.stage_durations[1], digits=3),
-    Figure(later("K first\ncontact"), lambda row: row.run.k_dyn_first_contact, 3),
-    Figure(later("contacts"), lambda row: row.run.contacts, 0),
+    Figure("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
+    Figure("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
+    Figure("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
+    Figure("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
+    Figure("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
+    Figure("contacts", lambda row: row.run.contacts, 0),
 )
 
 
@@ -324,107 +316,89 @@ def details(machine: Drive | Chain) -> tuple[Figure, ...]:
     names = machine.shaft_names if len(machine.shaft_names) > 1 else ()
     headings = ("over mean\n" + name.replace(" - ", " -\n") for name in names)
     shafts = (Figure(heading, of_shaft(k), 3) for k, heading in enumerate(headings))
-    used = Figure(later("torque\nused %"), lambda row: row.run.used_torque, 1)
+    used = Figure("torque\nused %", lambda row: row.run.used_torque, 1)
     return (*shafts, *([used] if machine.limits else []), AT_THE_GAP[-1])
 
 
 def comparison_table(rows: Sequence[Row], figures: Sequence[Figure] = (), title: str = "") -> Table:
-    """The strategies and these figures, by default all; last columns for limits and flags, where needed."""
+    """The strategies and these figures, by default all; beside K_dyn also flags and limits, where needed."""
     uncertain = INTERVALS if rows[0].intervals else ()
-    figures = figures or (*GENTLE, *uncertain, *QUICK, *details(rows[0].run.drive))
-    cells = {later("strategy"): [row.run.controller_name for row in rows]}
+    figures = figures or (*GENTLE, *QUICK, *uncertain, *TIMES, *details(rows[0].run.drive))
+    judged = GENTLE[0] in figures
+    cells = {"strategy": [row.marked if judged else row.name for row in rows]}
     for figure in figures:
         values = [figure.of(row) for row in rows]
         if figure.decimals is None:
             cells[figure.heading] = column_of(values, figure.digits)
         else:
             cells[figure.heading] = [number(value, figure.decimals) for value in values]
-    if any(row.against_limits for row in rows) and GENTLE[0] in figures:
-        cells[later("limits")] = [row.against_limits for row in rows]
-    if any(row.flags for row in rows):
-        cells[later("flag")] = [", ".join(flag.word for flag in row.flags) for row in rows]
-    return Table.of(title, cells, ("strategy", "limits", "flag"))
+    if judged and any(row.against_limits for row in rows):
+        cells["limits"] = [row.against_limits for row in rows]
+    return Table.of(title, cells, ("strategy", "limits"))
 
 
-INTERVALS_NOTE = later(
-    "from, to: 95 % of the drives that the logs leave possible start within them, under the controller as "
-    "it is set up for the drive found; the limits must be kept at the upper end as well."
+INTERVALS_NOTE = (
+    "from, to: 95 % of the drives that the logs leave possible start within them, under the strategy as it "
+    "is set up for the drive found; the limits must be kept at the upper end as well."
+)
+LEGEND = (
+    "K worn: the backlash 4 times as wide (gap x4); K light: 0.4 times the load inertia (J2 x0.4); later: "
+    "settled later than direct start."
 )
 
 
-def notes(comparison: Comparison) -> list[str]:
-    """What the columns mean, and which starts did not end as they should."""
+def definitions(comparison: Comparison) -> list[str]:
+    """What the columns mean."""
     run = comparison.rows[0].run
     base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
     chain = isinstance(comparison.drive, Chain)
-    own = (
-        f'"{comparison.fitted_to.name}"'
-        if comparison.fitted_to
-        else said("this chain")
-        if chain
-        else said("this drive")
-    )
+    nominal = f'"{comparison.fitted_to.name}"' if comparison.fitted_to else "this machine"
     found = [
-        said(
-            "K_dyn = largest torque of all shafts at the motor shaft / {mean:.4g} N m, the mean shaft "
-            "torque under full starting torque. K gap x4, K J2 x0.4: the controller set up for {own}, when "
-            "all gaps are 4 times as wide or the load inertia 0.4 times as large.",
-            mean=base,
-            own=own,
-        )
-        if chain
-        else said(
-            "K_dyn = peak shaft torque / {mean:.4g} N m, the mean shaft torque under full starting torque. "
-            "K gap x4, K J2 x0.4: the controller set up for {own}, when the gap is 4 times as wide or the "
-            "load inertia 0.4 times as large.",
-            mean=base,
-            own=own,
-        ),
-        said(
-            "settled: from then on the load speed is never more than {percent:g} % below the target, for "
-            "{periods:g} elastic periods after the start time. later: compared with direct start.",
-            percent=100.0 * SETTLED_BAND,
-            periods=SETTLING_PERIODS,
-        ),
+        f"K_dyn = {'largest torque of all shafts at the motor shaft' if chain else 'peak shaft torque'} / "
+        f"{base:.4g} N m, the mean shaft torque under full starting torque.",
+        f"{LEGEND} Strategies are set up for {nominal}.",
+        f"settled: from then on the load speed is never more than {100.0 * SETTLED_BAND:g} % below the "
+        f"target, for {SETTLING_PERIODS:g} elastic periods after the start time.",
     ]
-    if chain:
-        found += comparison.drive.warnings
     if checked_limits(comparison.drive):
-        cases = [
-            said("the chain as it is") if chain else said("the drive as it is"),
-            *map(said, comparison.worst_case),
-        ]
-        found.append(said("limits: the least margin in the worst of {cases}.", cases=", ".join(cases)))
-    if comparison.rows[0].intervals:
-        found.append(said(INTERVALS_NOTE))
-    found += position_notes([row.run for row in comparison.rows])
+        cases = ", ".join(("the machine as it is", *comparison.worst_case))
+        found.append(f"limits: the least margin in the worst of {cases}.")
     if not chain and comparison.drive.brake == "motor":
-        found.append(said("Times count from the command, so that they include the release of the brake."))
-    found += [
-        f"{row.run.controller_name}: {said(row.run.status.value)}"
-        for row in comparison.rows
-        if math.isnan(row.run.start_time)
-    ]
-    found += [
-        said("{name}, torque cut off: {clipped}.", name=row.run.controller_name, clipped=clipped)
-        for row in comparison.rows
-        if (clipped := clipped_torque(row.run))
-    ]
-    found += [
-        said(
-            "{name} is flagged: {reasons}.", name=row.name, reasons="; ".join(flag.text for flag in row.flags)
-        )
-        for row in comparison.rows
-        if row.flags and not math.isnan(row.run.start_time)
-    ]
+        found.append("Times count from the command, so that they include the release of the brake.")
     return found
+
+
+def remarks(comparison: Comparison) -> list[str]:
+    """What the figures of these starts leave out, and which starts did not end as they should."""
+    rows = comparison.rows
+    return [
+        *(comparison.drive.warnings if isinstance(comparison.drive, Chain) else ()),
+        *([INTERVALS_NOTE] if rows[0].intervals else []),
+        *row_remarks(rows),
+    ]
+
+
+def row_remarks(rows: Sequence[Row]) -> list[str]:
+    """Positions, starts that failed, torque cut off, and flags."""
+    cut = [(row.name, clipped_torque(row.run)) for row in rows]
+    failed = [row for row in rows if math.isnan(row.run.start_time)]
+    return [
+        *position_notes([row.run for row in rows]),
+        *(f"{row.name}: {row.run.status.value}" for row in failed),
+        *(f"{name}, torque cut off: {clipped}." for name, clipped in cut if clipped),
+        *(
+            f"{row.name} is flagged: {'; '.join(flag.text for flag in row.flags)}."
+            for row in rows
+            if row.flags and row not in failed
+        ),
+    ]
 
 
 def comparison_figure(rows: Sequence[Row], title: str) -> Any:
     """Motor torque and torque of each shaft of several starts, one panel each."""
     runs = [row.run for row in rows]
     chain = isinstance(runs[0].drive, Chain)
-    names = [said("shaft torque T")]
+    names = ["shaft torque T"]
     if chain:  # a few names fit above the first panel; of more shafts none
         names = list(runs[0].drive.shaft_names)
         names = names if len(names) < 4 else [f"_{name}" for name in names]
@@ -443,17 +417,12 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
                 color=COLOURS[1],
                 ls=DASHES[1],
                 lw=1.1,
-                label=said("motor") if chain else said("motor torque u"),
+                label="motor" if chain else "motor torque u",
             )
             for k, (name, torque) in enumerate(zip(names, run.T.reshape(run.t.size, -1).T, strict=True)):
                 panel.plot(run.t, torque, color=SHAFTS[k % len(SHAFTS)], label=name)
             panel.set_title(
-                said(
-                    "{name}:  K_dyn {k_dyn:.3f},  start {time:.4f} s",
-                    name=row.marked,
-                    k_dyn=run.k_dyn,
-                    time=run.start_time,
-                ),
+                f"{row.marked}:  K_dyn {run.k_dyn:.3f},  start {run.start_time:.4f} s",
                 loc="left",
                 fontsize=9.5,
                 pad=3,
@@ -465,7 +434,7 @@ def comparison_figure(rows: Sequence[Row], title: str) -> Any:
             figure.legend(handles, labels, loc="outside lower right", ncols=named)
         else:
             legend_above(axes[0, 0], named)
-        axes[-1, 0].set_xlabel(said("time, s") if chain else said("time, s     (grey: gap open)"))
+        axes[-1, 0].set_xlabel("time, s" if chain else "time, s     (grey: gap open)")
         axes[-1, 0].set_xlim(0.0, longest)
         entitle(figure, title)
     return figure
@@ -527,7 +496,8 @@ def write_comparison(comparison: Comparison, folder: Path, command: str) -> None
         *(f"Doubt: {markdown(one)}" for one in doubts(comparison.drive)),
         comparison.recommendation.text,
         markdown_table(comparison_table(rows)),
-        *notes(comparison),
+        *definitions(comparison),
+        *remarks(comparison),
         *(f"![{stem}]({stem}.svg)" for stem in pictures),
     ]
     each = (_strategy(run, stem) for run, stem in zip(runs, stems, strict=True))

@@ -141,3 +141,11 @@ def print_conclusion(to: rich_console.Console, found: Sequence[str], notes: Sequ
         sentence(to, text, "bold")
     for note in notes:
         sentence(to, note, "dim")
+
+
+def print_commands(to: rich_console.Console, commands: Sequence[tuple[str, str]]) -> None:
+    """What to type next, each command whole on a line of its own, and what it gives."""
+    wide = max(len(command) for command, _ in commands)
+    to.print("\nNext:")
+    for command, gives in commands:
+        to.print(f"  {command:{wide}}   {gives}", soft_wrap=True)

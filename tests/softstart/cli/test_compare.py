@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import shlex
 import tomllib
 
 import pytest
@@ -54,8 +55,17 @@ def test_loose_controller_takes_parameters(run):
 
 @pytest.mark.parametrize("width", ["80", "100", "140"])
 def test_table_says_all_and_fits(run, monkeypatch, width):
+    """One table of six columns; times, events and definitions with --details."""
     monkeypatch.setenv("COLUMNS", width)
-    code, out, err = run("compare", *THREE)
+    few = run("compare", *THREE).out
+    headings = [line.split() for line in few.splitlines() if line.endswith(("settled  later", " s      %"))]
+    assert headings == [
+        ["K", "K", "peak", "settled", "later"], ["strategy", "K_dyn", "worn", "light", "N", "m", "s", "%"]
+    ]  # fmt: skip
+    assert few.count("\ndirect ") == 1
+    code, out, err = run("compare", *THREE, "--details")
+    assert out.count("\ndirect ") == 3
+    assert set(few.split()) - {"More:", "--details."} <= set(out.split())
     assert (code, err) == (0, "")
     lines = out.splitlines()
     assert max(map(len, lines)) <= int(width)
@@ -64,7 +74,7 @@ def test_table_says_all_and_fits(run, monkeypatch, width):
     assert not set("─│┃━") & set(out)
     for words in (
         "Crane travel drive", "J1 = 0.035 kg m2", "gap = 0.5 rad", "no-pull", "active", "strategy", "K_dyn",
-        "gap x4", "J2 x0.4", "stage 1", "stage 2", "contacts", "time", "later %",
+        "gap x4", "J2 x0.4", "stage 1", "stage 2", "contacts", "time", "later s",
         "No other strategy beats", "52.86 N m",
     ):  # fmt: skip
         assert words in out
@@ -83,6 +93,30 @@ def test_the_closing_sentence_is_the_recommendation(run, monkeypatch):
     said = compare("crane-4amtkf", THREE[1].split(",")).recommendation.text
     assert said in out
     assert said.startswith("No other strategy beats ")
+
+
+QUICKLY = {
+    "optimize": ("--time-limit", "0"),
+    "tune": ("--gaps", "1x", "--inertias", "1x", "--restarts", "1", "--workers", "1", "--no-optimum"),
+}
+
+
+@pytest.mark.parametrize(
+    ("machine", "more", "wanted"),
+    [
+        ("good.toml", ("--set", "name=my drive"), ["optimize", "tune", "report"]),
+        ("good.toml", ("--set", "limits.shaft_torque=200"), ["tune", "report"]),
+        ("crane-4-mass", ("--set", "shaft[1].damping_ratio=0.02"), ["optimize", "tune", "report"]),
+    ],
+)
+def test_it_ends_with_commands_for_this_machine_that_run(run, machine, more, wanted):
+    out = run("compare", machine, *more, "--controllers", "direct,ramp").out
+    commands = [shlex.split(line.partition("   ")[0]) for line in out.rpartition("Next:\n")[2].splitlines()]
+    assert [words[1] for words in commands] == wanted
+    for words in commands:
+        assert words[2:5] == [machine, *more]
+        if machine == "good.toml" and words[1] in QUICKLY:
+            assert run(*words[1:], *QUICKLY[words[1]]).code == 0, words
 
 
 def test_time_lost_is_that_of_direct():
@@ -200,7 +234,7 @@ def test_compare_tells_limits_and_flags(run):
                          "direct,shaped,s-curve")  # fmt: skip
     assert (code, err) == (0, "")
     assert "exceeded" in out
-    assert "harder x" in out
+    assert "shaped (harder x" in out
     code, out, err = run("compare", "--worst-case", "gap")
     assert code == 2
     assert "write gap x4, J2 x0.4" in err

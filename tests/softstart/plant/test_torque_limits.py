@@ -119,7 +119,7 @@ def test_the_worst_of_several_positions_counts() -> None:
 def test_it_is_said_once(controller: Controller, sentence: str) -> None:
     until = None if controller.name == "ramp" else END
     table = compare(CRANE, [controller], until=until)
-    assert sum(sentence in note for note in starts.notes(table)) == 1
+    assert sum(sentence in note for note in starts.remarks(table)) == 1
     run = table.rows[0].run
     assert sum(sentence in text for row in starts.figure_rows(run) for text in row) == 1
     assert starts.outcome(run).startswith(run.status.value)
