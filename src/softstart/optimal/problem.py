@@ -85,7 +85,7 @@ class Problem:
         subject to lowest_torque <= u <= highest_torque, the drive's lag and rate, u <= torque_speed(w1),
                    t_f <= start_time, K_dyn <= k_dyn, heat <= heat
         and at t_f synchronous: w1 = w2 = target_speed, from then on the shaft torque is held
-                   steady:      also T = Mc
+                   steady:      also T = Mc; without load torque T = 0, the flanks just touch
                    reached:     only w2 = target_speed for the first time; the motor coasts until T peaks
 
     The drive's computing_delay is left out: a profile that is known beforehand is sent that much earlier.

@@ -25,6 +25,7 @@ collocation = late("softstart.optimal.collocation.search")
 COARSE, FINE = 40, 80  # steps of the linear programs
 WITHIN = 2e-6  # of the start time
 MOST_TRIALS = 40
+LONGEST = 100.0  # times the least that momentum allows: no start time beyond it is tried
 
 
 def shortest_start_time(problem: Problem) -> float:
@@ -128,7 +129,7 @@ def _quickest(problem: Problem, soonest: float, speed_at: Callable[[float, int],
             if abs(missing) <= within * end:
                 bracket.high = min(bracket.high, end + max(missing, 0.0))
                 break
-            if bracket.high - bracket.low <= within * end or end > 100.0 * soonest:
+            if bracket.high - bracket.low <= within * end or end > LONGEST * soonest:
                 break
             end = bracket.next()
         end = bracket.high
@@ -212,20 +213,23 @@ def verdict_on(problem: Problem) -> Verdict:
     assert problem.start_time is not None
     bound = problem.start_time
     shortest = shortest_start_time(problem)
+    none_found = math.isinf(shortest)
     if math.isnan(shortest):
         constraint, least = _constraint(problem, shortest), momentum_shortest_time(problem)
         shown = f"the shortest start time was not found, it is no less than {least:.6g} s"
-    elif not math.isfinite(shortest):
-        constraint = "the first contact, so hard that the gap opens again whatever the motor does"
-        shown = "no start time would do"
-        if problem.k_dyn is not None:
-            constraint = f"K_dyn <= {problem.k_dyn:g}"
-        elif problem.heat is not None:
-            constraint = f"heat <= {problem.heat:g} s"
+    elif none_found:
+        constraint = "probably the first contact, so hard that the gap opens again whatever the motor does"
+        shown = f"none was found up to {LONGEST * momentum_shortest_time(problem):.4g} s, which is no proof"
+        if problem.k_dyn is not None or problem.heat is not None:
+            shown = "the search for the least start time found none, which is no proof"
+            constraint = (
+                f"heat <= {problem.heat:g} s" if problem.k_dyn is None else f"K_dyn <= {problem.k_dyn:g}"
+            )
     else:
         constraint, shown = _constraint(problem, shortest), f"the shortest start time is {shortest:.6g} s"
     text = (
-        f"start_time = {bound:g} s: no torque brings {problem.drive.name} to {problem.target:g} rad/s "
+        f"start_time = {bound:g} s: no torque {'was found that ' if none_found else ''}brings "
+        f"{problem.drive.name} to {problem.target:g} rad/s "
         f"({problem.terminal}) so soon while the gap closes only once; "
         f"what forbids it is {constraint}; {shown}."
     )

@@ -43,8 +43,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
-from softstart.optimal.lp.motion import Contact
-from softstart.optimal.lp.rows import MARGIN
+from softstart.optimal.lp.motion import MARGIN, Contact
 from softstart.optimal.lp.whole import ONE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem

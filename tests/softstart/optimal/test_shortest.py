@@ -19,6 +19,7 @@ from softstart.optimal.momentum import momentum_shortest_time
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.result import NotConverged
 from softstart.optimal.shortest import shortest_start_time, verdict_on
+from softstart.profile import TorqueProfile
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
@@ -127,7 +128,40 @@ def test_a_start_that_takes_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shortest, "shortest_start_time", lambda problem: math.inf)
     said = verdict_on(Problem(CRANE, 0.3, minimise="heat", k_dyn=0.1))
     assert said.constraint == "K_dyn <= 0.1"
-    assert "no start time" in said.sentence
+    assert "found none, which is no proof" in said.sentence
+
+
+IDLE = Drive(
+    motor_inertia=0.035, load_inertia=0.175, starting_torque=62.0, load_torque=0.0, stiffness=368.465,
+    gap=0.0, target_speed=41.265,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("drive", "start_time", "k_dyn"),
+    [
+        (IDLE, 0.17, 0.9198),  # with a load torque of 0.03 N m
+        (IDLE.replace(load_torque=0.001), 0.17, 0.9198),
+        (IDLE.replace(damping=0.1), 0.2, 0.7629),
+        (CRANE.replace(load_torque=0.01), 0.27, 0.8689),
+    ],
+)
+def test_a_steady_start_without_load_torque(drive: Drive, start_time: float, k_dyn: float) -> None:
+    """It costs what little load torque costs, and ends with T = Mc and equal speeds."""
+    best = optimize(drive, start_time, terminal="steady", time_limit=0.0)
+    assert best.k_dyn == pytest.approx(k_dyn, rel=2e-3)
+    end = best.run.at(best.end_time)
+    assert end["T"] == pytest.approx(drive.Mc, abs=1e-3 * best.problem.base_torque)
+    assert end["w1"] == pytest.approx(end["w2"], abs=1e-3 * drive.target_speed)
+
+
+def test_the_least_time_of_a_steady_start_without_load_torque() -> None:
+    """It is known: 0.152995 s. Constant torque over three elastic periods ends steady, K_dyn 2 u/Ms."""
+    periods, u = 3.0 * float(IDLE.elastic_period), 51.672
+    assert u * periods == pytest.approx(0.21 * 41.265, rel=1e-4)
+    run = simulate(IDLE, "profile", parameters={"profile": TorqueProfile.steps([0.0, periods], [u])})
+    assert run.k_dyn == pytest.approx(2.0 * u / 62.0, rel=1e-6)
+    assert shortest_start_time(Problem(IDLE, 1.0, "steady")) == pytest.approx(0.152995, rel=2e-4)
 
 
 def test_several_contacts_are_pointed_out() -> None:
@@ -150,7 +184,7 @@ def test_what_was_not_found_is_not_called_impossible(monkeypatch: pytest.MonkeyP
     assert shortest_start_time(Problem(drive, 0.3, minimise="heat", k_dyn=0.5)) == math.inf
     said = verdict_on(Problem(drive, 0.1))
     assert "was not found" in said.sentence
-    assert "no start time would do" not in said.sentence
+    assert "no start time" not in said.sentence
     assert default_start_times(drive)[0] == pytest.approx(1.02 * simulate(drive, "direct").start_time)
     with pytest.raises(NotConverged):
         optimize(drive, 0.3, method="collocation")

@@ -30,11 +30,10 @@ from scipy.optimize import minimize_scalar
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.optimal.lp.motion import Contact, Entry, entry_of, no_ideal
+from softstart.optimal.lp.motion import MARGIN, Contact, Entry, entry_of, no_ideal
 from softstart.optimal.lp.rows import (
     AIM,
     FINE_ENDS,
-    MARGIN,
     QUARTERS,
     SIXTEENTHS,
     Limits,
@@ -60,6 +59,7 @@ from softstart.profile import TorqueProfile
 TAIL_POINTS = 120
 COARSE, MIDDLE = 40, 80  # steps of the grid: to find the entry, to refine it
 REFINEMENT = Refinement(most=400, mending=3, narrowing=0.4)
+ENDING = 0.05  # of U, at most, which T keeps above half an elastic period before it ends at 0
 EXCESS = 1e-4  # relative: T above P between the checks by more counts
 SCANNED, LOCAL_MINIMA = 20, 3
 SOONER = (0.985, 0.95, 0.9, 0.83, 0.75, 0.66, 0.56, 0.46, 0.36, 0.27, 0.19, 0.13, 0.09, 0.06)  # of the end
@@ -159,6 +159,9 @@ class ContactProgram:
         self.warm = warm or WarmStarts()
         # the exact plant must not part the flanks by rounding; at first T is 0
         self.least = np.where(np.arange(self.kept[1].size) < 2 * len(checks), 0.0, margin)
+        if problem.terminal == "steady" and contact.Mc < margin * self.U:  # it ends with T = Mc
+            left = (1.0 - self.share) * tau / contact.half_period
+            self.least = np.minimum(self.least, ENDING * left**2)
         reach = min(contact.half_period, np.pi / contact.Omega)
         self.tail_at = reach * np.arange(1, TAIL_POINTS + 1) / TAIL_POINTS
         a, b = self._from_node(self.tail_at, np.full(TAIL_POINTS, self.n), None)

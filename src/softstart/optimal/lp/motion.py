@@ -21,6 +21,7 @@ from softstart.arrays import Indices, Vector
 from softstart.drive import Drive
 from softstart.optimal.problem import Problem
 
+MARGIN = 2e-4  # of U, which T keeps above 0
 Pieces = list[tuple[float, float]]  # (duration in s, torque in N m)
 
 
@@ -295,6 +296,8 @@ def no_ideal(problem: Problem) -> str:
         return "the motor may brake, so the gap part is not one pulse at either end"
     if drive.contact_law == "modelica" and drive.d > 0.0:
         return "the damped modelica law is not linear in contact"
+    if problem.terminal == "steady" and drive.d > 0.0 and drive.Mc < MARGIN * problem.highest_torque:
+        return "a damped shaft ends without torque only after it did not push"
     if v0 < 0.0:
         return "the load runs away from the motor at first"
     if reactive and drive.d > 0.0:

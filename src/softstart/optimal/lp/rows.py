@@ -25,7 +25,6 @@ Steps = NDArray[np.int64]
 Marks = NDArray[np.bool_]
 
 AIM = 1.0 + 1e-9  # a little above the target, so that the exact plant finds it reached
-MARGIN = 2e-4  # of U, which T keeps above 0
 QUARTERS, HALVES = (0.25, 0.5, 0.75, 1.0), (0.5, 1.0)  # of a step, where T is checked
 SIXTEENTHS = tuple((np.arange(16) + 1.0) / 16.0)  # where it is checked afterwards
 FINE_ENDS = 30.0  # radians of the elastic oscillation at either end of a long contact

@@ -32,9 +32,9 @@ from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
+from softstart.optimal.lp.motion import MARGIN
 from softstart.optimal.lp.rows import (
     AIM,
-    MARGIN,
     QUARTERS,
     SIXTEENTHS,
     Limits,
