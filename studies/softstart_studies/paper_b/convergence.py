@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from softstart.balancing.parts import CYCLE_ANGLE
-from softstart.balancing.slider_crank import (
-    SliderCrank,
-    acceleration_harmonics,
-    acceleration_series,
-    inertia_torque_harmonics,
-    inertia_torque_series,
-)
+from softstart.balancing.slider_crank import SliderCrank, acceleration_harmonics, inertia_torque_harmonics
 from softstart.study import Table
+from softstart_studies.paper_b.series import acceleration_series, inertia_torque_series
 from softstart_studies.paper_b.vaz import RPM, TUNING, VAZ
 
 ORDERS = 12

@@ -11,7 +11,7 @@ from tests.softstart.balancing.engines import RPM, engine
 
 from softstart.balancing import BalancerShaft, Counterweights, Engine, Layout, balance
 from softstart.balancing.design import arm, free_force, two_shafts
-from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_series
+from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
 from softstart.errors import InputError
 
 VAZ = Engine.load("vaz-11113")
@@ -121,7 +121,7 @@ def test_inertia_only_leaves_the_gas():
     gas = [abs(VAZ.gas_harmonics(float(w))[2]) for w in found.speeds]
     assert alone.first_order == pytest.approx(gas, rel=1e-12)
     # h = 2 r B_1: the masses cancel out
-    B_1 = inertia_torque_series(35.5 / 121, 1)[1]
+    B_1 = inertia_torque_harmonics(35.5 / 121, 1)[1]
     assert alone.height == pytest.approx(2.0 * 0.0355 * B_1, rel=1e-12)
     heavy = balance(Engine.load("vaz-11113", also={"masses.reciprocating": 2.0})).residual("inertia-only")
     assert heavy.height == pytest.approx(alone.height, rel=1e-12)

@@ -150,12 +150,6 @@ def test_two_cylinders_with_throws_together_and_opposite():
     assert couple == pytest.approx([1.0, 0.0], abs=1e-12)
 
 
-def test_three_cylinders():
-    force, couple = first_and_second(engine((1, 3, 2)))
-    assert force == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert couple == pytest.approx([math.sqrt(3.0), math.sqrt(3.0) * A2], rel=1e-12)
-
-
 def test_four_cylinders_cancel_in_the_first_order_and_add_in_the_second():
     made = engine((1, 3, 4, 2))
     force, couple = first_and_second(made)

@@ -1,21 +1,12 @@
 """The exact crank drive, and its harmonics in two independent ways."""
 
-from fractions import Fraction
-from itertools import pairwise
-from math import comb
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softstart.balancing.slider_crank import (
-    SliderCrank,
-    acceleration_harmonics,
-    acceleration_series,
-    inertia_torque_harmonics,
-    inertia_torque_series,
-)
+from softstart.balancing.slider_crank import SliderCrank, acceleration_harmonics, inertia_torque_harmonics
+from softstart_studies.paper_b.series import acceleration_series, inertia_torque_series
 
 PHI = np.linspace(0.0, 2.0 * np.pi, 97)
 ratios = st.floats(0.02, 0.9)
@@ -72,45 +63,15 @@ def test_the_harmonics_make_up_the_exact_course(ratio):
     assert torque == pytest.approx(-crank.slope(PHI) * crank.curvature(PHI) / ratio**2, abs=1e-12)
 
 
-def rod_coefficients(terms):
-    """c_0, c_2 .. of sqrt(1 - x^2 sin^2), each a polynomial in x^2, in exact fractions."""
-    found = [[Fraction(0)] * (terms + 1) for _ in range(terms + 1)]
-    binomial = Fraction(1)
-    for j in range(terms + 1):
-        for i in range(j + 1):
-            size = Fraction(comb(2 * j, j - i), 4**j) * (1 if i == 0 else 2) * (-1) ** i
-            found[i][j] += binomial * (-1) ** j * size
-        binomial *= (Fraction(1, 2) - j) / (j + 1)
-    return found
-
-
 def test_textbook_coefficients():
-    # A_2 = x + x^3/4 + 15 x^5/128, A_4 = -(x^3/4 + 3 x^5/16), A_6 = 9 x^5/128 of the acceleration, from the
-    # exact expansion in fractions: A_2i = 4 i^2 c_2i/x
-    rod = rod_coefficients(3)
-    assert [4 * rod[1][j] for j in (1, 2, 3)] == [1, Fraction(1, 4), Fraction(15, 128)]
-    assert [16 * rod[2][j] for j in (2, 3)] == [Fraction(-1, 4), Fraction(-3, 16)]
-    assert 36 * rod[3][3] == Fraction(9, 128)
     x = 0.01
     A = acceleration_harmonics(x, 6)
     assert A[1] == 1.0
     assert A[2] == pytest.approx(x + x**3 / 4 + 15 * x**5 / 128, rel=1e-12)
     assert A[4] == pytest.approx(-(x**3) / 4 - 3 * x**5 / 16, abs=1e-14)
-    B = inertia_torque_series(0.1, 4)
+    B = inertia_torque_harmonics(0.1, 4)
     x = 0.1  # the next terms are of x^7, x^6, x^7, x^6
     assert B[1] == pytest.approx(x / 4 + x**3 / 16 + 15 * x**5 / 512, abs=3 * x**7)
     assert B[2] == pytest.approx(-1 / 2 - x**4 / 32, abs=3 * x**6)
     assert B[3] == pytest.approx(-3 * x / 4 - 9 * x**3 / 32 - 81 * x**5 / 512, abs=3 * x**7)
     assert B[4] == pytest.approx(-(x**2) / 4 - x**4 / 8, abs=3 * x**6)
-
-
-def test_fft_converges_exponentially_with_the_samples():
-    ratio = 0.3
-    crank = SliderCrank(ratio, 1.0)
-    exact = inertia_torque_series(ratio, 4)
-    errors = []
-    for n in (8, 12, 16, 20):
-        phi = 2.0 * np.pi * np.arange(n) / n
-        torque = -crank.slope(phi) * crank.curvature(phi) / ratio**2
-        errors.append(float(np.abs(-2.0 / n * np.fft.rfft(torque).imag[:5] - exact).max()))
-    assert all(later < 0.02 * earlier for earlier, later in pairwise(errors))
