@@ -377,16 +377,6 @@ def test_with_decimal_commas_a_list_is_read_right_or_not_at_all(numbers):
             assert read == [float(f"{number:.4f}") for number in numbers]
 
 
-@pytest.mark.parametrize(
-    ("text", "written"),
-    [("0,5 rad", '"0.5 rad"'), ("1,500", '"1.500" with a decimal point, or "1500"'), ("0,07", '"0.07"')],
-)
-def test_a_decimal_comma_is_refused_with_the_text_to_write(text, written):
-    with pytest.raises(InputError, match="a comma may divide decimals or thousands") as error:
-        to_si(text, "rad")
-    assert written in str(error.value)
-
-
 @pytest.mark.parametrize("text", ["9" * 5000, "-1", "1.0", "\N{ARABIC-INDIC DIGIT FIVE}", "", "1e3"], ids=str)
 def test_a_whole_number_is_one(text):
     with pytest.raises(InputError, match="give a whole number of 1 or more"):

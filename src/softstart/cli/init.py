@@ -81,14 +81,15 @@ def init(
             raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
         write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
-        print_json({"data_sheet": found.summary(), "drive": drive.values(), "doubts": doubts(drive)})
+        print_json({"data_sheet": found.values(), "drive": drive.values(), "doubts": doubts(drive)})
         return
     for one in doubts(drive):
         click.echo(f"softstart: doubt: {one}", err=True)
     if out is None:
         click.echo(text, nl=False)
     else:
-        sentence(console(), f"{out} is written. What next: softstart compare {out}")
+        assumed = f" Assumed: {drive.assumed}." if drive.assumed else ""
+        sentence(console(), f"{out} is written.{assumed} What next: softstart compare {out}")
 
 
 def asked(given: Mapping[str, object]) -> DataSheet:

@@ -520,10 +520,6 @@ class DataSheet(ParameterSet):
         """The drive of `drive_toml`: its numbers have five digits, as those of the file."""
         return Drive.from_toml(self.drive_toml(), where="the drive that follows")
 
-    def summary(self) -> dict[str, Any]:
-        """The parameters as plain data, for JSON."""
-        return self.values()
-
 
 # what is typed -------------------------------------------------------------------------------------------
 
