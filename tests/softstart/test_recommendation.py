@@ -13,6 +13,7 @@ from softstart.controller.finding import ready_controller_names
 from softstart.drive import library
 from softstart.page.frames import Screen
 from softstart.page.session import Session
+from softstart.reporting.first_page import for_customer
 from softstart.start import metrics
 from softstart.start.fatigue import fatigue
 from softstart.start.recommendation import flags
@@ -180,7 +181,7 @@ def test_compare_page_and_report_say_the_same(drive):
     page = html.unescape(made.to_html().replace("K<sub>dyn</sub>", "K_dyn")).replace(
         "\N{NO-BREAK SPACE}", " "
     )
-    assert said in page
+    assert for_customer(said) in page
     for row in found.rows:
         assert f">{row.against_limits}<" in page
         for flag in row.flags:

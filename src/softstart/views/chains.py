@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.language import later, said
 from softstart.views.drawing import COLOURS, DASHES, SHAFTS, drawing, entitle, new_figure
 from softstart.views.drives import POSITIONS
 from softstart.views.numbers import Table, column_of, first_of, number, printable, short
@@ -36,35 +35,17 @@ def chain_lines(chain: Chain) -> list[str]:
     """The chain in a few lines."""
     arrays = chain.at_motor_shaft()
     gaps = int((arrays.gap > 0.0).sum())
-    sums = {
-        "masses": len(chain.masses), "count": gaps, "J": short(float(arrays.J.sum())),
-        "gaps": short(float(arrays.gap.sum())), "torque": short(float(arrays.Mc.sum())),
-    }  # fmt: skip
-    contents = (
-        said(
-            "{masses} masses, {count} gap; at the motor shaft J = {J} kg m2, gaps {gaps} rad, load torque "
-            "{torque} N m",
-            **sums,
-        )
-        if gaps == 1
-        else said(
-            "{masses} masses, {count} gaps; at the motor shaft J = {J} kg m2, gaps {gaps} rad, load torque "
-            "{torque} N m",
-            **sums,
-        )
-    )
+    J, play, torque = (short(float(one.sum())) for one in (arrays.J, arrays.gap, arrays.Mc))
     lines = [
         printable(chain.name),
-        f"  {contents}",
-        "  "
-        + said("motor on {motor}, load {load}", motor=chain.masses[arrays.motor].name, load=chain.load_mass),
+        f"  {len(chain.masses)} masses, {gaps} gap{'' if gaps == 1 else 's'}; at the motor shaft J = {J} kg "
+        f"m2, gaps {play} rad, load torque {torque} N m",
+        f"  motor on {chain.masses[arrays.motor].name}, load {chain.load_mass}",
     ]
     if chain.position != "mid-gap":
-        lines.append(
-            "  " + said("starts {position}, of all gaps alike", position=said(POSITIONS[chain.position]))
-        )
+        lines.append(f"  starts {POSITIONS[chain.position]}, of all gaps alike")
     if chain.assumed:
-        lines.append("  " + said("assumed: {values}", values=printable(chain.assumed)))
+        lines.append(f"  assumed: {printable(chain.assumed)}")
     return lines
 
 
@@ -93,18 +74,16 @@ def shaft_table(run: ChainRun) -> Table:
     """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
     own = run.peak_torques / run.chain.at_motor_shaft().torque_ratio
     cells = {
-        later("shaft"): list(run.chain.shaft_names),
-        later("K"): [number(k, 4) for k in run.k_dyns.tolist()],
-        later("over its\nown mean"): [number(k, 4) for k in run.shaft_factors.tolist()],
-        later("torque at\nmotor shaft\nN m"): column_of(run.peak_torques.tolist()),
-        later("torque at\nown shaft\nN m"): column_of(own.tolist()),
-        later("at s"): column_of(run.peak_times.tolist(), 5),
+        "shaft": list(run.chain.shaft_names),
+        "K": [number(k, 4) for k in run.k_dyns.tolist()],
+        "over its\nown mean": [number(k, 4) for k in run.shaft_factors.tolist()],
+        "torque at\nmotor shaft\nN m": column_of(run.peak_torques.tolist()),
+        "torque at\nown shaft\nN m": column_of(own.tolist()),
+        "at s": column_of(run.peak_times.tolist(), 5),
     }
     if run.chain.limits:
-        cells[later("of the\npermissible\n%")] = [
-            number(100.0 * used, 1) for used in run.utilisation.tolist()
-        ]
-    return Table.of(said("Shafts"), cells, ("shaft",))
+        cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
+    return Table.of("Shafts", cells, ("shaft",))
 
 
 def event_rows(run: ChainRun) -> list[list[object]]:
@@ -234,17 +213,13 @@ def frequencies_table(vibration: Vibration) -> Table:
     count = min(vibration.Omega.size, MOST_MODES)
     nodes = [", ".join(f"{n.shaft + 1 + n.share:.2f}" for n in vibration.nodes[m]) for m in range(count)]
     more = vibration.Omega.size - count
-    title = (
-        said("Natural frequencies, gaps closed (and {more} above)", more=more)
-        if more
-        else said("Natural frequencies, gaps closed")
-    )
-    of_nodes = later("nodes (7.30: behind mass 7, at 0.30 of the twist to mass 8)")
+    title = f"Natural frequencies, gaps closed{f' (and {more} above)' if more else ''}"
+    of_nodes = "nodes (7.30: behind mass 7, at 0.30 of the twist to mass 8)"
     cells = {
         of_nodes: [node or "-" for node in nodes],
-        later("mode"): [str(m) for m in range(count)],
-        later("Omega\nrad/s"): column_of([float(w) for w in vibration.Omega[:count]], 6),
-        later("Hz"): column_of([float(f) for f in vibration.frequency[:count]], 5),
+        "mode": [str(m) for m in range(count)],
+        "Omega\nrad/s": column_of([float(w) for w in vibration.Omega[:count]], 6),
+        "Hz": column_of([float(f) for f in vibration.frequency[:count]], 5),
     }
     return Table.of(title, cells, texts=[of_nodes])
 
@@ -369,15 +344,15 @@ def shapes_figure(vibration: Vibration, modes: int = 3) -> Any:
         axes.axhline(0.0, color="black", lw=0.8)
         for m in range(1, shown + 1):
             colour = COLOURS[(m - 1) % len(COLOURS)]
-            label = said("mode {number}: {frequency:.4g} Hz", number=m, frequency=vibration.frequency[m])
+            label = f"mode {m}: {vibration.frequency[m]:.4g} Hz"
             axes.plot(place, vibration.shape[m], "o-", ms=4, color=colour, label=label)
             nodes = [
                 place[n.shaft] + n.share * (place[n.shaft + 1] - place[n.shaft]) for n in vibration.nodes[m]
             ]
             axes.plot(nodes, np.zeros(len(nodes)), "o", ms=8, mfc="white", mec=colour, mew=1.6, zorder=4)
         _name_masses(axes, place, [mass.name for mass in vibration.chain.masses])
-        axes.set_ylabel(said("amplitude at the motor shaft"))
-        axes.set_title(said("{name}: shapes with the gaps closed", name=vibration.chain.name))
+        axes.set_ylabel("amplitude at the motor shaft")
+        axes.set_title(f"{vibration.chain.name}: shapes with the gaps closed")
         axes.legend()
     return figure
 
@@ -394,7 +369,7 @@ def _name_masses(axes: Any, place: np.ndarray[Any, Any], names: list[str]) -> No
             labels.append([name])
     texts = [group[0] if len(group) == 1 else f"{group[0]} ... {group[-1]}" for group in labels]
     axes.set_xticks(ticks, texts, rotation=30, ha="right")
-    axes.set_xlabel(said("place along the chain, by compliance (grey: shafts with a gap)"))
+    axes.set_xlabel("place along the chain, by compliance (grey: shafts with a gap)")
 
 
 def reduction_figure(reduction: Reduction) -> Any:
@@ -431,8 +406,8 @@ def run_figure(run: ChainRun) -> Any:
     gap, units = run.chain.at_motor_shaft().gap, units_of(run.chain)
     with drawing():
         figure, (torque, speed, twist) = new_figure(3, size=(8.0, 7.5), sharex=True)
-        entitle(figure, said("{name}, at the motor shaft", name=run.chain.name))
-        torque.plot(run.t, run.u, color="black", lw=1.0, label=said("motor"))
+        entitle(figure, f"{run.chain.name}, at the motor shaft")
+        torque.plot(run.t, run.u, color="black", lw=1.0, label="motor")
         for k, name in enumerate(shafts):
             style = {"color": SHAFTS[k % len(SHAFTS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
             torque.plot(run.t, run.T[:, k], label=name, **style)
@@ -445,10 +420,10 @@ def run_figure(run: ChainRun) -> Any:
             speed.plot(run.t, units.shown(run.w[:, i], "rad/s"), color=colour, ls=dash, label=name)
         for flank in (-1.0, 1.0):
             twist.axhline(flank, color="black", lw=0.8)
-        torque.set_ylabel(said("torque, N m"))
-        speed.set_ylabel(said("speed, {unit}", unit=units.speed))
-        twist.set_ylabel(said("twist over half the gap"))
-        twist.set_xlabel(said("time, s"))
+        torque.set_ylabel("torque, N m")
+        speed.set_ylabel(f"speed, {units.speed}")
+        twist.set_ylabel("twist over half the gap")
+        twist.set_xlabel("time, s")
         few = len(masses) <= 8  # else their names would cover the curves
         for axes in (torque, speed, twist):
             if axes.get_legend_handles_labels()[0] and few:

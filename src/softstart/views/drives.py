@@ -6,15 +6,14 @@ import math
 from typing import Any
 
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, Drive
-from softstart.language import later
 from softstart.views.numbers import printable, short
 
 POSITIONS = {
-    "driving-flank": later("on the driving flank"),
-    "mid-gap": later("in the middle of the gap"),
-    "opposite-flank": later("on the opposite flank"),
-    "hanging": later("with the load hanging in the wound-up shaft"),
-    "unknown": later("at an unknown position in the gap: the worst of both flanks and the middle counts"),
+    "driving-flank": "on the driving flank",
+    "mid-gap": "in the middle of the gap",
+    "opposite-flank": "on the opposite flank",
+    "hanging": "with the load hanging in the wound-up shaft",
+    "unknown": "at an unknown position in the gap: the worst of both flanks and the middle counts",
 }
 
 

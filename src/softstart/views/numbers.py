@@ -97,7 +97,11 @@ def short(value: float) -> str:
 
 
 def printable(text: str) -> str:
-    """The text without control characters, which could steer the terminal."""
+    r"""The text without control characters, which could steer the terminal.
+
+    >>> printable("a\x1b[31mb")
+    'a [31mb'
+    """
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
