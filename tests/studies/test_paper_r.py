@@ -9,13 +9,13 @@ import pytest
 from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
-from softstart.chain import Chain, forced_response, natural_vibration, reduce_chain
+from softstart.chain import Chain, natural_vibration, reduce_chain
 from softstart.chain.simulation import simulate_chain
-from softstart.chain.vibration_with_gaps import backbone
 from softstart.study import Verdict, study_names
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables
 from softstart_studies.paper_r.motion import moved, released
 from softstart_studies.paper_r.pictures import map_figure
+from softstart_studies.paper_r.vibration_with_gaps import backbone, forced_response
 
 CRANE = Drive.load("crane-4amtkf")
 

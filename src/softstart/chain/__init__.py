@@ -26,15 +26,12 @@ if TYPE_CHECKING:
         verify_on_chain,
     )
     from softstart.chain.vibration import Vibration, natural_vibration
-    from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse, chain_backbone, forced_response
 
 __all__ = [
-    "Backbone",
     "Chain",
     "ChainArrays",
     "ChainFatigue",
     "ChainRun",
-    "ForcedResponse",
     "Mass",
     "Motor",
     "Reduction",
@@ -43,9 +40,7 @@ __all__ = [
     "TwoMassError",
     "Verification",
     "Vibration",
-    "chain_backbone",
     "chain_fatigue",
-    "forced_response",
     "natural_vibration",
     "reduce_chain",
     "simulate_chain",
@@ -56,18 +51,14 @@ __all__ = [
 
 # loaded when first used: they need compiled code
 _HOME = {
-    "Backbone": "softstart.chain.vibration_with_gaps",
     "ChainFatigue": "softstart.chain.fatigue",
     "ChainRun": "softstart.chain.run",
-    "ForcedResponse": "softstart.chain.vibration_with_gaps",
     "Reduction": "softstart.chain.reduction",
     "ShaftLife": "softstart.chain.fatigue",
     "TwoMassError": "softstart.chain.simulation",
     "Verification": "softstart.chain.simulation",
     "Vibration": "softstart.chain.vibration",
-    "chain_backbone": "softstart.chain.vibration_with_gaps",
     "chain_fatigue": "softstart.chain.fatigue",
-    "forced_response": "softstart.chain.vibration_with_gaps",
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",

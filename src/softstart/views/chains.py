@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from softstart.chain.run import ChainRun
     from softstart.chain.simulation import TwoMassError, Verification
     from softstart.chain.vibration import Vibration
-    from softstart.chain.vibration_with_gaps import Backbone, ForcedResponse
 
 MOST_MODES = 12
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
@@ -430,34 +429,4 @@ def run_figure(run: ChainRun) -> Any:
                 axes.legend(fontsize=7.5, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
             elif axes.get_legend_handles_labels()[0]:
                 axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure
-
-
-def backbone_figure(found: Backbone) -> Any:
-    """The frequencies, over that without gaps, against the largest torque."""
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        axes.semilogx(found.torque, found.frequency / found.Omega, "o-", color=COLOURS[0], label="chain")
-        if np.isfinite(found.two_masses).all():
-            two = found.two_masses / found.Omega
-            axes.semilogx(found.torque, two, "--", color=COLOURS[1], label="two masses, exact")
-        axes.set_xlabel("largest torque at release, N m")
-        axes.set_ylabel("frequency over that without gaps")
-        axes.set_title(f"{found.chain.name}: free vibration with gaps, mode {found.mode}")
-        axes.legend()
-    return figure
-
-
-def response_figure(found: ForcedResponse, mass: str | int) -> Any:
-    """The amplitude of one mass against the frequency, with gaps and without."""
-    index = found.chain.index(mass)
-    with drawing():
-        figure, axes = new_figure(size=(6.5, 4.0))
-        with_gaps = f"with gaps, {found.locking:g} N m constant"
-        axes.plot(found.frequency, found.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
-        axes.plot(found.frequency, found.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
-        axes.set_xlabel("frequency of the exciting torque, rad/s")
-        axes.set_ylabel("amplitude, rad")
-        axes.set_title(f"{found.chain.name}: forced response of {found.chain.masses[index].name}")
-        axes.legend()
     return figure

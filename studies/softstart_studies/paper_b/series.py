@@ -23,8 +23,8 @@ def inertia_torque_series(ratio: float, orders: int) -> Vector:
 
     The products of the harmonics of s' and s'' are summed up to orders where they vanish.
 
-    >>> [round(float(b), 6) for b in inertia_torque_series(0.25, 4)]
-    [0.0, 0.063506, -0.50013, -0.192056, -0.016129]
+    >>> [round(float(b), 6) for b in inertia_torque_series(0.25, 4)[1:]]
+    [0.063506, -0.50013, -0.192056, -0.016129]
     """
     n = max(samples_needed(ratio), orders)
     sine = _speed_series(ratio, n)  # s' = -r sum sine_p sin(p phi), s'' = -r sum p sine_p cos(p phi)

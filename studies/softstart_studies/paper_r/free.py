@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.chain import Chain, chain_backbone, natural_vibration
+from softstart.chain import Chain, natural_vibration
 from softstart.study import Table
 from softstart_studies.paper_r.motion import Motion, moved, released
+from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
 
 __all__ = [
     "Free",

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from softstart import Command, Drive, InputError, Measured, PlainController, simulate
-from softstart.chain import Chain, Mass, Shaft, chain_backbone, natural_vibration
-from softstart.chain.vibration_with_gaps import backbone
+from softstart.chain import Chain, Mass, Shaft, natural_vibration
+from softstart_studies.paper_r.vibration_with_gaps import backbone, chain_backbone
 
 
 class Off(PlainController):

@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from softstart import InputError
-from softstart.chain import Chain, Mass, Shaft, forced_response
+from softstart.chain import Chain, Mass, Shaft
+from softstart_studies.paper_r.vibration_with_gaps import forced_response
 
 C, D, GAP = 200.0, 10.0, 0.01
 TWO = Chain([Mass(1.0), Mass(2.0)], [Shaft(C, damping=D, gap=GAP)])

@@ -16,10 +16,10 @@ from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_
 from softstart.chain.reduction import reduce_chain
 from softstart.chain.simulation import drive_of
 from softstart.chain.vibration import natural_vibration
-from softstart.chain.vibration_with_gaps import chain_backbone
 from softstart.errors import InputError
 from softstart.optimal.chains.problem import ChainProblem, momentum_bound
 from softstart.views.chain_schemes import scheme_svg
+from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
 
 SEEDS = settings(
     max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]

@@ -16,8 +16,8 @@ from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.run import ChainRun
 from softstart.chain.simulation import simulate_chain
-from softstart.chain.vibration_with_gaps import backbone
 from softstart.start import metrics
+from softstart_studies.paper_r.vibration_with_gaps import backbone
 
 CRANE = Drive.load("crane-4amtkf")
 # what can differ between a drive and another, each with the two-mass plant's own closed forms

@@ -10,9 +10,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy import optimize
 
 from softstart.arrays import Vector, plain_fields
 from softstart.balancing.periodic_torque import PeriodicTorque
@@ -24,16 +25,8 @@ from softstart.chain.simulation import simulate_chain
 from softstart.chain.vibration import natural_vibration
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
-from softstart.late import late
 from softstart.quantities import Value
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from scipy import optimize
-else:
-    optimize = late("scipy.optimize")
-
-views = late("softstart.views.chains")
+from softstart.views.drawing import COLOURS, drawing, new_figure
 
 
 def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Value:
@@ -78,10 +71,9 @@ class Backbone:
         """All of it as plain data."""
         return {"chain": self.chain.name, "assumed": self.chain.assumed, **plain_fields(self, "chain")}
 
-    def plot(self) -> Figure:
+    def plot(self) -> Any:
         """The frequencies, over that without gaps, against the largest torque."""
-        figure: Figure = views.backbone_figure(self)
-        return figure
+        return backbone_figure(self)
 
 
 HELD = "inertia = inf: vibrations with gaps are those of masses that all move; leave ground out."
@@ -184,10 +176,9 @@ class ForcedResponse:
         about = {"chain": self.chain.name, "assumed": self.chain.assumed, "masses": names}
         return {**about, **plain_fields(self, "chain")}
 
-    def plot(self, mass: str | int = 0) -> Figure:
+    def plot(self, mass: str | int = 0) -> Any:
         """The amplitude of one mass against the frequency, with gaps and without."""
-        figure: Figure = views.response_figure(self, mass)
-        return figure
+        return response_figure(self, mass)
 
 
 def forced_response(
@@ -344,3 +335,33 @@ def _about_mean(arrays: ChainArrays, angle: Any) -> Any:
 def _height(rows: Vector) -> Vector:
     found: Vector = np.sqrt(2.0 * np.mean((rows - rows.mean(axis=0)) ** 2, axis=0))
     return found
+
+
+def backbone_figure(found: Backbone) -> Any:
+    """The frequencies, over that without gaps, against the largest torque."""
+    with drawing():
+        figure, axes = new_figure(size=(6.5, 4.0))
+        axes.semilogx(found.torque, found.frequency / found.Omega, "o-", color=COLOURS[0], label="chain")
+        if np.isfinite(found.two_masses).all():
+            two = found.two_masses / found.Omega
+            axes.semilogx(found.torque, two, "--", color=COLOURS[1], label="two masses, exact")
+        axes.set_xlabel("largest torque at release, N m")
+        axes.set_ylabel("frequency over that without gaps")
+        axes.set_title(f"{found.chain.name}: free vibration with gaps, mode {found.mode}")
+        axes.legend()
+    return figure
+
+
+def response_figure(found: ForcedResponse, mass: str | int) -> Any:
+    """The amplitude of one mass against the frequency, with gaps and without."""
+    index = found.chain.index(mass)
+    with drawing():
+        figure, axes = new_figure(size=(6.5, 4.0))
+        with_gaps = f"with gaps, {found.locking:g} N m constant"
+        axes.plot(found.frequency, found.amplitude[:, index], "o-", color=COLOURS[0], label=with_gaps)
+        axes.plot(found.frequency, found.without_gaps[:, index], "--", color=COLOURS[1], label="no gaps")
+        axes.set_xlabel("frequency of the exciting torque, rad/s")
+        axes.set_ylabel("amplitude, rad")
+        axes.set_title(f"{found.chain.name}: forced response of {found.chain.masses[index].name}")
+        axes.legend()
+    return figure
