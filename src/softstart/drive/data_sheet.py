@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from softstart.drive.model import Drive
+from softstart.errors import InputError
 from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import text_of
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
@@ -230,9 +231,11 @@ class DataSheet(ParameterSet):
     @classmethod
     def from_toml(cls, text: str, where: str = "", also: Mapping[str, object] | None = None) -> Self:
         """A data sheet from the tables of a TOML text: [load], [motor], [coupling], [gear], [output], ..."""
-        return cls._from_document(
-            parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES), where, also
-        )
+        wording = Wording(where, style="toml")
+        document = parsed(text, wording, cls.WHAT, cls.TABLES)
+        if "start" in document and not cls.describes(document):
+            raise InputError(wording.whole("this is the file of a drive already; softstart compare takes it"))
+        return cls._from_document(document, where, also)
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, object]) -> Self:
@@ -316,8 +319,9 @@ class DataSheet(ParameterSet):
             ("shaft_diameter", "shaft_length"),
             ("rope_length", "rope_diameter"),
             ("rope_diameter", "rope_length"),
+            ("rope_modulus", "rope_diameter"),
         ):
-            if getattr(self, one) and not getattr(self, other):
+            if given.get(one) and not given.get(other):
                 p, q = of[one], of[other]
                 yield f"{p.place} says nothing without {q.place}; write for example {q.key} = {q.example}."
         yield from self._said_twice()

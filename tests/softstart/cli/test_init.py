@@ -63,6 +63,7 @@ def test_answers_make_a_drive_that_every_command_takes(run, typed, place):
     drive = Drive.load("mine.toml")
     assert (drive.name, drive.load_kind) == ("gantry", "reactive")
     assert run("simulate", "mine.toml", "--controller", "ramp", "--json").code == 0
+    assert "this is the file of a drive already" in run("init", "mine.toml").err
     before = (place / "mine.toml").read_text()
     typed(*ANSWERS)
     code, out, err = run("init", "--ask", "--out", "mine.toml")

@@ -221,6 +221,7 @@ def test_a_file_and_back(tmp_path):
             "both say how stiff the rope is",
         ),
         (HOIST | {"rope.length": 9}, "[rope] length says nothing without [rope] diameter"),
+        (HOIST | {"rope.modulus": "9 GPa"}, "[rope] modulus says nothing without [rope] diameter"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
         ({"output.length": None}, "[output] diameter says nothing without [output] length"),
         ({"gear.ratio": -1}, "must be above 0"),
