@@ -37,7 +37,8 @@ Progress = Callable[[str], object]
 
 YARDSTICK: Terminal = "reached"  # a controller is judged by the instant its load has the target speed
 SHORT, LONG, COUNT = 1.02, 1.6, 12
-QUICKEST = 1.08  # first start time of a chain over that of direct: what is shortest is not known there
+QUICKEST = 1.08  # first start time of a chain, or of an unknown position, over that of direct: what is
+# shortest is not known there
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ class FrontPoint:
     def for_shorter(self, start_time: float) -> FrontPoint:
         """The point of a start time shorter than this one, where this one is infeasible already."""
         shortest = self.shortest_start_time
-        least = f"; the shortest is {shortest:.6g} s" if shortest is not None else ""
-        reason = f"No start whose gap closes only once takes {start_time:.6g} s ({self.terminal}){least}."
+        least = f"; the shortest found is {shortest:.6g} s" if shortest is not None else ""
+        reason = f"A start time of {start_time:.6g} s is too short ({self.terminal}){least}."
         return replace(self, start_time_bound=start_time, status_text=reason)
 
     def summary(self) -> dict[str, Any]:
@@ -381,14 +382,15 @@ def default_start_times(
 ) -> list[float]:
     """`count` start times in s, from 1.02 of the shortest feasible one to 1.6 of that of `direct`.
 
-    Where the shortest one cannot be found, that of `direct` stands for it; on a chain 1.08 of that. Closer
-    together towards the short end, where the curve is steep. `options` go to `Problem`.
+    Where the shortest one cannot be found, that of `direct` stands for it; on a chain 1.08 of that, and where
+    the start position is unknown, with half as many times. Closer together towards the short end, where the
+    curve is steep. `options` go to `Problem`.
     """
     direct = simulate(drive, "direct").start_time
-    if isinstance(drive, Chain):
-        shortest = direct * QUICKEST / SHORT
+    if isinstance(drive, Chain) or len(drive.positions) > 1:
+        shortest, count = direct * QUICKEST / SHORT, count if isinstance(drive, Chain) else count // 2
     else:
-        shortest = shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time", **options))
+        shortest = shortest_start_time(Problem(drive, 1.0, terminal, **options))
     if not math.isfinite(shortest):
         shortest = direct
     if not math.isfinite(shortest):

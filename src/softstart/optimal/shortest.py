@@ -228,9 +228,8 @@ def verdict_on(problem: Problem) -> Verdict:
     else:
         constraint, shown = _constraint(problem, shortest), f"the shortest start time is {shortest:.6g} s"
     text = (
-        f"start_time = {bound:g} s: no torque {'was found that ' if none_found else ''}brings "
-        f"{problem.drive.name} to {problem.target:g} rad/s "
-        f"({problem.terminal}) so soon while the gap closes only once; "
+        f"No torque {'was found that ' if none_found else ''}brings {problem.drive.name} to "
+        f"{problem.target:g} rad/s ({problem.terminal}) within {bound:g} s while the gap closes only once; "
         f"what forbids it is {constraint}; {shown}."
     )
     return Verdict(problem, shortest, constraint, text + _with_several_contacts(problem))

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from softstart.chain.model import Chain, load_machine
 from softstart.controller import make_controller, ready_controller_names
 from softstart.drive import Drive
-from softstart.errors import InputError
+from softstart.errors import InputError, SimulationError
 from softstart.late import late
 from softstart.optimal import pulse_coast_hold, within_limits
 from softstart.optimal.certificate import certified_bound, not_certified
@@ -93,7 +93,8 @@ def optimize(
         ("1.2x"). By default 1.2x, and `why` says so; none where the start time is minimised.
     terminal : {"synchronous", "steady", "reached"}, optional
         What holds at t_f: w1 = w2 = target_speed; also T = Mc; or only w2 = target_speed. By default
-        synchronous; reached, and nothing else, where the start position is unknown. On a chain all masses
+        synchronous; reached where no start time is given and none is synchronous in that time, and always
+        where the start position is unknown. On a chain all masses
         have the target speed, by default only its load (reached).
     minimise : {"k_dyn", "heat", "start_time"}
         `heat` is the integral of (u/Ms)^2 from 0 to t_f, s. The least start time is the first at which the
@@ -202,8 +203,16 @@ def optimize(
             about, lambda one: solve(one, method, warm, certify=False), certified, time_limit
         )
     seconds = None if bound is None else bound.seconds(lambda: start_time_of_direct(about.drive))
-    best = solve(replace(about, start_time=seconds), method, warm, tolerance, time_limit, confirm)
-    return replace(best, why=f"{best.why}; no start time given: {bound} that of direct") if usual else best
+    why = f"; no start time given: {bound} that of direct" if usual else ""
+    asked = replace(about, start_time=seconds)
+    try:
+        best = solve(asked, method, warm, tolerance, time_limit, confirm)
+    except InfeasibleError:
+        if not usual or terminal is not None or ending == "reached":
+            raise
+        best = solve(replace(asked, terminal="reached"), method, warm, tolerance, time_limit, confirm)
+        why += ", in which only the load can have the target speed"
+    return replace(best, why=best.why + why)
 
 
 def refuse_for_chain(method: str, limits: bool) -> None:
@@ -232,7 +241,7 @@ def solve(
     """The optimum of a problem; see `optimize`. Without `certify` its bound is that of momentum."""
     began = time.perf_counter()
     if len(problem.drive.positions) > 1:
-        return _over_positions(problem, method)
+        return _over_positions(problem, method, quick=time_limit == 0.0)
     if problem.minimise == "start_time" and _by_roots(problem, method, warm):
         return _least_start_time(problem, method, tolerance, time_limit, confirm)
     hold = hold_of(problem)
@@ -253,7 +262,8 @@ def solve(
     except InfeasibleError as error:
         shortest = error.verdict.shortest_start_time  # inf: no start has a single contact
         assert problem.start_time is not None
-        if not may_bounce or problem.start_time < BOUNCING * shortest < math.inf:
+        hopeless = problem.start_time < BOUNCING * shortest < math.inf
+        if not may_bounce or (hopeless and not _direct_in_time(problem)):
             raise
         with suppress(InfeasibleError, OptimumError):
             found = _bouncing(hold, "no start with one contact is that quick", began)
@@ -379,6 +389,13 @@ def _least_start_time(
     return replace(best, tried=(*best.tried, trial), seconds=time.perf_counter() - began)
 
 
+def _direct_in_time(problem: Problem) -> bool:
+    """Whether the constant starting torque reaches the target speed within the start time."""
+    with suppress(SimulationError):
+        return bool(simulate(problem.drive, "direct").start_time <= (problem.start_time or math.inf))
+    return False
+
+
 def _may_bounce(problem: Problem) -> bool:
     """Whether nothing but K_dyn, torque and time count, and the load need only reach its speed."""
     alone = problem.minimise == "k_dyn" and problem.heat is None and problem.smoothness == 0.0
@@ -481,8 +498,8 @@ def _checked(
     )
 
 
-def _over_positions(problem: Problem, method: Choice) -> Optimum:
-    """One profile for all positions at which the start may begin, beside the optimum of each by itself."""
+def _over_positions(problem: Problem, method: Choice, quick: bool) -> Optimum:
+    """One profile for all positions at which the start may begin; unless quick, with the optimum of each."""
     began = time.perf_counter()
     drive, latest = problem.drive, problem.start_time
     assert latest is not None
@@ -493,9 +510,11 @@ def _over_positions(problem: Problem, method: Choice) -> Optimum:
         )
     if latest < momentum_shortest_time(problem):
         raise InfeasibleError(verdict_on(problem))  # at once: the search takes its time to say so
-    found = robust.optimize_robust(list(drive.positions.values()), latest, base=problem.base or drive)
+    found = robust.optimize_robust(
+        list(drive.positions.values()), latest, base=problem.base or drive, quick=quick
+    )
     alone = {}
-    for name, one in drive.positions.items():
+    for name, one in drive.positions.items() if not quick else ():
         with suppress(InfeasibleError, OptimumError, NotConverged):
             alone[name] = solve(replace(problem, drive=one), certify=False)  # the bound is that of all
     return Optimum(

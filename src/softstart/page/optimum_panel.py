@@ -50,7 +50,7 @@ class OptimumPanel:
             self._time = field(
                 "Start time", "1.2x", "optimum-time", "0.3 (s), 300 ms, or 1.2x: that of direct times 1.2"
             ).classes("panel-narrow")
-            self._end = choice("At its end", TERMINALS, "synchronous", "optimum-terminal")
+            self._end = choice("At its end", TERMINALS, "reached", "optimum-terminal")
             self._go = action("Compute", self._begin, "optimum-go", main=True)
             self._time.on("keydown.enter", self._begin)
         self._hint = hint(

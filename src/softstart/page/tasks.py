@@ -106,7 +106,7 @@ def player_of(best: Optimum) -> Controller:
 
 def label_of(best: Optimum) -> str:
     """What the optimum is called among the strategies."""
-    ending = "" if best.problem.terminal == "synchronous" else f", {best.problem.terminal}"
+    ending = "" if best.problem.terminal == "reached" else f", {best.problem.terminal}"
     return f"optimum {best.end_time:.4g} s{ending}"
 
 
@@ -119,7 +119,8 @@ def curve(
     """
     points: list[FrontPoint] = []
     direct = simulate(drive, "direct").start_time
-    easy = [one * direct for one in LONG_MULTIPLES] if math.isfinite(direct) else []
+    several = len(drive.positions) > 1  # then each point takes a search of some ten seconds
+    easy = [one * direct for one in LONG_MULTIPLES[:: 2 if several else 1]] if math.isfinite(direct) else []
     own = [one for one in start_times if math.isfinite(one)]
     long = sorted({*easy, *(one for one in own if easy and one >= easy[0])})
     total = len(easy) + len(SHORT_SHARES) + len(own) + 1
@@ -141,10 +142,10 @@ def curve(
 
     with no_solution_as_sentence():
         through(long)
-        least = math.inf  # of a chain nobody knows it
-        if isinstance(drive, Drive):
+        least = math.inf  # of a chain, or over positions, nobody knows it
+        if isinstance(drive, Drive) and not several:
             progress(done / total, "the shortest start time")
-            least = shortest.shortest_start_time(Problem(drive, terminal=terminal, minimise="start_time"))
+            least = shortest.shortest_start_time(Problem(drive, 1.0, terminal))
         done += 1
         if math.isfinite(least):
             first, last = SHORT * least, easy[0] if easy and easy[0] > SHORT * least else 1.6 * least

@@ -41,16 +41,16 @@ class Family:
             self._staircase(self._unknowns(np.full((1, N_NUMBERS), 0.55))[0]), evaluator.drives[0]
         )
 
-    def spread(self, seed: int, members: int = CELL_MEMBERS) -> list[Staircase]:
-        """One staircase of each cell, the best of its random members."""
+    def spread(self, seed: int, less: int = 1, members: int = CELL_MEMBERS) -> list[Staircase]:
+        """One staircase of each cell, the best of its random members; of each length `less` times fewer."""
         random = np.random.default_rng(seed)
         cost = gentleness(self.evaluator, self.high - self.low)
         chosen = []
-        coasts = COASTS_REACTING if self.react else COASTS
-        for pulse in range(PULSES):
+        pulses, coasts = max(PULSES // less, 1), max((COASTS_REACTING if self.react else COASTS) // less, 1)
+        for pulse in range(pulses):
             for coast in range(coasts):
                 numbers = random.random((members, N_NUMBERS))
-                numbers[:, PULSE] = (pulse + numbers[:, PULSE]) / PULSES
+                numbers[:, PULSE] = (pulse + numbers[:, PULSE]) / pulses
                 numbers[:, COAST] = (coast + numbers[:, COAST]) / coasts
                 unknowns = self._unknowns(numbers)
                 best = int(np.argmin(cost(self.evaluator.figures(self.parameters, unknowns))))

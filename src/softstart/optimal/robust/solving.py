@@ -170,10 +170,13 @@ TIDY_COST = 2e-4  # relative, that a calmer profile of fewer knots may cost
 class RobustSearch:
     """The searches, one after the other, each from the best of those before."""
 
-    def __init__(self, drives: Sequence[Drive], start_time: float, react: bool, progress: Progress) -> None:
+    def __init__(
+        self, drives: Sequence[Drive], start_time: float, react: bool, progress: Progress, quick: bool = False
+    ) -> None:
         self.drives, self.start_time, self.react, self.progress = tuple(drives), start_time, react, progress
         self.low, self.high = limits(drives)
-        self.rules = Rules(self.low, self.high, calm=CALM, rounds=ROUNDS)
+        self.less = 2 if quick else 1  # times fewer starts, rounds and intervals
+        self.rules = Rules(self.low, self.high, calm=CALM, rounds=ROUNDS // self.less**3)
         self.evaluator = Evaluator(drives, start_time)
 
     def best(self) -> Point:
@@ -184,9 +187,11 @@ class RobustSearch:
             self.progress(f"coarse grid: peak {coarse[-1].peak:.3f} N m")
         fine = []
         for point in _different(coarse, ALIKE)[:FINISHED]:
-            fine.append(descend(self.evaluator, self._refined(point.staircase, FINE), self.rules, 1e-5))
+            staircase = self._refined(point.staircase, FINE // self.less)
+            fine.append(descend(self.evaluator, staircase, self.rules, 1e-5))
             self.progress(f"fine grid: peak {fine[-1].peak:.3f} N m")
-        best = self._calmed(_different(fine)[0])
+        best = _different(fine)[0]
+        best = best if self.less > 1 else self._calmed(best)
         if best.late > 0.0:
             raise OptimumError(
                 f"robust optimum: a start within {self.start_time:g} s was found and lost again."
@@ -197,18 +202,19 @@ class RobustSearch:
         """Where to go on from: the best after a few rounds of each start, over differing scenarios."""
         quick = self._quick() if self._constant(self.evaluator).late > 0.0 else []
         evaluator = Evaluator(differing(self.drives, REPRESENTED), self.start_time)
-        rules = replace(self.rules, calm=0.0, rounds=FIRST_ROUNDS)
+        rules = replace(self.rules, calm=0.0, rounds=FIRST_ROUNDS // self.less)
         points = []
         for staircase in [*self._starts(evaluator), *quick]:
             start = staircase.cut(*[self._grid()] * 2)
             points.append(descend(evaluator, start, rules, 1e-4))
             self.progress(f"first rounds: peak {points[-1].peak:.3f} N m")
-        return [point.staircase for point in _different(points, ALIKE)[:PURSUED]] + quick
+        pursued = _different(points, ALIKE)[: max(PURSUED // self.less, 1)]
+        return [point.staircase for point in pursued] + quick
 
     def _starts(self, evaluator: Evaluator) -> list[Staircase]:
         """Members of the family from all over, and the best short staircases of any kind."""
-        starts = Family(evaluator, self.low, self.high, self.react).spread(SEED)
-        for steps, seed in EVOLUTIONS:
+        starts = Family(evaluator, self.low, self.high, self.react).spread(SEED, self.less)
+        for steps, seed in EVOLUTIONS[: len(EVOLUTIONS) // self.less or 1]:
             search = Evolution(evaluator, steps, self.low, self.high, self.react)
             starts.append(search.best(gentleness(evaluator, self.high - self.low), SEED + seed)[1])
         return starts
@@ -278,7 +284,7 @@ class RobustSearch:
             f"{f' ({slowest.name})' if slowest.name else ''}"
         )
         sentence = (
-            f"start_time = {self.start_time:g} s is too short for one profile over {len(self.drives)} "
+            f"A start time of {self.start_time:g} s is too short for one profile over {len(self.drives)} "
             f"scenario{'s' if len(self.drives) > 1 else ''}: the shortest found is {shortest:.6g} s, and "
             f"the slowest scenario is the one with {who}; the torque limit is {self.high:g} N m."
         )
@@ -310,6 +316,7 @@ def optimize_robust(
     start_time: float,
     *,
     react_to_contact: bool = False,
+    quick: bool = False,
     base: Drive | None = None,
     progress: Progress | None = None,
     bound_of: BoundOf | None = None,
@@ -335,6 +342,8 @@ def optimize_robust(
     react_to_contact : bool
         Allow one profile until the gap first closes and another one, on a clock that starts there, from then
         on, or the blind profile where that is better (see `note`). Both are searched: twice the time.
+    quick : bool
+        Look for the blind profile from fewer starts and on a coarser grid, for one point of a curve.
     base : Drive, optional
         The drive to whose mean shaft torque K_dyn refers; by default the first scenario.
     progress : callable, optional
@@ -367,7 +376,7 @@ def optimize_robust(
     ----------
     How good it is, and how it is searched: docs/optimal-starts.md, docs/theory/optimum.md.
     """
-    blind = _optimum(scenarios, start_time, False, base, progress or _quiet, bound_of)
+    blind = _optimum(scenarios, start_time, False, base, progress or _quiet, bound_of, quick=quick)
     if not react_to_contact:
         return blind
     return _reacting(blind, progress or _quiet)
@@ -375,7 +384,7 @@ def optimize_robust(
 
 def _optimum(
     scenarios: Sequence[Drive], start_time: float, react: bool, base: Drive | None, progress: Progress,
-    bound_of: BoundOf | None, bound: LowerBound | None = None,
+    bound_of: BoundOf | None, bound: LowerBound | None = None, quick: bool = False,
 ) -> RobustOptimum:  # fmt: skip
     """The best profile found of one kind, run on the exact plant and checked."""
     began = time.perf_counter()
@@ -384,7 +393,7 @@ def _optimum(
     known = base or drives[0]
     # in an order of their own, each once: what comes out does not depend on how they were listed
     sorted_once = sorted(dict.fromkeys(drives), key=lambda drive: drive.to_toml())
-    best = RobustSearch(sorted_once, start_time, react, progress).best()
+    best = RobustSearch(sorted_once, start_time, react, progress, quick).best()
     profile = best.staircase.tidy()
     runs = tuple(
         simulate(drive, make_controller("profile", {"profile": profile}), base=known) for drive in drives
