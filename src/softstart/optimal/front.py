@@ -401,16 +401,6 @@ def default_start_times(
     return times
 
 
-def even_start_times(first: float, last: float, count: int) -> list[float]:
-    """`count` start times in s from `first` to `last`, evenly spaced.
-
-    >>> even_start_times(0.25, 0.5, 3)
-    [0.25, 0.375, 0.5]
-    """
-    times: list[float] = np.linspace(first, last, count).tolist()
-    return times
-
-
 class PointAsked(NamedTuple):
     """A point to be computed, what another one left to start from, and for how long (s) to go on.
 

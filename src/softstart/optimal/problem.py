@@ -75,6 +75,24 @@ def usual_terminal(drive: Drive) -> Terminal:
 
 
 USUAL = StartTime(1.2, multiple=True)  # where a bound is needed and none is given
+REACTS = (  # what is to be said beside a best fixed profile
+    "It is one torque over time for every start position: feedback reacts to the contact, and its K_dyn can "
+    "be lower."
+)
+
+
+def best_start(machine: Any) -> str:
+    """What the best torque over time is called: no optimum where the position is unknown, as feedback reacts.
+
+    >>> best_start(Drive.load("crane-4amtkf")), best_start(Drive.load("long-travel-3kw"))
+    ('optimum', 'best fixed profile')
+    """
+    return "best fixed profile" if len(machine.positions) > 1 else "optimum"
+
+
+def best_k_dyn(machine: Any) -> str:
+    """What its K_dyn is called."""
+    return "K_dyn of the best fixed profile" if len(machine.positions) > 1 else "least K_dyn"
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from softstart.optimal.front import FrontPoint
     from softstart.optimal.problem import Terminal
 
-COLUMNS = ("strategy", "K_dyn", "start, s", "least", "ratio")
+COLUMNS = ("strategy", "K_dyn", "start, s", "profile", "ratio")
 COLOURS = 12
 SAME = 1e-9  # relative distance of start times that are the same
 WIDTH, HEIGHT = 340.0, 250.0
@@ -62,8 +62,8 @@ class CurvePanel:
             self._end = choice("Start ends with", TERMINALS, "reached", "curve-terminal")
             self._go = action("Compute", self._begin, "curve-go", main=True)
         self._hint = hint(
-            "The least K_dyn for each start time; the shaded part is proved to be out of reach. "
-            "Points appear as they are computed."
+            "K_dyn of the best torque profile for each start time; the shaded part is proved out of reach. "
+            "Where the start position is unknown one profile serves all of them, and feedback can be lower."
         )
         self._view = JobView(
             jobs or jobs_of(user), user, "curve", on_begin=self._begun, on_part=self._part,
@@ -86,7 +86,7 @@ class CurvePanel:
         own = {found.start_time for found in self._session.strategies}
         times = sorted(one for one in own if math.isfinite(one))
         terminal = cast("Terminal", self._end.value)
-        self._view.begin("least K_dyn over start time", tasks.curve, drive, times, terminal, subject=drive)
+        self._view.begin("best profile over start time", tasks.curve, drive, times, terminal, subject=drive)
 
     def _begun(self) -> None:
         self._points, self._drawn = [], ()
@@ -128,7 +128,7 @@ class CurvePanel:
         self._table.set_content(table(COLUMNS, rows, 1, "curve-table") if rows else "")
 
     def _save(self) -> None:
-        save(csv_of(self._points), file_name(self._view.subject.name, "least k_dyn", suffix=".csv"))
+        save(csv_of(self._points), file_name(self._view.subject.name, "best profiles", suffix=".csv"))
 
 
 def colour(index: int) -> str:
@@ -369,7 +369,7 @@ def _description(found: Sequence[FrontPoint], marks: Sequence[StrategyPoint]) ->
         first = min(found, key=lambda point: point.start_time_bound)
         last = max(found, key=lambda point: point.start_time_bound)
         sentences.append(
-            f"Least K_dyn {first.k_dyn:.3g} in {first.start_time_bound:.3g} s to {last.k_dyn:.3g} in "
+            f"Best profile: K_dyn {first.k_dyn:.3g} in {first.start_time_bound:.3g} s to {last.k_dyn:.3g} in "
             f"{last.start_time_bound:.3g} s."
         )
     sentences += [f"{mark.name}: {mark.k_dyn:.3g} in {mark.start_time:.3g} s." for mark in marks]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 from nicegui import ui
 
 from softstart.errors import InputError
-from softstart.optimal.problem import StartTime
+from softstart.optimal.problem import REACTS, StartTime
 from softstart.page import tasks
 from softstart.page.downloads import file_name
 from softstart.page.jobs import Jobs
@@ -54,7 +54,8 @@ class OptimumPanel:
             self._go = action("Compute", self._begin, "optimum-go", main=True)
             self._time.on("keydown.enter", self._begin)
         self._hint = hint(
-            "The torque over time with the least K_dyn, and a bound that no torque can go below."
+            "The torque over time with the lowest K_dyn, and a bound that no start can go below. Where "
+            "the start position is unknown it is the best fixed profile for all, and feedback can be lower."
         )
         self._view = JobView(jobs or jobs_of(user), user, "optimum", on_done=self._done, on_state=self._state)
         with box().classes("panel-result") as self._result:
@@ -76,7 +77,7 @@ class OptimumPanel:
             return
         text = str(self._time.value).strip()
         try:
-            _check(text)
+            StartTime.of(text, "Start time")
         except InputError as error:
             self._view.refuse(error)
             return
@@ -121,6 +122,7 @@ class OptimumPanel:
     def _beside(self, best: Optimum) -> str:
         """What it is worth, against the constant torque."""
         text = f"It is among the strategies: {tasks.label_of(best)}."
+        text += f" {REACTS}" if len(best.problem.drive.positions) > 1 else ""
         if self._stale.stale or REFERENCE not in self._session.controllers:
             return text
         direct = self._session.result(REFERENCE)
@@ -145,16 +147,3 @@ def figures(best: Optimum) -> list[tuple[str, str]]:
         ("peak torque", f"{number(best.run.peak_torque)} N m"),
         ("contacts", str(best.run.contacts)),
     ]
-
-
-def _check(text: str) -> None:
-    """A start time, or an InputError."""
-    try:
-        if not text:
-            raise InputError("")
-        StartTime.of(text)
-    except InputError:
-        raise InputError(
-            f'Start time "{text}": give a time above 0 s, as 0.3 or 300 ms, or a multiple of that of direct, '
-            "as 1.2x."
-        ) from None

@@ -24,7 +24,7 @@ from softstart.controller.finding import make_controller, ready_controller_names
 from softstart.drive import UNKNOWN_POSITIONS, Drive
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.optimal.problem import Problem
+from softstart.optimal.problem import Problem, best_start
 from softstart.optimal.result import InfeasibleError, NotConverged, OptimumError
 from softstart.page.downloads import text_of
 from softstart.page.machines import changed
@@ -85,7 +85,8 @@ def gentlest(drive: Machine, start_time: str, terminal: Terminal, *, progress: P
     """The gentlest start within a time, as `0.3`, `300 ms` or `1.2x` (of that of `direct`)."""
     progress(None, "looking for the gentlest start")
     with no_solution_as_sentence():
-        best = solving.optimize(drive, start_time, terminal=terminal)
+        several = len(drive.positions) > 1  # then a search goes on for minutes
+        best = solving.optimize(drive, start_time, terminal=terminal, time_limit=0.0 if several else math.inf)
     progress(None, "writing the profile")
     about = {"drive": drive.name, "start_time": best.end_time, "terminal": terminal, "k_dyn": best.k_dyn}
     profile = best.profile
@@ -107,7 +108,7 @@ def player_of(best: Optimum) -> Controller:
 def label_of(best: Optimum) -> str:
     """What the optimum is called among the strategies."""
     ending = "" if best.problem.terminal == "reached" else f", {best.problem.terminal}"
-    return f"optimum {best.end_time:.4g} s{ending}"
+    return f"{best_start(best.problem.drive)} {best.end_time:.4g} s{ending}"
 
 
 def curve(

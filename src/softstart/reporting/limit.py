@@ -20,7 +20,7 @@ from softstart.optimal.chains import problem
 from softstart.optimal.front import FrontPoint, PointAsked, computed
 from softstart.optimal.lp import ideal, whole_search
 from softstart.optimal.momentum import momentum_bound, momentum_shortest_time
-from softstart.optimal.problem import Problem, Terminal
+from softstart.optimal.problem import REACTS, Problem, Terminal, best_start
 from softstart.optimal.pulse_coast_hold import applies
 from softstart.optimal.result import InfeasibleError, OptimumError
 from softstart.optimal.solving import optimize
@@ -303,11 +303,18 @@ def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) 
         )
     ]
     if limit.found:
-        caption.append(said("The solid line joins optimal starts, each simulated exactly."))
+        caption.append(
+            said(
+                "The solid line joins the best profiles found that serve every start position, each "
+                "simulated exactly; feedback reacts to the contact and can lie below it."
+            )
+            if len(drive.positions) > 1
+            else said("The solid line joins optimal starts, each simulated exactly.")
+        )
     if limit.known:
         caption.append(
             said(
-                "The dash-dotted line is the gentlest start known in that time, of a strategy, an optimum or "
+                "The dash-dotted line is the gentlest start known in that time, of a strategy, a profile or "
                 "a quick search (crosses): possible, not proved best."
             )
         )
@@ -348,7 +355,7 @@ def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
         is_best = best is not None and known is not None and best.k_dyn == known
         cells = [label_of(run.controller), digits(run.start_time), fixed(run.k_dyn, 3)]
         cells += [fixed(bound, 3)] if bounded else []
-        cells += [fixed(known, 3) + (said(" (optimum)") if is_best else "")]
+        cells += [fixed(known, 3) + (f" ({best_start(drive)})" if is_best else "")]
         cells += [fixed(run.k_dyn / known if known else None, 2)]
         rows.append(cells + ([fixed(run.k_dyn / bound if bound else None, 2)] if bounded else []))
     heads = [said("strategy"), said("start time, s"), "K_dyn"]
@@ -377,7 +384,7 @@ def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
 def _on_optima(drive: Drive, limit: Limit) -> list[str]:
     """Of how many optima it is proved that nothing is gentler, and among which starts."""
     every, single, loose = [], [], []
-    for p in limit.found:
+    for p in limit.found if len(drive.positions) == 1 else ():
         bound, above = bound_at(drive, p.start_time_bound), p.gap_percent
         if bound and p.k_dyn is not None and 100.0 * (p.k_dyn / bound - 1.0) <= TIGHT:
             every.append(100.0 * (p.k_dyn / bound - 1.0))
@@ -386,6 +393,10 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
         else:
             loose.append(math.inf if above is None else above)
     notes = []
+    if limit.found and len(drive.positions) > 1:
+        notes.append(
+            said("The best fixed profiles are those found, not proved best. {reacts}", reacts=REACTS)
+        )
     if every:
         notes.append(
             said(
@@ -439,6 +450,8 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
 def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
     """Start times for which there is no start with a single contact, or just one."""
     refused = [p for p in limit.points if p.status == "INFEASIBLE"]
+    if refused and len(choice.rows[0].run.drive.positions) > 1:
+        return [refused[-1].status_text]
     once = [row.run.start_time for row in choice.rows if row.run.contacts == 1]
     soonest = min((time for time in once if not math.isnan(time)), default=math.inf)
     # within rounding of the shortest time the search may refuse a start that a strategy has made
@@ -482,8 +495,9 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
             )
         notes.append(
             said(
-                "For {times} no optimum is shown: {reason}, and {ended}. The lower bound holds nevertheless.",
+                "For {times} no {what} is shown: {reason}, and {ended}. The lower bound holds nevertheless.",
                 times=_times(limit.missing),
+                what=best_start(drive),
                 reason=_why_hard(drive),
                 ended=ended,
             )
@@ -575,7 +589,7 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
         if optima:
             axes.plot(
                 [p.start_time_bound for p in optima], [p.k_dyn for p in optima], "-", color=COLOURS[0],
-                lw=1.2, marker=".", ms=7, label=said("optimum found"), zorder=3,
+                lw=1.2, marker=".", ms=7, label=f"{best_start(rows[0].run.drive)} found", zorder=3,
             )  # fmt: skip
         if limit.known:
             steps = sorted({right, *own})

@@ -13,6 +13,7 @@ from softstart.chain.model import Chain
 from softstart.drive import Drive
 from softstart.late import late
 from softstart.optimal.front import ControllerPoint, Front
+from softstart.optimal.problem import REACTS, best_k_dyn, best_start
 from softstart.optimal.result import Kept, Optimum, RobustOptimum, SensorWorth
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import Run
@@ -112,7 +113,7 @@ def _searches(best: Optimum) -> str:
 def question(best: Optimum) -> str:
     """What was asked for."""
     problem = best.problem
-    words = [f"least {AIMS[problem.minimise]}"]
+    words = [best_k_dyn(problem.drive) if problem.minimise == "k_dyn" else f"least {AIMS[problem.minimise]}"]
     if _by_limits(best) and best.kept is not None:
         limits = [f"{one.name} {short(one.limit)} {one.unit}" for one in best.kept.margins]
         words = [f"least start time that keeps the limits ({', '.join(limits)})"]
@@ -134,7 +135,8 @@ def comparison(best: Optimum, others: Sequence[Run]) -> str:
     """The optimum beside `direct` and the gentlest shipped controller, or the quickest within limits."""
     if best.kept is not None:
         return _within_limits(best, best.kept, others)
-    text = f"K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
+    blind = "Best fixed profile: " if len(best.problem.drive.positions) > 1 else ""
+    text = f"{blind}K_dyn {best.k_dyn:.3f} in {best.end_time:.4g} s"
     reaching = [run for run in others if not math.isnan(run.start_time)]
     direct = next((run for run in reaching if run.controller_name == "direct"), None)
     if direct is not None:
@@ -155,16 +157,18 @@ def comparison(best: Optimum, others: Sequence[Run]) -> str:
 
 def position_sentences(best: Optimum) -> list[str]:
     """What a sensor of the start position is worth, where that is unknown."""
-    if not best.alone:
+    if len(best.problem.drive.positions) == 1:
         return []
+    if not best.alone:
+        return [REACTS]
     name, worst = max(best.alone.items(), key=lambda item: item[1].k_dyn)
     lower = 100.0 * (1.0 - worst.k_dyn / best.k_dyn)
     missing = [one for one in best.run.positions if one not in best.alone]
     none = f" (no start that quick with one contact: {', '.join(missing)})" if missing else ""
     return [
         f"Worst of {', '.join(best.run.positions)}: {best.run.position}. With the position known, the "
-        f"largest of the optima is {worst.k_dyn:.4f} ({name}), {lower:.1f} % lower{none}. A controller that "
-        "measures the contact may do as well."
+        f"largest of the optima is {worst.k_dyn:.4f} ({name}), {lower:.1f} % lower{none}.",
+        REACTS,
     ]
 
 
@@ -237,8 +241,13 @@ def optimum_figure(best: Optimum) -> Any:
         _twist(twist, best)
         twist.set_xlabel("time, s     (grey: gap open; dotted: end of the start)")
         twist.set_xlim(0.0, run.end_time)
-        aim = "start time within limits" if _by_limits(best) else AIMS[best.problem.minimise]
-        asked = f"least {aim}, terminal {best.problem.terminal}, {best.method}"
+        aim = (
+            best_k_dyn(run.drive)
+            if best.problem.minimise == "k_dyn"
+            else f"least {AIMS[best.problem.minimise]}"
+        )
+        aim = "least start time within limits" if _by_limits(best) else aim
+        asked = f"{aim}, terminal {best.problem.terminal}, {best.method}"
         entitle(figure, f"{run.drive.name}: {asked}")
     return figure
 
@@ -363,7 +372,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
     }
     replay = REPLAY.replace("drive.toml", "chain.toml") if isinstance(drive, Chain) else REPLAY
     parts = [
-        f"# {markdown(drive.name)}: optimal start",
+        f"# {markdown(drive.name)}: {best_start(drive)}",
         f"Asked: {markdown(question(best))}. Method {best.method}: {markdown(best.why)}",
         markdown(comparison(best, others)),
         figure_table(rows),
@@ -385,7 +394,7 @@ def write_optimum(best: Optimum, others: Sequence[Run], folder: Path, command: s
 
 def front_tables(front: Front) -> list[Table]:
     """The curve, and the controllers, the one nearest to the limit first."""
-    points = front.points
+    points, blind = front.points, len(front.drive.positions) > 1
     order = sorted(front.controllers, key=lambda one: one.ratio or math.inf)
     curve = {
         "start time\nallowed s": column_of([p.start_time_bound for p in points], 5),
@@ -401,12 +410,20 @@ def front_tables(front: Front) -> list[Table]:
         "strategy": [one.name for one in order],
         "K_dyn": [number(one.k_dyn, 4) for one in order],
         "start\ntime s": column_of([one.start_time for one in order], 5),
-        "least K_dyn\nat that time": [number(one.optimum.k_dyn if one.optimum else None, 4) for one in order],
-        "times\nthe least": [number(one.ratio, 3) for one in order],
+        f"{'best fixed profile' if blind else 'least K_dyn'}\nat that time": [
+            number(one.optimum.k_dyn if one.optimum else None, 4) for one in order
+        ],
+        f"times\n{'that' if blind else 'the least'}": [number(one.ratio, 3) for one in order],
     }
     return [
-        Table.of(f"Least K_dyn, terminal {front.terminal}", curve, ("bound", "method")),
-        Table.of("Controllers against the optimum at their own start time", controllers, ("strategy",)),
+        Table.of(
+            f"{_capital(best_k_dyn(front.drive))}, terminal {front.terminal}", curve, ("bound", "method")
+        ),
+        Table.of(
+            f"Controllers against the {best_start(front.drive)} at their own start time",
+            controllers,
+            ("strategy",),
+        ),
     ]
 
 
@@ -416,7 +433,7 @@ def front_conclusion(front: Front) -> str:
     if not found:
         return "None of these start times is feasible."
     first, last = found[0], found[-1]
-    text = f"Least K_dyn {first.k_dyn:.3f} in {first.start_time_bound:.4g} s"
+    text = f"{_capital(best_k_dyn(front.drive))} {first.k_dyn:.3f} in {first.start_time_bound:.4g} s"
     if last is not first:
         text += f" to {last.k_dyn:.3f} in {last.start_time_bound:.4g} s"
     judged = [one for one in front.controllers if one.ratio is not None]
@@ -424,10 +441,18 @@ def front_conclusion(front: Front) -> str:
         return text + "."
     best = min(judged, key=lambda one: one.ratio or math.inf)
     least = best.optimum.k_dyn if best.optimum is not None else math.nan
+    named = f"{best.name}, K_dyn {best.k_dyn:.3f} where"
+    if len(front.drive.positions) > 1:
+        then = f"the best fixed profile in its start time of {best.start_time:.4g} s has {least:.3f}"
+        return f"{text}. Lowest beside it: {named} {then}."
     return (
-        f"{text}. Nearest to the limit: {best.name}, K_dyn {best.k_dyn:.3f} where {least:.3f} is the least "
+        f"{text}. Nearest to the limit: {named} {least:.3f} is the least "
         f"in its start time of {best.start_time:.4g} s."
     )
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def footnotes(front: Front) -> list[str]:
@@ -438,21 +463,23 @@ def footnotes(front: Front) -> list[str]:
         if point.found and point.bound_covers
     )
     missing = dict.fromkeys(point.status_text for point in front.points if not point.found)
-    apart = [f"{one.name}: {_why_apart(one)}" for one in front.controllers if one.ratio is None]
+    blind = len(front.drive.positions) > 1
+    reacts = [REACTS] if blind else []
+    apart = [f"{one.name}: {_why_apart(one, blind)}" for one in front.controllers if one.ratio is None]
     below = [
         f"{one.name} lies below the lower bound of its start time: its start is not of the class covered."
         for one in front.controllers
         if one.optimum is not None and one.k_dyn < (one.optimum.k_dyn_lower_bound or 0.0)
     ]
-    return [*covers, *below, *missing, *apart]
+    return [*reacts, *covers, *below, *missing, *apart]
 
 
-def _why_apart(one: ControllerPoint) -> str:
+def _why_apart(one: ControllerPoint, blind: bool) -> str:
     """Why a controller has no optimum to be compared with."""
     best = one.optimum
     if best is None:
         return one.status_text
-    if best.status == "INFEASIBLE" and best.shortest_start_time is not None:
+    if best.status == "INFEASIBLE" and best.shortest_start_time is not None and not blind:
         return (
             "quicker than any start whose gap closes only once, which takes "
             f"{best.shortest_start_time:.6g} s or more; there is no optimum to compare it with."
@@ -466,15 +493,19 @@ def front_figure(front: Front) -> Any:
     placed = [one for one in front.controllers if not math.isnan(one.start_time)]
     with drawing():
         figure, axes = new_figure(1, 1, (8.0, 5.4))
-        _curve(axes, found)
+        _curve(axes, found, best_start(front.drive))
         for index, one in enumerate(placed):
             axes.plot([one.start_time], [one.k_dyn], MARKERS[index % len(MARKERS)], ms=7, mfc="none", mew=1.8,
                       color=COLOURS[(index + 1) % 8], clip_on=False, zorder=4)  # fmt: skip
         _scale(axes, [k for _, k, _ in found] + [one.k_dyn for one in placed])
         _where_nothing_starts(axes, front)
-        axes.set_xlabel("start time, s     (x: K_dyn over the least K_dyn at the same start time)")
+        axes.set_xlabel(
+            f"start time, s     (x: K_dyn over that of the {best_start(front.drive)} at the same start time)"
+        )
         axes.set_ylabel("K_dyn")
-        axes.set_title(f"{front.drive.name}: least K_dyn, terminal {front.terminal}", loc="left")
+        axes.set_title(
+            f"{front.drive.name}: {best_k_dyn(front.drive)}, terminal {front.terminal}", loc="left"
+        )
         if axes.get_legend_handles_labels()[0]:
             axes.legend(loc="upper right")
         name_points(figure, axes, [(_with_ratio(one), one.start_time, one.k_dyn) for one in placed])
@@ -482,16 +513,16 @@ def front_figure(front: Front) -> Any:
 
 
 def _with_ratio(one: ControllerPoint) -> str:
-    """Its name, and how many times the least K_dyn at its start time it has."""
+    """Its name, and how many times the K_dyn of the best profile at its start time it has."""
     return one.name if one.ratio is None else f"{one.name}, x{one.ratio:.2f}"
 
 
-def _curve(axes: Axes, found: Sequence[tuple[float, float, float | None]]) -> None:
+def _curve(axes: Axes, found: Sequence[tuple[float, float, float | None]], name: str) -> None:
     if not found:
         return
     times, k = [one[0] for one in found], [one[1] for one in found]
     bounded = [(t, k, low) for t, k, low in found if low is not None]
-    axes.plot(times, k, "o-", ms=3.5, color=COLOURS[0], label="optimum", zorder=3)
+    axes.plot(times, k, "o-", ms=3.5, color=COLOURS[0], label=name, zorder=3)
     if bounded:
         t, above, below = (list(column) for column in zip(*bounded, strict=True))
         axes.fill_between(t, below, above, color=COLOURS[5], alpha=0.45, lw=0)
@@ -503,14 +534,15 @@ def _where_nothing_starts(axes: Axes, front: Front) -> None:
     refused = [p.start_time_bound for p in front.points if not p.found]
     if refused:
         axes.plot(refused, [0.03] * len(refused), "x", ms=6, mew=1.5, color=GREY, clip_on=False,
-                  transform=axes.get_xaxis_transform(), label="no optimum")  # fmt: skip
+                  transform=axes.get_xaxis_transform(), label=f"no {best_start(front.drive)}")  # fmt: skip
     shortest = front.shortest_start_time
     if not math.isnan(shortest):
         left, right = axes.get_xlim()
         if left < shortest:
             axes.axvspan(left, shortest, fc="#F6F6F6", ec="#DDDDDD", hatch="///", lw=0, zorder=0)
             axes.set_xlim(left, right)
-        label = f"shortest with one contact, {shortest:.4f} s"
+        once = " with one contact" if len(front.drive.positions) == 1 else " found"
+        label = f"shortest{once}, {shortest:.4f} s"
         axes.axvline(shortest, color=GREY, lw=1.0, ls=DASHES[1], label=label)
 
 
@@ -535,7 +567,7 @@ def write_front(front: Front, folder: Path, command: str) -> None:
     save_figure(front.plot(), folder, "pareto")
     front.to_csv(folder / "pareto.csv")
     parts = [
-        f"# {markdown(front.drive.name)}: least K\\_dyn against start time",
+        f"# {markdown(front.drive.name)}: {markdown(best_k_dyn(front.drive))} against start time",
         f"Terminal {front.terminal}.",
         markdown(front_conclusion(front)),
         "![pareto](pareto.svg)",

@@ -259,8 +259,9 @@ def test_unknown_is_the_robust_optimum_and_its_bound_the_largest(small_search: N
         assert alone.k_dyn <= best.k_dyn
     assert best.summary()["k_dyn_if_position_known"] == {at: one.k_dyn for at, one in best.alone.items()}
     assert not wrong_in(compared(drive, best))
-    (said,) = position_sentences(best)
+    said, reacts = position_sentences(best)
     assert said.startswith("Worst of driving-flank, mid-gap, opposite-flank: ")
+    assert "feedback reacts" in reacts
     front = pareto(drive, [0.05], controllers=[])
     assert [point.status for point in front.points] == ["INFEASIBLE"]
 

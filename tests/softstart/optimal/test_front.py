@@ -15,7 +15,6 @@ from softstart.optimal.front import (
     FrontPoint,
     _monotone,
     default_start_times,
-    even_start_times,
     pareto,
 )
 from softstart.optimal.lp.rows import Limits
@@ -238,7 +237,8 @@ def test_default_start_times():
     assert times[-1] == pytest.approx(1.6 * simulate(CRANE, "direct").start_time)
     assert len(times) == 12
     assert times == sorted(times)
-    assert even_start_times(1.0, 2.0, 2) == [1.0, 2.0]
+    unknown = default_start_times(CRANE.replace(start_position="unknown"))
+    assert len(unknown) == 6
 
 
 def test_a_controller_that_never_starts_has_no_ratio():

@@ -1,0 +1,163 @@
+"""Every command and tab with its defaults, on every shipped machine and on those that `init` writes.
+
+In the suite stands a cell for each class of behaviour, with a rough search; `-m slow` has the other 200,
+an hour of processor time. What is refused for a reason stands in REFUSED with its sentence.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import Drive, InputError
+from softstart.chain.elements import LIBRARY
+from softstart.chain.model import load_machine
+from softstart.cli import main
+from softstart.drive import library
+from softstart.drive.data_sheet import DataSheet
+from softstart.optimal import front
+from softstart.optimal.robust import guesses, solving
+from softstart.page import tasks
+from softstart.page.jobs import Jobs
+from softstart.page.session import Session
+
+MOTOR = {"motor.power": "11 kW", "motor.speed": "1460 rpm", "motor.inertia": "0.055 kg*m^2"}
+GEAR = {"gear.ratio": 25, "gear.stiffness": "1 kN*m/arcmin", "gear.backlash": "8 arcmin"}
+MASS = {"load.mass": "5400 kg", "load.radius": "0.25 m"}
+SHEETS = {
+    "hoist": {**MOTOR, **GEAR, "load.mass": "3000 kg", "load.radius": "0.1 m", "load.reeving": 2},
+    "travel": {**MOTOR, **GEAR, **MASS},
+    "belt": {**MOTOR, **GEAR, **MASS},
+    "rotor": {**MOTOR, **GEAR, "load.inertia": "290 kg*m^2", "load.torque": "900 N*m"},
+}
+COMMANDS = {
+    "compare": "compare {}",
+    "simulate": "simulate {} --controller direct",
+    "fatigue": "fatigue {}",
+    "linear": "linear {} --controller state-feedback",
+    "optimize": "optimize {}",
+    "pareto": "pareto {}",
+    "tune": "tune {} --controller shaped",
+    "sweep": "sweep {} --controller shaped --axis shaft.gap=1x:2x:2",
+    "reduce": "reduce {}",
+    "report": "report {} --out report.html",
+}
+PANELS = {  # module, class, the method of its button
+    "Optimum": ("optimum_panel", "OptimumPanel", "_begin"),
+    "Limit": ("curve_panel", "CurvePanel", "_begin"),
+    "Checks": ("checks_panel", "ChecksPanel", "_begin"),
+    "Tuning": ("tuning_panel", "TuningPanel", "_begin"),
+    "Report": ("files_panel", "Exports", "_begin_report"),
+}
+# command and machine, or its class: a word of the sentence
+REFUSED = {("fatigue", one): "damping" for one in ("undamped", "crane-4-mass")}
+CHAINS = LIBRARY.names()
+MACHINES = (*library.names(), *SHEETS, *CHAINS)
+# no damping and a start that bounces; lag, friction and an unknown position; a brake; drives of data sheets
+QUICK = (
+    ("optimize", "crane-4amtkf-light-worn"),
+    ("pareto", "long-travel-3kw"),
+    ("fatigue", "crane-4amtkf"),
+    ("sweep", "hoist"),
+    *(("fatigue", machine) for machine in SHEETS),
+    ("Optimum", "travel"),
+    ("Limit", "belt"),
+)
+CELLS = [
+    (cell, machine) for cell in (*COMMANDS, *PANELS) for machine in (CHAINS if cell == "reduce" else MACHINES)
+]
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty folder with the drive files of `init`."""
+    monkeypatch.chdir(tmp_path)
+    for name, values in SHEETS.items():
+        sheet = DataSheet.from_settings({"load.machine": name, **values})
+        (tmp_path / f"{name}.toml").write_text(sheet.drive_toml(), encoding="utf-8")
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few points and rough searches: what is asked is whether there is an answer."""
+    monkeypatch.setattr(front.default_start_times, "__defaults__", ("reached", 4))
+    monkeypatch.setattr(tasks, "LONG_MULTIPLES", (1.2,))
+    monkeypatch.setattr(guesses, "ROUNDS", 40)
+    monkeypatch.setattr(guesses, "CELL_MEMBERS", 40)
+    for name, less in {"COARSE": 12, "FINE": 24, "DENSE": 8, "SPARSE": 3, "ROUNDS": 16, "PURSUED": 1}.items():
+        monkeypatch.setattr(solving, name, less)
+
+
+@pytest.fixture
+def client() -> Iterator[Any]:
+    """A tab of a browser that is never opened."""
+    pytest.importorskip("nicegui", reason="NiceGUI is missing: pip install 'softstart[ui]'")
+    from nicegui import Client
+    from nicegui.page import page
+
+    with Client(page("/never-opened")) as client:
+        yield client
+    client.delete()
+
+
+class Asked(Jobs):
+    """Keeps what a button asks for, and does not begin it."""
+
+    def begin(self, user: Any, title: str, work: Callable[..., Any], *args: Any, **keywords: Any) -> Any:
+        self.work = lambda: work(*args, progress=Heard(), **keywords)
+        raise InputError("It is done in this process.")
+
+
+class Heard:
+    """Takes what a work reports."""
+
+    def __call__(self, share: float | None, message: str = "") -> None:
+        assert share is None or 0.0 <= share <= 1.0 + 1e-9
+
+    def part(self, value: Any) -> None:
+        assert value
+
+
+def pressed(panel: str, session: Session) -> Any:
+    """What the button of a tab gives with the defaults of its form."""
+    module, name, button = PANELS[panel]
+    asked = Asked()
+    built = getattr(import_module(f"softstart.page.{module}"), name)(session, "user")
+    built._view._jobs = asked
+    getattr(built, button)()
+    return asked.work()
+
+
+@pytest.mark.parametrize(
+    ("cell", "machine"), [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in CELLS]
+)
+@pytest.mark.usefixtures("place")
+def test_a_default_works(
+    cell: str, machine: str, request: pytest.FixtureRequest, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 0, or a reason that is listed; no message names an option that was not given."""
+    quick = (cell, machine) in QUICK
+    if quick:
+        request.getfixturevalue("hasty")
+    path = f"{machine}.toml" if machine in SHEETS else machine
+    one = load_machine(path)
+    if cell in PANELS:
+        request.getfixturevalue("client")
+        assert pressed(cell, Session(one, ["direct", "ramp"] if quick else None))
+        return
+    words = COMMANDS[cell].format(path).split()
+    if quick and cell == "pareto":
+        words += ["--controllers", "direct"]
+    undamped = isinstance(one, Drive) and one.damping == 0.0
+    refused = REFUSED.get((cell, "undamped" if undamped else machine))
+    code, (out, err) = main(words), capfd.readouterr()
+    assert set(re.findall(r"(--[a-z-]+)(?: =|:)", err)) <= set(words), err
+    assert (code == 0) if refused is None else (code in (2, 3) and refused in err), err
+    if cell in ("optimize", "pareto") and len(one.positions) > 1:  # feedback may be lower
+        assert "est fixed profile" in out
+        assert not re.search("least K_dyn|optimum", out, re.IGNORECASE), out
