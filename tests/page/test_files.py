@@ -201,6 +201,32 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     assert (name, Drive.from_toml(content.decode())) == ("gantry.toml", drive)
 
 
+@pytest.mark.parametrize(("size", "columns"), [((800, 1000), 1), ((1024, 768), 2), ((1280, 800), 3)])
+def test_the_form_of_a_data_sheet_and_its_answer_are_seen(
+    visit: Any, size: tuple[int, int], columns: int
+) -> None:
+    page = visit(*size, select="")
+    lefts = "[...document.querySelectorAll('.controls, .plots, .figure')].map(one => one.offsetLeft)"
+    assert len(set(page.evaluate(lefts))) == columns
+    page.get_by_role("tab", name="Sheet", exact=True).click()
+    for path, text in SHEET.items():
+        page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
+    page.get_by_test_id("sheet-use").click()
+    answer = page.get_by_test_id("sheet-drive")
+    answer.wait_for(state="visible")
+
+    def seen(part: Any) -> bool:
+        box = part.bounding_box()
+        return bool(box["y"] >= 0.0 and box["y"] + box["height"] <= size[1])
+
+    comes_to(lambda: seen(answer), True)
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    if columns == 3:
+        fields = page.locator(".sheet-form input:visible, .sheet-form .q-select:visible").all()
+        assert sum(map(seen, fields)) >= 28
+        assert seen(page.locator(".k-dyn"))
+
+
 def test_from_a_data_sheet_to_an_answer_and_its_link_elsewhere(
     visit: Any, start_server: Callable[..., Any]
 ) -> None:

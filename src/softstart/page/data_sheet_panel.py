@@ -12,7 +12,7 @@ from softstart.drive.doubts import doubts
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
 from softstart.page.downloads import drive_file
-from softstart.page.panel_parts import action, box, choice, few, field, guarded, hint, notify, save
+from softstart.page.panel_parts import action, box, choice, few, field, guarded, hint, notify, reveal, save
 from softstart.page.sentences import clipped
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
@@ -35,29 +35,30 @@ class DataSheetPanel:
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
         self._fields: dict[str, Any] = {}
-        hint(
-            "Each number as its data sheet gives it, at its own part, in the unit beside its name or with "
-            "another one; all are referred to the motor shaft here. Grey text in a field is an example. What "
-            "is not known stays empty: below the field stands what is used then. Marked fields are needed."
-        )
-        tables = {table.name: table.parameters for table in DataSheet.TABLES}
-        for name, title in {"": "", **TITLES}.items():
-            if title:
-                ui.html(title, tag="h3", sanitize=False).classes("panel-title")
-            with box().classes("panel-form"):
-                for p in tables[name]:
-                    self._fields[p.name] = made(p)
+        with box().classes("sheet-form"):
+            hint(
+                "Each number as its data sheet gives it, at its own part, in the unit beside its name or "
+                "another one. What is not known stays empty: below it stands what is used then; * is needed."
+            )
+            tables = {table.name: table.parameters for table in DataSheet.TABLES}
+            for name, title in {"": "", **TITLES}.items():
+                if title:
+                    ui.html(title, tag="h3", sanitize=False).classes("panel-title")
+                with box().classes("panel-form"):
+                    for p in tables[name]:
+                        self._fields[p.name] = made(p)
         machine = self._fields["machine"]
         machine.on_value_change(lambda event: self._about(str(event.value)))
         self._about(str(machine.value))
-        with box().classes("panel-actions"):
-            action("Use this drive", guarded(self._use), "sheet-use", main=True)
-            action("Save drive as TOML", guarded(self._save), "sheet-save")
-        with box().classes("troubles").props('role=alert data-testid="sheet-trouble"') as self._troubles:
-            pass
-        self._troubles.set_visibility(False)
-        self._text = ui.label().classes("command lines").props('data-testid="sheet-drive" tabindex=0')
-        self._text.set_visibility(False)
+        with box().classes("sheet-answer") as self._answer:
+            with box().classes("panel-actions"):
+                action("Use this drive", guarded(self._use), "sheet-use", main=True)
+                action("Save drive as TOML", guarded(self._save), "sheet-save")
+            with box().classes("troubles").props('role=alert data-testid="sheet-trouble"') as self._troubles:
+                pass
+            self._troubles.set_visibility(False)
+            self._text = ui.label().classes("command lines").props('data-testid="sheet-drive" tabindex=0')
+            self._text.set_visibility(False)
 
     def _about(self, machine: str) -> None:
         """Show the fields of this machine."""
@@ -74,6 +75,7 @@ class DataSheetPanel:
             and (text := typed(p, str(self._fields[p.name].value)))
         }
         found: DataSheet | None = None
+        reveal(self._answer, "nearest")
         try:
             found = DataSheet.from_settings(written)
             title, sentences = "Check these values.", doubts(found.drive)

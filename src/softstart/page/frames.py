@@ -20,6 +20,7 @@ from softstart.chain.run import ChainRun, mean_torque_of
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
+from softstart.drive.doubts import doubts
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.machines import (
@@ -337,7 +338,9 @@ class Screen:
                 yield frame
             yield from (None for _ in session.judged(label))
         rows = [row(session, found) for found in session.strategies]
-        yield {"rows": rows, "recommendation": session.recommendation().text}
+        machine = session.machine
+        remarks = {"doubts": doubts(machine), "assumed": [one for one in machine.assumed.split("; ") if one]}
+        yield {"rows": rows, "recommendation": session.recommendation().text, "remarks": remarks}
         yield from self._map()
 
     def _map(self) -> Iterator[Frame | None]:
@@ -518,6 +521,7 @@ def figure(session: Session, found: Strategy, units: Units) -> dict[str, Any]:
         facts |= {
             "reached": math.isfinite(run.start_time),
             "peak_time": number(run.peak_time),
+            "output_torque": number(run.peak_torque * (getattr(run.drive, "gear_ratio", None) or math.nan)),
             "contacts": run.contacts,
             "impact_speed": number(units.shown(getattr(run, "impact_speed", math.nan), "rad/s")),
             "speed_unit": units.of("rad/s"),

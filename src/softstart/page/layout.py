@@ -27,7 +27,8 @@ else:  # the state and the server need no NiceGUI until a page is built
     nicegui, ui = late("nicegui"), late("nicegui.ui")
 
 WEB = Path(__file__).with_name("web")
-# tabs beside the live part: title, module and class
+EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
+# further tabs: title, module and class
 PANELS = (
     ("Optimum", "optimum_panel", "OptimumPanel"),
     ("Limit", "curve_panel", "CurvePanel"),
@@ -112,10 +113,10 @@ def _panels(session: Session, client: Client) -> None:
         user = client.request.scope.get(USER, client.id)  # of all tabs of a browser
     except RuntimeError:  # a page that no request has asked for
         user = client.id
-    with ui.tabs().props("dense no-caps align=left").classes("panel-tabs") as tabs:
-        for title, _, _ in PANELS:
-            ui.tab(title)
-    with ui.tab_panels(tabs, value=PANELS[0][0], animated=False).classes("panel-body"):
+    with ui.tabs().props("dense no-caps align=justify").classes("panel-tabs") as tabs:
+        for title in (EXPLORE, *(title for title, _, _ in PANELS)):
+            ui.tab(title).classes(f"tab-{title.lower()}")
+    with ui.tab_panels(tabs, value=EXPLORE, animated=False).classes("panel-body"):
         for title, module, name in PANELS:
             with ui.tab_panel(title):
                 try:

@@ -180,6 +180,12 @@ def few(sentences: Sequence[str]) -> list[str]:
     ]
 
 
+def reveal(part: Any, block: str = "start") -> None:
+    """Scroll to a part of a panel once the browser has drawn it."""
+    seen = f"getHtmlElement({part.id})?.scrollIntoView({{block: '{block}', behavior: 'smooth'}})"
+    ui.run_javascript(f"setTimeout(() => {seen}, 150)")
+
+
 def notify(sentence: str) -> None:
     """A short note at the edge of the page."""
     ui.notify(sentence, position="bottom-left", timeout=2500, classes="note")
@@ -410,6 +416,8 @@ class JobView:
             if state is State.DONE and not self._given:
                 self._given = True
                 self._on_done(job.result)
+                if self.mine:
+                    reveal(self._box)
         finally:
             self._on_state()
 

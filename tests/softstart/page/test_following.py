@@ -15,6 +15,7 @@ from softstart import simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.drive import PARAMETERS
+from softstart.drive.doubts import doubts
 from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
@@ -407,6 +408,22 @@ def test_another_drive_brings_its_own_sliders_and_forgets_mistakes():
     assert not screen.first()["mistakes"]
     assert screen.scales["shaft.gap"].high == 0.02
     assert max(screen.axes.gaps) == 0.02
+
+
+@pytest.mark.parametrize("machine", ["crane-4amtkf", "crane-4-mass"])
+def test_what_is_assumed_or_can_hardly_be_is_told_at_rest(machine):
+    session = Session(machine, controllers=["direct"])
+    controls, screen = controls_of(session)
+    if machine == "crane-4amtkf":
+        known = {"assumed": "efficiency 0.95; damping ratio 0.02", "gear_ratio": 31.5}
+        session.take(session.machine.replace(**known))
+        controls.take({"what": "edit", "path": "shaft.gap", "text": "4 rad"})
+        figure = screen.first()["figure"]
+        assert figure["output_torque"] == pytest.approx(31.5 * figure["peak_torque"], rel=1e-12)
+    (remarks,) = [frame["remarks"] for frame in screen.at_rest() if frame and "remarks" in frame]
+    assert remarks["assumed"] == session.machine.assumed.split("; ")
+    assert remarks["doubts"] == doubts(session.machine)
+    assert bool(remarks["doubts"]) is (machine == "crane-4amtkf")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ export default {
     <span class="drive-name"></span>
     <span class="steps" role="group" aria-label="Undo and redo"></span>
     <div class="units fields"></div>
-    <span class="pulse" title="From the slider to the drawn picture, and pictures in the last second"></span>
     <div class="theme" role="radiogroup" aria-label="Colours"></div>
   </header>
   <nav class="controls fields" aria-label="Parameters of the drive"></nav>

@@ -5,6 +5,7 @@ const FACTS = [
   ["start_time", "start time", "s", (f) => fixed(f.start_time, 4)],
   ["time_lost", "after direct", "s", (f) => fixed(f.time_lost, 4)],
   ["peak_torque", "peak torque", "N m", (f) => significant(f.peak_torque, 5)],
+  ["output_torque", "at the output", "N m", (f) => significant(f.output_torque, 5)],
   ["base", "mean torque", "N m", (f) => significant(f.base, 5)],
   ["impact_speed", "first impact", "", (f) => significant(f.impact_speed, 4)],
   ["contacts", "contacts", "", (f) => (f.contacts ?? "\u2013").toString()],
@@ -40,6 +41,7 @@ export class Figure {
       const shown = text(figure);
       if (place.textContent !== shown) place.textContent = shown;
     }
+    this.facts.get("output_torque").parentElement.hidden = figure.output_torque == null; // where no gear is known
     if (figure.speed_unit && this.speed.textContent !== figure.speed_unit) this.speed.textContent = figure.speed_unit;
     this.said = figure.reached ? figure.position : figure.status;
     this.failed = !figure.reached;

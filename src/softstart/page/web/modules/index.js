@@ -2,6 +2,7 @@
 import { Controls } from "./controls.js";
 import { Figure } from "./figure.js";
 import { GapMap } from "./map.js";
+import { element } from "./numbers.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Scheme } from "./scheme.js";
@@ -15,13 +16,12 @@ export class Instrument {
   constructor(root, send) {
     this.send = send;
     this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", stamp: 0 };
-    this.pulse = root.querySelector(".pulse");
     this.driveName = root.querySelector(".drive-name");
-    this.times = [];
     this.waiting = 0;
     const say = (message) => this.say(message);
     this.theme = new Theme(root.querySelector(".theme"), () => this.redraw());
     this.scheme = new Scheme(root.querySelector(".controls"));
+    this.remarks = root.querySelector(".controls").appendChild(element("div", { class: "remarks", role: "status" }));
     this.controls = new Controls(root.querySelector(".controls"), root.querySelector(".strategy"), root.querySelector(".units"), say);
     this.steps = new Steps(root.querySelector(".steps"), say);
     this.figure = new Figure(root.querySelector(".figure"), say);
@@ -97,6 +97,7 @@ export class Instrument {
     }
     if (frame.recommendation !== undefined || frame.order) this.advise(frame.recommendation);
     if (frame.recommendation !== undefined) this.table.rest();
+    if (frame.remarks) this.remark(frame.remarks);
     if (frame.mistakes) this.figure.mistake(frame.mistakes[""] ?? "");
     if (frame.fields) this.controls.show(frame.fields, frame.mistakes, frame.stamp);
     if (frame.keep) this.keep(frame.keep);
@@ -121,6 +122,12 @@ export class Instrument {
   advise(text) {
     this.advice.classList.toggle("old", text === undefined);
     if (text !== undefined && this.advice.textContent !== text) this.advice.textContent = text;
+  }
+
+  // what can hardly be, and what is assumed of the machine
+  remark({ doubts, assumed }) {
+    const texts = [...doubts, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
+    this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < doubts.length ? "doubt" : "" }, text)));
   }
 
   // the plots read this instant: so stands the drive
@@ -149,20 +156,7 @@ export class Instrument {
     if (this.number !== this.answered) {
       this.answered = this.number;
       this.send({ what: "drawn", number: this.number });
-      this.measure();
     }
-  }
-
-  // how long it took from the hand to the picture, and how many pictures there were in the last second
-  measure() {
-    const now = performance.now();
-    this.times = this.times.filter((time) => now - time < 1000);
-    this.times.push(now);
-    if (!this.stamp || this.stamp === this.measured) return;
-    this.measured = this.stamp;
-    this.lag = now - this.stamp;
-    this.pulse.textContent = `${Math.round(this.lag)} ms   ${this.times.length}/s`;
-    this.pulse.dataset.lag = this.lag;
   }
 
   end() {
