@@ -420,7 +420,7 @@ def test_a_reference_is_kept_drawn_linked_undone_and_cleared(visit, screenshot):
         page.get_by_text("SVG", exact=True).click()
     svg = Path(download.value.path()).read_text(encoding="utf-8")
     assert f"reference: direct, shaft.gap 28.6479 deg, {direct.k_dyn:.3f}" in svg
-    assert svg.count('stroke-dasharray="7 4"') == 4  # in three plots and the legend
+    assert svg.count('stroke-width="4.5" stroke-linejoin="round"/>') == 4  # in three plots, the legend
     at_rest(page)  # then its bench is kept
     page.wait_for_function(
         "(sessionStorage.getItem('softstart-bench') ?? '').includes(location.hash.slice(1))"

@@ -56,12 +56,20 @@ def style() -> str:
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
 
 
+@cache
+def gentlest(drive: Machine) -> str:
+    """The strategy that is selected at first: computed for the first tab alone, since others would wait."""
+    session = Session(drive)
+    session.select_gentlest()
+    return session.selected
+
+
 def build(drive: Machine) -> Session:
     """Build the page for the client of the moment, in a session of its own; returns that session."""
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.select_gentlest()
+    session.select(gentlest(drive))
     session.restore(session.bench)  # the page begins here: that is no step to undo
     screen = Screen(session)
     with instrument()() as element:

@@ -183,7 +183,7 @@ def few(sentences: Sequence[str]) -> list[str]:
 def reveal(part: Any, block: str = "start") -> None:
     """Scroll to a part of a panel once the browser has drawn it."""
     seen = f"getHtmlElement({part.id})?.scrollIntoView({{block: '{block}', behavior: 'smooth'}})"
-    ui.run_javascript(f"setTimeout(() => {seen}, 150)")
+    ui.timer(POLL, lambda: ui.run_javascript(seen), once=True)
 
 
 def notify(sentence: str) -> None:

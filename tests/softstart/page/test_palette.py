@@ -58,7 +58,13 @@ def test_any_two_strategies_are_told_apart(name, sight):
         float(np.linalg.norm(seen(one, sight) - seen(other, sight)))
         for one, other in combinations(palette(name), 2)
     )
-    assert nearest > 4.0 * NOTICED  # lines are thin
+    assert nearest > (6.5 if sight == "full" else 4.0) * NOTICED  # lines are thin
+
+
+def test_a_strategy_has_one_hue_in_light_and_dark():
+    for tones in zip(palette("LIGHT"), palette("DARK"), strict=True):
+        one, other = (np.angle(complex(*seen(tone, "full")[1:]), deg=True) for tone in tones)
+        assert abs((one - other + 180.0) % 360.0 - 180.0) < 2.0
 
 
 @pytest.mark.parametrize("name", ["LIGHT", "DARK"])

@@ -8,6 +8,7 @@ import itertools
 import re
 import weakref
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -236,3 +237,28 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     session.undo()
     panel._add()
     assert len(session.controllers) == 2
+
+
+def test_docs_name_the_tabs_as_the_page_does() -> None:
+    """Each tab has its paragraph in the page on the page, in its order; no document names another one."""
+    from softstart.page.layout import EXPLORE, PANELS
+
+    docs = Path(__file__).parents[3] / "docs"
+    titles = [EXPLORE, *(title for title, _, _ in PANELS)]
+    text = (docs / "howto" / "in-the-browser.md").read_text("utf-8")
+    assert [name for name in re.findall(r"^- \*(\w+)\.\*", text, re.M) if name in titles] == titles
+    named = [
+        name
+        for path in docs.rglob("*.md")
+        for name in re.findall(r"\btab\s+\*([^*]+)\*", path.read_text("utf-8"))
+    ]
+    assert named
+    assert set(named) <= set(titles)
+
+
+def test_a_further_tab_starts_no_strategy_to_begin_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    from softstart.page import layout, session
+
+    first = layout.gentlest(Drive.load("crane-4amtkf"))
+    monkeypatch.setattr(session, "simulate", pytest.fail)
+    assert layout.gentlest(Drive.load("crane-4amtkf")) == first == "pulse-coast-hold"

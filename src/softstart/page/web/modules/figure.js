@@ -14,7 +14,7 @@ const FACTS = [
 export class Figure {
   constructor(place, say) {
     this.name = element("div", { class: "name" });
-    const keep = element("button", { type: "button", class: "keep", title: "Keep this start drawn, dashed and grey, while drive and strategies change" }, "Keep as reference");
+    const keep = element("button", { type: "button", class: "keep", title: "Keep this start drawn, as a wide grey line, while drive and strategies change" }, "Keep as reference");
     keep.addEventListener("click", () => say({ what: "reference", kept: true }));
     this.value = element("output", { class: "k-dyn", id: "k-dyn", "aria-live": "off" });
     this.status = element("div", { class: "status", role: "status" });

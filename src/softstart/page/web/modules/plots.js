@@ -7,7 +7,7 @@ import { extent, indexAt, unpackAll, valueAt } from "./trace.js";
 const LEFT = 52, RIGHT = 12, TOP = 20, BOTTOM = 26, BETWEEN = 24, LINE = 15;
 const SHARES = [0.5, 0.25, 0.25];
 const BAND = 0.36; // of the height of a gap's band, from its middle to a flank
-const DASH = [7, 4]; // of the reference
+const WIDE = 4.5; // of the reference: motor torque and speed are dashed
 const FINEST = 1e-7; // of the whole start: a shorter window has no digits left in single precision
 
 // whether a start is that of a chain, with several shafts
@@ -201,7 +201,7 @@ export class Plots {
   named(pen, w, state, others) {
     const flagged = (name) => (state.rows.get(name)?.flag ? ` (${state.rows.get(name).flag})` : "");
     const { reference } = state;
-    const kept = this.reference ? [[`reference: ${reference.name}, ${fixed(reference.k_dyn, 3)}`, this.theme.colours.quiet, DASH, 1.4]] : [];
+    const kept = this.reference ? [[`reference: ${reference.name}, ${fixed(reference.k_dyn, 3)}`, this.theme.colours.kept, [], WIDE]] : [];
     const entries = others.map((name) => [`T, ${name}${flagged(name)}`, this.theme.strategy(state.order.indexOf(name)), [], 1]);
     if (state.traces.get(state.selected).allowed) entries.push(["permissible", this.theme.colours.warn, [], 1]);
     const main = state.traces.get(state.selected);
@@ -296,7 +296,7 @@ export class Plots {
   }
 
   compared(panel, channel) {
-    if (this.reference) this.curve(panel, this.reference.t, this.reference[channel], this.theme.colours.quiet, 1.4, DASH);
+    if (this.reference) this.curve(panel, this.reference.t, this.reference[channel], this.theme.colours.kept, WIDE);
   }
 
   // least and largest of what is seen of a channel of the selected start and of the reference
@@ -407,12 +407,12 @@ export class Plots {
       const base = state.rows.get(state.selected);
       if (base?.k_dyn) this.level(panel, base.peak_torque / base.k_dyn, quiet, [1, 3]);
       if (allowed) this.level(panel, allowed, this.theme.colours.warn, []);
+      this.compared(panel, "T");
       for (const name of others) {
         const trace = state.traces.get(name);
         this.curve(panel, trace.t, trace.T, this.theme.strategy(state.order.indexOf(name)), 1);
       }
       this.startLine(panel, state);
-      this.compared(panel, "T");
       for (const { T } of beside) this.curve(panel, main.t, main[T], own, 0.8);
       this.curve(panel, main.t, main.u, ink, 1.2, [5, 3]);
       this.curve(panel, main.t, main.T, own, 2.2);

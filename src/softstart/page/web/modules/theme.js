@@ -4,10 +4,10 @@ import { element } from "./numbers.js";
 const CHOICES = [["auto", "Auto"], ["light", "Light"], ["dark", "Dark"]];
 const KEY = "softstart-colours";
 
-// the least difference of two, with full sight or any colour blindness, is as large as twelve allow; the first ones
-// differ most (tests/softstart/page/test_palette.py)
-const LIGHT = ["#3c0fe1", "#c33c00", "#7887d2", "#691e3c", "#c37887", "#961e00", "#a54bff", "#4b00a5", "#f05a3c", "#693c78", "#6969a5", "#a55a69"];
-const DARK = ["#ff870f", "#c3f0e1", "#8778b4", "#b4a5c3", "#d21eff", "#f03c1e", "#ffc30f", "#e178ff", "#009669", "#00f096", "#4bc378", "#d2c3f0"];
+// each has one hue in light and dark; the least difference of two, with full sight before all, with any colour blindness
+// too, is as large as a search for twelve found (tests/softstart/page/test_palette.py)
+const LIGHT = ["#2a9393", "#ba8a49", "#2526e3", "#922544", "#597203", "#c4505b", "#9b4bae", "#1f4e01", "#f64cc2", "#9682f7", "#610157", "#671ba9"];
+const DARK = ["#6ac2c1", "#e3970d", "#3753fe", "#fe4179", "#b3d26f", "#955054", "#eea8ff", "#84fe41", "#c00093", "#967ffe", "#b37fa9", "#844fc3"];
 
 export class Theme {
   constructor(place, changed) {
@@ -44,7 +44,7 @@ export class Theme {
     this.dark = document.body.classList.contains("body--dark");
     const style = getComputedStyle(document.body);
     const colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const names = ["ink", "quiet", "line", "grid", "paper", "shade", "accent", "torque", "motor", "load", "warn"];
+    const names = ["ink", "quiet", "line", "kept", "grid", "paper", "shade", "accent", "torque", "motor", "load", "warn"];
     this.colours = Object.fromEntries(names.map((name) => [name, colour(name)]));
     this.font = style.getPropertyValue("--font").trim();
     const palette = this.dark ? DARK : LIGHT;
