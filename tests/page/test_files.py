@@ -209,7 +209,10 @@ def test_the_form_of_a_data_sheet_and_its_answer_are_seen(
     lefts = "[...document.querySelectorAll('.controls, .plots, .figure')].map(one => one.offsetLeft)"
     assert len(set(page.evaluate(lefts))) == columns
     page.get_by_role("tab", name="Sheet", exact=True).click()
-    for path, text in SHEET.items():
+    page.get_by_test_id("sheet-load-machine").click()
+    page.get_by_role("option", name="rotor").click()
+    own = {path: text for path, text in SHEET.items() if not path.startswith("load")}
+    for path, text in {**own, "load.inertia": "290"}.items():
         page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
     page.get_by_test_id("sheet-use").click()
     answer = page.get_by_test_id("sheet-drive")

@@ -118,7 +118,8 @@ def made(p: Parameter) -> Any:
     def say() -> None:
         text = str(one.value)
         try:
-            said = echo(p, text) if text.strip() else "" if needed else f"empty: {if_empty(p)}"
+            nothing = "" if needed or if_empty(p) == "none" else f"empty: {if_empty(p)}"
+            said = echo(p, text) if text.strip() else nothing
         except RefusedError as refusal:
             said = refusal.reason
         note.set_text(said)
