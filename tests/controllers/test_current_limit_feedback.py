@@ -18,7 +18,7 @@ from softstart.plant.layout import index
 from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
-from softstart_controllers.shaft_observer import DISTURBANCE, OUTPUT, TRANSITION, design, observer, predict
+from softstart_controllers.shaft_observer import DISTURBANCE, OUTPUT, TRANSITION, design, predict
 
 CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
 
@@ -65,13 +65,6 @@ def test_gains_are_the_stationary_kalman_filter(steps: int) -> None:
     else:
         L, _, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * 0.05)]]), np.eye(1))
         assert np.allclose(A @ K, L, rtol=1e-9)
-
-
-def test_observer_of_a_batch_equals_that_of_its_drives() -> None:
-    batch = CRANE.replace(load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096])
-    together = observer(batch, 0.001, 0.05)
-    for i, one in enumerate(batch.elements()):
-        assert [values[i] for values in together] == list(observer(one, 0.001, 0.05))
 
 
 @pytest.mark.parametrize(("gap", "J2", "lag", "kind"), CRANES)
