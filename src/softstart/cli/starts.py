@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,7 @@ from softstart.views.terminal import (
     print_figures,
     print_lines,
     print_table,
+    print_tables,
     sentence,
 )
 
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from softstart.chain import fatigue as shaft_lives
-    from softstart.controller.base import Controller
     from softstart.identification.result import Identification
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
@@ -332,56 +332,41 @@ def fatigue(
     lives are relative to that of direct. A drive needs damping; a chain needs it in every shaft, and each
     shaft is evaluated separately.
     """
-    if isinstance(drive, Chain):
-        _fatigue_of_chain(
-            drive, lambda: make_controllers(controllers, params, prefix=True), fitted_to, slope, out, as_json
-        )
-        return
+    chain = drive if isinstance(drive, Chain) else None
     with output_folder(out) as folder:
-        with working("starting the drive ..."):
+        with working("starting the machine ..."):
             made = make_controllers(controllers, params, prefix=True)
             with Attributed():
-                runs = [softstart.simulate(drive, controller, fitted_to=fitted_to) for controller in made]
-                found = softstart.fatigue(
-                    runs,
-                    slope=slope,
-                    worn_gap=worn_gap,
-                    estimate_damping=estimate_damping,
-                    fitted_to=fitted_to,
-                )
+                runs: Any = [
+                    softstart.simulate(drive, controller, fitted_to=fitted_to) for controller in made
+                ]
+                found: Any = (
+                    shaft_lives.chain_fatigue(runs, slope=slope)
+                    if chain
+                    else softstart.fatigue(
+                        runs, slope=slope, worn_gap=worn_gap, estimate_damping=estimate_damping,
+                        fitted_to=fitted_to,
+                    )
+                )  # fmt: skip
         if folder is not None:
             with working("drawing the figure ..."):
-                lives.write_fatigue(found, folder, command_line(), fitted_to)
+                if chain:
+                    lives.write_chain_fatigue(found, folder, command_line())
+                else:
+                    lives.write_fatigue(found, folder, command_line(), fitted_to)
 
     def show(to: Console) -> None:
-        rows = list(found.rows)
-        if controllers is None:
-            rows.sort(key=lambda row: -row.relative)
-        print_lines(to, starts.machine_lines(found.drive, fitted_to))
-        to.print()
-        print_table(to, lives.fatigue_table(found, rows))
-        print_conclusion(to, [lives.conclusion(found)], lives.notes(found))
+        print_lines(to, starts.machine_lines(chain or found.drive, fitted_to))
+        if chain:
+            tables, conclusion = lives.chain_tables(found), lives.chain_conclusion(found)
+            notes = [*lives.chain_notes(found), *chain.warnings]
+        else:
+            rows = list(found.rows)
+            if controllers is None:
+                rows.sort(key=lambda row: -row.relative)
+            tables, conclusion = [lives.fatigue_table(found, rows)], lives.conclusion(found)
+            notes = lives.notes(found)
+        print_tables(to, tables)
+        print_conclusion(to, [conclusion], notes)
 
-    present(found.summary, show, as_json, out and f"{out}: report.md, figure, cycles and turning points")
-
-
-def _fatigue_of_chain(
-    chain: Chain, makes: Callable[[], Sequence[Controller]], nominal: Drive | None, slope: float | None,
-    out: str | None, as_json: bool,
-) -> None:  # fmt: skip
-    """The same for each shaft of a chain."""
-    with output_folder(out) as folder:
-        with working("starting the chain ..."), Attributed():
-            runs = [softstart.simulate_chain(chain, controller, fitted_to=nominal) for controller in makes()]
-            found = shaft_lives.chain_fatigue(runs, slope=slope)
-        if folder is not None:
-            lives.write_chain_fatigue(found, folder, command_line())
-
-    def show(to: Console) -> None:
-        print_lines(to, starts.machine_lines(chain))
-        for table in lives.chain_tables(found):
-            to.print()
-            print_table(to, table)
-        print_conclusion(to, [lives.chain_conclusion(found)], [*lives.chain_notes(found), *chain.warnings])
-
-    present(found.summary, show, as_json, out and f"{out}: report.md, fatigue.csv and turning points")
+    present(found.summary, show, as_json, out and f"{out}: report.md, tables, cycles and turning points")
