@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,91 @@ def test_a_unit_in_columns_takes_the_place_of_that_of_the_file(log: Log, tmp_pat
         Log.load(path, columns={"torqe": "M"})
 
 
+# ---- traces of inverters, scopes and spreadsheets ----------------------------------------------------------
+
+TRACES = {  # heading, unit of the times in ms, row, what is read from the message
+    "TwinCAT": (
+        "Name;MyScope\nFile;trace_0017\nStarttime of export;2025-03-11 08:12:05\nSampleTime[ms];4\n\n"
+        "Name;ActTorque;;Name;ActPos\nData-Type;REAL32;;Data-Type;REAL64\nUnit;%;;Unit;deg\nOffset;0;;Offset;0\n",
+        "{t:.0f};{percent:.8f};;{t:.0f};{deg:.8f}", ",", "utf-8",
+    ),
+    "spreadsheet": (
+        "Zeit [ms];Drehmoment [Nm];Lage [deg]", "{t:.1f};{torque:.8f};{deg:.8f}", ",", "utf-8-sig",
+    ),
+    "Siemens": (
+        "Time [ms];Channel 1 r0080 Actual torque [Nm];Channel 2 Actual position [deg]",
+        "{t:.1f};{torque:.8f};{deg:.8f}", ".", "utf-8",
+    ),
+    "tabs": (
+        "Motor trace\texport 3.2\nTime\tTorque ref.\tPosition\nms\tNm\trev",
+        "{t:.1f}\t{torque:.8f}\t{turns:.10f}", ".", "utf-16",
+    ),
+    "commas": (
+        "Controller,axis 1\nt_1 [ms],fActTorque (0.1% Mn),t_2 [ms],fActPosition (\N{DEGREE SIGN})",
+        "{t:.1f},{mille:.8f},{t:.1f},{deg:.8f}", ".", "cp1252",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TRACES)
+def test_a_trace_is_read_by_the_one_command_that_its_message_gives(
+    log: Log, kind: str, tmp_path: Path
+) -> None:
+    heading, row, point, encoding = TRACES[kind]
+    rows = [
+        row.format(
+            t=1e3 * t, torque=u, percent=100.0 * u / 12.0, mille=1e3 * u / 12.0, deg=math.degrees(a),
+            turns=a / (2.0 * math.pi),
+        ).replace(".", point)
+        for t, u, a in zip(2.0 * log.time, log.torque, log.values, strict=True)
+    ]  # fmt: skip
+    path = tmp_path / "trace.csv"
+    path.write_text("\n".join([heading, *rows]), encoding=encoding)
+    with pytest.raises(InputError) as refused:
+        Log.load(path)
+    told = shlex.split(str(refused.value).partition("; write ")[2].partition(" (the torque")[0].rstrip("."))
+    assert told[::2] == ["--columns", "--rated-torque"][: len(told) // 2]
+    columns = dict(one.split("=") for one in told[1].split(","))
+    read = Log.load(path, columns=columns, rated_torque=told[3] if len(told) > 2 else None)
+    assert read.time == pytest.approx(2.0 * log.time, abs=1e-9)
+    assert read.torque == pytest.approx(log.torque, abs=1e-7)
+    assert read.values == pytest.approx(log.values, abs=1e-7)
+
+
+def test_columns_of_a_trace_with_instants_of_their_own_are_joined(tmp_path: Path) -> None:
+    coarse, fine = np.arange(0.0, 0.4, 4e-3), np.arange(0.0007, 0.38, 3e-3)
+    rows = [
+        f"{t if i < coarse.size else ''};{20.0 if i < coarse.size else ''};;{s};{40.0 * s**2.1}"
+        for i, (t, s) in enumerate(zip(np.resize(coarse, fine.size), fine, strict=True))
+    ]
+    path = tmp_path / "trace.csv"
+    path.write_text("\n".join(["time [s];torque [N*m];;time [s];angle [rad]", *rows]))
+    read = Log.load(path)
+    assert read.time.size == np.union1d(coarse, fine)[1:].size - np.sum(coarse > fine[-1])
+    assert int(np.isfinite(read.values).sum()) == fine.size
+    assert np.all(read.torque == 20.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("a.mat", "MATLAB 5.0", "this is a MATLAB file; export the signals as CSV"),
+        ("a.csv", "\0\0", "this is not a text file; export the signals as CSV"),
+        ("a.csv", "0;1;2\n1;1;2", "no line above the numbers names the columns"),
+        ("a.csv", "s;torque;angle\n0;1;2\n1;1;2", "none has a name of times, .*--columns .time=NAME .ms."),
+        (
+            "a.csv",
+            "time;torque [%];angle\n0;1;2\n1;1;2",
+            "it is in %; give the torque at 100 %, as --rated-t",
+        ),
+    ],
+)
+def test_what_is_no_trace_is_told_what_to_write(tmp_path: Path, name: str, text: str, sentence: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        Log.load(tmp_path / name)
+
+
 # ---- measurement files ----------------------------------------------------------------------------------
 
 
@@ -167,8 +253,8 @@ def test_a_measurement_file_is_the_log_that_was_written(log: Log, tmp_path: Path
     assert read.name == "start.mf4"
     assert not [note for note in read.notes if "instants" in note]
     for columns, sentence in (
-        ({}, "its channels name neither of angle and speed; .* there are .*M_soll"),
-        ({"angle": "phi_ist"}, 'no channel is called "torque"'),
+        ({}, "there are the columns M_soll .* they name neither of angle and speed"),
+        ({"angle": "phi_ist"}, "none is called torque; write --columns torque=M_soll,angle=phi_ist"),
         ({"torque": "M_soll", "speed": "n_ist"}, "n_ist.*frequency"),
         ({"torque": "M_soll", "angle": "phi_ist", "time": "t"}, "leave time out"),
     ):

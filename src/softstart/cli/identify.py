@@ -104,6 +104,10 @@ def _check_question(given: Mapping[str, Any]) -> None:
     help="Torque constant, for example '1.2 N*m/A', if the log has the current instead of the torque.",
 )  # fmt: skip
 @click.option(
+    "--rated-torque", metavar="TORQUE", type=quantity("N*m"),
+    help="Torque at 100 %, for example '12 N*m', if the log has the torque in %. Default: that of the drive.",
+)  # fmt: skip
+@click.option(
     "--free",
     metavar="NAME,...",
     type=Reading(read_list),
@@ -220,7 +224,7 @@ def show_fit(
         found = softstart.identify(
             list(logs), given["drive"], free=given["free"], torque_is=given["torque_is"],
             columns=given["columns"] or {}, torque_constant=given["torque_constant"],
-            searches=given["searches"], progress=progress,
+            rated_torque=given["rated_torque"], searches=given["searches"], progress=progress,
         )  # fmt: skip
         each = found.k_dyn(strategies)
         if folder is not None:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.optimize import least_squares, minimize
 from scipy.stats import qmc
 from scipy.stats import t as student
@@ -52,7 +52,6 @@ RIPPLE, RIPPLE_FACTOR = 0.025, 3.0
 MOST_STEPS, HALVINGS = 20, 7  # towards an end of an interval, or the most likely x
 TURNS: Final = 4  # of the most likely torque error at one x; fewer if it moves by less than
 ERROR_SETTLED: Final = 0.1  # standard deviations, all samples together
-ROUNDING: Final = 1e-14  # of the largest variance
 STEEP: Final = 1e-3  # what the likelihood must still gain for another step
 ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
 SCANNED: Final = 5  # values of what the logs do not tell, at which all else is fitted
@@ -487,9 +486,9 @@ class Fitter:
             self.values[i], variance = self._measured(model.log, logged)
             rows = self.counts[i] = np.isfinite(self.values[i])
             response = model.torque_responses(values)[rows]
-            covariance = np.diag(variance[rows]) + ripple**2 * (response @ response.T)
-            factor = cholesky(covariance, lower=True)
-            found.append(solve_triangular(factor, self.part(x, i).jacobian, lower=True))
+            size = np.sqrt(variance[rows])[:, None]
+            factor = root_of_covariance(1.0, ripple * response / size)
+            found.append(solve_triangular(factor, self.part(x, i).jacobian / size, lower=True))
         return np.vstack(found)
 
     def deviations(self, parts: Sequence[Part], before: Errors) -> tuple[Errors, Vector]:
@@ -612,10 +611,7 @@ class Fitter:
             model.shift = None if model.error is None else response @ model.error
             residual = self.part(x, log, derivatives=False).residual / size
             seen = errors.ripple * response[self.counts[log]] / size[:, None]
-            covariance = seen @ seen.T
-            floor = ROUNDING * float(np.max(np.diag(covariance)))  # where no ripple is that large
-            covariance.flat[:: covariance.shape[0] + 1] += errors.noise**2 + floor
-            root = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+            root = root_of_covariance(errors.noise, seen)
             white = solve_triangular(root, residual, lower=True, check_finite=False)
             value = 2.0 * float(np.log(np.diag(root)).sum()) + float(white @ white)
             pulled = solve_triangular(root, white, lower=True, trans=1, check_finite=False)
@@ -720,6 +716,7 @@ class Fitter:
             x_scale="jac",
             max_nfev=30,
             xtol=1e-9,
+            ftol=STEEP / sum(rows.size for rows in self.roots),
         )
         return np.asarray(found.x, dtype=np.float64)
 
@@ -896,15 +893,6 @@ class Fitter:
             free &= ~outside
         return step
 
-    def innovations(self, x: Vector, errors: Errors) -> list[Vector]:
-        """What is left of each log, sample by sample, made independent and of unit size."""
-        left = []
-        for part, one in zip(self.parts(x, derivatives=False), errors.weights, strict=True):
-            covariance = errors.noise**2 * np.diag(one.root**2)
-            covariance += errors.ripple**2 * (one.response @ one.response.T)
-            left.append(solve_triangular(cholesky(covariance, lower=True), part.residual, lower=True))
-        return left
-
 
 def quantile_of(freedom: float) -> float:
     """Student's quantile of an interval, for a variance with these degrees of freedom.
@@ -913,6 +901,22 @@ def quantile_of(freedom: float) -> float:
     1.96
     """
     return float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+
+
+def root_of_covariance(noise: float, seen: Matrix) -> Matrix:
+    """The lower triangle L of L L' = noise^2 I + seen seen', with a positive diagonal.
+
+    By a QR decomposition of [noise I, seen]', which rounding cannot break: seen seen', whose error is that of
+    its largest entry, is never formed. (The product has no Cholesky factor once a torque error moves the
+    signal by 1e7 times its rounding.)
+
+    >>> root_of_covariance(3.0, np.array([[4.0], [0.0]])).tolist()
+    [[5.0, 0.0], [0.0, 3.0]]
+    """
+    size = seen.shape[0]
+    root: Matrix = np.triu(lapack.dtpqrt(0, min(32, size), noise * np.eye(size), seen.T)[0]).T
+    root *= np.copysign(1.0, np.diag(root))
+    return root + 0.0
 
 
 def covariance_of(jacobian: Matrix, space: Space) -> Matrix:

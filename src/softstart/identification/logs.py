@@ -4,40 +4,22 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 from softstart.errors import InputError
-from softstart.input.columns import Wanted, read_columns
-from softstart.input.files import ABSENT, FOLDER, read_text, refusal_of, write_whole
-from softstart.late import late
-from softstart.quantities import RefusedError, nearest, parse, show, to_si
+from softstart.identification.traces import COLUMNS, FEWEST, Kind, asked_columns, check_times, read_signals
+from softstart.input.files import write_whole
+from softstart.quantities import show, to_si
 
-if TYPE_CHECKING:
-    import asammdf
-else:
-    asammdf = late("asammdf")
-
-Kind = Literal["angle", "speed"]
 TorqueIs = Literal["demand", "measured"]
 
-COLUMNS: Final = {
-    "time": Wanted(("time", "t"), "s"),
-    "torque": Wanted(("torque", "u", "demand"), "N*m"),
-    "angle": Wanted(("angle", "phi", "position"), "rad"),
-    "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
-    "current": Wanted(("current", "i", "iq"), "A"),
-}
-MEASUREMENTS: Final = (".mf4", ".mdf", ".dat")  # how names of MDF files end
-SAME_INSTANT: Final = 1e-3  # of a sample period: two channels have a sample at the same time
-FEWEST: Final = 30  # samples
 MOST_ROWS: Final = 1000  # samples of angle or speed that the fit looks at
 LEAST_COUNT: Final = 1e-5  # of the largest difference: a smaller step is rounding
 SPIKE: Final = 15.0  # times the usual distance from the line through the neighbours
@@ -122,7 +104,8 @@ class Log:
         seconds, torques, values = columns.values()
         notes: list[str] = []
         torques = _whole(torques, seconds, name, notes)
-        _check_times(seconds, name)
+        check_times(seconds, name)
+        _check_holes(seconds, name)
         if kind == "angle":
             values = _unwrapped(values, notes)
         values = _without_spikes(values, notes)
@@ -152,8 +135,12 @@ class Log:
         columns: Mapping[str, str] | None = None,
         torque_is: TorqueIs = "measured",
         torque_constant: float | str | None = None,
+        rated_torque: float | str | None = None,
     ) -> Log:
         """A log from a CSV file whose first line names the columns, as `time [ms];torque [N*m];speed [rpm]`.
+
+        Names, units and the sample time may also stand in lines of a preamble, and each column may have times
+        of its own to its left, as scopes of inverters write it.
 
         Also from a measurement file, MDF 3 or 4 (`.mf4`, `.mdf`, `.dat`), by the package `asammdf`. Its
         channels may be sampled at different instants: the torque, which is straight or constant between its
@@ -166,15 +153,19 @@ class Log:
         columns : mapping, optional
             What the file calls time, torque (or current), angle and speed; a name after a minus has the other
             sign, and a unit in brackets behind it takes the place of that of the file: `-n_act [rpm]`.
+            A torque may be in %, or in 0.1 %.
         torque_is : {"measured", "demand"}
             As for `Log`.
         torque_constant : float or str, optional
             Torque over current in N m/A, or with a unit: the file has the current that makes the torque in
             place of it.
+        rated_torque : float or str, optional
+            The torque at 100 % in N m, or with a unit, where the file has it in %.
         """
         where = os.fspath(path)
-        asked = _asked(columns or {})
-        constant = None if torque_constant is None else _constant(torque_constant)
+        asked = asked_columns(columns or {})
+        rated = None if rated_torque is None else _above_0("rated_torque", rated_torque, "N*m")
+        constant = None if torque_constant is None else _above_0("torque_constant", torque_constant, "N*m/A")
         cause = "torque" if constant is None else "current"
         for key in asked:
             if key in ("torque", "current") and key != cause:
@@ -184,10 +175,7 @@ class Log:
                     else "columns: torque: with a torque constant the current is read; name it with "
                     "current=, or leave out --torque-constant."
                 )
-        if where.lower().endswith(MEASUREMENTS):
-            found = _from_measurement(where, asked, cause, torque_is == "demand")
-        else:
-            found = _from_text(where, asked, cause)
+        found = read_signals(where, asked, cause, rated, held=torque_is == "demand")
         signs = {key: asked[key].sign if key in asked else 1.0 for key in (cause, found.kind)}
         torque = signs[cause] * (1.0 if constant is None else constant) * found.cause
         values: dict[str, Any] = {found.kind: signs[found.kind] * found.values}
@@ -282,201 +270,13 @@ class Log:
             )
 
 
-class _Asked(NamedTuple):
-    """What a file calls a signal: name, sign, and a unit that takes the place of its own."""
-
-    name: str
-    sign: float
-    unit: str
-
-
-class _Signals(NamedTuple):
-    """Signals of a file in SI: what moves the motor (torque or current), and how it moved."""
-
-    time: Vector
-    cause: Vector
-    kind: Kind
-    values: Vector
-    notes: tuple[str, ...] = ()
-
-
-def _asked(columns: Mapping[str, str]) -> dict[str, _Asked]:
-    """The columns as people write them.
-
-    >>> _asked({"speed": "-n_act [rpm]"})
-    {'speed': _Asked(name='n_act', sign=-1.0, unit='rpm')}
-    """
-    found = {}
-    for key, text in columns.items():
-        if key not in COLUMNS:
-            near = nearest(key, COLUMNS)
-            hint = f"did you mean {near}?" if near else f"name {', '.join(COLUMNS)}, as speed=n_act."
-            raise InputError(f"columns: {show(key)} is no signal of a log; {hint}")
-        part = re.fullmatch(r"\s*(-?)\s*(.+?)\s*(?:\[([^\]]*)\])?\s*", text)
-        if part is None:
-            raise InputError(f"columns: {key} = {show(text)}: write the name of a column, as {key}=NAME.")
-        unit = part[3] or ""
-        try:
-            parse(f"1 {unit}", COLUMNS[key].unit)
-        except RefusedError as refusal:
-            raise InputError(f"columns: {key} = {show(text)}: {refusal.reason}.") from None
-        found[key] = _Asked(part[2], -1.0 if part[1] else 1.0, unit)
-    return found
-
-
-def _constant(given: float | str) -> float:
-    value = float(to_si(given, "N*m/A", name="torque_constant"))
+def _above_0(name: str, given: float | str, unit: str) -> float:
+    value = float(to_si(given, unit, name=name))
     if not value > 0.0:
         raise InputError(
-            f"torque_constant = {show(given)}: give a value above 0; a minus before the column turns "
-            "the sign."
+            f"{name} = {show(given)}: give a value above 0; a minus before the column turns the sign."
         )
     return value
-
-
-def _from_text(where: str, asked: Mapping[str, _Asked], cause: str) -> _Signals:
-    """The signals of a CSV file."""
-    try:
-        text = read_text(Path(where))
-    except RefusedError as refusal:
-        raise InputError(f"log = {where}: {refusal.reason}.") from None
-    heading = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-    cells = [part.strip() for part in re.split(r"[;\t,]", heading)]
-    names = {part.split("[")[0].split("(")[0].strip().lower() for part in cells}
-
-    def in_heading(key: str) -> bool:
-        return bool(names & {one.lower() for one in COLUMNS[key].names})
-
-    kinds = [kind for kind in ("angle", "speed") if kind in asked] or [
-        kind for kind in ("angle", "speed") if in_heading(kind)
-    ]
-    if len(kinds) != 1:
-        found = "both" if kinds else "neither"
-        raise InputError(
-            f"log = {where}: its first line is {show(heading.strip())}, which names {found} of angle and "
-            "speed; write --columns angle=NAME or speed=NAME with the name of one column."
-        )
-    if cause == "torque" and "torque" not in asked and not in_heading("torque") and in_heading("current"):
-        raise InputError(
-            f"log = {where}: it has a current and no torque; give the torque constant of the motor, as "
-            '--torque-constant "1.2 N*m/A".'
-        )
-    wanted = ["time", cause, kinds[0]]
-    own = [Wanted((asked[key].name,), COLUMNS[key].unit) if key in asked else COLUMNS[key] for key in wanted]
-    for key in (key for key in wanted if key in asked and asked[key].unit):
-        cell = rf"(?<![^;\t,]){re.escape(asked[key].name)}\s*([\[(][^\])]*[\])])?(?=\s*([;\t,]|$))"
-        changed = re.sub(cell, lambda _, key=key: f"{asked[key].name} [{asked[key].unit}]", heading)  # type: ignore[misc]
-        text = text.replace(heading, changed, 1)
-        heading = changed
-    _, (time, first, values) = read_columns(text, f"log = {where}", own, headed="names", missing=True)
-    return _Signals(time, first, "angle" if kinds[0] == "angle" else "speed", values)
-
-
-def _from_measurement(where: str, asked: Mapping[str, _Asked], cause: str, held: bool) -> _Signals:
-    """The signals of an MDF file; `held`: the torque keeps its value from sample to sample."""
-    if (reason := refusal_of(where)) in (ABSENT, FOLDER):
-        raise InputError(f"log = {where}: {reason}.")
-    if "time" in asked:
-        raise InputError("columns: time: each channel of a measurement file has its own; leave time out.")
-    try:
-        measurement = asammdf.MDF(where)
-    except ImportError:
-        raise InputError(
-            f"log = {where}: measurement files need the package asammdf; install it with "
-            '"pip install softstart[mdf]", or write the channels to a CSV file.'
-        ) from None
-    except Exception as error:  # what its parser meets in a damaged file
-        raise InputError(f"log = {where}: this cannot be read as an MDF file ({error}).") from None
-    with measurement:
-        names = list(measurement.channels_db)
-
-        def called(key: str) -> list[str]:
-            known = [asked[key].name] if key in asked else COLUMNS[key].names
-            return [name for name in names if name in known] or [
-                name for name in names if name.lower() in {one.lower() for one in known}
-            ]
-
-        kinds = [kind for kind in ("angle", "speed") if kind in asked] or [
-            kind for kind in ("angle", "speed") if called(kind)
-        ]
-        if len(kinds) != 1:
-            raise InputError(
-                f"log = {where}: its channels name {'both' if kinds else 'neither'} of angle and speed; "
-                f"write --columns angle=NAME or speed=NAME; there are {_few(names)}."
-            )
-        read = {}
-        for key in (cause, kinds[0]):
-            one = called(key)
-            if len(one) != 1 or len(measurement.whereis(one[0])) != 1:
-                name = asked[key].name if key in asked else key
-                many = "more than one channel" if one else "no channel"
-                raise InputError(
-                    f"log = {where}: {many} is called {show(name)}; write --columns {key}=NAME; there are "
-                    f"{_few(names)}."
-                )
-            read[key] = _channel(measurement.get(one[0]), where, key, asked)
-    (times, first), (instants, values) = read[cause], read[kinds[0]]
-    kind: Kind = "angle" if kinds[0] == "angle" else "speed"
-    if np.array_equal(times, instants):
-        return _Signals(times, first, kind, values)
-    time, torque, values = _together(times, first, instants, values, held, where)
-    told = f"{cause} and {kind} are sampled at different instants; the torque between its samples is "
-    return _Signals(time, torque, kind, values, (told + ("held" if held else "straight"),))
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
-
-
-def _channel(
-    signal: asammdf.Signal, where: str, key: str, asked: Mapping[str, _Asked]
-) -> tuple[Vector, Vector]:
-    """Instants in s and values in SI of a channel."""
-    unit = (asked[key].unit if key in asked else "") or signal.unit or ""
-    wanted = COLUMNS[key].unit
-    try:
-        factor = float(parse(f"1 {unit}" if unit else 1.0, wanted))
-        values = np.asarray(signal.samples, dtype=np.float64)
-        times = np.asarray(signal.timestamps, dtype=np.float64)
-        if values.ndim != 1 or values.size < FEWEST:
-            raise RefusedError(f"it has values of the shape {values.shape}, and a fit needs {FEWEST} or more")
-    except RefusedError as refusal:
-        raise InputError(
-            f"log = {where}: channel {signal.name}: {refusal.reason}; a unit of your own is given with "
-            f'--columns "{key}={signal.name} [{wanted}]".'
-        ) from None
-    except (TypeError, ValueError):
-        raise InputError(f"log = {where}: channel {signal.name} holds text, and no numbers.") from None
-    _check_times(times, f"{where}, {signal.name}")
-    return times, factor * values
-
-
-def _together(
-    times: Vector, torque: Vector, instants: Vector, values: Vector, held: bool, where: str
-) -> tuple[Vector, Vector, Vector]:
-    """Both signals at the instants of both; values are NaN where they have no sample.
-
-    >>> t, u, y = _together(np.arange(3.0), np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.5, 2.0]),
-    ...     np.array([0.0, 5.0, 9.0]), False, "here")
-    >>> t.tolist(), u.tolist(), y.tolist()
-    ([0.0, 1.0, 1.5, 2.0], [1.0, 2.0, 3.0, 4.0], [0.0, nan, 5.0, 9.0])
-    """
-    near = SAME_INSTANT * min(float(np.median(np.diff(times))), float(np.median(np.diff(instants))))
-    closest = instants[np.clip(np.searchsorted(instants, times - near), 0, instants.size - 1)]
-    times = np.where(np.abs(closest - times) <= near, closest, times)
-    first, last = max(times[0], instants[0]), min(times[-1], instants[-1])
-    if not first < last:
-        raise InputError(f"log = {where}: torque and motion were not logged at the same time.")
-    time = np.union1d(times, instants)
-    time = time[(time >= first) & (time <= last)]
-    if held:
-        joined = torque[np.searchsorted(times, time, side="right") - 1]
-    else:
-        joined = np.interp(time, times, torque)
-    seen = np.full(time.size, math.nan)
-    inside = (instants >= first) & (instants <= last)
-    seen[np.searchsorted(time, instants[inside])] = values[inside]
-    return time, joined, seen
 
 
 def _whole(torque: Vector, time: Vector, name: str, notes: list[str]) -> Vector:
@@ -496,17 +296,8 @@ def _whole(torque: Vector, time: Vector, name: str, notes: list[str]) -> Vector:
     return np.interp(time, time[~missing], torque[~missing])
 
 
-def _check_times(time: Vector, name: str) -> None:
-    if time.size < FEWEST:
-        raise InputError(f"{name}: {time.size} samples; a fit needs {FEWEST} or more.")
-    if not np.isfinite(time).all():
-        raise InputError(f"{name}: the time of sample {int(np.argmin(np.isfinite(time))) + 1} is missing.")
+def _check_holes(time: Vector, name: str) -> None:
     steps = np.diff(time)
-    if np.any(steps <= 0.0):
-        i = int(np.argmax(steps <= 0.0))
-        raise InputError(
-            f"{name}: time goes from {time[i]:g} s to {time[i + 1]:g} s at sample {i + 2}; it must rise."
-        )
     typical = float(np.median(steps))
     if float(steps.max()) > HOLE * typical:
         i = int(np.argmax(steps))

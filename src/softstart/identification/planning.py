@@ -17,9 +17,10 @@ from softstart.controller import Controller, make_controller
 from softstart.drive import FRICTIONS, Drive
 from softstart.errors import InputError
 from softstart.identification.fitting import POWERS, Fitter, Space, chosen, covariance_of, root_of, usual
-from softstart.identification.logs import FEWEST, Kind, Log, TorqueIs
+from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE
+from softstart.identification.traces import FEWEST, Kind
 from softstart.late import late
 from softstart.plant import layout as at
 from softstart.plant import record

@@ -60,6 +60,7 @@ def identify(
     torque_is: TorqueIs = "measured",
     columns: dict[str, str] | None = None,
     torque_constant: float | str | None = None,
+    rated_torque: float | str | None = None,
     searches: int = 12,
     seed: int = 0,
     progress: Progress | None = None,
@@ -91,6 +92,8 @@ def identify(
         What files call the columns, see `Log.load`.
     torque_constant : float or str, optional
         N m/A: files hold the current in place of the torque, see `Log.load`.
+    rated_torque : float or str, optional
+        N m: the torque at 100 % of files that have it in %; by default the rated torque of the drive.
     searches : int
         At most so many searches.
     seed : int
@@ -131,7 +134,10 @@ def identify(
     given = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
     if not given:
         raise InputError("logs: there is none; give a log, or the path of its CSV file.")
-    files: dict[str, Any] = {"columns": columns, "torque_is": torque_is, "torque_constant": torque_constant}
+    files: dict[str, Any] = {
+        "columns": columns, "torque_is": torque_is, "torque_constant": torque_constant,
+        "rated_torque": drive.rated_torque if rated_torque is None else rated_torque,
+    }  # fmt: skip
     read = [one if isinstance(one, Log) else Log.load(one, **files) for one in given]
     read = [one.summed(float(drive.encoder_lines)) for one in read]
     if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
@@ -243,7 +249,8 @@ def _check_inertia(log: Log, drive: Drive) -> None:
     raise InputError(
         f"{log.name}: torque and motion tell an inertia of about {inertia:.3g} kg m2, and the drive has "
         f"{low + float(drive.J2):.3g} kg m2; look at the units of its columns: time in ms, speed in "
-        "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms]."
+        "rpm, angle in degrees or revolutions, torque in % are written in the first line, as time [ms], or "
+        'given as --columns "time=NAME [ms]".'
     )
 
 
@@ -433,7 +440,9 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
             "clipped signal, another kind of load), or the torque signal is poor. Do not trust the intervals."
         )
     for log, left in zip(
-        (one.log for one in fitter.models), fitter.innovations(solution.x, errors), strict=True
+        (one.log for one in fitter.models),
+        [fitter.likely(solution.x, i, errors).residual for i in range(len(fitter.models))],
+        strict=True,
     ):
         chance = _whiteness(left)
         if chance < 1e-4:

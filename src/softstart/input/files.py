@@ -114,8 +114,11 @@ def refusal_of(path: str | os.PathLike[str]) -> str | None:
     return None
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a UTF-8 file; raises RefusedError with the reason, for callers that word the sentence."""
+def read_text(path: str | os.PathLike[str], also: str | None = None) -> str:
+    """The text of a UTF-8 file; raises RefusedError with the reason, for callers that word the sentence.
+
+    A file that begins with the mark of UTF-16 is that, as spreadsheets write it; `also`: a second encoding.
+    """
     reason = refusal_of(path)
     if reason is not None:
         raise RefusedError(reason)
@@ -124,8 +127,10 @@ def read_text(path: str | os.PathLike[str]) -> str:
     except OSError as error:
         raise RefusedError(f"the file cannot be read ({error.strerror or error})") from None
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError as error:
+        if also is not None and b"\0" not in content:
+            return content.decode(also, errors="replace")
         line = content.count(b"\n", 0, error.start) + 1
         raise RefusedError(f"the file is not UTF-8 text (line {line}); save it as UTF-8") from None
 
