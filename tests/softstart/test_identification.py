@@ -12,15 +12,17 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 from tests.softstart.optimal.test_from_positions import random_unknown
 
-from softstart import Drive, InputError, Log, Run, identify, plan_experiments, simulate
+from softstart import Drive, Identification, InputError, Log, Run, identify, plan_experiments, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
-from softstart.identification.fitting import Errors, Fitter, Solution, Space, covariance_of, edges, root_of
+from softstart.identification.covariance import edges
+from softstart.identification.fitting import Errors, Fitter, Solution, Space, covariance_of, root_of
 from softstart.identification.model import FILTER, LogModel, filtered
 from softstart.identification.planning import Experiment, Plan, _Bench, _profile, made_up_log
 from softstart.identification.solving import _advice
 from softstart.plant import record
 from softstart.profile import TorqueProfile
+from softstart.views.identification import estimates_table
 
 TRUTH = Drive.load("crane-4amtkf").replace(
     damping=0.3,
@@ -366,9 +368,52 @@ def test_the_bias_by_the_torque_error_is_gone(solved: tuple[Fitter, Solution]) -
     assert 0.02 < shares[1] < 0.7  # and that of the load
 
 
-def test_a_clipped_torque_is_noticed(log: Log) -> None:
-    clipped = Log(log.time, np.clip(log.torque, -20.0, 25.0), angle=log.values, torque_is="demand")
-    assert any("something else moves this drive" in n for n in identify(clipped, TRUTH, searches=1).notes)
+@pytest.fixture(scope="module")
+def coarse() -> Log:
+    return made_up_log(TRUTH, REVERSE, log_period=4e-3, ripple=1.0, seed=3)
+
+
+@pytest.mark.parametrize("other", ["clipped", "not realised", "cogging"])
+def test_where_another_machine_made_the_log_no_interval_is_stated(
+    coarse: Log, other: str, tmp_path: Path
+) -> None:
+    torque, angle = coarse.torque, coarse.values
+    if other == "clipped":
+        torque = np.clip(torque, -20.0, 25.0)
+    else:
+        waves = 9.0 * coarse.time if other == "not realised" else 5.0 * angle
+        resisting = 8.0 * np.sin(waves)
+        states = played(coarse, torque - resisting, {"position": -0.6})
+        angle = np.floor(states[:, record.PHI1_OUT] / coarse.count + 0.3) * coarse.count
+    found = identify(Log(coarse.time, torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
+    assert not found.stated
+    assert any("something else moves this drive" in note for note in found.notes)
+    assert any("no interval is stated" in note for note in found.notes)
+    assert not any(one.known for one in found.estimates)
+    found.save(tmp_path)
+    read = Identification.load(tmp_path)
+    assert all(math.isnan(one.upper) for one in read.estimates)
+    assert math.isnan(read.k_dyn(["direct"])["direct"][1])
+    with pytest.raises(InputError, match="states no intervals"):
+        read.draws()
+
+
+def test_an_interval_that_ends_with_the_search_is_not_known(coarse: Log) -> None:
+    """The search goes to a twelfth of the guess, which is 0.2 % below the truth here."""
+    guess = TRUTH.replace(motor_inertia=12.0 * 0.998 * TRUTH.motor_inertia)
+    found = identify(coarse, guess, free=["motor_inertia", "position"], searches=1)
+    assert found["motor_inertia"].value == pytest.approx(TRUTH.motor_inertia, rel=0.01)
+    assert not found["motor_inertia"].known
+    assert any("motor_inertia: at the limit of the search. Remedy: begin" in note for note in found.notes)
+    assert "at the limit of the search" in [cell for row in estimates_table(found).rows for cell in row]
+
+
+def test_a_fit_whose_time_is_up_says_what_it_lacks(coarse: Log) -> None:
+    found = identify(coarse, TRUTH, searches=3, time_limit=0.0)
+    assert found.searches == 1
+    assert not found.stated
+    assert found["gap"].value == pytest.approx(0.08, rel=0.1)
+    assert any(note.startswith("The time limit of 0 s came before the intervals") for note in found.notes)
 
 
 @pytest.mark.parametrize("wrong", [pytest.param("cut", marks=pytest.mark.slow), "rpm"])

@@ -119,6 +119,10 @@ def _check_question(given: Mapping[str, Any]) -> None:
     help="Largest number of searches for the best fit. Default: 12.",
 )  # fmt: skip
 @click.option(
+    "--time-limit", metavar="TIME", type=quantity("s", "a time in s, 0 or more", least=0.0), default="120 s",
+    help="Time after which the best fit so far is the answer, without intervals. Default: 120 s.",
+)  # fmt: skip
+@click.option(
     "--controllers",
     metavar="NAME,...",
     type=Reading(read_names),
@@ -224,7 +228,8 @@ def show_fit(
         found = softstart.identify(
             list(logs), given["drive"], free=given["free"], torque_is=given["torque_is"],
             columns=given["columns"] or {}, torque_constant=given["torque_constant"],
-            rated_torque=given["rated_torque"], searches=given["searches"], progress=progress,
+            rated_torque=given["rated_torque"], searches=given["searches"], time_limit=given["time_limit"],
+            progress=progress,
         )  # fmt: skip
         each = found.k_dyn(strategies)
         if folder is not None:

@@ -103,7 +103,7 @@ def reduction_note(
     moved = [
         f"{one.name} {100.0 * (one.value / float(getattr(drive, one.name)) - 1.0):+.2g} %"
         for one in each
-        if one.known and float(getattr(drive, one.name, 0.0))
+        if (one.known or math.isnan(one.upper)) and float(getattr(drive, one.name, 0.0))
     ]
     return (
         f"{said}That moves the values, by a fit of two masses to the start of the whole chain, as it was "

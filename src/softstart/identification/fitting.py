@@ -19,12 +19,13 @@ Amer. Statist. Assoc. 72 (1977) 320-338).
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_solve, lapack, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import least_squares, minimize
 from scipy.stats import qmc
 from scipy.stats import t as student
@@ -32,6 +33,7 @@ from scipy.stats import t as student
 from softstart.arrays import Matrix, Vector
 from softstart.drive import FRICTIONS, PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
+from softstart.identification.covariance import edges, root_of_covariance
 from softstart.identification.logs import Log
 from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE, WIDEST
@@ -55,9 +57,11 @@ ERROR_SETTLED: Final = 0.1  # standard deviations, all samples together
 STEEP: Final = 1e-3  # what the likelihood must still gain for another step
 ROUNDS_OF_ENDS: Final = 2  # of deviations and an end
 SCANNED: Final = 5  # values of what the logs do not tell, at which all else is fitted
+SCAN_STEPS: Final = 10  # of these fits, from which ends of intervals are then followed
 LOADS: Final = (0.08, 0.25, 0.45, 0.7)  # load torques from which valleys are sought, over the largest
 FIRST_ROUNDS: Final = 2  # of weights and fit, on the way to a valley
 LONGEST_STEP: Final = 0.7  # of a number of x, towards it
+HOPELESS: Final = 100.0  # above the least L: no place there is as likely
 CLOSE: Final = 0.04  # how far the root of the squares may be off there
 MOST_RIPPLE: Final = 0.25  # of the largest torque: more is no small error, see `Fitter.slope`
 APART: Final = 0.02  # of x, or half a standard error if that is less: for derivatives of covariances
@@ -288,38 +292,8 @@ class Solution(NamedTuple):
 Other = tuple[Vector, Matrix, float]  # another explanation: x, its covariance, L
 
 
-def edges(time: Vector, angle: Vector, count: float) -> tuple[Vector, Vector]:
-    """What an encoder tells in each sample: the angle and its variance, infinite where others tell it.
-
-    Samples on one count have nearly the same error while the motor creeps, and together they tell one thing:
-    when the count ended. In the last of them the motor was before that edge by less than it then moved to the
-    next sample: by half of that on average, and uniformly about it. How far it moves follows from the times
-    to the neighbouring edges, the shorter of which is taken for the variance. A motor that passes a count or
-    more from sample to sample has the variance of a rounded number, count^2/12. The first sample, and the
-    last, are rounded numbers.
-
-    All this depends on the log alone: a covariance that follows the fitted motion fits what it rounds, and
-    found the torque error of a single start with 64 lines a quarter too small.
-
-    >>> angle, variance = edges(np.arange(7.0), np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 1.0)
-    >>> angle.round(2).tolist(), (12.0 * variance).round(2).tolist()
-    ([0.0, 0.21, 1.0, 1.28, 2.0, 2.0, 2.0], [1.0, 0.44, inf, 0.25, inf, inf, 1.0])
-    """
-    told, variance = angle.copy(), np.full(angle.size, math.inf)
-    ends = np.flatnonzero(np.abs(np.diff(angle)) > 0.5 * count)
-    variance[[0, -1]] = count**2 / 12.0
-    if ends.size == 0:
-        return told, variance
-    steps, passed = angle[ends + 1] - angle[ends], time[ends + 1] - time[ends]
-    at = np.concatenate([[time[0]], 0.5 * (time[ends] + time[ends + 1]), [time[-1]]])
-    before, after = np.diff(at)[:-1], np.diff(at)[1:]
-    moved = 2.0 * count * passed / np.maximum(before + after, 1e-300)
-    most = np.minimum(count * passed / np.maximum(np.minimum(before, after), 1e-300), count)
-    single = (np.abs(steps) < 1.5 * count) & (moved < count)
-    inner = np.where(single, 0.5 * (count - moved), 0.0)
-    told[ends] += np.sign(steps) * inner
-    variance[ends] = np.where(single, most, count) ** 2 / 12.0
-    return told, variance
+class TimeIsUpError(Exception):
+    """The time of a fit is up."""
 
 
 class Fitter:
@@ -331,7 +305,14 @@ class Fitter:
         self.values = [values for values, _ in told]  # NaN where there is none, or where others tell it
         self.counts = [np.isfinite(values) for values in self.values]
         self.roots = [np.sqrt(variance[rows]) for (_, variance), rows in zip(told, self.counts, strict=True)]
-        self.progress = progress or (lambda _: None)
+        self._progress = progress or (lambda _: None)
+        self.deadline = math.inf
+
+    def progress(self, text: str) -> None:
+        """Say what is being done; raises `TimeIsUpError` after the deadline."""
+        if time.perf_counter() > self.deadline:
+            raise TimeIsUpError
+        self._progress(text)
 
     @property
     def largest_torque(self) -> float:
@@ -386,7 +367,7 @@ class Fitter:
     # ---- the search --------------------------------------------------------------------------------------
 
     def search(
-        self, guess: Vector, lower: Vector, upper: Vector, most: int, seed: int
+        self, guess: Vector, lower: Vector, upper: Vector, most: int, seed: int, deadline: float = math.inf
     ) -> list[tuple[Vector, float]]:
         """Minima of the plain squares, best first: from the guess, then from points all over the range.
 
@@ -413,7 +394,10 @@ class Fitter:
                 continue
             found.sort(key=lambda one: one[1])
             best = found[0][1]
-            if sum(cost <= 1.01 * best + 1e-300 for _, cost in found) >= AGREED:
+            if (
+                sum(cost <= 1.01 * best + 1e-300 for _, cost in found) >= AGREED
+                or time.perf_counter() > deadline
+            ):
                 break
         if not found:
             raise InputError("The logs cannot be computed with any of the values tried; check their units.")
@@ -680,7 +664,7 @@ class Fitter:
         x = np.clip(x, lower, upper)
         slope = self.slope(x, errors)
         for _ in range(MOST_STEPS):
-            step = self._outward(x, slope, lower, upper)
+            step = self.outward(x, slope, lower, upper)
             gain = -float(2.0 * slope.gradient @ step + step @ slope.curvature @ step)
             if gain < STEEP:
                 break
@@ -706,15 +690,15 @@ class Fitter:
             pulled = one.rotation.T @ ((one.rotation @ part.residual) / size)
             model.error = -(errors.ripple**2) * (one.response.T @ pulled)
 
-    def fit(self, x: Vector, errors: Errors, lower: Vector, upper: Vector) -> Vector:
-        """The weighted least squares from x."""
+    def fit(self, x: Vector, errors: Errors, lower: Vector, upper: Vector, most: int = 30) -> Vector:
+        """The weighted least squares from x, in at most so many steps."""
         found = least_squares(
             lambda point: self.whitened(point, errors, False).residual,
             np.clip(x, lower + 1e-12, upper - 1e-12),
             jac=lambda point: self.whitened(point, errors).jacobian,
             bounds=(lower, upper),
             x_scale="jac",
-            max_nfev=30,
+            max_nfev=most,
             xtol=1e-9,
             ftol=STEEP / sum(rows.size for rows in self.roots),
         )
@@ -741,7 +725,7 @@ class Fitter:
                 x, lower, upper = self._fixed(solution, i, value)
                 self.about(solution.errors.weights)
                 try:
-                    found.append((self.fit(x, solution.errors, lower, upper), i))
+                    found.append((self.fit(x, solution.errors, lower, upper, SCAN_STEPS), i))
                 except (InputError, SimulationError):
                     continue
         if unknown and last > first and load is not None:
@@ -753,6 +737,9 @@ class Fitter:
                 try:
                     x, errors, freedom = self._weighted(start, lower, upper, FIRST_ROUNDS)
                     found.append((x, load if lower[load] > solution.lower[load] else None))
+                    self.about(solution.errors.weights)
+                    if self.likelihood(x, solution.errors) > solution.slope.value + HOPELESS:
+                        continue
                     valleys.append(self._settled(x, errors, freedom, solution.lower, solution.upper))
                 except (InputError, SimulationError):
                     continue
@@ -812,7 +799,7 @@ class Fitter:
             errors, freedom = self.deviations(self.parts(x), errors._replace(weights=self.weights(x)))
             self.about(solution.errors.weights)
             slope = self.slope(solution.x, errors)
-            step = self._outward(solution.x, slope, solution.lower, solution.upper)
+            step = self.outward(solution.x, slope, solution.lower, solution.upper)
             least = slope.value + min(float(2.0 * slope.gradient @ step + step @ slope.curvature @ step), 0.0)
             quantile = quantile_of(freedom[i])
             self.about(errors.weights)
@@ -843,7 +830,7 @@ class Fitter:
         over = max(ratio_of(slope.value) - 1.0, 0.0)
         best = sign * max(sign * best, sign * (middle + float(x[i] - middle) / (1.0 + over)))
         for number in range(MOST_STEPS):
-            step = self._outward(x, slope, solution.lower, solution.upper, i, sign, least + quantile**2)
+            step = self.outward(x, slope, solution.lower, solution.upper, i, sign, least + quantile**2)
             length = min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
             for cut in 0.5 ** np.arange(HALVINGS):
                 point = np.clip(x + cut * length * step, solution.lower, solution.upper)
@@ -862,7 +849,7 @@ class Fitter:
             slope = self.slope(x, errors)
         return best, x, straight
 
-    def _outward(
+    def outward(
         self,
         x: Vector,
         slope: Slope,
@@ -901,22 +888,6 @@ def quantile_of(freedom: float) -> float:
     1.96
     """
     return float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
-
-
-def root_of_covariance(noise: float, seen: Matrix) -> Matrix:
-    """The lower triangle L of L L' = noise^2 I + seen seen', with a positive diagonal.
-
-    By a QR decomposition of [noise I, seen]', which rounding cannot break: seen seen', whose error is that of
-    its largest entry, is never formed. (The product has no Cholesky factor once a torque error moves the
-    signal by 1e7 times its rounding.)
-
-    >>> root_of_covariance(3.0, np.array([[4.0], [0.0]])).tolist()
-    [[5.0, 0.0], [0.0, 3.0]]
-    """
-    size = seen.shape[0]
-    root: Matrix = np.triu(lapack.dtpqrt(0, min(32, size), noise * np.eye(size), seen.T)[0]).T
-    root *= np.copysign(1.0, np.diag(root))
-    return root + 0.0
 
 
 def covariance_of(jacobian: Matrix, space: Space) -> Matrix:

@@ -26,6 +26,7 @@ from softstart.start.simulation import simulate
 views = late("softstart.views.identification")  # above this module; see softstart.late
 notebook = late("softstart.views.notebook")
 
+AT_LIMIT = "at the limit of the search"  # the reason of an estimate that is no answer of the logs
 CONFIDENCE = 0.95
 WIDEST = 3.0  # upper over lower end of an interval: beyond it a parameter is called unknown
 FORMAT = 1  # of the file
@@ -42,7 +43,8 @@ class Estimate:
     name : str
         The parameter of the drive, or "position" of a log, from -1 (opposite flank) to 1 (driving flank).
     value, lower, upper : float
-        In SI. What is unknown has the value at which the search ended.
+        In SI. What is unknown has the value at which the search ended. Ends are NaN where no interval is
+        stated, see `Identification.stated`.
     known : bool
         False if the interval is wider than a factor of 3; of a friction, than a tenth of the torque that
         accelerates.
@@ -173,6 +175,11 @@ class Identification:
         """The estimates of the drive, without the positions of the logs."""
         return tuple(one for one in self.estimates if one.name in PARAMETERS)
 
+    @property
+    def stated(self) -> bool:
+        """Whether intervals are stated: not where the drive does not explain the logs, or time was short."""
+        return all(math.isfinite(one.upper - one.lower) for one in self.estimates)
+
     def draws(self, count: int = 200, seed: int = 0) -> Drive:
         """Drives that the logs leave possible: a batch, drawn from the joint distribution of the estimates.
 
@@ -183,6 +190,11 @@ class Identification:
         >>> found.draws(100).shape
         (100,)
         """
+        if not self.stated:
+            raise InputError(
+                f"{self.drive.name}: its identification states no intervals ({self.notes[0]}) Give "
+                f"{DRIVE_FILE} alone, as a drive without intervals."
+            )
         which = [i for i, one in enumerate(self.estimates) if one.name in PARAMETERS]
         values, vectors = np.linalg.eigh(self.correlations[np.ix_(which, which)])
         normal = np.random.default_rng(seed).standard_normal((count, len(which)))
@@ -199,10 +211,12 @@ class Identification:
     ) -> dict[str, tuple[float, float, float]]:
         """K_dyn of each strategy with its interval of 95 %: of the drive found, lower end, upper end.
 
-        Each strategy is set up for the drive found and started on `draws`.
+        Each strategy is set up for the drive found and started on `draws`. Ends are NaN without intervals.
         """
-        drawn = self.draws(count, seed)
         runs = {name: simulate(self.drive, name) for name in controllers}
+        if not self.stated:
+            return {name: (float(run.k_dyn), math.nan, math.nan) for name, run in runs.items()}
+        drawn = self.draws(count, seed)
         return {name: (float(run.k_dyn), *intervals(run, drawn, name)["k_dyn"]) for name, run in runs.items()}
 
     def with_settings(self, settings: Iterable[str]) -> Self:
@@ -256,7 +270,8 @@ class Identification:
             if not isinstance(kept, dict) or kept.get("format") != FORMAT:
                 raise RefusedError(f"it is not of the format {FORMAT}; identify the drive again")
             estimates = tuple(
-                Estimate(**{f.name: one[f.name] for f in fields(Estimate)}) for one in kept["estimates"]
+                Estimate(**{f.name: _or_nan(one[f.name]) for f in fields(Estimate)})
+                for one in kept["estimates"]
             )
             correlations = np.array(kept["correlations"], dtype=np.float64)
             _check_kept(estimates, correlations)
@@ -289,7 +304,8 @@ class Identification:
             "estimates": [
                 {
                     **plain_fields(one),
-                    "half_width_percent": 100.0 * one.half_width if one.value else None,
+                    **({} if self.stated else {"lower": None, "upper": None}),
+                    "half_width_percent": 100.0 * one.half_width if one.value and self.stated else None,
                 }
                 for one in self.estimates
             ],
@@ -315,10 +331,17 @@ class Identification:
         return str(notebook.of_identification(self))
 
 
+def _or_nan(value: Any) -> Any:
+    """What a file has, NaN in place of null."""
+    return math.nan if value is None else value
+
+
 def _check_kept(estimates: Sequence[Estimate], correlations: Matrix) -> None:
     """That estimates and correlations of a file can be those of an identification."""
     for one in estimates:
         numbers = (one.lower, one.value, one.upper)
+        if math.isnan(one.lower) and math.isnan(one.upper) and math.isfinite(one.value) and not one.known:
+            continue  # no interval is stated
         if not all(isinstance(n, int | float) and math.isfinite(n) for n in numbers) or sorted(numbers) != [
             *numbers
         ]:

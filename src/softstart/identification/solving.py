@@ -21,12 +21,14 @@ from softstart.identification.fitting import (
     FACTOR,
     FREE,
     MOST_FRICTION,
+    MOST_RIPPLE,
     STEP,
     Fitter,
     Other,
     Progress,
     Solution,
     Space,
+    TimeIsUpError,
     chosen,
     covariance_of,
     position_of,
@@ -37,16 +39,20 @@ from softstart.identification.fitting import (
 from softstart.identification.logs import Log, TorqueIs
 from softstart.identification.model import FILTER, POSITION, LogModel
 from softstart.identification.planning import plan_experiments
-from softstart.identification.result import Estimate, Identification
+from softstart.identification.result import AT_LIMIT, Estimate, Identification
 from softstart.processes import on_one_thread
-from softstart.quantities import show
+from softstart.quantities import show, to_si
 
 CURVED: Final = 0.05  # of half a quadratic interval, by which an end of a bent one lies elsewhere
 MOST_LOAD: Final = 0.99  # of the starting torque
 SURE: Final = 4.0  # standard deviations of an effect that the model has not, to be named
 LARGE_RIPPLE: Final = 0.06  # of the largest torque: more is no ripple
 FAR: Final = 5.0  # standard deviations that hardly a sample is off
+UNSETTLED: Final = 4.0  # gain of the likelihood by another step, from which the fit is none
+CHANCE: Final = 1e-5  # that errors alone look like this
+WAVES: Final = 20  # torques that change slowly, of which none must be left
 LAGS: Final = 20  # samples over which what is left must not be correlated
+TOO_NOISY: Final = 5.0  # standard deviations of a variance that is larger than the encoder explains
 DOUBTFUL: Final = 5.0  # ratio of inertias found and guessed that is told
 SUSPECT: Final = 25.0  # ratio of inertia by log and guess that only a wrong unit explains
 
@@ -63,6 +69,7 @@ def identify(
     rated_torque: float | str | None = None,
     searches: int = 12,
     seed: int = 0,
+    time_limit: float | str | None = None,
     progress: Progress | None = None,
 ) -> Identification:
     """Find the parameters of a drive from what an inverter logged of its starts, each with its interval.
@@ -98,13 +105,16 @@ def identify(
         At most so many searches.
     seed : int
         Of the points at which searches begin.
+    time_limit : float or str, optional
+        Time in s, after which the best fit so far is the answer, without intervals.
     progress : callable, optional
         Called with a text that says what is being done.
 
     Returns
     -------
     Identification
-        Drive, intervals, what is unknown and why, what the logs show that the model has not.
+        Drive, intervals (none where the drive does not explain the logs, or time was short), what is
+        unknown and why, what the logs show that the model has not.
 
     Raises
     ------
@@ -149,12 +159,27 @@ def identify(
     space = Space.of(asked, drive, [moving for _ in read], [one.kind == "angle" for one in read])
     fitter = Fitter([LogModel(one, base) for one in read], space, progress)
     guess, lower, upper = _bounds(space, drive, read)
-    found = fitter.search(guess, lower, upper, searches, seed)
+    limit = None if time_limit is None else float(to_si(time_limit, "s", name="time_limit"))
+    deadline = math.inf if limit is None else began + limit
+    found = fitter.search(guess, lower, upper, searches, seed, deadline)
     solution = fitter.refine(found[0][0], lower, upper)
-    fitter.progress("other explanations")
-    solution, others = fitter.elsewhere(solution, _untold(fitter, solution, guess))
+    doubts, estimates = _misfits(fitter, solution), list[Estimate]()
+    if not doubts:
+        fitter.deadline = deadline
+        try:
+            fitter.progress("other explanations")
+            solution, others = fitter.elsewhere(solution, _untold(fitter, solution, guess))
+            if not (doubts := _misfits(fitter, solution)):
+                estimates = _estimates(fitter, solution, guess, others)
+        except TimeIsUpError:
+            fitter.about(solution.errors.weights)
+            doubts = [
+                f"The time limit of {limit:g} s came before the intervals: none is stated, and another drive "
+                "may explain the logs as well. Remedy: a longer --time-limit, or fewer samples."
+            ]
+        fitter.deadline = math.inf
+    estimates = estimates or _without_intervals(space, solution)
     covariance = covariance_of(solution.part.jacobian, space)
-    estimates = _estimates(fitter, solution, covariance, guess, others)
     changes = {one.name: one.value for one in estimates if one.name in PARAMETERS}
     sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     kept = len(estimates)
@@ -163,8 +188,8 @@ def identify(
     notes = [
         *(f"{one.name}: {note}" for one in read for note in one.notes),
         *([] if chain is None else _reduction(chain, drive, read[0], free, progress)),
-        *_advice(drive.replace(**changes), estimates, read),
-        *_misfits(fitter, solution),
+        *doubts,
+        *([] if doubts else _advice(drive.replace(**changes), estimates, read)),
         *_other_scale(drive, drive.replace(**changes)),
         "The scale of the torque cannot be found from motion: if the signal is 10 % low, so are both "
         "inertias, stiffness, damping and load torque, and K_dyn hardly moves.",
@@ -308,11 +333,21 @@ def _untold(fitter: Fitter, solution: Solution, guess: Vector) -> list[int]:
     ]
 
 
-def _estimates(
-    fitter: Fitter, solution: Solution, covariance: Matrix, guess: Vector, others: Sequence[Other]
-) -> list[Estimate]:
+def _without_intervals(space: Space, solution: Solution) -> list[Estimate]:
+    """The best fit, of which no number is called known."""
+    x = solution.x.tolist()
+    values = [space.value(i, x[i]) for i in range(len(space.shared))]
+    values += [position_of(one) for one in x[len(values) : len(values) + sum(space.positions)]]
+    return [
+        Estimate(name, value, math.nan, math.nan, known=False, reason="no interval is stated")
+        for name, value in zip(space.names, values, strict=False)
+    ]
+
+
+def _estimates(fitter: Fitter, solution: Solution, guess: Vector, others: Sequence[Other]) -> list[Estimate]:
     """Values and intervals: their ends are where the fit gets worse, with all else fitted anew."""
     space, found, lost = fitter.space, [], set[str]()
+    covariance = covariance_of(solution.part.jacobian, space)
     sizes, untold = _sizes(solution, covariance), _untold(fitter, solution, guess)
     told = [i not in untold for i, name in enumerate(space.names) if not name.startswith("offset")]
     for i, (name, tells) in enumerate(zip(space.names, told, strict=False)):
@@ -323,7 +358,10 @@ def _estimates(
         bent = max(abs(ends[0] - middle + half), abs(ends[1] - middle - half)) > CURVED * half
         known = tells and space.known(i, middle, 0.5 * (ends[1] - ends[0]))
         known = known and not (position and "gap" in lost)  # a share of the gap
-        reason = "" if known else _why(i, covariance, space)
+        ends_there = not position and _limited(solution, i, name, ends)
+        here = not position and _limited(solution, i, name, [middle])
+        reason = AT_LIMIT if here or (known and ends_there) else "" if known else _why(i, covariance, space)
+        known = not reason
         if not known:
             lost.add(name)
         of = position_of if position else partial(space.value, i)
@@ -331,6 +369,16 @@ def _estimates(
         found.append(Estimate(name, middle, min(ends), max(ends), known, bent, reason))
     fitter.about(solution.errors.weights)
     return found
+
+
+def _limited(solution: Solution, i: int, name: str, numbers: Sequence[float]) -> bool:
+    """Whether a value, or an end of its interval, is where the search ends and not where the logs say.
+
+    A friction of 0 is a limit of the drive, not of the search.
+    """
+    lower, upper = float(solution.lower[i]), float(solution.upper[i])
+    near = 1e-3 * (upper - lower)
+    return any((one < lower + near and name not in FRICTIONS) or one > upper - near for one in numbers)
 
 
 def _why(i: int, covariance: Matrix, space: Space) -> str:
@@ -356,6 +404,8 @@ def _advice(drive: Drive, estimates: Sequence[Estimate], logs: Sequence[Log]) ->
     for one in unknown:
         reasons.setdefault(one.reason, []).append(one.name)
     told = "; ".join(f"{listed(group)}: {reason}" for reason, group in reasons.items())
+    if AT_LIMIT in reasons:
+        return [f"Unknown: {told}. Remedy: begin from another guess of {listed(reasons[AT_LIMIT])} (--set)."]
     period = float(np.median(np.diff(logs[0].time)))
     try:
         tried = plan_experiments(drive, log_period=period, optimise=False).experiments
@@ -385,7 +435,7 @@ def _other_scale(guess: Drive, found: Drive) -> list[str]:
 
 def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
     """What the logs show that the model has not, each tried as a torque of its own shape."""
-    notes = []
+    notes, rows = [], 0
     errors, part = solution.errors, solution.part
     drive = fitter.models[0].guess
     extra = [name for name in FRICTIONS if name not in fitter.space.shared]
@@ -394,6 +444,7 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         name: STEP * unit for name, unit in zip(extra, Space.of(extra, drive, (), ()).units, strict=True)
     }
     columns: dict[str, list[Vector]] = {}
+    unexplained = 1.0
     for i, (model, weights) in enumerate(zip(fitter.models, errors.weights, strict=True)):
         values = fitter.space.values(solution.x, i) | had
         signals = model.signals([values, *(values | {name: had[name] + steps[name]} for name in extra)])
@@ -405,6 +456,13 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         size = np.sqrt(errors.noise**2 + errors.ripple**2 * weights.eigenvalues)
         for name, shape in shapes.items():
             columns.setdefault(name, []).append((weights.rotation @ shape[fitter.counts[i]]) / size)
+        here = slice(rows, rows := rows + size.size)
+        unexplained = min(
+            unexplained,
+            _slow_torque(
+                weights.rotation @ weights.response / size[:, None], part.jacobian[here], part.residual[here]
+            ),
+        )
     best = ("", 0.0, 0.0)
     for name, parts in columns.items():
         column = np.concatenate(parts)
@@ -424,20 +482,33 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         one = PARAMETERS[name]
         notes.append(
             f"The logs show {one.meaning} of {had[name] + amount:.3g} +- {2.0 * error:.2g} {one.unit}, and "
-            f"the drive has {had[name]:.3g}: gap and load torque may be off by more than their intervals. "
+            f"the drive has {had[name]:.3g}: gap and load torque may be far off. "
             f"Remedy: find it too, --free +{one.path}."
         )
     elif name:
         notes.append(
             f"The logs show an offset of the torque signal of {amount:.3g} +- {2.0 * error:.2g} N m, which "
-            "the model has not: gap and load torque may be off by more than their intervals."
+            "the model has not: gap and load torque may be far off."
+        )
+    counted = all(one.log.kind == "angle" and one.log.count for one in fitter.models)
+    excess = errors.noise**2 - 1.0 - TOO_NOISY * math.sqrt(2.0 / part.residual.size)
+    if unexplained < CHANCE or (counted and excess > 0.0):
+        notes.append(
+            (
+                f"A torque that changes slowly is left (chance {unexplained:.1g})"
+                if unexplained < CHANCE
+                else f"What is left of the angle is {errors.noise:.3g} times what the encoder rounds"
+            )
+            + ": something else moves this drive (another friction or load, cogging, a torque that was not "
+            "realised), or the times of the samples are not exact."
         )
     usual, ripple = max(fitter.largest_torque, 0.5 * float(fitter.models[0].guess.Ms)), errors.ripple
-    if ripple > LARGE_RIPPLE * usual:
+    if ripple > min(LARGE_RIPPLE * usual, MOST_RIPPLE * fitter.largest_torque):
+        share = 100.0 * ripple / fitter.largest_torque
         notes.append(
-            f"A torque error of {ripple:.3g} N m in each sample, {100.0 * ripple / usual:.0f} % of the "
-            "largest, is needed to explain the logs: something else moves this drive (a second gap, a cut or "
-            "clipped signal, another kind of load), or the torque signal is poor. Do not trust the intervals."
+            f"A torque error of {ripple:.3g} N m in each sample, {share:.0f} % of the largest, is needed to "
+            "explain the logs: something else moves this drive (a second gap, a cut or clipped signal, "
+            "another kind of load), or the torque signal is poor."
         )
     for log, left in zip(
         (one.log for one in fitter.models),
@@ -453,7 +524,46 @@ def _misfits(fitter: Fitter, solution: Solution) -> list[str]:
         far = int(np.sum(np.abs(left) > FAR))
         if far > 2 + 0.005 * left.size:
             notes.append(f"{log.name}: {far} samples lie more than {FAR:g} standard deviations off.")
+    notes.extend(_unsettled(fitter, solution))
+    if notes:
+        notes.append(
+            "The drive does not explain the logs: the values are its best fit, and no interval is stated."
+        )
     return notes
+
+
+def _unsettled(fitter: Fitter, solution: Solution) -> list[str]:
+    """That the likelihood still grows from where the fit ended, beyond a limit of the search or before it."""
+    space, slope, shared = fitter.space, solution.slope, len(fitter.space.shared)
+    lower, upper = solution.lower.copy(), solution.upper.copy()
+    upper[:shared] = math.inf
+    lower[[i for i, name in enumerate(space.shared) if name not in FRICTIONS]] = -math.inf
+    step = fitter.outward(solution.x, slope, lower, upper)
+    if -float(2.0 * slope.gradient @ step + step @ slope.curvature @ step) < UNSETTLED:
+        return []
+    held = [n for i, n in enumerate(space.shared) if _limited(solution, i, n, [float(solution.x[i])])]
+    if not held:
+        return ["The search for the most likely drive did not settle: begin from another guess (--set)."]
+    return [
+        f"The fit would be better beyond the limit of the search for {listed(held)}: begin from another "
+        "guess (--set), unless something else moves this drive."
+    ]
+
+
+def _slow_torque(response: Matrix, jacobian: Matrix, residual: Vector) -> float:
+    """Chance that no torque that changes slowly is left: the share of it in what is left is chi-square.
+
+    Of the torques cos(k pi t/T), of which the parameters explain a part. All are whitened.
+    """
+    count = response.shape[1]
+    waves = np.cos(math.pi * np.outer(np.arange(count) + 0.5, np.arange(min(WAVES, count))) / count)
+    both = np.column_stack([jacobian, response @ waves])
+    both /= np.maximum(np.linalg.norm(both, axis=0), 1e-300)
+    of_all, values, _ = np.linalg.svd(both, full_matrices=False)
+    of_model, known, _ = np.linalg.svd(both[:, : jacobian.shape[1]], full_matrices=False)
+    of_all, of_model = of_all[:, values > 1e-6 * values[0]], of_model[:, known > 1e-6 * known[0]]
+    gained = float(np.sum((of_all.T @ residual) ** 2) - np.sum((of_model.T @ residual) ** 2))
+    return float(chi2.sf(max(gained, 0.0), max(of_all.shape[1] - of_model.shape[1], 1)))
 
 
 def _whiteness(left: Vector) -> float:

@@ -282,7 +282,8 @@ def identified(
         path = Path(folder, "log.csv")
         path.write_bytes(content)
         try:
-            log = logs.Log.load(path, columns=columns, torque_is=torque_is)
+            rated = getattr(guess, "rated_torque", None)  # not of a chain
+            log = logs.Log.load(path, columns=columns, torque_is=torque_is, rated_torque=rated)
         except InputError as error:
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None
     found = fits.identify(log, guess, progress=lambda doing: progress(None, doing))

@@ -10,6 +10,7 @@ import numpy as np
 
 from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER, POSITION, LogModel
+from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import NOTHING, Table, number, short
@@ -30,10 +31,11 @@ def headline(found: Identification) -> list[str]:
         return [f"{found.drive.name}: {found.drive.source}"]
     logs = f"{len(found.logs)} logs" if len(found.logs) > 1 else found.logs[0].name
     known = sum(one.known for one in found.shared)
+    told = f"{known} of {len(found.shared)} parameters are told by the logs"
     return [
         f"{found.drive.name}: identified from {logs}",
         f"  {samples} samples of torque and {' and '.join(sorted({one.kind for one in found.logs}))}; "
-        f"{known} of {len(found.shared)} parameters are told by the logs",
+        f"{told if found.stated else 'best fit, no intervals'}",
         f"  {found.agreed} of {found.searches} searches ended at the best minimum; torque error "
         f"{found.ripple:.3g} N m in each sample",
     ]
@@ -46,7 +48,7 @@ def estimates_table(found: Identification) -> Table:
         "parameter": [_name(one) for one in rows],
         "unit": [UNITS[one.name][1] if _shared(one) else "s" if one.name == FILTER else "1" for one in rows],
         "guess": [_guess(found, one) for one in rows],
-        "found": [_digits(one.value, one) if one.known else "unknown" for one in rows],
+        "found": [_found(one) for one in rows],
         "+- %": [
             number(100.0 * one.half_width, 2) if one.known and one.value and _shared(one) else NOTHING
             for one in rows
@@ -54,7 +56,14 @@ def estimates_table(found: Identification) -> Table:
         "from": [_digits(one.lower, one) for one in rows],
         "to": [_digits(one.upper, one) for one in rows],
     }
-    return Table.of("Found, with intervals of 95 %", cells, ("parameter", "unit"))
+    title = "Found, with intervals of 95 %" if found.stated else "Best fit, no intervals"
+    return Table.of(title, cells, ("parameter", "unit"))
+
+
+def _found(one: Estimate) -> str:
+    if one.known or math.isnan(one.upper):
+        return _digits(one.value, one)
+    return AT_LIMIT if one.reason == AT_LIMIT else "unknown"
 
 
 def _shared(one: Estimate) -> bool:
@@ -74,6 +83,8 @@ def _guess(found: Identification, one: Estimate) -> str:
 def _digits(value: float, one: Estimate) -> str:
     """As many digits as the interval leaves meaning, one more than are certain."""
     width = 0.5 * (one.upper - one.lower)
+    if math.isnan(value):
+        return NOTHING
     if not (math.isfinite(width) and width > 0.0 and value):
         return short(value)
     digits = max(2, min(7, 2 + math.ceil(math.log10(max(abs(value) / width, 1.0)))))
@@ -89,7 +100,9 @@ def k_dyn_table(each: Mapping[str, tuple[float, float, float]]) -> Table:
         "from": [number(lower, 3) for _, (_, lower, _) in rows],
         "to": [number(upper, 3) for _, (_, _, upper) in rows],
     }
-    return Table.of("K_dyn of the drive found, with intervals of 95 %", cells, ("strategy",))
+    stated = all(math.isfinite(upper) for _, _, upper in each.values())
+    title = "K_dyn of the drive found" + (", with intervals of 95 %" if stated else "")
+    return Table.of(title, cells, ("strategy",))
 
 
 def figure(found: Identification) -> Any:
