@@ -100,10 +100,12 @@ class Margin:
         return {**plain, "margin": self.share, "kept": self.kept, "case": self.case}
 
     def __str__(self) -> str:
-        """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)"."""
+        """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)", "used life 109 times ..."."""
         case = f" with {self.case}" if self.case else ""
         if math.isnan(self.value):
             return f"no {self.name}{case}, as the load does not reach its speed"
+        if self.share < -1.0:
+            return f"{self.name} {1.0 - self.share:.3g} times what is permitted{case}"
         percent = 100.0 * self.share
         left = f"margin {percent:.3g} %" if self.kept else f"{-percent:.3g} % over"
         return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{case} ({left})"
@@ -192,10 +194,12 @@ class Row:
 
     @property
     def against_limits(self) -> str:
-        """Whether it keeps the limits, and the margin: "kept 28.3 %", "exceeded -4.2 %"; "" without any."""
+        """Whether it keeps the limits, and the margin: "kept 28.3 %", "exceeded -4.2 %", "exceeded x109"."""
         least = self.least_margin
         if least is None:
             return ""
+        if least.share < -1.0:
+            return f"exceeded x{1.0 - least.share:.3g}"
         left = "-" if math.isnan(least.share) else f"{100.0 * least.share:.1f} %"
         return f"{'kept' if least.kept else 'exceeded'} {left}"
 
