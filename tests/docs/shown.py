@@ -45,6 +45,7 @@ def rewritten(shown: str, printed: str) -> str:
     >>> rewritten("K 1", "crane\\n  motor\\n\\nK 2\\nnext"), rewritten("K 1\\n...", "crane\\nK 2\\nnext")
     ('...\\n\\nK 2\\nnext', '...\\nK 2\\n...')
     """
+    printed = re.sub(r"(; )[\d,]+ starts/s in .*|^(computed in +).*", r"\1\2...", printed, flags=re.MULTILINE)
     lines, wanted, kept = printed.rstrip().splitlines(), shown.rstrip().splitlines(), list[str]()
     if SKIP not in wanted:
         if lines[0] not in wanted and "" in lines:

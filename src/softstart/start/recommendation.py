@@ -105,10 +105,15 @@ class Margin:
         if math.isnan(self.value):
             return f"no {self.name}{case}, as the load does not reach its speed"
         if self.share < -1.0:
-            return f"{self.name} {1.0 - self.share:.3g} times what is permitted{case}"
+            return f"{self.name} {_times(self.share)} times what is permitted{case}"
         percent = 100.0 * self.share
         left = f"margin {percent:.3g} %" if self.kept else f"{-percent:.3g} % over"
         return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{case} ({left})"
+
+
+def _times(share: float) -> str:
+    """How often a limit is used up of which this share is left: 26.1, 172,000."""
+    return f"{float(f'{1.0 - share:.3g}'):,.6g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +204,7 @@ class Row:
         if least is None:
             return ""
         if least.share < -1.0:
-            return f"exceeded x{1.0 - least.share:.3g}"
+            return f"exceeded x{_times(least.share)}"
         left = "-" if math.isnan(least.share) else f"{100.0 * least.share:.1f} %"
         return f"{'kept' if least.kept else 'exceeded'} {left}"
 
