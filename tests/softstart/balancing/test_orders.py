@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.balancing.engines import ORDERS, RPM, engine
 
-from softstart.balancing import Counterweights, Cylinders
+from softstart.balancing import Counterweights
 from softstart.balancing.slider_crank import acceleration_harmonics
 
 PHI = np.linspace(0.0, 4.0 * np.pi, 361)
@@ -168,12 +168,6 @@ def test_six_cylinders_cancel_up_to_the_fifth_order():
 
 
 # units -------------------------------------------------------------------------------------------------
-
-
-def test_units_of_the_input_do_not_matter():
-    metre = Cylinders(0.08, 0.084, 0.14, firing_angles=(0.0, 2.0 * math.pi))
-    other = Cylinders("80 mm", "8.4 cm", "140 mm", firing_angles=("0 deg", "1 turn"))
-    assert metre == other
 
 
 @settings(max_examples=20, deadline=None)
