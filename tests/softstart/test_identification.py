@@ -156,19 +156,6 @@ def test_a_fit_to_rounded_angles_scatters_as_its_weights_say(counts: float, expo
         assert np.all(square > 0.75 * mean)
 
 
-def test_samples_on_one_count_tell_when_it_ended_and_what_is_not_rounded_does_not_matter() -> None:
-    logged = np.array([0.0, 0.0, 0.0, 2.0, 3.0, 3.0, 2.0])
-    time = np.arange(7.0)
-    told, variance = edges(time, logged, 1.0)
-    assert variance[[0, 2, 3, 6]] == pytest.approx(1.0 / 12.0)
-    assert np.all(np.isinf(variance[[1, 4]]))
-    assert told[5] == pytest.approx(3.0 - 0.5 * (1.0 - 2.0 / 2.5))
-    found, scaled = edges(time, 0.1 * logged, 0.1)
-    assert found == pytest.approx(0.1 * told)
-    assert scaled == pytest.approx(0.01 * variance)
-    assert edges(time, logged + 0.2 * np.sin(time), 1.0)[1] == pytest.approx(variance)
-
-
 @pytest.mark.parametrize(("experiment", "lines"), [("start", 64.0), (REVERSE, 64.0), (REVERSE, 1024.0)])
 def test_the_truth_is_as_likely_as_the_covariance_says(experiment: str, lines: float) -> None:
     """Of 16 logs of 4 ms: weighted squares, and what the best linear step takes off them, are chi-square."""

@@ -8,24 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.softstart.test_identification import NAMES, REVERSE, TRUTH
 
-from softstart import Drive, InputError, Log, identify
+from softstart import InputError, Log, identify
 from softstart.arrays import Vector
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
 from softstart.plant import record
 
-TRUTH = Drive.load("crane-4amtkf").replace(
-    damping=0.3,
-    torque_lag=0.004,
-    load_kind="reactive",
-    gap=0.08,
-    start_position="unknown",
-    encoder_lines=1024,
-)
 GUESS = TRUTH.replace(gap=0.2, stiffness=200, load_inertia=0.4, motor_inertia=0.02, load_torque=12)
-NAMES = ("motor_inertia", "load_inertia", "stiffness", "gap", "damping", "load_torque", "torque_lag")
-REVERSE = "two levels, then reverse"
 
 
 @pytest.fixture(scope="module")

@@ -8,21 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.softstart import test_identification as identification
+from tests.softstart.test_identification import REVERSE
 
 from softstart import Drive, Identification, InputError, compare, identify, report, simulate, tune
 from softstart.identification.planning import made_up_log
 from softstart.identification.result import Estimate
 from softstart.start.comparison import LEFT_POSSIBLE
 
-TRUTH = Drive.load("crane-4amtkf").replace(
-    damping=0.3,
-    torque_lag=0.004,
-    load_kind="reactive",
-    gap=0.08,
-    start_position="mid-gap",
-    encoder_lines=1024,
-)
-REVERSE = "two levels, then reverse"
+TRUTH = identification.TRUTH.replace(start_position="mid-gap")
 
 
 @pytest.fixture(scope="module")

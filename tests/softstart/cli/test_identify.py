@@ -7,18 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.softstart.test_identification import TRUTH
 
 from softstart import Drive
 from softstart.identification.planning import made_up_log
-
-TRUTH = Drive.load("crane-4amtkf").replace(
-    damping=0.3,
-    torque_lag=0.004,
-    load_kind="reactive",
-    gap=0.08,
-    start_position="unknown",
-    encoder_lines=1024,
-)
 
 
 def test_the_command_writes_a_drive_that_compare_takes(run, tmp_path: Path) -> None:
