@@ -14,7 +14,6 @@ from softstart.chain.model import Chain
 from softstart.controller.base import label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, listed
-from softstart.language import said
 from softstart.late import late
 from softstart.optimal.chains import problem
 from softstart.optimal.front import FrontPoint, PointAsked, computed
@@ -147,7 +146,7 @@ def chain_limit(
     """
     known = [one for one in own if math.isfinite(one)]
     if not known:
-        return Limit(refusal=said("No strategy reaches the target speed."))
+        return Limit(refusal="No strategy reaches the target speed.")
     times = np.linspace(EARLIER * min(known), max(known), INSTANTS).tolist()
     curve = [(t, b) for t in times if (b := bound_at(chain, t)) is not None]
     points: list[FrontPoint] = []
@@ -186,9 +185,7 @@ def limit(
     shortest = momentum_shortest_time(Problem(drive, 1.0, TERMINAL))
     least = reference if math.isfinite(reference) else min(own, default=math.nan)
     if not (math.isfinite(least) and math.isfinite(shortest)):
-        return Limit(
-            refusal=said("No strategy reaches the target speed, so there is no start time to judge by.")
-        )
+        return Limit(refusal="No strategy reaches the target speed, so there is no start time to judge by.")
     asked = list(dict.fromkeys([*own, *(share * least for share in SHARES)]))
     longest = max(*asked, 1.05 * shortest)
     soonest = max(1.0005 * shortest, EARLIER * min(asked))
@@ -291,43 +288,33 @@ def optima(
 def limit_section(drive: Drive, choice: Choice, limit: Limit, figures: Figures) -> Html:
     """Figure, table and what can and cannot be said."""
     if limit.refusal:
-        return tag(
-            "p", said("For this drive there is no limit to compare with. {reason}", reason=limit.refusal)
-        )
+        return tag("p", f"For this drive there is no limit to compare with. {limit.refusal}")
     caption = [
-        said(
-            "Every strategy (filled: {role}, and best of an ordinary inverter) by its start time and K_dyn. "
-            "Below the dashed line (hatched) no start is possible, with whatever motor torque within its "
-            "limits and however it is controlled.",
-            role=choice.role,
+        (
+            f"Every strategy (filled: {choice.role}, and best of an ordinary inverter) by its start time and "
+            "K_dyn. Below the dashed line (hatched) no start is possible, with whatever motor torque within "
+            "its limits and however it is controlled."
         )
     ]
     if limit.found:
         caption.append(
-            said(
+            (
                 "The solid line joins the best profiles found that serve every start position, each "
                 "simulated exactly; feedback reacts to the contact and can lie below it."
             )
             if len(drive.positions) > 1
-            else said("The solid line joins optimal starts, each simulated exactly.")
+            else "The solid line joins optimal starts, each simulated exactly."
         )
     if limit.known:
         caption.append(
-            said(
-                "The dash-dotted line is the gentlest start known in that time, of a strategy, a profile or "
-                "a quick search (crosses): possible, not proved best."
-            )
+            "The dash-dotted line is the gentlest start known in that time, of a strategy, a profile or "
+            "a quick search (crosses): possible, not proved best."
         )
     starts = "; ".join(
-        said(
-            "{name} {k_dyn} at {time} s",
-            name=one.name,
-            k_dyn=fixed(one.row.run.k_dyn, 3),
-            time=digits(one.row.run.start_time),
-        )
+        f"{one.name} {fixed(one.row.run.k_dyn, 3)} at {digits(one.row.run.start_time)} s"
         for one in choice.candidates
     )
-    title = said("K_dyn against start time: {starts}", starts=starts)
+    title = f"K_dyn against start time: {starts}"
     return html(
         figures.shown(
             "limit",
@@ -358,21 +345,20 @@ def how_near(drive: Drive | Chain, found: Sequence[Row], limit: Limit) -> Html:
         cells += [fixed(known, 3) + (f" ({best_start(drive)})" if is_best else "")]
         cells += [fixed(run.k_dyn / known if known else None, 2)]
         rows.append(cells + ([fixed(run.k_dyn / bound if bound else None, 2)] if bounded else []))
-    heads = [said("strategy"), said("start time, s"), "K_dyn"]
-    heads += [said("lower bound at that time")] if bounded else []
-    heads += [said("lowest known in that time"), said("times the lowest known")]
-    heads += [said("times the bound")] if bounded else []
-    caption = said("How near each strategy comes to the limit in its own start time")
+    heads = ["strategy", "start time, s", "K_dyn"]
+    heads += ["lower bound at that time"] if bounded else []
+    heads += ["lowest known in that time", "times the lowest known"]
+    heads += ["times the bound"] if bounded else []
+    caption = "How near each strategy comes to the limit in its own start time"
     return table(heads, rows, caption=caption, class_="names near")
 
 
 def _notes(drive: Drive, choice: Choice, limit: Limit) -> list[str]:
     return [
-        said(
-            "Lower bound: proved from the momentum of the load, for every torque from {least} to {most} N m "
-            "over time and any number of contacts. A dash: no bound at that start time.",
-            least=short(float(drive.minimum_torque)),
-            most=short(float(min(drive.Ms, drive.maximum_torque))),
+        (
+            "Lower bound: proved from the momentum of the load, for every torque from "
+            f"{short(float(drive.minimum_torque))} to {short(float(min(drive.Ms, drive.maximum_torque)))} N "
+            "m over time and any number of contacts. A dash: no bound at that start time."
         ),
         *_on_optima(drive, limit),
         *_on_the_shortest(choice, limit),
@@ -394,18 +380,11 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
             loose.append(math.inf if above is None else above)
     notes = []
     if limit.found and len(drive.positions) > 1:
-        notes.append(
-            said("The best fixed profiles are those found, not proved best. {reacts}", reacts=REACTS)
-        )
+        notes.append(f"The best fixed profiles are those found, not proved best. {REACTS}")
     if every:
         notes.append(
-            said(
-                "{count} of {all} optima are certified against every other start: none lies more than "
-                "{percent} % above the lower bound.",
-                count=len(every),
-                all=len(limit.found),
-                percent=digits(max(*every, 0.001), 1),
-            )
+            f"{len(every)} of {len(limit.found)} optima are certified against every other start: none "
+            f"lies more than {digits(max(*every, 0.001), 1)} % above the lower bound."
         )
     if single:
         times, most = (
@@ -413,36 +392,27 @@ def _on_optima(drive: Drive, limit: Limit) -> list[str]:
             max(*(p.gap_percent or 0.0 for p in single), 0.001),
         )
         notes.append(
-            said(
-                "That at {times} is certified among starts whose gap closes only once, to {percent} %. That "
-                "a start that bounces in the gap is gentler, down to the lower bound, is not ruled out.",
-                times=times,
-                percent=digits(most, 1),
+            (
+                f"That at {times} is certified among starts whose gap closes only once, to {digits(most, 1)} "
+                "%. That a start that bounces in the gap is gentler, down to the lower bound, is not ruled "
+                "out."
             )
             if len(single) == 1
-            else said(
-                "Those at {times} are certified among starts whose gap closes only once, to {percent} %. "
-                "That a start that bounces in the gap is gentler, down to the lower bound, is not ruled out.",
-                times=times,
-                percent=digits(most, 1),
+            else (
+                f"Those at {times} are certified among starts whose gap closes only once, to "
+                f"{digits(most, 1)} %. That a start that bounces in the gap is gentler, down to the "
+                "lower bound, is not ruled out."
             )
         )
     if loose:
         count, every_one = len(loose), len(limit.found)
         notes.append(
-            said(
-                "{count} of {all} optima are the best starts found, up to {percent} % above their lower "
-                "bound: gentler ones may exist.",
-                count=count,
-                all=every_one,
-                percent=digits(max(loose), 2),
+            (
+                f"{count} of {every_one} optima are the best starts found, up to {digits(max(loose), 2)} % "
+                "above their lower bound: gentler ones may exist."
             )
             if max(loose) < math.inf
-            else said(
-                "{count} of {all} optima are the best starts found: gentler ones may exist.",
-                count=count,
-                all=every_one,
-            )
+            else f"{count} of {every_one} optima are the best starts found: gentler ones may exist."
         )
     return notes
 
@@ -460,20 +430,14 @@ def _on_the_shortest(choice: Choice, limit: Limit) -> list[str]:
     notes = []
     if none:
         notes.append(
-            said(
-                "In {times} there is no start whose gap closes only once; the shortest such start takes "
-                "{shortest} s. Quicker starts bounce in the gap.",
-                times=_times([p.start_time_bound for p in none]),
-                shortest=digits(none[0].shortest_start_time, 5),
-            )
+            f"In {_times([p.start_time_bound for p in none])} there is no start whose gap closes only "
+            f"once; the shortest such start takes {digits(none[0].shortest_start_time, 5)} s. Quicker "
+            "starts bounce in the gap."
         )
     if only:
         notes.append(
-            said(
-                "In {times} there is no choice: no start whose gap closes only once was found that is "
-                "noticeably quicker, so there is no optimum to tell.",
-                times=_times([p.start_time_bound for p in only]),
-            )
+            f"In {_times([p.start_time_bound for p in only])} there is no choice: no start whose gap "
+            "closes only once was found that is noticeably quicker, so there is no optimum to tell."
         )
     return notes
 
@@ -483,32 +447,23 @@ def _on_missing(drive: Drive, limit: Limit) -> list[str]:
     notes = []
     if limit.missing:
         ended = (
-            said("none was found within {budget} s of search", budget=short(limit.budget))
+            f"none was found within {short(limit.budget)} s of search"
             if limit.budget
-            else said("none was looked for")
+            else "none was looked for"
         )
         if gave_up := limit.gave_up:
-            ended = said(
-                "{ended}; at {times} the search ended without one",
-                ended=ended,
-                times=_times([p.start_time_bound for p in gave_up]),
+            ended = (
+                f"{ended}; at {_times([p.start_time_bound for p in gave_up])} the search ended without one"
             )
         notes.append(
-            said(
-                "For {times} no {what} is shown: {reason}, and {ended}. The lower bound holds nevertheless.",
-                times=_times(limit.missing),
-                what=best_start(drive),
-                reason=_why_hard(drive),
-                ended=ended,
-            )
+            f"For {_times(limit.missing)} no {best_start(drive)} is shown: {_why_hard(drive)}, and "
+            f"{ended}. The lower bound holds nevertheless."
         )
     if limit.known:
         notes.append(
-            said(
-                "Starts found: the best of some thousand torques over time that a quick search tried, each "
-                "simulated exactly. They are known to be possible, not known to be the gentlest: the limit "
-                "lies between them and the lower bound."
-            )
+            "Starts found: the best of some thousand torques over time that a quick search tried, each "
+            "simulated exactly. They are known to be possible, not known to be the gentlest: the limit "
+            "lies between them and the lower bound."
         )
     return notes
 
@@ -530,40 +485,34 @@ def _on_the_recommended(drive: Drive, choice: Choice, limit: Limit) -> list[str]
         "own": fixed(own, 3), "most": percent(1.0 - bound / own), "certain": percent(1.0 - known / own),
     }  # fmt: skip
     return [
-        said(
+        (
             "In the {time} s of {name} the least possible K_dyn thus lies between {least} (proved) and "
             "{known} (found): {name} with {own} could be undercut by {certain} for certain, by {most} at "
-            "most.",
-            **figures,
-        )
+            "most."
+        ).format(**figures)
         if known < own
-        else said(
+        else (
             "In the {time} s of {name} the least possible K_dyn thus lies between {least} (proved) and "
-            "{known} (that of {name} itself, the gentlest start known): {most} less at most.",
-            **figures,
-        )
+            "{known} (that of {name} itself, the gentlest start known): {most} less at most."
+        ).format(**figures)
     ]
 
 
 def _times(times: Sequence[float]) -> str:
     """Start times in words, each once, or how many there are."""
     words = list(dict.fromkeys(f"{digits(t)} s" for t in times))
-    return said("{count} start times", count=len(times)) if len(words) > 4 else listed(words)
+    return f"{len(times)} start times" if len(words) > 4 else listed(words)
 
 
 def _why_hard(drive: Drive) -> str:
     if len(drive.positions) > 1:
-        return said(
-            "the start position is unknown, and one torque for every position has a search of its own"
-        )
+        return "the start position is unknown, and one torque for every position has a search of its own"
     problem = Problem(drive, 1.0, "reached")
     if ideal.not_linear(problem) and (reason := whole_search.not_linear(problem)):
-        return said("they need a numerical search (direct collocation), because {reason}", reason=reason)
+        return f"they need a numerical search (direct collocation), because {reason}"
     if reason := applies(problem):
-        return said("there is no formula ({reason}), only a search by linear programs", reason=reason)
-    return said(
-        "so near the shortest start time there is no formula, and a linear program has to be certified"
-    )
+        return f"there is no formula ({reason}), only a search by linear programs"
+    return "so near the shortest start time there is no formula, and a linear program has to be certified"
 
 
 def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> Any:
@@ -582,9 +531,7 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
         if limit.times:
             t, k = _within(limit, left, right, 2.0 * max(values))
             axes.fill_between(t, 0.0, k, fc="#F1F1F1", ec="#DADADA", hatch="////", lw=0.0, zorder=0)
-            axes.plot(
-                t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label=said("lower bound: no torque goes below")
-            )
+            axes.plot(t, k, color=COLOURS[4], ls=DASHES[1], lw=1.8, label="lower bound: no torque goes below")
             values.append(float(k.min()))
         if optima:
             axes.plot(
@@ -596,7 +543,7 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
             axes.step(
                 steps, [limit.gentlest_known(t, placed) for t in steps], where="post", ls=DASHES[2],
                 color="black", lw=1.0, zorder=3,
-                label=said("gentlest start known: possible, not proved best"),
+                label="gentlest start known: possible, not proved best",
             )  # fmt: skip
             axes.plot(
                 [one.start_time for one in limit.known], [one.k_dyn for one in limit.known], "+",
@@ -616,7 +563,7 @@ def limit_figure(rows: Sequence[Row], strong: Sequence[Row], limit: Limit) -> An
             room = max(high - low, 0.1 * high)
             axes.set_ylim(max(0.0, low - 0.35 * room), high + 0.15 * room)
         axes.set_xlim(left, right)
-        axes.set_xlabel(said("start time, s"))
+        axes.set_xlabel("start time, s")
         axes.set_ylabel(K_DYN)
         handles = axes.get_legend_handles_labels()[0]
         if handles:
