@@ -17,7 +17,7 @@ from softstart.chain.machines import Machine, moved
 from softstart.chain.model import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
-from softstart.page.machines import changed, machine_from, single, without
+from softstart.page.machines import changed, single, without
 from softstart.page.sentences import FAILED_START, clipped, sentence_of
 from softstart.quantities import nearest
 from softstart.start.comparison import DEFAULT_DRIVE, REFERENCE, changed_case
@@ -239,10 +239,6 @@ class Session:
         """
         controller = changed_controller(self.controllers[self.selected], {name: value})
         self._put(gesture, controllers={**self.controllers, self.selected: controller})
-
-    def load(self, text: str, where: str = "") -> None:
-        """Take the drive or chain of a TOML text; `where` is put before each sentence of an InputError."""
-        self.take(machine_from(text, where))
 
     def take(self, drive: Machine) -> None:
         """Go over to another drive or chain, without the optima and gains that were computed for this one."""

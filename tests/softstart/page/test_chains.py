@@ -19,7 +19,15 @@ from softstart.page import links
 from softstart.page.controls import Controls
 from softstart.page.downloads import command_text
 from softstart.page.frames import Screen, channels_at, open_somewhere, traces_of
-from softstart.page.machines import GROUPS, axes_about, changed, entries, k_dyn_row, scales_about
+from softstart.page.machines import (
+    GROUPS,
+    axes_about,
+    changed,
+    entries,
+    k_dyn_row,
+    machine_from,
+    scales_about,
+)
 from softstart.page.sentences import changed_since, differences
 from softstart.page.session import Session
 
@@ -236,7 +244,7 @@ def test_a_chain_that_cannot_start_is_refused_and_nothing_changes(text, said):
     session = Session(controllers=["direct"])
     before = session.machine
     with pytest.raises(InputError, match=said):
-        session.load(text)
+        session.take(machine_from(text))
     assert session.machine is before
 
 

@@ -17,6 +17,7 @@ from softstart import Drive, InputError, compare, simulate
 from softstart.controller import Command, PlainController, make_controller
 from softstart.page.downloads import command_text
 from softstart.page.links import bench_of, link_of
+from softstart.page.machines import machine_from
 from softstart.page.session import MAX_STRATEGIES, Session
 
 
@@ -259,7 +260,7 @@ def test_several_changes_are_one_step_or_none():
 def test_no_text_whatever_breaks_the_bench(path, text):
     session = Session(controllers=["direct"])
     before = session.machine
-    for change in (lambda: session.set(path, text), lambda: session.load(text)):
+    for change in (lambda: session.set(path, text), lambda: session.take(machine_from(text))):
         with contextlib.suppress(InputError):
             change()
         assert session.machine is before or session.version > 0
@@ -269,10 +270,10 @@ def test_no_text_whatever_breaks_the_bench(path, text):
 def test_load_takes_a_file_or_leaves_everything():
     session = Session(controllers=["direct"])
     other = Drive.load("nordin-servo-60kw")
-    session.load(other.to_toml())
+    session.take(machine_from(other.to_toml()))
     assert session.machine == session.origin == other
     with pytest.raises(InputError, match=r"mine.toml: \[shaft\]"):
-        session.load(other.to_toml().replace("gap =", "gapp ="), where="mine.toml")
+        session.take(machine_from(other.to_toml().replace("gap =", "gapp ="), where="mine.toml"))
     assert session.machine == other
 
 
