@@ -83,8 +83,8 @@ def _guess(found: Identification, one: Estimate) -> str:
 def _digits(value: float, one: Estimate) -> str:
     """As many digits as the interval leaves meaning, one more than are certain."""
     width = 0.5 * (one.upper - one.lower)
-    if math.isnan(value):
-        return NOTHING
+    if math.isnan(width):  # no interval is stated
+        return NOTHING if math.isnan(value) else f"{value:.3g}"
     if not (math.isfinite(width) and width > 0.0 and value):
         return short(value)
     digits = max(2, min(7, 2 + math.ceil(math.log10(max(abs(value) / width, 1.0)))))
