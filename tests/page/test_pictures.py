@@ -12,12 +12,12 @@ from tests.page.conftest import SOFTSTART, at_rest
 
 pytestmark = pytest.mark.slow  # nothing of the page is judged
 LARGEST = 90_000  # bytes: they are part of every clone
-COLOURS = 128
 
 
 def small(path: Path) -> int:
     """Reduce the picture to a palette; returns its size in bytes."""
-    Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    picture = Image.open(path).convert("RGB")
+    picture.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
     return path.stat().st_size
 
 
