@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from softstart.drive.checks import FRICTIONS
+from softstart.drive.data_sheet import DataSheet
 from softstart.drive.limits import INFORMATIVE_TABLES, Limit, Limits, SNCurve
 from softstart.drive.model import (
     PARAMETERS,
@@ -27,6 +28,7 @@ __all__ = [
     "TABLES",
     "UNKNOWN_POSITIONS",
     "ContactLaw",
+    "DataSheet",
     "Drive",
     "Limit",
     "Limits",
@@ -35,3 +37,5 @@ __all__ = [
     "SNCurve",
     "library",
 ]  # fmt: skip
+
+Drive.SHEET = DataSheet

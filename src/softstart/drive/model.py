@@ -88,6 +88,7 @@ class Drive(ParameterSet):
 
     WHAT: ClassVar[str] = "a drive"
     BATCH: ClassVar[bool] = True
+    SHEET: ClassVar[Any]  # `DataSheet`, which knows drives
 
     name: str = parameter("name", "", "name of the drive", '"my drive"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
@@ -314,10 +315,8 @@ class Drive(ParameterSet):
 
         The tables of a data sheet give the drive that follows from it (`softstart.DataSheet`).
         """
-        from softstart.drive.data_sheet import DataSheet
-
-        if DataSheet.describes(document):
-            document = tomllib.loads(DataSheet._from_document(dict(document), where).drive_toml())
+        if cls.SHEET.describes(document):
+            document = tomllib.loads(cls.SHEET._from_document(dict(document), where).drive_toml())
         return cls._from_document(dict(document), where)
 
     # ---- the drive changed -------------------------------------------------------------------------------
