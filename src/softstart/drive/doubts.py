@@ -50,8 +50,8 @@ def doubts(machine: Drive | Lumped) -> list[str]:
     >>> crane = Drive.load("crane-4amtkf")
     >>> doubts(crane)
     []
-    >>> doubts(crane.replace(target_speed=880))[0][:56]
-    'target speed 8,403 rpm, '
+    >>> doubts(crane.replace(target_speed=1460))[0][:25]
+    'speed 13,942 rpm, where m'
     """
     if not isinstance(machine, Drive):
         return list(_doubts(machine.lumped))
