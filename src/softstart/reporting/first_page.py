@@ -61,10 +61,10 @@ def answer(
 def for_customer(text: str) -> str:
     """A text without what it tells the author to give.
 
-    >>> for_customer("It depends on the machine: give [limits] in the drive file. Give more. Nothing damps.")
-    'It depends on the machine. Nothing damps.'
+    >>> for_customer("It depends: give [limits] in a file. Give more; give start.position. Nothing damps.")
+    'It depends. Nothing damps.'
     """
-    return re.sub(r"(?:[:;] give|\. Give) [^.;]*(?=\.)", "", text)
+    return re.sub(r"(?:[:;] give|\. Give) (?:[^.;]|\.(?=\S))*(?=[.;])", "", text)
 
 
 def to_check(machine: Drive | Chain) -> Html | None:
