@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -116,6 +118,70 @@ def run(place, capfd):
         code = main(list(arguments))
         out, err = capfd.readouterr()
         return Ended(code, out, err.replace(f"softstart: {COMPILING}\n", ""))
+
+    return go
+
+
+@pytest.fixture
+def done(run):
+    """What softstart ARGUMENTS prints, which has nothing to complain about."""
+
+    def go(*arguments: str) -> str:
+        code, out, err = run(*arguments)
+        assert (code, err) == (0, "")
+        return out
+
+    return go
+
+
+@pytest.fixture
+def as_json(done):
+    """What softstart ARGUMENTS --json tells; there is no NaN and no infinity in it."""
+
+    def go(*arguments: str) -> Any:
+        return json.loads(done(*arguments, "--json"), parse_constant=pytest.fail)
+
+    return go
+
+
+@pytest.fixture(params=[80, 120])
+def table(request, done, monkeypatch):
+    """The tables of softstart ARGUMENTS on a narrow and a wide terminal, where they fit; as one line."""
+
+    def go(*arguments: str) -> str:
+        monkeypatch.setenv("COLUMNS", str(request.param))
+        lines = done(*arguments).splitlines()
+        assert max(map(len, lines)) <= request.param
+        assert not any(line != line.rstrip() or "\x1b" in line for line in lines)
+        return " ".join(" ".join(lines).split())
+
+    return go
+
+
+@pytest.fixture
+def refused(run, place):
+    """What softstart ARGUMENTS says of bad input: no output, one sentence, no file left.
+
+    Several mistakes are numbered sentences below a line that counts them.
+    """
+
+    def go(*arguments: str, says: Sequence[str] = (), mistakes: int = 1) -> str:
+        before = snapshot(place)
+        code, out, err = run(*arguments)
+        assert (code, out) == (2, "")
+        first, *rest = err.splitlines()
+        assert first.startswith("softstart: ")
+        assert err.endswith((".\n", "?\n"))
+        assert "Traceback" not in err
+        for words in says:
+            assert words in err
+        if mistakes == 1:
+            assert rest == []
+        else:
+            assert first == f"softstart: {mistakes} things are wrong:"
+            assert [line.split(". ")[0].strip() for line in rest] == [str(1 + k) for k in range(mistakes)]
+        assert snapshot(place) == before
+        return err
 
     return go
 

@@ -113,33 +113,57 @@ ONE_SENTENCE = {
     "files of a list": (["study", "--out", "here"], ["a list writes no files"]),
 }
 
-
-@pytest.mark.parametrize("kind", ONE_SENTENCE)
-def test_one_clear_sentence(kind, run, nothing_left):
-    arguments, says = ONE_SENTENCE[kind]
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("softstart: ")
-    assert err.count("\n") == 1
-    assert err.endswith((".\n", "?\n"))
-    assert "Traceback" not in err
-    for words in says:
-        assert words in err
-    nothing_left()
+# what every command that takes a drive says
+OF_A_DRIVE = (
+    "compare {}", "optimize {}", "pareto {}", "tune {} --controller ramp",
+    "sweep {} --axis gap=1,2 --controller ramp", "linear {} --controller ramp", "fatigue {}",
+)  # fmt: skip
+for line in OF_A_DRIVE:
+    name = line.split()[0]
+    ONE_SENTENCE[f"{name}: misspelt"] = (line.format("crane-4amtk").split(), ["did you mean crane-4amtkf?"])
+    ONE_SENTENCE[f"{name}: output"] = (line.format("--out good.toml").split(), ["is a file, not a folder"])
 
 
-def test_all_mistakes_are_told_at_once(run, nothing_left):
-    code, out, err = run(
-        "compare", "wrong.toml", "--controllers", "dirct,ramp", "--until", "-1", "--param", "ramp"
-    )
-    assert (code, out) == (2, "")
-    lines = err.splitlines()
-    assert lines[0] == "softstart: 5 things are wrong:"
-    assert [line.split(". ")[0].strip() for line in lines[1:]] == ["1", "2", "3", "4", "5"]
-    assert "starting_torque" in err
-    assert "gap = nan" in err
-    assert "did you mean direct?" in err
-    nothing_left()
+@pytest.mark.parametrize(("arguments", "says"), ONE_SENTENCE.values(), ids=ONE_SENTENCE)
+def test_one_clear_sentence(arguments, says, refused):
+    refused(*arguments, says=says)
+
+
+# a line with several mistakes: what the sentence of each must say
+SEVERAL = {
+    "compare wrong.toml --controllers dirct,ramp --until -1 --param ramp": [
+        "starting_torque", "gap = nan", "did you mean direct?", "--until", "--param"
+    ],
+    "optimize wrong.toml --terminal sync --method best --max-heat 0 --smoothness rough --torque-speed 62": [
+        "starting_torque", "gap = nan", "--terminal", "--method", "--max-heat", "--smoothness",
+        "--torque-speed",
+    ],
+    "pareto wrong.toml --start-times soon,0.3 --terminal x --controllers dirct,ramp": [
+        "starting_torque", "gap = nan", "--start-times", "--terminal", "did you mean direct?"
+    ],
+    "tune wrong.toml --controller rmp --gaps x --free a=1 --only b --seed c": [
+        "starting_torque", "gap = nan", "did you mean ramp?", "--gaps", "--free", "--only", "--seed"
+    ],
+    "sweep wrong.toml --axis gapp=1 --controller rmp --workers 0 --until soon": [
+        "starting_torque", "gap = nan", "did you mean ramp?", "--workers", "--until"
+    ],
+    "reduce --to 1 --method modl --factor -2 --set mass[9].inertia=3": [
+        "--to", "did you mean modal?", "--factor", "N from 1 to 4"
+    ],
+    "balance --speed 50Hz --set cylinders.bore=1N --set masses.rotating=-1": [
+        "--speed", "cylinders", "rotating"
+    ],
+    "clutch good.toml": ["[motor]", "[clutch] inertia", "[clutch] torque", "[clutch] speed", "time tM"],
+    "clutch --law x --until soon --points 0": ["--law", "--until", "--points"],
+    "report nowhere.toml --resolution tme=1ms --budget x": [
+        "--out: name the file", "no such file", "did you mean time?", "--budget"
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("line", "says"), SEVERAL.items())
+def test_all_mistakes_are_told_at_once(line, says, refused):
+    refused(*line.split(), says=says, mistakes=len(says))
 
 
 UNFINISHED = {

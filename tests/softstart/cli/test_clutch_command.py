@@ -10,19 +10,14 @@ import pytest
 from softstart.clutch import Clutch, engage
 
 
-def test_without_arguments_the_clutch_of_the_paper(run):
-    code, out, err = run("clutch")
-    assert (code, err) == (0, "")
+def test_without_arguments_the_clutch_of_the_paper(done):
+    out = done("clutch")
     for words in ("Friction clutch of [C]", "634.076", "266163", "The clutch has locked."):
         assert words in out
 
 
-def test_json_is_the_engagement(run):
-    code, out, _ = run(
-        "clutch", "--law", "quadratic-convex", "--json", "--set", "clutch.lining_area=0.05 m^2"
-    )
-    assert code == 0
-    found = json.loads(out)
+def test_json_is_the_engagement(as_json):
+    found = as_json("clutch", "--law", "quadratic-convex", "--set", "clutch.lining_area=0.05 m^2")
     expected = engage(Clutch.load("paper-c").replace(law="quadratic-convex", lining_area=0.05))
     assert found["slip_work"] == expected.slip_work
     assert found["lining_heat"] == expected.friction_work / 0.05
@@ -70,25 +65,9 @@ ONE_SENTENCE = {
     "count": (["--optimal", "--points", "many"], ['--points = "many"', "from 1 to 200"]),
     "until of an optimum": (["--optimal", "--until", "3"], ["leave it out with --optimal"]),
     "gap of an optimum": (["--optimal", "--set", "shaft.gap=0.1"], ["gap = 0.1", "without a gap"]),
-    "output": (["--out", "good.toml"], ["is a file, not a folder"]),
-    "no clutch": (["good.toml"], ["motor"]),
 }
 
 
-@pytest.mark.parametrize("kind", ONE_SENTENCE)
-def test_each_mistake_in_clear_sentences(kind, run, nothing_left):
-    arguments, says = ONE_SENTENCE[kind]
-    code, out, err = run("clutch", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("softstart: ")
-    assert "Traceback" not in err
-    for words in says:
-        assert words in err
-    nothing_left()
-
-
-def test_all_mistakes_are_told_at_once(run):
-    code, _, err = run("clutch", "--law", "x", "--until", "soon", "--points", "0")
-    assert code == 2
-    for words in ("3 things are wrong", "--law", "--until", "--points"):
-        assert words in err
+@pytest.mark.parametrize(("arguments", "says"), ONE_SENTENCE.values(), ids=ONE_SENTENCE)
+def test_one_clear_sentence(arguments, says, refused):
+    refused("clutch", *arguments, says=says)

@@ -88,13 +88,11 @@ def test_every_key_that_is_offered_can_be_set():
     assert keys["load.kind"][1] == ("active", "reactive")
 
 
-def test_no_shell_and_a_wrong_one(run, monkeypatch):
+def test_no_shell_and_a_wrong_one(run, monkeypatch, refused):
     monkeypatch.setenv("SHELL", "/usr/bin/zsh")
     assert "#compdef softstart" in run("completion").out
     monkeypatch.delenv("SHELL")
-    code, out, err = run("completion")
-    assert (code, out) == (2, "")
-    assert "there are bash, zsh and fish" in err
+    refused("completion", says=["there are bash, zsh and fish"])
     assert 'shell = "fsh"' in run("completion", "fsh").err
 
 

@@ -70,7 +70,7 @@ def test_k_dyn_that_is_doubted_is_that_of_the_start(position: str) -> None:
         assert not found or f"about {k:.4g} " in found[0]
 
 
-def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run) -> None:
+def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run, as_json) -> None:
     """Of 9 arcmin written as 9 rad, behind 25:1, come 225 rad at the motor."""
     sheet = {
         "load.machine": "rotor", "motor.power": "15 kW", "motor.speed": "1460 rpm", "motor.inertia": 0.09,
@@ -80,7 +80,7 @@ def test_a_backlash_in_the_wrong_unit_is_doubted_by_the_commands(run) -> None:
     code, out, err = run("init", *settings, "--out", "mine.toml")
     assert code == 0
     assert "doubt: gap 225 rad at the motor shaft" in err
-    gap, k_dyn = json.loads(run("init", *settings, "--json").out)["doubts"]
+    gap, k_dyn = as_json("init", *settings)["doubts"]
     assert gap.startswith("gap 225 rad")
     code, out, err = run("compare", "mine.toml", "--controllers", "direct", "--json")
     assert json.loads(out)["doubts"] == [gap, k_dyn]

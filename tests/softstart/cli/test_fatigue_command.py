@@ -18,10 +18,8 @@ LIMITS = (
 )  # fmt: skip
 
 
-def test_json_is_the_summary(run):
-    code, out, err = run(*ASKED, "--json")
-    assert (code, err) == (0, "")
-    told = json.loads(out, parse_constant=pytest.fail)
+def test_json_is_the_summary(as_json):
+    told = as_json(*ASKED)
     lives = fatigue(RUNS)
     assert [one["relative_life"] for one in told["strategies"]] == [row.relative for row in lives.rows]
     assert told["slope"] == 6.6
@@ -31,11 +29,10 @@ def test_json_is_the_summary(run):
 
 
 @pytest.mark.parametrize("width", ["80", "140"])
-def test_the_table_is_shown(run, monkeypatch, width):
+def test_the_table_is_shown(monkeypatch, width, done):
     monkeypatch.setenv("COLUMNS", width)
     settings = [part for one in LIMITS for part in ("--set", one)]
-    code, out, err = run(*ASKED, *settings, "--worn-gap", "2 rad")
-    assert (code, err) == (0, "")
+    out = done(*ASKED, *settings, "--worn-gap", "2 rad")
     text = " ".join(out.split())
     assert "Longest life: s-curve" in text
     assert "years" in text
@@ -46,18 +43,16 @@ def test_the_table_is_shown(run, monkeypatch, width):
     assert "not by: direct" in text
 
 
-def test_an_estimated_damping_is_marked(run):
+def test_an_estimated_damping_is_marked(done):
     given = ("fatigue", "--controllers", "direct,s-curve", "--estimate-damping", "gears=3,couplings=2")
-    code, out, err = run(*given)
-    assert (code, err) == (0, "")
+    out = done(*given)
     text = " ".join(out.split())
     assert "The damping is ESTIMATED: a ratio of 4 % from 3 gears and 2 couplings" in text
     assert "d = 0.26226 N m s/rad" in text
 
 
-def test_files(run, place):
-    code, _, err = run(*ASKED, "--slope", "5", "--out", "lives")
-    assert (code, err) == (0, "")
+def test_files(place, done):
+    done(*ASKED, "--slope", "5", "--out", "lives")
     folder = place / "lives"
     with (folder / "spectrum-direct.csv").open() as stream:
         rows = list(csv.DictReader(stream))
@@ -81,21 +76,17 @@ def test_files(run, place):
         (("--set", "shaft.damping=1", "--estimate-damping", "gears=3"), "a damping of its own"),
     ],
 )
-def test_bad_input_is_one_sentence(run, more, said):
-    code, out, err = run("fatigue", "--controllers", "direct", *more)
-    assert code == 2
-    assert out == ""
-    assert said in " ".join(err.split())
+def test_bad_input_is_one_sentence(more, said, refused):
+    refused("fatigue", "--controllers", "direct", *more, says=[said])
 
 
 DAMPED = [f"shaft[{k}].damping_ratio=0.02" for k in (1, 2, 3)]
 
 
-def test_each_shaft_of_a_chain_is_counted(run, tmp_path):
+def test_each_shaft_of_a_chain_is_counted(tmp_path, done):
     settings = [part for one in DAMPED for part in ("--set", one)]
     more = ("--controllers", "direct,s-curve", "--json", "--out", str(tmp_path / "lives"))
-    code, out, err = run("fatigue", "crane-4-mass", *settings, *more)
-    assert (code, err) == (0, "")
+    out = done("fatigue", "crane-4-mass", *settings, *more)
     lives = json.loads(out)["lives"]
     assert [one["shaft"] for one in lives[:3]] == list(Chain.load("crane-4-mass").shaft_names)
     assert all(one["relative_life"] == 1.0 for one in lives[:3])
@@ -103,8 +94,7 @@ def test_each_shaft_of_a_chain_is_counted(run, tmp_path):
     report = (tmp_path / "lives" / "report.md").read_text(encoding="utf-8")
     assert "Longest life: s-curve; the shaft that gains least" in report
     assert len(list((tmp_path / "lives").glob("turning-points-*.csv"))) == 6
-    code, out, err = run("fatigue", "crane-4-mass", *settings, "--controllers", "direct,s-curve")
-    assert (code, err) == (0, "")
+    out = done("fatigue", "crane-4-mass", *settings, "--controllers", "direct,s-curve")
     assert "Life over that under direct" in out
 
 

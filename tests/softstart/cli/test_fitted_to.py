@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from softstart import Drive, InputError, compare, simulate
@@ -16,10 +14,8 @@ STIFF = BELIEVED.replace(stiffness=2.0 * BELIEVED.stiffness)
 ASKED = ("good.toml", "--fitted-to", "good.toml", "--set", "shaft.stiffness=736.93")
 
 
-def test_simulate_runs_the_one_and_sets_up_for_the_other(run, place):
-    code, out, err = run("simulate", *ASKED, "--controller", "shaped", "--json", "--out", "one")
-    assert (code, err) == (0, "")
-    told = json.loads(out)
+def test_simulate_runs_the_one_and_sets_up_for_the_other(place, as_json):
+    told = as_json("simulate", *ASKED, "--controller", "shaped", "--out", "one")
     wrong, right = simulate(STIFF, "shaped", fitted_to=BELIEVED), simulate(STIFF, "shaped")
     assert (told["k_dyn"], told["fitted_to"]) == (wrong.k_dyn, "a drive of my own")
     assert wrong.k_dyn > 1.5 * right.k_dyn
@@ -30,11 +26,9 @@ def test_simulate_runs_the_one_and_sets_up_for_the_other(run, place):
     assert Drive.load(place / "one" / "drive.toml").stiffness == STIFF.stiffness
 
 
-def test_compare_does_the_same_for_each(run, place):
+def test_compare_does_the_same_for_each(run, place, as_json):
     names = ("shaped",)
-    code, out, _ = run("compare", *ASKED, "--controllers", ",".join(names), "--json", "--out", "both")
-    assert code == 0
-    told = json.loads(out)
+    told = as_json("compare", *ASKED, "--controllers", ",".join(names), "--out", "both")
     assert told["fitted_to"] == "a drive of my own"
     for row, name in zip(told["strategies"], names, strict=True):
         assert row["k_dyn"] == simulate(STIFF, name, fitted_to=BELIEVED).k_dyn
@@ -46,19 +40,15 @@ def test_compare_does_the_same_for_each(run, place):
     assert 'set up for "a drive of my own": shaft.stiffness 368.465 there, 736.93 here' in shown
 
 
-def test_sweep_sets_up_for_one_drive_everywhere(run, place):
+def test_sweep_sets_up_for_one_drive_everywhere(place, as_json, refused):
     asked = ("--axis", "controller=shaped,ramp", "--axis", "shaft.stiffness=200,736.93", "--workers", "1")
-    code, out, _ = run("sweep", "good.toml", *asked, "--fitted-to", "good.toml", "--json", "--out", "grid")
-    assert code == 0
-    told = json.loads(out)
+    told = as_json("sweep", "good.toml", *asked, "--fitted-to", "good.toml", "--out", "grid")
     assert told["fitted_to"] == "a drive of my own"
     for cell in told["cells"]:
         there = BELIEVED.replace(stiffness=cell["stiffness"])
         assert cell["k_dyn"] == simulate(there, cell["controller"], fitted_to=BELIEVED).k_dyn
     assert Drive.load(place / "grid" / "fitted-to.toml") == BELIEVED
-    code, _, err = run("sweep", "good.toml", *asked, "--out", "grid")
-    assert code == 2
-    assert "it holds a sweep with another fitted_to" in err
+    refused("sweep", "good.toml", *asked, "--out", "grid", says=["it holds a sweep with another fitted_to"])
 
 
 def test_the_same_drive_changes_no_bit():
@@ -68,12 +58,10 @@ def test_the_same_drive_changes_no_bit():
     assert (plain.fitted_to, same.fitted_to) == (None, STIFF)
 
 
-def test_what_is_no_drive_is_refused(run, nothing_left):
+def test_what_is_no_drive_is_refused(refused):
     with pytest.raises(InputError, match="fitted_to: give the one Drive"):
         compare(STIFF, ["direct"], fitted_to="good.toml")
     for command in (("simulate", "good.toml", "--controller", "ramp"), ("compare", "good.toml")):
-        code, out, err = run(*command, "--fitted-to", "nowhere.toml", "--set", "gapp=1")
-        assert (code, out) == (2, "")
-        assert '--fitted-to: "nowhere.toml": there is no such file' in err
-        assert "gapp" in err
-    nothing_left()
+        said = refused(*command, "--fitted-to", "nowhere.toml", "--set", "gapp=1", mistakes=2)
+        assert '--fitted-to: "nowhere.toml": there is no such file' in said
+        assert "gapp" in said

@@ -92,23 +92,21 @@ def test_a_value_that_is_given_is_not_asked(run, typed):
 
 def test_an_end_of_the_answers_names_the_one_that_is_missing(run, typed, nothing_left):
     typed(*ANSWERS[:5])
-    code, out, err = run("init", "--ask", "--out", "mine.toml")
+    code, out, said = run("init", "--ask", "--out", "mine.toml")
     assert (code, out) == (2, "")
-    assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in err
-    assert "--set motor.inertia=" in err
+    assert "the answers end before [motor] inertia (inertia of the motor's own rotor)" in said
+    assert "--set motor.inertia=" in said
     nothing_left()
 
 
-def test_a_sheet_in_a_file(run, place):
+def test_a_sheet_in_a_file(run, place, as_json):
     code, out, _ = run("init", "--template")
     assert code == 0
     filled = "".join(
         line.removeprefix("# ") + "\n" for line in out.splitlines() if "only for hoist;" not in f"{line};"
     ).replace("[rope]", "")
     (place / "sheet.toml").write_text(filled)
-    code, out, err = run("init", "sheet.toml", "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)
+    found = as_json("init", "sheet.toml")
     assert found["data_sheet"]["machine"] == "travel"
     sheet = DataSheet.load("sheet.toml")
     assert found["drive"]["load_inertia"] == sheet.drive.J2

@@ -12,10 +12,8 @@ from softstart import Drive, linear_view
 LOOP = ("linear", "--controller", "current-limit-feedback")
 
 
-def test_json_is_the_summary(run):
-    code, out, err = run(*LOOP, "--json")
-    assert (code, err) == (0, "")
-    told = json.loads(out, parse_constant=pytest.fail)
+def test_json_is_the_summary(as_json):
+    told = as_json(*LOOP)
     view = linear_view(Drive.load("crane-4amtkf"), "current-limit-feedback")
     assert told["phase_margin"] == view.phase_margin
     assert told["delay_margin"] == view.delay_margin
@@ -24,20 +22,14 @@ def test_json_is_the_summary(run):
     assert told["kind"] == "loop"
 
 
-@pytest.mark.parametrize("width", ["80", "120"])
-def test_the_tables_are_shown(run, monkeypatch, width):
-    monkeypatch.setenv("COLUMNS", width)
-    code, out, err = run(*LOOP, "--set", "motor.torque_lag=2 ms", "--param", "damping_ratio=0.5")
-    assert (code, err) == (0, "")
-    assert max(map(len, out.splitlines())) <= int(width)
-    flat = " ".join(out.split())
+def test_the_tables_are_shown(table):
+    flat = table(*LOOP, "--set", "motor.torque_lag=2 ms", "--param", "damping_ratio=0.5")
     for words in ("phase margin", "delay margin", "elastic mode", "J2 x 2.5", "c x 0.9", "No limit cycle"):
         assert words in flat
 
 
-def test_files(run, place):
-    code, _, err = run(*LOOP, "--out", "loop")
-    assert (code, err) == (0, "")
+def test_files(place, done):
+    done(*LOOP, "--out", "loop")
     files = {path.name for path in (place / "loop").iterdir()}
     assert files == {"report.md", "linear.svg", "linear.png", "response.csv", "drive.toml"}
     with (place / "loop" / "response.csv").open(newline="") as stream:
@@ -48,9 +40,8 @@ def test_files(run, place):
     assert "phase margin" in (place / "loop" / "report.md").read_text()
 
 
-def test_open_loop_is_a_sentence(run, place):
-    code, out, err = run("linear", "good.toml", "--controller", "ramp", "--out", "open")
-    assert (code, err) == (0, "")
+def test_open_loop_is_a_sentence(place, done):
+    out = done("linear", "good.toml", "--controller", "ramp", "--out", "open")
     assert "ramp acts open loop" in " ".join(out.split())
     assert {path.name for path in (place / "open").iterdir()} == {"report.md", "drive.toml"}
 

@@ -1,7 +1,6 @@
 """`softstart simulate`: one start."""
 
 import csv
-import json
 import math
 
 import pytest
@@ -11,10 +10,8 @@ from softstart import Drive, simulate
 START = ("simulate", "crane-4amtkf", "--controller", "reduced-two-stage", "--until", "0.3")
 
 
-def test_json_has_summary_stages_and_events(run):
-    code, out, err = run(*START, "--param", "torque=15.5", "--json")
-    assert (code, err) == (0, "")
-    told = json.loads(out, parse_constant=pytest.fail)
+def test_json_has_summary_stages_and_events(as_json):
+    told = as_json(*START, "--param", "torque=15.5")
     wanted = simulate(Drive.load("crane-4amtkf"), "reduced-two-stage", 0.3, parameters={"torque": 15.5})
     summary = wanted.summary()
     assert told.keys() == {*summary, "fitted_to", "stages", "events"}
@@ -26,9 +23,8 @@ def test_json_has_summary_stages_and_events(run):
     assert [(e["time"], e["kind"]) for e in told["events"]] == [(e.time, e.kind) for e in wanted.events]
 
 
-def test_the_start_in_words(run):
-    code, out, err = run(*START)
-    assert (code, err) == (0, "")
+def test_the_start_in_words(done):
+    out = done(*START)
     for words in (
         "Crane travel drive", "under  reduced-two-stage (torque = 15.386",
         "The run ended at the time asked for",
@@ -45,9 +41,8 @@ def test_long_lists_are_cut_and_say_so(run):
     assert len(out.splitlines()) < 80
 
 
-def test_the_files(run, place):
-    code, out, err = run(*START, "--out", "results")
-    assert (code, err) == (0, "")
+def test_the_files(place, done):
+    out = done(*START, "--out", "results")
     folder = place / "results"
     assert {path.name for path in folder.iterdir()} == {
         "report.md", "drive.toml", "figures.csv", "stages.csv", "events.csv", "run-reduced-two-stage.svg",
@@ -65,7 +60,6 @@ def test_the_files(run, place):
 
 
 @pytest.mark.parametrize("drive", ["servo-axis-small", "nordin-servo-60kw", "crane-4amtkf-worn"])
-def test_shipped_drives_start(run, drive):
-    code, out, err = run("simulate", drive, "--controller", "direct")
-    assert (code, err) == (0, "")
+def test_shipped_drives_start(drive, done):
+    out = done("simulate", drive, "--controller", "direct")
     assert "The load reached its target speed." in out

@@ -1,7 +1,5 @@
 """`softstart study`, and what a study is."""
 
-import json
-
 import pytest
 
 from softstart import InputError, SimulationError, plugins
@@ -66,20 +64,18 @@ def registered(monkeypatch):
     monkeypatch.setattr(plugins, "registered", lambda group: points)
 
 
-def test_list(run):
+def test_list(done, as_json):
     for arguments in (["study"], ["study", "--list"]):
-        code, out, err = run(*arguments)
-        assert (code, err) == (0, "")
+        out = done(*arguments)
         assert "Does a wider gap raise K_dyn?" in out
         assert "No module named 'nothing'" in " ".join(out.split())
-    told = json.loads(run("study", "--list", "--json").out)
+    told = as_json("study", "--list")
     listed = {"name": "example", "title": Example.title, "pictures": ["gap"], "files": ["gap.svg", "gap.png"]}
     assert listed in told["studies"]
 
 
-def test_result_is_shown(run):
-    code, out, err = run("study", "example")
-    assert (code, err) == (0, "")
+def test_result_is_shown(done):
+    out = done("study", "example")
     for words in (
         "Peak over gap",
         "gap, rad",
@@ -92,22 +88,18 @@ def test_result_is_shown(run):
     assert max(map(len, out.splitlines())) <= 100
 
 
-def test_json(run):
-    code, out, err = run("study", "example", "--json")
-    assert (code, err) == (0, "")
-    told = json.loads(out)
+def test_json(as_json):
+    told = as_json("study", "example")
     assert told["study"] == "example"
     assert [claim["verdict"] for claim in told["claims"]] == ["confirmed", "refuted", "partly"]
     assert told["tables"][0]["rows"] == [[0.5, 3.1179, "[G]"], [2.0, None, ""]]
 
 
-def test_files(run, place):
+def test_files(run, place, as_json):
     code, out, _ = run("study", "example", "--out", "results")
     assert code == 0
     names = {path.name for path in (place / "results").iterdir()}
-    listed = {
-        one["name"]: one["files"] for one in json.loads(run("study", "--list", "--json").out)["studies"]
-    }
+    listed = {one["name"]: one["files"] for one in as_json("study", "--list")["studies"]}
     assert set(listed["example"]) == {name for name in names if not name.endswith(".csv")}
     assert names == {"gap.svg", "gap.png", "peak-over-gap.csv", "claims.csv"}
     table = (place / "results" / "peak-over-gap.csv").read_text("utf-8")

@@ -157,7 +157,9 @@ def test_what_cannot_be_followed_is_refused(new: Identification, tmp_path: Path)
             follow_wear(found, dates, limit)  # type: ignore[arg-type]
 
 
-def test_the_command_reads_folders_and_writes_a_report(run, new: Identification, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_the_command_reads_folders_and_writes_a_report(
+    run, new: Identification, tmp_path: Path, as_json
+) -> None:  # type: ignore[no-untyped-def]
     for year, gap in (("2024", 0.08), ("2026", 0.1)):
         with_value(new, "gap", gap, 0.001).save(tmp_path / year)
     line = ["identify", "--wear", str(tmp_path / "2024"), str(tmp_path / "2026"), "--controllers", "direct"]
@@ -166,7 +168,7 @@ def test_the_command_reads_folders_and_writes_a_report(run, new: Identification,
     assert "The gap grows by 0.01 rad a year" in result.out
     assert "It reaches 0.2 rad on 2036-0" in " ".join(result.out.split())
     assert {"report.md", "wear.csv", "wear.svg"} <= {path.name for path in (tmp_path / "worn").iterdir()}
-    data = json.loads(run(*line, "--json").out)
+    data = as_json(*line)
     assert [one["gap"] for one in data["gaps"]] == [0.08, 0.1]
     for extra, sentence in (
         (["--drive", "crane-4amtkf"], "--drive: --wear reads folders"),
