@@ -171,20 +171,6 @@ def test_servo_drives() -> None:
         assert run.start_time < 1.1 * direct.start_time
 
 
-def test_softer_than_direct_on_random_drives() -> None:
-    """K_dyn over that of `direct`: measured median 0.60, worst 0.86; start time 1.11 times on the median."""
-    rng = np.random.default_rng(7)
-    ratios, times = [], []
-    for _ in range(150):
-        drive = random_drive(rng)
-        run, direct = simulate(drive, CurrentLimitFeedback()), simulate(drive, "direct")
-        ratios.append(run.k_dyn / direct.k_dyn)
-        times.append(run.start_time / direct.start_time)
-    assert np.median(ratios) < 0.65
-    assert max(ratios) < 1.0
-    assert np.median(times) < 1.25
-
-
 # the parts of the law ------------------------------------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from tests.controllers.starts import CRANE, random_drive, traced
+from tests.controllers.starts import CRANE, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.drive import library
@@ -255,48 +255,6 @@ def test_invariant_to_gap_inertia_and_stiffness() -> None:
     peaks = simulate(drives, StateFeedback(), fitted_to=nominal, base=nominal).k_dyn.values
     assert peaks.max() < 1.35
     assert np.ptp(peaks, axis=0).max() < 0.12
-
-
-def test_softer_than_direct_on_random_drives() -> None:
-    """K_dyn over that of `direct`: measured median 0.53, worst 0.94; start time 1.07 times on the median."""
-    rng = np.random.default_rng(7)
-    ratios, times = [], []
-    for _ in range(100):
-        drive = random_drive(rng)
-        run, direct = simulate(drive, StateFeedback()), simulate(drive, "direct")
-        ratios.append(run.k_dyn / direct.k_dyn)
-        times.append(run.start_time / direct.start_time)
-    assert np.median(ratios) < 0.58
-    assert max(ratios) < 1.0
-    assert np.median(times) < 1.12
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"gap": 0.0},
-        {"start_position": -0.25},
-        {"start_position": 0.3},
-        {"initial_load_speed": 5.0},
-        {"load_torque": 0.0},
-        {"torque_rate": 2000.0},
-        {"encoder_lines": 16},
-        {"computing_delay": 0.001},
-        {"computing_delay": 0.0025, "torque_lag": 0.01},
-        {"torque_noise": 1.0, "encoder_lines": 1024},
-        {"damping": 20.0},
-        {"damping": 200.0},
-        {"stiffness": 5.0},
-        {"stiffness": 2e4},
-    ],
-    ids=str,
-)
-@pytest.mark.parametrize("kind", ["active", "reactive"])
-def test_odd_starts_come_to_their_end(changes: dict[str, Any], kind: Any) -> None:
-    drive = CRANE.replace(load_kind=kind, **changes)
-    run, direct = simulate(drive, StateFeedback()), simulate(drive, "direct")
-    assert run.start_time < 3.0 * direct.start_time
-    assert run.k_dyn < 1.1 * direct.k_dyn
 
 
 def test_gives_up_waiting() -> None:

@@ -69,9 +69,15 @@ def test_csv_has_a_header_with_units(tmp_path: Path) -> None:
     ]
 
 
+GOOD = "[profile]\ntime = [0, 0.1]\ntorque = [1, 2.5]\n"
+
+
 @pytest.mark.parametrize(
     "text",
     [
+        GOOD,
+        '[controller]\nname = "profile"\n' + GOOD,
+        '[profile]\ntime = [0, 100]\ntime_unit = "ms"\ntorque = [0.001, 0.0025]\ntorque_unit = "kN*m"\n',
         "0,1\n0.1,2.5\n",
         "t,u\n0,1\n0.1,2.5",
         "# measured\n\nZeit [ms];Moment [N*m]\n0;1\n100;2.5\n",
@@ -86,97 +92,66 @@ def test_csv_has_a_header_with_units(tmp_path: Path) -> None:
         "t [ms];u [kN*m]\n0;0,001\n100;0,0025\n",
     ],
 )
-def test_csv_is_read_with_other_headers_units_and_separators(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "p.csv"
+def test_files_are_read_with_other_headers_units_and_separators(tmp_path: Path, text: str) -> None:
+    path = tmp_path / ("p.toml" if "[profile]" in text else "p.csv")
     path.write_text(text, encoding="utf-8")
     read = TorqueProfile.load(path)
     assert read.time.tolist() == pytest.approx([0.0, 0.1], rel=1e-15)
     assert read.torque.tolist() == pytest.approx([1.0, 2.5], rel=1e-15)
 
 
+CSV = [
+    ("", "there are no numbers in it"),
+    ("time,torque\n", "there are no numbers in it"),
+    ("time,torque\n0,1\n0.1,a\n", 'line 3, torque = "a": this is no number'),
+    ("time,torque\n0,1\n0.1,nan\n", 'line 3, torque = "nan": this is not a number'),
+    ("time,torque\n0.5,1\n", "line 2: the first time is 0.5 s"),
+    ("0,1\n0.2,1\n0.1,2\n", "line 3: time falls from 0.2 s to 0.1 s"),
+    ("0,1\n0.2\n", 'line 2, "0.2", has 1 value instead of 2'),
+    ("time,torque\n0,1\n0,5,62\n", "write decimal points"),
+    ("time;torque\n0;1\n0.1;62,5\n", '"62,5" has a comma and "0.1" a point'),
+    ("0,0,10,5\n0,1,62,0\n", 'line 1, "0,0,10,5", has 4 values instead of 2'),
+    ("0,10,5\n1,20,5\n", 'line 1, "0,10,5", has 3 values instead of 2'),
+    ("0;1,500\n1;2,000\n", "may divide thousands"),
+    ("0;1.234,5\n", "write decimal points only"),
+    ("0 10\n1 20\n", "has 1 value instead of 2"),
+    ("t,time\n0,1\n", "it names time twice"),
+    ("time,torque\n0,1_000\n", 'torque = "1_000"'),
+    ("time,torque\n0,\N{ARABIC-INDIC DIGIT FIVE}\n", "this is no number"),
+    ("when,what,u\n0,1,2\n", "it must name the columns, as time,torque"),
+    ("time [furlong],torque\n0,1\n", "furlong"),
+    ("0\n1\n", "has 1 value instead of 2"),
+]
+TOML = [
+    ("[profile\n", "not valid TOML"),
+    ("", "no table [profile]"),
+    ("[motor]\ninertia = 1\n", 'no "motor"'),
+    ('[controller]\nname = "ramp"\n' + GOOD, 'for the controller "ramp"'),
+    ("profile = 3\n", "write a table [profile]"),
+    ("[profile]\ntime = [0]\n", "torque = None: write a list"),
+    ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
+    ('[profile]\ntime = [0, "1"]\ntorque = [1, 1]\n', 'number 2 of the list is "1"'),
+    ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "number 2 of the list is True"),
+    ("[profile]\ntime = [0, inf]\ntorque = [1, 1]\n", "number 2 of the list is inf"),
+    ("[profile]\ntime = [0, 1]\ntorque = [1]\n", "2 times for 1 torques"),
+    ("[profile]\ntime = [1, 2]\ntorque = [1, 1]\n", "the first is 1 s"),
+    ("[profile]\ntime = [0, 2, 1]\ntorque = [1, 1, 1]\n", "falls from 2 s to 1 s at number 3"),
+    (GOOD + 'unit = "s"\n', 'no key "unit"'),
+    (GOOD + 'time_unit = "N*m"\n', "time_unit"),
+    (GOOD + "[after_contact]\ntime = [0]\n", "[after_contact] torque"),
+]
+
+
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "there are no numbers in it"),
-        ("time,torque\n", "there are no numbers in it"),
-        ("time,torque\n0,1\n0.1,a\n", 'line 3, torque = "a": this is no number'),
-        ("time,torque\n0,1\n0.1,nan\n", 'line 3, torque = "nan": this is not a number'),
-        ("time,torque\n0.5,1\n", "line 2: the first time is 0.5 s"),
-        ("0,1\n0.2,1\n0.1,2\n", "line 3: time falls from 0.2 s to 0.1 s"),
-        ("0,1\n0.2\n", 'line 2, "0.2", has 1 value instead of 2'),
-        ("time,torque\n0,1\n0,5,62\n", "write decimal points"),
-        ("time;torque\n0;1\n0.1;62,5\n", '"62,5" has a comma and "0.1" a point'),
-        ("0,0,10,5\n0,1,62,0\n", 'line 1, "0,0,10,5", has 4 values instead of 2'),
-        ("0,10,5\n1,20,5\n", 'line 1, "0,10,5", has 3 values instead of 2'),
-        ("0;1,500\n1;2,000\n", "may divide thousands"),
-        ("0;1.234,5\n", "write decimal points only"),
-        ("0 10\n1 20\n", "has 1 value instead of 2"),
-        ("t,time\n0,1\n", "it names time twice"),
-        ("time,torque\n0,1_000\n", 'torque = "1_000"'),
-        ("time,torque\n0,\N{ARABIC-INDIC DIGIT FIVE}\n", "this is no number"),
-        ("when,what,u\n0,1,2\n", "it must name the columns, as time,torque"),
-        ("time [furlong],torque\n0,1\n", "furlong"),
-        ("0\n1\n", "has 1 value instead of 2"),
-    ],
+    ("name", "text", "words"), [("bad.csv", *row) for row in CSV] + [("bad.toml", *row) for row in TOML]
 )
-def test_bad_csv_in_one_sentence_with_line_and_value(tmp_path: Path, text: str, words: str) -> None:
-    path = tmp_path / "bad.csv"
-    path.write_text(text, encoding="utf-8")
+def test_a_bad_file_in_one_sentence_with_its_place(tmp_path: Path, name: str, text: str, words: str) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        TorqueProfile.load(path)
+        TorqueProfile.load(tmp_path / name)
     (sentence,) = caught.value.sentences
     assert words in sentence
-    assert "bad.csv" in sentence
-
-
-GOOD = "[profile]\ntime = [0, 0.1]\ntorque = [1, 2.5]\n"
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        GOOD,
-        '[controller]\nname = "profile"\n' + GOOD,
-        '[profile]\ntime = [0, 100]\ntime_unit = "ms"\ntorque = [0.001, 0.0025]\ntorque_unit = "kN*m"\n',
-    ],
-)
-def test_toml_is_read_with_units(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "p.toml"
-    path.write_text(text, encoding="utf-8")
-    read = TorqueProfile.load(path)
-    assert read.time.tolist() == pytest.approx([0.0, 0.1], rel=1e-15)
-    assert read.torque.tolist() == pytest.approx([1.0, 2.5], rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[profile\n", "not valid TOML"),
-        ("", "no table [profile]"),
-        ("[motor]\ninertia = 1\n", 'no "motor"'),
-        ('[controller]\nname = "ramp"\n' + GOOD, 'for the controller "ramp"'),
-        ("profile = 3\n", "write a table [profile]"),
-        ("[profile]\ntime = [0]\n", "torque = None: write a list"),
-        ('[profile]\ntime = "0 s"\ntorque = [1]\n', 'time = "0 s": write a list'),
-        ('[profile]\ntime = [0, "1"]\ntorque = [1, 1]\n', 'number 2 of the list is "1"'),
-        ("[profile]\ntime = [0, true]\ntorque = [1, 1]\n", "number 2 of the list is True"),
-        ("[profile]\ntime = [0, inf]\ntorque = [1, 1]\n", "number 2 of the list is inf"),
-        ("[profile]\ntime = [0, 1]\ntorque = [1]\n", "2 times for 1 torques"),
-        ("[profile]\ntime = [1, 2]\ntorque = [1, 1]\n", "the first is 1 s"),
-        ("[profile]\ntime = [0, 2, 1]\ntorque = [1, 1, 1]\n", "falls from 2 s to 1 s at number 3"),
-        (GOOD + 'unit = "s"\n', 'no key "unit"'),
-        (GOOD + 'time_unit = "N*m"\n', "time_unit"),
-        (GOOD + "[after_contact]\ntime = [0]\n", "[after_contact] torque"),
-    ],
-)
-def test_bad_toml_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
-    path = tmp_path / "bad.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as caught:
-        TorqueProfile.load(path)
-    (sentence,) = caught.value.sentences
-    assert words in sentence
-    assert "bad.toml" in sentence
+    assert name in sentence
 
 
 def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
@@ -210,18 +185,8 @@ def test_the_c_code_is_the_profile(tmp_path: Path) -> None:
     for i, profile in enumerate((many, steep, TorqueProfile([0.0], [5.0], after_contact=many))):
         source, library = tmp_path / f"p{i}.c", tmp_path / f"p{i}.so"
         profile.to_c(source)
-        command = [
-            str(compiler),
-            "-O2",
-            "-Wall",
-            "-Werror",
-            "-shared",
-            "-fPIC",
-            "-o",
-            str(library),
-            str(source),
-            "-lm",
-        ]
+        flags = ("-O2", "-Wall", "-Werror", "-shared", "-fPIC")
+        command = [str(compiler), *flags, "-o", str(library), str(source), "-lm"]
         subprocess.run(command, check=True, capture_output=True)
         code = ctypes.CDLL(str(library))
         functions = {"torque_profile": profile}

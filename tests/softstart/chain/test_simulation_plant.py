@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tests.softstart.plant.pieces import Pieces
-from tests.softstart.plant.test_against_oracle import case
+from tests.softstart.plant.test_against_oracle import case, drive_of
 
 from softstart import Drive, simulate
 from softstart.chain import Chain, simulate_chain
@@ -22,25 +22,7 @@ def compare(seed: int, overdamped: bool = False) -> None:
     if overdamped:
         critical = 2.0 * np.sqrt(drawn["c"] * drawn["J1"] * drawn["J2"] / (drawn["J1"] + drawn["J2"]))
         drawn["d"] = float(critical * 10 ** np.random.default_rng(seed).uniform(0.0, 1.5))
-    torques = [u for _, u in drawn["torque_pieces"]]
-    drive = Drive(
-        motor_inertia=drawn["J1"],
-        load_inertia=drawn["J2"],
-        stiffness=drawn["c"],
-        damping=drawn["d"],
-        gap=drawn["gap"],
-        load_torque=drawn["Mc"],
-        load_kind=drawn["kind"],
-        contact_law=drawn["law"],
-        start_position=drawn["theta0"],
-        initial_motor_speed=drawn["w1_0"],
-        initial_load_speed=drawn["w2_0"],
-        torque_lag=drawn["lag"],
-        torque_rate=drawn["rate"],
-        starting_torque=max(*torques, 1.1 * drawn["Mc"], 1e-9),
-        minimum_torque=min(0.0, *torques),
-        target_speed=drawn["target"],
-    )
+    drive = drive_of(drawn)
     played = Pieces(pieces=tuple(drawn["torque_pieces"]), end=drawn["t_end"])
     plant = simulate(drive, played, until=drawn["t_end"])
     chain = simulate_chain(Chain.from_drive(drive), played, until=drawn["t_end"], fitted_to=drive)

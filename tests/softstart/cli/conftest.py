@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -194,6 +196,25 @@ def spawn(place):
         return subprocess.run(
             [*COMMAND, *arguments], capture_output=True, text=True, timeout=300, check=False, **options
         )
+
+    return go
+
+
+@pytest.fixture
+def interrupted(command):
+    """softstart ARGUMENTS stopped from the keyboard once `begun`: what it says, and exit 130."""
+
+    def go(*arguments: str, begun: Callable[[], bool]) -> str:
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen([*command, *arguments], start_new_session=True, **pipes)
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and not begun():
+            time.sleep(0.005)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does it: to the workers too
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, out) == (130, ""), err
+        assert "Traceback" not in err
+        return err
 
     return go
 

@@ -10,19 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.softstart.test_identification import TRUTH as UNKNOWN
 
-from softstart import Drive, Identification, InputError, compare, follow_wear, identify, simulate
+from softstart import Identification, InputError, compare, follow_wear, identify, simulate
 from softstart.identification.planning import made_up_log
 from softstart.identification.wear import Line
 
-TRUTH = Drive.load("crane-4amtkf").replace(
-    damping=0.3,
-    torque_lag=0.004,
-    load_kind="reactive",
-    gap=0.08,
-    start_position="mid-gap",
-    encoder_lines=1024,
-)
+TRUTH = UNKNOWN.replace(start_position="mid-gap")
 
 
 @pytest.fixture(scope="module")

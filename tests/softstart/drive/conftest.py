@@ -6,6 +6,16 @@ import pytest
 
 from softstart.errors import InputError
 
+GOOD = {
+    "motor_inertia": 0.035,
+    "starting_torque": 62.0,
+    "stiffness": 368.465,
+    "gap": 0.5,
+    "load_inertia": 0.175,
+    "load_torque": 7.16,
+    "target_speed": 92.0,
+}
+
 
 @pytest.fixture
 def sentences():

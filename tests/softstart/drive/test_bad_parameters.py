@@ -4,20 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from tests.softstart.drive.conftest import GOOD
 
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.reporting.resolution import rated_torque
-
-GOOD = {
-    "motor_inertia": 0.035,
-    "starting_torque": 62.0,
-    "stiffness": 368.465,
-    "gap": 0.5,
-    "load_inertia": 0.175,
-    "load_torque": 7.16,
-    "target_speed": 92.0,
-}
 
 # parameter, value, what the sentence begins with, what it says
 PYTHON = [

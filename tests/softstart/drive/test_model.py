@@ -11,19 +11,12 @@ import typing
 
 import numpy as np
 import pytest
+from tests.softstart.drive.conftest import GOOD
 
 from softstart.drive import INFORMATIVE_TABLES, PARAMETERS, TABLES, Drive
 from softstart.errors import InputError
 
-CRANE = {
-    "motor_inertia": 0.035,
-    "starting_torque": 62.0,
-    "stiffness": 368.465,
-    "gap": 0.5,
-    "load_inertia": 0.175,
-    "load_torque": 7.16,
-    "rated_speed": 92.0,
-}
+CRANE = {**GOOD, "target_speed": None, "rated_speed": 92.0}
 
 
 @pytest.fixture

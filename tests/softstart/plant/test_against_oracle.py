@@ -35,8 +35,8 @@ def case(seed: int) -> dict[str, Any]:
     return drawn
 
 
-def run_of(drawn: dict[str, Any]) -> Run:
-    """The same start by the plant under test."""
+def drive_of(drawn: dict[str, Any]) -> Drive:
+    """The drive of this start."""
     pieces, ends = (
         drawn["torque_pieces"],
         [*(piece[0] for piece in drawn["torque_pieces"][1:]), drawn["t_end"]],
@@ -44,7 +44,7 @@ def run_of(drawn: dict[str, Any]) -> Run:
     torques = [u for _, u, *_ in pieces]
     torques += [u + (end - t) * sum(slope) for (t, u, *slope), end in zip(pieces, ends, strict=True)]
     Ms = max(*torques, 1.1 * drawn["Mc"], 1e-09)
-    drive = Drive(
+    return Drive(
         motor_inertia=drawn["J1"],
         load_inertia=drawn["J2"],
         stiffness=drawn["c"],
@@ -66,7 +66,24 @@ def run_of(drawn: dict[str, Any]) -> Run:
         load_viscous_friction=drawn.get("b2", 0.0),
         **brake_of(drawn),
     )
-    return simulate(drive, Pieces(pieces=tuple(pieces), end=drawn["t_end"]), until=drawn["t_end"])
+
+
+def run_of(drawn: dict[str, Any]) -> Run:
+    """The same start by the plant under test."""
+    played = Pieces(pieces=tuple(drawn["torque_pieces"]), end=drawn["t_end"])
+    return simulate(drive_of(drawn), played, until=drawn["t_end"])
+
+
+def in_other_units(drawn: dict[str, Any], mass: float, time: float) -> dict[str, Any]:
+    """The same start with inertias times `mass` and times times `time`."""
+    torque = mass / time**2
+    units = dict.fromkeys(("J1", "J2"), mass) | dict.fromkeys(("c", "Mc", "friction"), torque)
+    units |= dict.fromkeys(("d", "b1", "b2"), torque * time)
+    units |= dict.fromkeys(("w1_0", "w2_0", "target"), 1.0 / time)
+    units |= {"lag": time, "rate": torque / time, "t_end": time}
+    scaled = drawn | {name: drawn[name] * unit for name, unit in units.items() if name in drawn}
+    scaled["torque_pieces"] = [(t * time, u * torque) for t, u in drawn["torque_pieces"]]
+    return scaled
 
 
 def brake_of(drawn: dict[str, Any]) -> dict[str, Any]:

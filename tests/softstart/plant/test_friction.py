@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.plant.pieces import Pieces, TwoSteps
-from tests.softstart.plant.test_against_oracle import case_with_friction, run_of
+from tests.softstart.plant.test_against_oracle import case_with_friction, in_other_units, run_of
 
 from softstart import Chain, Drive, InputError, Run, optimize, simulate
 from softstart.start.metrics import base_torque
@@ -148,11 +148,7 @@ def test_unit_changes(seed: int, mass: float, time: float) -> None:
     drawn = case_with_friction(seed)
     m, s = 10.0**mass, 10.0**time
     torque = m / s**2
-    units = dict.fromkeys(("J1", "J2"), m) | dict.fromkeys(("c", "Mc", "friction"), torque)
-    units |= dict.fromkeys(("d", "b1", "b2"), torque * s) | dict.fromkeys(("w1_0", "w2_0", "target"), 1.0 / s)
-    units |= {"lag": s, "rate": torque / s, "t_end": s}
-    scaled = drawn | {name: drawn[name] * unit for name, unit in units.items() if name in drawn}
-    scaled["torque_pieces"] = [(t * s, u * torque) for t, u in drawn["torque_pieces"]]
+    scaled = in_other_units(drawn, m, s)
     one, other = run_of(drawn), run_of(scaled)
     assert other.peak_torque == pytest.approx(one.peak_torque * torque, rel=1e-8, abs=1e-12 * scaled["c"])
     assert other.start_time == pytest.approx(one.start_time * s, rel=1e-8, nan_ok=True)

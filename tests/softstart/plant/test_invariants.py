@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.plant.pieces import Pieces, TwoSteps
-from tests.softstart.plant.test_against_oracle import case, run_of
+from tests.softstart.plant.test_against_oracle import case, in_other_units, run_of
 
 from softstart import Drive, TorqueProfile, controller, simulate
 from softstart.plant.layout import S_SIDE, S_THETA
@@ -72,21 +72,7 @@ def test_unit_changes(seed: int, mass: float, time: float) -> None:
     drawn = case(seed)
     m, s = 10.0**mass, 10.0**time
     torque = m / s**2
-    scaled = {
-        **drawn,
-        "J1": drawn["J1"] * m,
-        "J2": drawn["J2"] * m,
-        "c": drawn["c"] * torque,
-        "d": drawn["d"] * torque * s,
-        "Mc": drawn["Mc"] * torque,
-        "w1_0": drawn["w1_0"] / s,
-        "w2_0": drawn["w2_0"] / s,
-        "target": drawn["target"] / s,
-        "lag": drawn["lag"] * s,
-        "rate": drawn["rate"] * torque / s,
-        "t_end": drawn["t_end"] * s,
-        "torque_pieces": [(t * s, u * torque) for t, u in drawn["torque_pieces"]],
-    }
+    scaled = in_other_units(drawn, m, s)
     one, other = run_of(drawn), run_of(scaled)
     assert other.peak_torque == pytest.approx(one.peak_torque * torque, rel=1e-8, abs=1e-12 * scaled["c"])
     if drawn["gap"] > 0.0:

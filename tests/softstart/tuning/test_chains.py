@@ -4,36 +4,25 @@ import json
 
 import numpy as np
 import pytest
+from tests.softstart.tuning.test_trials import trials
 
 from softstart import InputError, simulate, tune
 from softstart.chain import Chain
 from softstart.chain.machines import knob, moved, two_masses, with_values
 from softstart.controller import make_controller
-from softstart.tuning.question import Question, bound_of, gaps_of, inertias_of, recipe_of, scenarios_of
-from softstart.tuning.ranges import ranges_of
-from softstart.tuning.trials import Trials
+from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
 
 CHAIN = Chain.load("crane-4-mass")
 DAMPED = Chain.from_toml(CHAIN.to_toml(), also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
+OFF = {"shaft[2].gap": "20 %", "load_torque": "10 %"}
 QUICK = {"restarts": 1, "generations": 3, "workers": 1}
-
-
-def trials(name, chain=CHAIN, tolerances=None, **change):
-    recipe = recipe_of(name)
-    asked = {
-        "drive": chain, "recipe": recipe, "gaps": (0.5, 1.0), "load_inertias": (40.0, 69.2),
-        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(chain, tolerances),
-        "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
-        "population": 8, "generations": 2,
-    }  # fmt: skip
-    return Trials(Question(**(asked | change)))
 
 
 @pytest.mark.parametrize("name", ["s-curve", "take-up", "acceleration-delay"])
 @pytest.mark.parametrize("position", ["mid-gap", "unknown"])
 def test_each_candidate_is_the_start_that_simulate_makes(name, position):
     chain = with_values(CHAIN, {"start_position": position})
-    tried = trials(name, chain, {"shaft[2].gap": "20 %", "load_torque": "10 %"})
+    tried = trials(name, chain, OFF, gaps=(0.5, 1.0), load_inertias=(40.0, 69.2))
     cells = np.array([0, 3])
     places = np.random.default_rng(3).random((2, len(tried.question.ranges)))
     values = {

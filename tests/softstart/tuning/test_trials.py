@@ -14,11 +14,11 @@ from softstart.tuning.trials import Trials
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 
 
-def trials(name, tolerances=None, **change):
+def trials(name, drive=CRANE, tolerances=None, **change):
     recipe = recipe_of(name)
     asked = {
-        "drive": CRANE, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
-        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(CRANE, tolerances),
+        "drive": drive, "recipe": recipe, "gaps": (0.5, 2.0), "load_inertias": (0.07, 0.175),
+        "ranges": ranges_of(recipe.make(), None), "scenarios": scenarios_of(drive, tolerances),
         "metric": "k_dyn", "bound": bound_of(None), "quantile": 1.0, "base": None, "seed": 0, "restarts": 1,
         "population": 8, "generations": 2,
     }  # fmt: skip
@@ -27,7 +27,7 @@ def trials(name, tolerances=None, **change):
 
 @pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback", "s-curve"])
 def test_each_candidate_is_the_start_that_simulate_makes(name):
-    tried = trials(name, {"load_torque": "20 %"})
+    tried = trials(name, tolerances={"load_torque": "20 %"})
     assert tried.batched
     places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
     cells = np.array([0, 3, 1])
