@@ -123,11 +123,7 @@ def test_reactive_load_stays_until_the_shaft_moves_it() -> None:
     assert x.P[3, 4] > 0.0
 
 
-@given(
-    st.floats(-60, 60),
-    st.floats(-60, 60),
-    st.floats(1e-3, 5.0),
-)
+@given(st.floats(-60, 60), st.floats(-60, 60), st.floats(1e-3, 5.0))
 def test_lean_of_a_lagging_torque(before: float, demand: float, ratio: float) -> None:
     """x = h/lag: mean and double integral of the exponential, against sums."""
     after = demand - (demand - before) * math.exp(-ratio)
@@ -141,12 +137,7 @@ def test_lean_of_a_lagging_torque(before: float, demand: float, ratio: float) ->
     assert lean(before, after, demand, mean) == pytest.approx(double - 0.5 * single, abs=1e-5 * size)
 
 
-@given(
-    st.floats(1e-4, 6e-3),
-    st.floats(2.0, 20.0),
-    st.floats(0.0, 1.0),
-    st.floats(0.0, 2.0),
-)
+@given(st.floats(1e-4, 6e-3), st.floats(2.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
 @settings(max_examples=50, deadline=None)
 def test_time_since_contact_inverts_the_way_lost(s: float, V: float, share: float, d: float) -> None:
     slope = share * V / s
@@ -259,10 +250,7 @@ def test_no_contact_is_seen_before_there_is_one(kind: Any, gap: float) -> None:
 # how near the optimum ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("gap", "ratio"),
-    [(0.5, 5.0), (2.0, 5.0), (0.5, 3.0), (1.0, 4.0)],
-)
+@pytest.mark.parametrize(("gap", "ratio"), [(0.5, 5.0), (2.0, 5.0), (0.5, 3.0), (1.0, 4.0)])
 def test_with_everything_ideal_it_is_the_optimum(gap: float, ratio: float) -> None:
     """No lag, an ideal encoder, the stiffness known, the peak held, J2 unknown: measured 0.02 to 0.23 %."""
     drive = cell("active", gap, ratio, torque_lag=0.0, encoder_lines=0)

@@ -116,11 +116,7 @@ def test_lines_of_code_are_counted_without_comments_and_docstrings():
 
 @pytest.mark.parametrize(
     ("name", "start_time", "k_dyn", "within"),
-    [
-        ("closed-form", LONG, 0.90924724, 1e-6),
-        ("lp", LONG, 0.90924724, 1e-3),
-        ("lp", SHORT, 1.4564, 1e-3),
-    ],
+    [("closed-form", LONG, 0.90924724, 1e-6), ("lp", LONG, 0.90924724, 1e-3), ("lp", SHORT, 1.4564, 1e-3)],
 )
 def test_softstart_answers_with_the_known_optima(name, start_time, k_dyn, within):
     task = crane_task(start_time)

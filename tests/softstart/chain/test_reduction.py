@@ -99,8 +99,7 @@ def test_four_masses_to_two_are_the_formulas_of_the_paper(
 ) -> None:
     """[R]: 1/C = 1/c1 + 1/c3, I_I = I1 + (I2 + I3) C/c3, I_II = I4 + (I2 + I3) C/c1; the gap stays."""
     chain = Chain(
-        [Mass(I1), Mass(I2), Mass(I3), Mass(I4)],
-        [Shaft(c1), Shaft(gap=0.3, restitution=1.0), Shaft(c3)],
+        [Mass(I1), Mass(I2), Mass(I3), Mass(I4)], [Shaft(c1), Shaft(gap=0.3, restitution=1.0), Shaft(c3)]
     )
     found = reduce_chain(chain, 2, force=True)
     if [step.kind for step in found.steps] != ["joint", "mass"]:

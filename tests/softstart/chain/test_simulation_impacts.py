@@ -202,11 +202,7 @@ def test_masses_joined_rigidly_through_a_gear_start_with_one_speed_but_for_round
 
 def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
     """Two masses with friction 1 and 2 on a rigid joint: they break away at 3 N m, not before."""
-    masses = [
-        Mass(1.0, torque=1.0, kind="reactive"),
-        Mass(2.0, torque=2.0, kind="reactive"),
-        Mass(1.0),
-    ]
+    masses = [Mass(1.0, torque=1.0, kind="reactive"), Mass(2.0, torque=2.0, kind="reactive"), Mass(1.0)]
     chain = Chain(masses, [Shaft("inf"), Shaft(100.0)], Motor(6.0, torque_rate=1.0), target_speed=0.5)
     run = simulate_chain(chain, Pieces(pieces=((0.0, 6.0),)), fitted_to=CRANE)
     starts = [e for e in run.events if e.kind == "load starts"]

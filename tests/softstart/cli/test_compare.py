@@ -139,16 +139,8 @@ FILES = {
 
 
 def test_the_files(place, done):
-    out = done(
-        "compare",
-        "good.toml",
-        "--controllers",
-        "direct,own.py:Good",
-        "--set",
-        "gap=0.6",
-        "--out",
-        "deep/results",
-    )
+    asked = ("--controllers", "direct,own.py:Good", "--set", "gap=0.6", "--out", "deep/results")
+    out = done("compare", "good.toml", *asked)
     assert out.endswith("Written to deep/results: report.md, figures, traces and the table.\n")
     folder = place / "deep" / "results"
     assert {path.name for path in folder.iterdir()} == FILES

@@ -52,8 +52,7 @@ def test_a_pipe_or_device_is_not_replaced(place, refused):
 
 
 @pytest.mark.parametrize(
-    ("out", "says"),
-    [("folder", "is a folder"), ("gone/r.html", "cannot be written"), ("", "name of a file")],
+    ("out", "says"), [("folder", "is a folder"), ("gone/r.html", "cannot be written"), ("", "name of a file")]
 )
 def test_a_place_that_cannot_be_written_is_told_first(out, says, refused):
     refused("report", "good.toml", "--out", out, says=[says])

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from tests.softstart.drive.conftest import GOOD
 
@@ -15,11 +14,7 @@ PYTHON = [
     ("gap", "5 m", 'gap = "5 m": ', "m is a length, not an angle"),
     ("gap", -0.5, "gap = -0.5: ", "the total angular gap must be 0 or more"),
     ("gap", "-30 deg", 'gap = "-30 deg": ', "must be 0 or more"),
-    ("gap", [[1, 2], [3]], "gap[0] = [1, 2]: ", "the same length"),
     ("gap", [0.5, -2.0, -3.0], "gap[1] = -2.0: ", "must be 0 or more"),
-    ("gap", [0.5, "2 m"], 'gap[1] = "2 m": ', "m is a length"),
-    ("gap", np.array([[1.0], [np.nan]]), "gap[1, 0] = nan: ", "not a number"),
-    ("gap", np.array([True, False]), "gap[0] = True: ", "true and false are no quantities"),
     ("motor_inertia", 0, "motor_inertia = 0: ", "must be above 0"),
     ("load_inertia", -1, "load_inertia = -1: ", "the inertia of the load at the motor shaft must be above 0"),
     ("stiffness", 0.0, "stiffness = 0.0: ", "must be above 0"),
@@ -30,7 +25,6 @@ PYTHON = [
     ("maximum_torque", 61, "maximum_torque = 61 N*m: ", "must not be below starting_torque = 62 N*m"),
     ("minimum_torque", 1, "minimum_torque = 1: ", "must be 0 or less"),
     ("rated_power", 0, "rated_power = 0: ", "must be above 0"),
-    ("target_speed", "50 Hz", 'target_speed = "50 Hz": ', "may count turns or radians"),
     ("target_speed", -92, "target_speed = -92: ", "must be above 0"),
     ("torque_lag", -0.001, "torque_lag = -0.001: ", "must be 0 or more"),
     ("torque_rate", 0, "torque_rate = 0: ", "must be above 0"),
@@ -121,7 +115,6 @@ SETTINGS = [
     ("zzz.yyy=1", "zzz.yyy=1: ", "there are name, source, assumed, units, motor.inertia"),
     ("load.kind=reactve", 'load.kind = "reactve": ', 'did you mean "reactive"?'),
     ("shaft.gap=2 m", 'shaft.gap = "2 m": ', "m is a length"),
-    ("shaft.gap=0.5,2", 'shaft.gap = "0.5,2": ', "decimal point"),
     ("motor.starting_torque=1", "motor.starting_torque = 1 N*m: ", "load.torque = 7.16 N*m"),
     (5, "5: ", "a setting is text"),
 ]

@@ -200,10 +200,6 @@ def test_contact_laws(law, rate, expected):
 
 def test_a_batch_is_refused(crane):
     batch = crane.replace(gap=[0.5, 2])
-    for attempt in (
-        batch.to_control,
-        lambda: batch.to_control(nonlinear=True),
-        lambda: initial_state(batch),
-    ):
+    for attempt in (batch.to_control, lambda: batch.to_control(nonlinear=True), lambda: initial_state(batch)):
         with pytest.raises(InputError, match=r"a batch of shape \(2,\) is not one system"):
             attempt()

@@ -45,8 +45,7 @@ SWING = (
     st.tuples(*[st.floats(-5.0, 5.0)] * 3),
 )
 SWINGS = st.one_of(
-    st.builds(swing, *SWING, st.floats(0.1, 50.0)),
-    st.builds(swing_from_start, *SWING, st.floats(1e-3, 2.0)),
+    st.builds(swing, *SWING, st.floats(0.1, 50.0)), st.builds(swing_from_start, *SWING, st.floats(1e-3, 2.0))
 )
 
 
