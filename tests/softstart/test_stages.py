@@ -177,6 +177,15 @@ def test_methods_are_what_integration_gives(kind, seed):
 
 @settings(deadline=None)
 @given(drives)
+def test_reactive_load_without_friction_is_an_active_one_without_torque(drawn):
+    r, drive = split(drawn)
+    drive["Mc"] = 0.0
+    for method in (stages.method_1, stages.method_2):
+        assert method(r, **drive, kind="reactive") == pytest.approx(method(r, **drive), rel=1e-13)
+
+
+@settings(deadline=None)
+@given(drives)
 def test_friction_that_is_never_overcome_leaves_a_motor_on_a_fixed_shaft(drawn):
     r, drive = split(drawn)
     J1, J2, c, gap, Ms, _ = drive.values()
