@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 73833, "tests": 41896}  # lines; lower a number when it has fallen, never raise it
+MOST = {"src, controllers": 73756, "tests": 41620}  # lines; lower a number when it has fallen, never raise it
 LONGEST = 921  # lines of the longest file
 
 

@@ -115,7 +115,7 @@ def test_a_log_is_identified_as_the_command_does(tmp_path: Path) -> None:
     assert [row[0] for row in found.rows][:2] == ["motor.inertia, kg m²", "load.inertia, kg m²"]
     assert tuple(found.notes) == alone.notes
     assert len(heard.shares) > 2
-    with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none has a name of times"):
+    with pytest.raises(InputError, match=r"^log = rig.csv: there are the columns a, b; none has a name"):
         tasks.identified(b"a,b\n1,2\n", "rig.csv", drive, "demand", {}, progress=heard)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="write signal=name"):
         tasks.columns_of("torque")
