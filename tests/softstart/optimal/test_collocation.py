@@ -51,7 +51,10 @@ def checked(problem):
 
 
 # Optima of issue 3: the first by the closed form pulse-coast-hold, the second by linear programs.
-@pytest.mark.parametrize(("start_time", "k_dyn"), [(0.2883042, 0.90924724), (0.2522662, 1.4564)])
+@pytest.mark.parametrize(
+    ("start_time", "k_dyn"),
+    [(0.2883042, 0.90924724), pytest.param(0.2522662, 1.4564, marks=pytest.mark.slow)],
+)
 def test_the_two_anchors_of_the_crane_drive_are_met_within_a_thousandth(start_time, k_dyn):
     candidate, path = checked(Problem(CRANE, start_time=start_time))
     problem = Problem(CRANE, start_time=start_time)
@@ -80,9 +83,12 @@ DRIVES = {
     "no gap": ({"gap": 0.0}, 0.2883),
     "braking motor": ({"minimum_torque": -30.0}, 0.26),
 }
+QUICK = ("modelica", "reactive", "rate", "lag and rate", "braking motor")
 
 
-@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in DRIVES]
+)
 def test_every_kind_of_drive_ends_where_it_says_with_the_peak_it_claims(name):
     changes, start_time = DRIVES[name]
     problem = Problem(CRANE.replace(**changes), start_time=start_time)
@@ -161,6 +167,7 @@ def test_a_change_of_units_leaves_k_dyn_as_it_is():
     assert other.end_time == pytest.approx(solved(problem).end_time * t, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_contact_from_which_the_search_begins_does_not_matter():
     problem = Problem(CRANE, start_time=SWITCHES)
     for contact in (0.016, 0.06):

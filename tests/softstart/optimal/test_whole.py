@@ -168,7 +168,7 @@ def test_units_do_not_matter() -> None:
     [
         {"torque_lag": 0.005},
         pytest.param({"load_kind": "reactive", "damping": 0.5}, marks=pytest.mark.slow),
-        {"torque_rate": 3e3},
+        pytest.param({"torque_rate": 3e3}, marks=pytest.mark.slow),
     ],
 )
 def test_the_shortest_start_time_parts_what_can_be_from_what_cannot(given: dict[str, Any]) -> None:

@@ -24,7 +24,7 @@ KINDS = {
     "motor stops": "motor-stops",
 }
 DRIVES_PER_BLOCK = 25
-BLOCKS = 8 if settings.default.derandomize else 20  # `make fuzz` takes all
+BLOCKS = 6 if settings.default.derandomize else 20  # `make fuzz` takes all
 
 
 def case(seed: int) -> dict[str, Any]:
