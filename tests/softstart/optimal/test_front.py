@@ -10,13 +10,7 @@ import pytest
 
 from softstart import Drive, InputError, simulate
 from softstart.controller import ready_controller_names
-from softstart.optimal.front import (
-    ControllerPoint,
-    FrontPoint,
-    _monotone,
-    default_start_times,
-    pareto,
-)
+from softstart.optimal.front import ControllerPoint, FrontPoint, _monotone, default_start_times, pareto
 from softstart.optimal.lp.rows import Limits
 from softstart.optimal.problem import Problem
 from softstart.optimal.shortest import shortest_start_time
@@ -250,10 +244,7 @@ def test_a_controller_that_never_starts_has_no_ratio():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("drive", "most"),
-    [
-        (CRANE.replace(torque_lag=0.005, damping=1.0), 14.0),
-        (Drive.load("nordin-servo-60kw"), 7.0),
-    ],
+    [(CRANE.replace(torque_lag=0.005, damping=1.0), 14.0), (Drive.load("nordin-servo-60kw"), 7.0)],
     ids=["lag", "servo"],
 )
 def test_a_front_of_20_points_takes_few_programs(

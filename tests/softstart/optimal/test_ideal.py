@@ -263,10 +263,7 @@ def test_where_the_start_is_no_linear_problem_the_reason_is_given() -> None:
         "modelica": {"damping": 0.5, "contact_law": "modelica"},
         "the load runs away": {"initial_load_speed": 5.0},
         "damped shaft moves a reactive": {"damping": 0.5, "load_kind": "reactive"},
-        "moves before the contact": {
-            "load_kind": "reactive",
-            "initial_motor_speed": 1.0,
-        },
+        "moves before the contact": {"load_kind": "reactive", "initial_motor_speed": 1.0},
         "wound up against": {"start_position": -0.3},
     }
     for words, given in reasons.items():

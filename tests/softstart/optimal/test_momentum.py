@@ -184,11 +184,9 @@ def test_a_reactive_load_starts_from_rest() -> None:
 def test_the_earliest_pull_is_that_of_full_torque(drive: Drive) -> None:
     run = simulate(drive, "direct")
     first = next(
-        (
-            e.time
-            for e in run.events
-            if e.kind == ("load starts" if drive.load_kind == "reactive" else "gap closed")
-        ),
+        e.time
+        for e in run.events
+        if e.kind == ("load starts" if drive.load_kind == "reactive" else "gap closed")
     )
     assert earliest_pull(Problem(drive, 1.0)) == pytest.approx(first, rel=1e-9)
 

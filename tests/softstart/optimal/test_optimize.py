@@ -218,10 +218,7 @@ def test_below_the_shortest_start_time_no_random_drive_has_a_start(seed: int) ->
 
 # what else could be tried ----------------------------------------------------------------------------------
 
-OTHERS = {
-    "damped": CRANE.replace(damping=1.0),
-    "reactive": CRANE.replace(load_kind="reactive"),
-}
+OTHERS = {"damped": CRANE.replace(damping=1.0), "reactive": CRANE.replace(load_kind="reactive")}
 
 
 @pytest.mark.parametrize("name", OTHERS)

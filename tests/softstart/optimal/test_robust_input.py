@@ -10,13 +10,7 @@ import pytest
 
 from softstart import Drive, InputError, simulate
 from softstart.optimal.result import InfeasibleError, LowerBound
-from softstart.optimal.robust import (
-    guesses,
-    optimize_robust,
-    scenarios_of,
-    solving,
-    worth_of_contact_sensor,
-)
+from softstart.optimal.robust import guesses, optimize_robust, scenarios_of, solving, worth_of_contact_sensor
 from softstart.optimal.robust.evaluation import Evaluator, ProfileParameters, Staircase, merged, refined
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)

@@ -116,9 +116,7 @@ def test_the_verdict_names_the_limit_that_forbids_it(
 
 def test_limits_that_forbid_it_only_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        shortest,
-        "shortest_start_time",
-        lambda problem: 0.25 if problem.ideal_torque else 0.4,
+        shortest, "shortest_start_time", lambda problem: 0.25 if problem.ideal_torque else 0.4
     )
     said = verdict_on(Problem(CRANE.replace(torque_lag=0.02, torque_rate=900.0), 0.3))
     assert "together" in said.constraint
