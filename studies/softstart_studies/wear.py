@@ -19,6 +19,7 @@ from softstart.controller import make_controller
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart.tuning.outcome import Tuning
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing
+from softstart_studies.paper_g.crane import published
 from softstart_studies.tuned_alike import CRANE, Front, front, panel_grid, rounded, tuned, tuned_controllers
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def live(extent: Extent, progress: Progress) -> Life:
     for name, tuning in tunings.items():
         progress(f"{name}: starts over the life")
         ways = {
-            "defaults": (make_controller(name), drive),
+            "defaults": (published(name), drive),
             "fixed": (_fixed(tuning), drive),
             "one set": (_robust(tuning), drive),
             "scheduled": (tuning.scheduled, None),
@@ -106,7 +107,7 @@ def _fixed(tuning: Tuning) -> Controller:
     assert tuning.schedule is not None
     cell = tuning.schedule.isel(gap=0, load_inertia=0)
     gains: dict[str, Any] = {one.name: float(cell[one.name]) for one in tuning.question.ranges}
-    return make_controller(tuning.controller, gains)
+    return published(tuning.controller, **gains)
 
 
 def _robust(tuning: Tuning) -> Controller:

@@ -71,6 +71,7 @@ def saved(page: Any, name: str) -> tuple[str, str]:
 def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_path: Path) -> None:
     direct = simulate(CRANE, "direct").start_time
     best = optimize(CRANE, 1.2 * direct)
+    tab(page, "Optimum")
     page.get_by_test_id("optimum-time").fill("1.2x")
     page.get_by_test_id("optimum-go").click()
     done(page, "optimum")
@@ -187,6 +188,7 @@ def test_two_users_have_their_own_sessions_and_turns_and_a_closed_tab_ends_its_j
     tab(first, "Tuning")
     first.get_by_test_id("tuning-go").click()
     until(lambda: state(first, "tuning").startswith("Waiting for its turn."), 5.0, first)
+    tab(second, "Optimum")
     second.get_by_test_id("optimum-go").click()  # comes later, and does not wait for the queue of the other
     done(second, "optimum")
     assert state(first, "tuning").startswith("Waiting for its turn.")

@@ -7,6 +7,7 @@ import pytest
 
 from softstart import optimize, simulate
 from softstart.study import find_study
+from softstart_studies.paper_g.crane import published
 from softstart_studies.tuned_alike import CRANE
 from softstart_studies.wear import Extent, Wear, live, present
 
@@ -15,7 +16,7 @@ PART = Extent(
     scheduled=(0.5, 1.0),
     restarts=1,
     generations=3,
-    controllers=("ramp", "current-limit-feedback"),
+    controllers=("ramp", "acceleration-delay"),
     front_points=4,
 )
 NEW = CRANE
@@ -29,7 +30,7 @@ def life():
 def test_defaults_are_those_of_the_new_drive(life):
     for name, ways in life.courses.items():
         for gap, k in zip(life.gaps, ways["defaults"].k_dyn, strict=True):
-            assert simulate(NEW.replace(gap=gap), name, fitted_to=NEW).k_dyn == k
+            assert simulate(NEW.replace(gap=gap), published(name), fitted_to=NEW).k_dyn == k
 
 
 def test_fixed_gains_are_those_of_the_schedule_at_the_new_gap(life):
@@ -37,7 +38,7 @@ def test_fixed_gains_are_those_of_the_schedule_at_the_new_gap(life):
         assert ways["fixed"].k_dyn[0] == pytest.approx(ways["scheduled"].k_dyn[0], rel=1e-12)
         # at a cell of the schedule it is neither harder nor slower than with the defaults of that drive
         for i, gap in enumerate(life.gaps):
-            own = simulate(NEW.replace(gap=gap), name)
+            own = simulate(NEW.replace(gap=gap), published(name))
             assert ways["scheduled"].k_dyn[i] <= own.k_dyn * (1 + 1e-9)
             assert ways["scheduled"].start_time[i] <= own.start_time * (1 + 1e-9)
 
