@@ -146,6 +146,7 @@ TRACES = {  # heading, unit of the times in ms, row, what is read from the messa
         "Time [ms];Channel 1 r0080 Actual torque [Nm];Channel 2 Actual position [deg]",
         "{t:.1f};{torque:.8f};{deg:.8f}", ".", "utf-8",
     ),
+    "DIN": ("t / ms;M / Nm;phi / (rev)", "{t:.1f};{torque:.8f};{turns:.10f}", ",", "utf-8"),
     "tabs": (
         "Motor trace\texport 3.2\nTime\tTorque ref.\tPosition\nms\tNm\trev",
         "{t:.1f}\t{torque:.8f}\t{turns:.10f}", ".", "utf-16",
@@ -208,6 +209,10 @@ def test_columns_of_a_trace_with_instants_of_their_own_are_joined(tmp_path: Path
             "time;torque [%];angle\n0;1;2\n1;1;2",
             "it is in %; give the torque at 100 %, as --rated-t",
         ),
+        ("a.csv", "time,torque [% TN],angle\n0,1,2\n1,1,2", r"torque=torque \[%\]. --rated-torque .12 N"),
+        ("a.csv", "time,torque,speed [%]\n0,1,2\n1,1,2", "speed in % is not read; write it in rad/s: %/100"),
+        ("a.csv", "time,torque,torque,angle\n0,1,1,2\n1,1,1,2", "more than one is called torque; rename one"),
+        ("a.csv", "time torque angle\n0 1 2\n1 1 2", "one column; divide columns by semicolons, comma"),
     ],
 )
 def test_what_is_no_trace_is_told_what_to_write(tmp_path: Path, name: str, text: str, sentence: str) -> None:

@@ -411,6 +411,13 @@ class Drive(ParameterSet):
         return self.starting_torque
 
     @property
+    def rated(self) -> Value | None:
+        """Rated torque, or rated power over rated speed, N m; None where neither is given."""
+        if self.rated_torque is not None or self.rated_power is None or self.rated_speed is None:
+            return self.rated_torque
+        return self.rated_power / self.rated_speed
+
+    @property
     def frictions(self) -> tuple[Value, Value, Value]:
         """Coulomb and viscous friction of the motor, and viscous friction of the load: N m, N m s/rad twice.
 

@@ -100,7 +100,8 @@ def identify(
     torque_constant : float or str, optional
         N m/A: files hold the current in place of the torque, see `Log.load`.
     rated_torque : float or str, optional
-        N m: the torque at 100 % of files that have it in %; by default the rated torque of the drive.
+        N m: the torque at 100 % of files that have it in %; by default that of the drive, or its rated
+        power over its rated speed.
     searches : int
         At most so many searches.
     seed : int
@@ -146,8 +147,10 @@ def identify(
         raise InputError("logs: there is none; give a log, or the path of its CSV file.")
     files: dict[str, Any] = {
         "columns": columns, "torque_is": torque_is, "torque_constant": torque_constant,
-        "rated_torque": drive.rated_torque if rated_torque is None else rated_torque,
+        "rated_torque": drive.rated if rated_torque is None else rated_torque,
     }  # fmt: skip
+    rated = "" if drive.rated_torque or drive.rated is None else f" in % of {drive.rated:.5g} N m"
+    power = ", rated_power/rated_speed"
     read = [one if isinstance(one, Log) else Log.load(one, **files) for one in given]
     read = [one.summed(float(drive.encoder_lines)) for one in read]
     if isinstance(searches, bool) or not isinstance(searches, int) or searches < 1:
@@ -186,7 +189,7 @@ def identify(
     sizes[len(space.shared) : kept] *= -1.0  # the further forward a position, the smaller its root
     best = found[0][1]
     notes = [
-        *(f"{one.name}: {note}" for one in read for note in one.notes),
+        *(f"{one.name}: {note}{power * note.endswith(rated or '?')}" for one in read for note in one.notes),
         *([] if chain is None else _reduction(chain, drive, read[0], free, progress)),
         *doubts,
         *([] if doubts else _advice(drive.replace(**changes), estimates, read)),

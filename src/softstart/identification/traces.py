@@ -134,26 +134,27 @@ def _signals(
     if len(kinds) != 1 or any(len(called(key)) != 1 for key in (cause, kinds[0])):
         raise InputError(f"log = {where}: {_choice(channels, called, asked, cause, kinds, rated)}.")
     kind: Kind = "angle" if kinds[0] == "angle" else "speed"
-    read = {}
+    read, notes = {}, list[str]()
     for key in (cause, kind):
         (one,) = called(key)
-        unit = (asked[key].unit if key in asked else "") or one.unit
+        given = unit = (asked[key].unit if key in asked else "") or one.unit
         try:
             factor, unit = _scale(unit, key, rated)
         except RefusedError as refusal:
-            raise InputError(
-                f"log = {where}: {show(one.name)}: {refusal.reason}"
-                + ("" if "--" in refusal.reason else f'; or name the unit that is meant, as --columns '
-                   f'"{key}={one.name} [{COLUMNS[key].unit}]"') + "."
-            ) from None  # fmt: skip
+            rest, share = "", "%" in unit
+            if "--" not in refusal.reason and not (share and key != "torque"):
+                meant = f"{key}={one.name} [{'%' if share else COLUMNS[key].unit}]"
+                rest = f'; or name the unit that is meant, as --columns "{meant}"{_at_100(share, rated)}'
+            raise InputError(f"log = {where}: {show(one.name)}: {refusal.reason}{rest}.") from None
+        notes += [f"{one.name} is in % of {rated:.5g} N m"] if key == "torque" and _percent(given) else []
         instants, values = one.read(key, unit)
         read[key] = instants, factor * values
     (times, first), (others, values) = read[cause], read[kind]
     if np.array_equal(times, others, equal_nan=True):
-        return Signals(times, first, kind, values)
+        return Signals(times, first, kind, values, tuple(notes))
     time, torque, values = _together(times, first, others, values, held, where)
     told = f"{cause} and {kind} are sampled at different instants; the torque between its samples is "
-    return Signals(time, torque, kind, values, (told + ("held" if held else "straight"),))
+    return Signals(time, torque, kind, values, (*notes, told + ("held" if held else "straight")))
 
 
 def _choice(
@@ -161,11 +162,12 @@ def _choice(
     cause: str, kinds: Sequence[str], rated: float | None,
 ) -> str:  # fmt: skip
     """Which signal is not named, or more than once, and the options that name all of them."""
-    words, options, percent = [], [], False
+    words, options, percent, twice = [], [], False, False
     for key in (cause, *(kinds if len(kinds) == 1 else ["motion"])):
         each, wanted = called(key) if key in COLUMNS else [], [key] if key in COLUMNS else ["angle", "speed"]
         if len(each) != 1:
             many = "more than one is" if each else "none is"
+            twice |= [one.name for one in each].count(each[0].name if each else "") > 1
             words.append(
                 f"{many} called {show(asked[key].name) if key in asked else key}"
                 if key in COLUMNS
@@ -178,10 +180,14 @@ def _choice(
         percent |= name == "torque" and one is not None and _percent(one.unit) > 0.0
     text = ",".join(options)
     text = f'"{text}"' if re.search(r"[^-=,.\w]", text) else text
-    rated_too = ' --rated-torque "12 N*m" (the torque at 100 %)' if percent and rated is None else ""
+    remedy = "rename one of them" if twice else f"write --columns {text}{_at_100(percent, rated)}"
     names = [f"{one.name} [{one.unit}]" if one.unit else one.name for one in channels]
     shown = ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
-    return f"there are the columns {shown}; {' and '.join(words)}; write --columns {text}{rated_too}"
+    return f"there are the columns {shown}; {' and '.join(words)}; {remedy}"
+
+
+def _at_100(share: bool, rated: float | None) -> str:
+    return ' --rated-torque "12 N*m" (the torque at 100 %)' if share and rated is None else ""
 
 
 def _likely(channels: Sequence[_Channel], key: str) -> list[_Channel]:
@@ -199,10 +205,13 @@ def _percent(unit: str) -> float:
 def _scale(unit: str, key: str, rated: float | None) -> tuple[float, str]:
     """A factor and the unit that it takes: a torque in per cent is one of the rated torque."""
     share = _percent(unit) if key == "torque" else 0.0
+    if "%" in unit and key != "torque":
+        si = COLUMNS[key].unit
+        raise RefusedError(f"a {key} in % is not read; write it in {si}: %/100 times the {key} at 100 %")
     if share and rated is None:
         raise RefusedError(
-            'it is in %; give the torque at 100 %, as --rated-torque "12 N*m", or the rated_torque of the '
-            "motor in the drive file"
+            'it is in %; give the torque at 100 %, as --rated-torque "12 N*m", or in the drive file the '
+            "rated_torque, or rated_power and rated_speed, of the motor"
         )
     if not share:
         parse(f"1 {unit}", COLUMNS[key].unit)
@@ -287,6 +296,8 @@ def _columns_of(where: str, asked: Mapping[str, Asked]) -> list[_Channel]:
             f"log = {where}: no line above the numbers names the columns; write names and units there, as "
             "time [ms];torque [N*m];speed [rpm]."
         )
+    if len(table.names) == 1:
+        raise InputError(f"log = {where}: it has one column; divide columns by semicolons, commas or tabs.")
     written = re.escape(asked["time"].name) if "time" in asked else TIMES
     times = [i for i, name in enumerate(table.names) if re.fullmatch(written, name, re.IGNORECASE)]
     if not times:
@@ -350,10 +361,9 @@ def _table(text: str) -> _Table:
     if units is None and len(wide) > 1 and _are_units(wide[-1]):
         units = wide[-1]
     names = names or [row for row in wide if row is not units][-1]
-    parts = [re.fullmatch(r"(.*?)\s*(?:[\[(]([^\[(]*)[\])])?", one, re.DOTALL) for one in names]
-    called = [part[1].strip() if part else one for part, one in zip(parts, names, strict=True)]
-    called = ["time" if one.lower() in labels else one for one in called]
-    own = [part[2] or "" if part else "" for part in parts]
+    pairs = [_named(one) for one in names]
+    called = ["time" if one.lower() in labels else one for one, _ in pairs]
+    own = [unit for _, unit in pairs]
     for i, one in enumerate(units or ()):
         if i < len(own) and not own[i] and one.lower() not in labels:
             own[i] = one.strip("[]() ")
@@ -362,6 +372,19 @@ def _table(text: str) -> _Table:
         if re.fullmatch(TIMES, name, re.IGNORECASE) and not own[i]:
             own[i] = _unit_of_times(head, data, i)
     return _Table(called, own, mark, lines, first or counts[0] + 1)
+
+
+def _named(heading: str) -> tuple[str, str]:
+    """Name and unit of a column.
+
+    >>> _named("M [Nm]"), _named("n / min-1"), _named("v / (m/s)"), _named("left / right")
+    (('M', 'Nm'), ('n', 'min-1'), ('v', 'm/s'), ('left / right', ''))
+    """
+    shape = r"(.*?)\s*(?:(?:\s/\s*)?[\[(]([^\[(]*)[\])]|\s/\s+(.+))?"
+    part = re.fullmatch(shape, heading, re.DOTALL)
+    if part is None or (part[3] and not _are_units([part[3]])):
+        return heading, ""
+    return part[1].strip(), part[2] or part[3] or ""
 
 
 def _cells(line: str, mark: str) -> list[str]:

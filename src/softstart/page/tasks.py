@@ -282,7 +282,7 @@ def identified(
         path = Path(folder, "log.csv")
         path.write_bytes(content)
         try:
-            rated = getattr(guess, "rated_torque", None)  # not of a chain
+            rated = getattr(guess, "rated", None)  # not of a chain
             log = logs.Log.load(path, columns=columns, torque_is=torque_is, rated_torque=rated)
         except InputError as error:
             raise InputError([one.replace(str(path), name) for one in error.sentences]) from None

@@ -124,11 +124,8 @@ def rated_torque(drive: Drive) -> tuple[float, str]:
     >>> round(rated_torque(Drive.load("crane-4amtkf"))[0], 2)
     23.87
     """
-    if drive.rated_torque is not None:
-        return float(drive.rated_torque), RATED
-    if drive.rated_power is not None and drive.rated_speed is not None:
-        return float(drive.rated_power / drive.rated_speed), RATED
-    return float(drive.Ms), "starting torque"
+    rated = drive.rated
+    return (float(drive.Ms), "starting torque") if rated is None else (float(rated), RATED)
 
 
 def nearest_step(value: float, step: float, most: float = math.inf) -> float:
