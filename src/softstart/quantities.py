@@ -153,8 +153,9 @@ TYPED = {
 }
 
 _SYMBOLS = str.maketrans(
-    {"·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁴": "^4", "¹": "^1", "⁻": "^-", "⁺": "^+"}
-)
+    {"·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁴": "^4", "¹": "^1", "⁻": "^-", "⁺": "^+",
+     "'": "arcmin", "′": "arcmin"}
+)  # fmt: skip
 # Units of data sheets without dots: kgm^2, Nm, Nms, Ncm, kgfm, Ws; to pint "Nms" is the plural of Nm.
 _WITHOUT_DOTS = re.compile(
     r"\b(?:(k?g(?=[cm]?m\^2)|[kMm]?N|kgf|kp)([cm]?m)(s?)|([kMm]?[NWJ])(s))(?![^\W\d_])"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 import click
 
+from softstart.chain.elements import LIBRARY
 from softstart.cli.commands import Command
 from softstart.cli.completion import files_only, table_keys
-from softstart.cli.options import changes_option, json_option, read_changes
+from softstart.cli.options import changes_option, json_option, named_as_options, read_changes
+from softstart.drive import library
 from softstart.drive.data_sheet import (
     ABOUT,
     INSTEAD,
@@ -31,13 +34,9 @@ from softstart.views.terminal import console, print_json, sentence
 
 # asked only where the other one was answered
 AFTER = {
-    "coupling_diameter": "coupling_play",
-    "efficiency": "ratio",
-    "play_diameter": "output_play",
-    "shaft_length": "shaft_diameter",
-    "rope_diameter": "rope_length",
-    "rope_modulus": "rope_length",
-}
+    "coupling_diameter": "coupling_play", "efficiency": "ratio", "play_diameter": "output_play",
+    "shaft_length": "shaft_diameter", "rope_diameter": "rope_length", "rope_modulus": "rope_length",
+}  # fmt: skip
 FIRST = ("name", "source", "machine")
 
 
@@ -79,7 +78,8 @@ def init(
     if out is not None:
         if Path(out).exists():
             raise InputError(f"--out {out}: there is such a file already; give another name, or remove it.")
-        write_whole(Path(out), lambda stream: stream.write(text))
+        with named_as_options():
+            write_whole(Path(out), lambda stream: stream.write(text))
     if as_json:
         print_json({"data_sheet": found.values(), "drive": drive.values(), "doubts": doubts(drive)})
         return
@@ -89,7 +89,9 @@ def init(
         click.echo(text, nl=False)
     else:
         assumed = f" Assumed: {drive.assumed}." if drive.assumed else ""
-        sentence(console(), f"{out} is written.{assumed} What next: softstart compare {out}")
+        shipped = out in (*library.names(), *LIBRARY.names())  # whose name alone would be that machine
+        path = shlex.quote(f"./{out}" if shipped else out)
+        sentence(console(), f"{out} is written.{assumed} What next: softstart compare {path}")
 
 
 def asked(given: Mapping[str, object]) -> DataSheet:
@@ -135,7 +137,8 @@ def _answer(p: Parameter, needed: bool) -> str:
                 raise RefusedError(f"it is needed; write for example {p.example}")
             read_value(p, text)
         except RefusedError as refusal:
-            click.echo("  " + Wording(style="toml").refused(p, text, refusal), err=True)
+            said, usual = Wording(style="toml").refused(p, text, refusal), USUAL.get(p.name, p.unit)
+            click.echo(f"  {said.replace(f'bare number in {p.unit}', f'bare number in {usual}')}", err=True)
             continue
         if said := echo(p, line):
             click.echo(f"  {said}", err=True)

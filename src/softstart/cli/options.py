@@ -24,6 +24,7 @@ from softstart.drive import Drive, library
 from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError, Mistakes
 from softstart.input.files import read_text, refusal_of
+from softstart.input.parameter_set import read_settings
 from softstart.late import late
 from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import RefusedError, to_si, whole_number
@@ -43,7 +44,7 @@ DEFAULT_DRIVE = "crane-4amtkf"
 CODE = "softstart.allow_code"
 # keywords of Python functions that are called otherwise than the option
 KEYWORDS = {"k_dyn": "--max-k-dyn", "heat": "--max-heat", "start_time": "--start-times", "grid": "--axis",
-            "tolerances": "--tolerance", "to": "--out"}  # fmt: skip
+            "tolerances": "--tolerance", "to": "--out", "output": "--out"}  # fmt: skip
 
 
 def drive_names() -> tuple[str, ...]:
@@ -82,7 +83,8 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
         paths = {path for p in DataSheet.PARAMETERS.values() for path in (p.path, p.formerly)}
         own = [one for one in settings if one.partition("=")[0].strip() in paths]
         settings = [one for one in settings if one not in own]
-        drive = DataSheet.from_toml(sheet, where=name, also=read_changes(own)).drive
+        found = DataSheet.from_toml(sheet, where=name, also=read_changes(own))
+        drive = found.drive
         print(
             f'"{name}" is a data sheet, read as the drive that follows from it; "softstart init {name} '
             '--out FILE" writes that drive.',
@@ -90,6 +92,9 @@ def read_drive(name: str, settings: Sequence[str]) -> Drive:
         )
     if settings:
         drive = drive.with_settings(settings)
+        given = read_settings(settings, Drive.PARAMETERS)[0]
+        if sheet is not None and "assumed" not in given:
+            drive = drive.replace(assumed=found.assumed_still(given))
     if drive.shape != ():
         raise InputError(
             f'"{name}": lists of values make {math.prod(drive.shape)} drives, and the command line starts '

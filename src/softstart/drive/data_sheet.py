@@ -48,34 +48,31 @@ TYPICAL: Mapping[str, tuple[str, str]] = {
 # the unit that a bare number has at the prompt and in the form, where it is not that of SI; in a file such a
 # number is refused
 USUAL: Mapping[str, str] = {
-    "rated_power": "kW",
-    "rated_speed": "rpm",
-    "torque_lag": "ms",
-    "backlash": "arcmin",
-    "rope_modulus": "GPa",
-    **dict.fromkeys(
+    "rated_power": "kW", "rated_speed": "rpm", "torque_lag": "ms", "backlash": "arcmin",
+    "rope_modulus": "GPa", **dict.fromkeys(
         ("coupling_play", "coupling_diameter", "shaft_diameter", "shaft_length", "output_play",
-         "play_diameter", "rope_diameter"), "mm",
-    ),
+         "play_diameter", "rope_diameter"), "mm"),
 }  # fmt: skip
 # parameters that say something about these machines only
 ABOUT: Mapping[str, tuple[Machine, ...]] = {
-    "mass": ("hoist", "travel", "belt"),
-    "radius": ("hoist", "travel", "belt"),
-    "resistance": ("travel", "belt"),
-    **dict.fromkeys(
-        ("reeving", "rope_stiffness", "rope_length", "rope_diameter", "rope_modulus"), ("hoist",)
-    ),
-}
+    **dict.fromkeys(("mass", "radius"), ("hoist", "travel", "belt")), "resistance": ("travel", "belt"),
+    **dict.fromkeys(("reeving", "rope_stiffness", "rope_length", "rope_diameter", "rope_modulus"), ("hoist",))
+}  # fmt: skip
 # parameters that need not be given where the other one is
 INSTEAD: Mapping[str, str] = {
-    "rated_torque": "rated_power",
-    "starting_ratio": "starting_torque",
-    "maximum_ratio": "maximum_torque",
+    "rated_torque": "rated_power", "starting_ratio": "starting_torque", "maximum_ratio": "maximum_torque",
     "rope_length": "rope_stiffness",
-}
+}  # fmt: skip
 FORMER = {"power": "rated_power", "speed": "rated_speed"}  # keywords of former versions
 _BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_QUOTIENT = re.compile(r"\s*(\d+\.?\d*)\s*[:/]\s*(\d+\.?\d*)\s*")
+_IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
+# the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
+SETTLE = {
+    "starting_ratio": {"starting_torque"}, "efficiency": {"stiffness", "load_inertia", "load_torque"},
+    "backlash": {"gap"}, "rope": {"stiffness"}, "rope_modulus": {"stiffness"}, "resistance": {"load_torque"},
+    "damping_ratio": {"damping"},
+}  # fmt: skip
 
 
 def _maybe(path: str, unit: str, meaning: str, example: str) -> Any:
@@ -96,7 +93,8 @@ class DataSheet(ParameterSet):
     Stiffnesses in series add by their reciprocals, backlashes directly. A mass m on a radius r is m r^2; a
     rope that is reeved n times makes the radius r/n. A steel shaft of diameter D and length L has
     c = G pi D^4/(32 L), G = 79.3e9 N/m^2. One fall of a rope of diameter d and length L has k = E 0.46 d^2/L;
-    n falls on the radius r/n store k n (r/n)^2 angle^2/2, so that they have c = k r^2/n at the drum.
+    n falls on the radius r/n store k n (r/n)^2 angle^2/2, so that they have c = k r^2/n at the drum. Several
+    motors share load and rope; shaft and gears are one motor's own. A ratio may be written "38:1" or "4/2".
 
     In a file and in `from_settings` a bare number is refused where people seldom mean SI (`USUAL`): speed,
     power, backlash, plays, diameters, lag. As an argument every number is in SI. An efficiency of 10 to 100
@@ -149,10 +147,7 @@ class DataSheet(ParameterSet):
         "motor.inertia", "kg*m^2", "inertia of the motor's own rotor", '"0.0119 kg*m^2"', "above 0"
     )
     added_inertia: Number = _nothing(
-        "motor.added_inertia",
-        "kg*m^2",
-        "inertia of brake disc, fan and coupling on the motor shaft",
-        '"0.0066 kg*m^2"',
+        "motor.added_inertia", "kg*m^2", "inertia of brake, fan and coupling at the motor", '"0.0066 kg*m^2"'
     )
     starting_torque: MaybeNumber = _maybe("motor.starting_torque", "N*m", "starting torque", '"44 N*m"')
     starting_ratio: Number = parameter(
@@ -199,7 +194,7 @@ class DataSheet(ParameterSet):
         default=1.0,
     )  # fmt: skip
     rope_stiffness: MaybeNumber = _maybe(
-        "rope.stiffness", "N/m", "stiffness of one fall of the rope", '"0.8 MN/m"'
+        "rope.stiffness", "N/m", "stiffness of one fall, times the ropes that the drum winds", '"0.8 MN/m"'
     )
     rope_length: MaybeNumber = _maybe("rope.length", "m", "length of one fall of the rope", '"12 m"')
     rope_diameter: MaybeNumber = _maybe("rope.diameter", "m", "nominal diameter of the rope", '"14 mm"')
@@ -216,7 +211,7 @@ class DataSheet(ParameterSet):
     output_torque: Number = _nothing(
         "load.torque", "N*m", "further torque of the load at the output", '"20 N*m"'
     )
-    motors: Number = parameter("load.motors", "1", "motors that share the load", "2", "above 0", default=1.0)
+    motors: Number = parameter("load.motors", "1", "motors on one load and rope", "2", "above 0", default=1.0)
     damping_ratio: Number = parameter(
         "shaft.damping_ratio", "1", "damping ratio of the elastic mode", "0.03", "from 0 to 1", default=0.02
     )
@@ -278,8 +273,8 @@ class DataSheet(ParameterSet):
     ) -> None:
         """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
         given = {FORMER.get(name, name): value for name, value in given.items()}
-        wrong = list(mistakes)
-        for name in USUAL if wording.style == "toml" else ():
+        wrong, toml = list(mistakes), wording.style == "toml"
+        for name in USUAL if toml else ():
             p, number = self.PARAMETERS[name], _bare(given.get(name))
             if float(number or 0.0) != 0.0:
                 meant = f"or, if {p.unit} is meant, "
@@ -288,7 +283,12 @@ class DataSheet(ParameterSet):
         share = _bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
-        super()._fill(given | {"efficiency": f"{share} %"} if per_cent else given, wording, wrong, *known)
+        given |= {name: _quotient(name, given[name]) for name in ("ratio", "reeving") if name in given}
+        given |= {"efficiency": f"{share} %"} if per_cent else {}
+        try:
+            super()._fill(given, wording, wrong, *known)
+        except InputError as error:
+            raise InputError([_IN_SI.sub("", one) if toml else one for one in error.sentences]) from None
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         given, of = vars(self)["_given"], self.PARAMETERS
@@ -313,17 +313,21 @@ class DataSheet(ParameterSet):
                     "leave it out."
                 )
         for one, other in (
-            ("coupling_play", "coupling_diameter"),
-            ("output_play", "play_diameter"),
-            ("shaft_length", "shaft_diameter"),
-            ("shaft_diameter", "shaft_length"),
-            ("rope_length", "rope_diameter"),
-            ("rope_diameter", "rope_length"),
+            ("coupling_play", "coupling_diameter"), ("output_play", "play_diameter"),
+            ("shaft_length", "shaft_diameter"), ("shaft_diameter", "shaft_length"),
+            ("rope_length", "rope_diameter"), ("rope_diameter", "rope_length"),
             ("rope_modulus", "rope_diameter"),
-        ):
+        ):  # fmt: skip
             if given.get(one) and not given.get(other):
                 p, q = of[one], of[other]
                 yield f"{p.place} says nothing without {q.place}; write for example {q.key} = {q.example}."
+        for name in ("starting_ratio", "maximum_ratio", "efficiency"):
+            p, value, usual = of[name], given.get(name), "0.1 or more" if name == "efficiency" else "below 10"
+            if value is not None and (value < 0.1 if name == "efficiency" else value >= 10.0):
+                yield (
+                    f"{p.place} is read as {value:.5g}, where the {p.meaning} is {usual}; write for example "
+                    f'{p.example} or "{100.0 * float(p.example):g} %".'
+                )
         yield from self._said_twice()
         if not self._stiffnesses:
             yield (
@@ -372,6 +376,11 @@ class DataSheet(ParameterSet):
         read: dict[str, str] = vars(self)["_read"]
         return found | read
 
+    def assumed_still(self, settled: Iterable[str]) -> str:
+        """What is assumed, less what no longer counts where these parameters of the drive are set."""
+        settled = {*settled}
+        return "; ".join(one for name, one in self.assumed.items() if not SETTLE.get(name, {""}) <= settled)
+
     def _mark(self, name: str) -> str:
         return ", assumed" if name in self.assumed else ""
 
@@ -409,7 +418,8 @@ class DataSheet(ParameterSet):
             twist = STEEL * math.pi * self.shaft_diameter**4 / (32.0 * self.shaft_length)
             found["output shaft"] = twist / behind
         if rope:
-            found[f"rope{self._mark('rope_modulus')}"] = rope * self.reeving * self._arm**2 / behind
+            shared = behind * self.motors
+            found[f"rope{self._mark('rope_modulus')}"] = rope * self.reeving * self._arm**2 / shared
         return found
 
     @cached_property
@@ -457,7 +467,7 @@ class DataSheet(ParameterSet):
         damping = 2.0 * self.damping_ratio * math.sqrt(stiffness * J1 * J2 / (J1 + J2))
         speed = f'"{self.rated_speed * 30.0 / math.pi:.6g} rpm"'
         hoist, gap = self.machine == "hoist", sum(self._gaps.values())
-        assumed = "; ".join(self.assumed.values())
+        assumed, no_gap = "; ".join(self.assumed.values()), mark("backlash") and "none given, assumed"
         unsaid = assumed and "source" not in self.given()
         more = f", brake, fan and coupling {self.added_inertia:.5g}" if self.added_inertia else ""
 
@@ -489,7 +499,7 @@ class DataSheet(ParameterSet):
                           f"{'; rope assumed rigid' if 'rope' in self.assumed else ''}"),
             "damping": (si(damping, "N*m*s/rad"),
                         f"damping ratio {self.damping_ratio:.5g}{mark('damping_ratio')}"),
-            "gap": (si(gap, "rad"), parts(self._gaps) if gap else f"none given{mark('backlash')}"),
+            "gap": (si(gap, "rad"), parts(self._gaps) if gap else no_gap or "given as 0"),
             "load_inertia": (si(J2, "kg*m^2"), f"{inertia_from}; {through}{shared}"),
             "load_torque": (si(Mc, "N*m"), f"{torque_from}; {through}{shared}"),
             "load_kind": ('"active"', "a load that hangs") if hoist else ('"reactive"', "friction"),
@@ -522,7 +532,11 @@ class DataSheet(ParameterSet):
     @cached_property
     def drive(self) -> Drive:
         """The drive of `drive_toml`: its numbers have five digits, as those of the file."""
-        return Drive.from_toml(self.drive_toml(), where="the drive that follows")
+        try:
+            return Drive.from_toml(self.drive_toml(), where="the drive that follows")
+        except InputError as error:
+            cause = " Is [gear] ratio inverted (turns of the motor for one of the output), or a power in W?"
+            raise InputError([one + cause * ("cannot move" in one) for one in error.sentences]) from None
 
 
 # what is typed -------------------------------------------------------------------------------------------
@@ -534,12 +548,19 @@ def _bare(value: object) -> str:
     return text if not isinstance(value, bool) and _BARE.fullmatch(text) else ""
 
 
+def _quotient(name: str, value: object) -> object:
+    """The quotient that "38:1" or "4/2" is where a ratio or a reeving is written; anything else as it is."""
+    found = _QUOTIENT.fullmatch(str(value)) if name in ("ratio", "reeving") else None
+    return float(found[1]) / float(found[2]) if found and float(found[2]) else value
+
+
 def typed(p: Parameter, text: str) -> str:
     """What is typed at a prompt or in a form for one parameter: a bare number has its usual unit.
 
     >>> [typed(DataSheet.PARAMETERS[name], "95") for name in ("backlash", "mass", "efficiency", "ratio")]
     ['95 arcmin', '95 kg', '95 %', '95']
     """
+    text = str(_quotient(p.name, text))
     number, unit = _bare(text), USUAL.get(p.name, p.unit)
     if p.name == "efficiency" and number and float(number) >= 10.0:
         unit = "%"

@@ -44,8 +44,8 @@ def doubts(machine: Drive | Lumped) -> list[str]:
 
     Elastic frequency, [G](8), 0.5 to 500 Hz; gap at most half a turn of the motor; J2/J1 0.01 to 100; speed
     at most 10,000 rpm; start under the starting torque, (J1 + J2) w/(Ms - Mc), at most a minute; K_dyn of
-    direct at the first contact, [G](16) and (18), at most 8; no ratio below 1 before the larger inertia. A
-    chain counts by the lever rule. Raises `InputError` for a batch of drives.
+    direct at the first contact, [G](16) and (18), at most 8; Ms 0.5 to 6 times the rated torque; no ratio
+    below 1 before the larger inertia. A chain counts by the lever rule. Raises `InputError` for a batch.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> doubts(crane)
@@ -54,26 +54,19 @@ def doubts(machine: Drive | Lumped) -> list[str]:
     'speed 13,942 rpm, where m'
     """
     if not isinstance(machine, Drive):
-        return list(_doubts(machine.lumped))
+        return [*_doubts(machine.lumped), *_not_the_rated_torque(getattr(machine, "motor", None))]
     if machine.shape != ():
         raise InputError(f"{machine.name}: doubts are those of one drive; give its elements().")
-    return [*_doubts(_of_drive(machine)), *_nothing_holds(machine)]
+    return [*_doubts(_of_drive(machine)), *_not_the_rated_torque(machine), *_nothing_holds(machine)]
 
 
 def _of_drive(drive: Any) -> TwoMasses:
     return TwoMasses(
-        J1=drive.J1,
-        J2=drive.J2,
-        c=drive.c,
-        d=drive.d,
-        gap=drive.gap,
+        J1=drive.J1, J2=drive.J2, c=drive.c, d=drive.d, gap=drive.gap, Ms=drive.Ms - drive.motor_friction,
         travel=max(0.0, *(0.5 * drive.gap - one.theta0 for one in drive.positions.values())),
-        Ms=drive.Ms - drive.motor_friction,
-        Mc=drive.Mc,
-        active=drive.load_kind == "active",
-        speed=drive.target_speed,
+        Mc=drive.Mc, active=drive.load_kind == "active", speed=drive.target_speed,
         ratio=math.nan if drive.gear_ratio is None else drive.gear_ratio,
-    )
+    )  # fmt: skip
 
 
 def _doubts(of: TwoMasses) -> Iterator[str]:
@@ -107,8 +100,8 @@ def _doubts(of: TwoMasses) -> Iterator[str]:
         )
     if rpm > 10_000.0:
         yield (
-            f"speed {rpm:,.0f} rpm, where motors run at up to 10,000 rpm: rpm written without a unit? A bare "
-            f'number is rad/s; write "{of.speed:.4g} rpm".'
+            f"speed {rpm:,.0f} rpm, where motors run at up to 10,000 rpm: if rpm was written without a "
+            f'unit, which is read as rad/s, write "{of.speed:.4g} rpm".'
         )
     time = (J1 + J2) * of.speed / (Ms - Mc) if Ms > Mc else math.nan
     if time > 60.0:
@@ -137,6 +130,18 @@ def _k_dyn_of_direct(of: TwoMasses, Omega: float) -> float:
     a = of.Ms / of.J1 + (of.Mc / of.J2 if of.active else 0.0)
     decay = math.exp(-0.25 * math.pi * of.d / (J * Omega))
     return 1.0 + decay * math.sqrt(1.0 + of.c * J * 2.0 * a * of.travel / mean**2)
+
+
+def _not_the_rated_torque(motor: Any) -> Iterator[str]:
+    """Of a drive, or of the motor of a chain; None for a chain without one."""
+    rated = motor and motor.rated_torque
+    if motor and rated is None and motor.rated_power is not None and motor.rated_speed is not None:
+        rated = motor.rated_power / motor.rated_speed
+    if rated is not None and not 0.5 <= (times := float(motor.starting_torque / rated)) <= 6.0:
+        yield (
+            f"starting torque {times:.4g} times the rated torque, where motors have 0.5 to 6 times: a ratio "
+            "in per cent, rpm written as rad/s, or kW written as W?"
+        )
 
 
 def _nothing_holds(drive: Drive) -> Iterator[str]:

@@ -30,7 +30,8 @@ def test_no_shipped_machine_is_doubted(machine: str) -> None:
         ("half a turn", {"gap": math.pi}, 1.01, {}),
         ("inertia of the load", {"load_inertia": 0.01 * 0.035}, 0.99, {}),
         ("inertia of the load", {"load_inertia": 100 * 0.035}, 1.01, {}),
-        ("rpm", {"target_speed": 10_000 * TURN / 60}, 1.01, {}),
+        ("the rated torque", {"starting_torque": 6 * 150 / TURN}, 1.01, {"maximum_torque": 200}),
+        ("if rpm", {"target_speed": 10_000 * TURN / 60}, 1.01, {}),
         ("a minute", {"starting_torque": 7.16 + 0.21 * 92.153 / 60}, 0.999, {}),
     ],
 )  # fmt: skip

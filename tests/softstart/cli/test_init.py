@@ -164,5 +164,16 @@ def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     assert "J2 = 0.40166 kg m2, Mc = 20 N m" in out
     assert "gap = 0.17686 rad" in out
     assert "assumed: damping ratio 0.02" in out
+    assert "assumed:" not in run("simulate", "sheet.toml", "--controller", "direct", "--set", "damping=1").out
     code, _, err = run("simulate", "sheet.toml", "--controller", "direct", "--set", "gear.backlash=16")
     assert (code, 'write "16 arcmin"' in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [("crane-4amtkf", "compare ./crane-4amtkf"), ("a b", "compare 'a b'"), ("none/x", "--out = none/x: the")],
+)
+def test_the_file_is_named_as_a_shell_takes_it(run, place, out, said):
+    given = SLEWING | UNITS | {"gear.backlash": "8'"}
+    settings = [word for path, text in given.items() for word in ("--set", f"{path}={text}")]
+    assert said in " ".join("".join(map(str, run("init", *settings, "--out", out))).split())
