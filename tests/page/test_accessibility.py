@@ -18,9 +18,7 @@ import pytest
 from softstart.reporting import report
 
 AXE = "axe-core@4.14.1"
-STILL = (
-    "document.getAnimations().every(one => one.playState !== 'running')"  # no colour fades
-)
+STILL = "document.getAnimations().every(one => one.playState !== 'running')"  # no colour fades
 HARMFUL = ("serious", "critical")
 
 

@@ -148,7 +148,7 @@ class Residual:
     `first_order_cosine` and `first_order_sine` its parts, `moment` the largest deviation from the mean with
     all orders to 24, sampled every half degree. Forces in N: `force` the largest at crank speed,
     `all_forces` with all orders; `couple` and `all_couples` the same of the couple about an axis across the
-    crank, N m. `shafts` are those that do it, at the tuning speed.
+    crank, N m; NaN without a spacing. `shafts` are those that do it, at the tuning speed.
     """
 
     name: str
@@ -215,9 +215,10 @@ class Balance:
         """Why no balancer was designed; empty if one was."""
         if self.imbalance or free_couple(self.engine) or free_couple(self.engine, forward=True):
             return ""
+        known = self.engine.cylinders.couples_known
         return (
-            "The first-order inertia forces and couples of the cylinders cancel one another: shafts at crank "
-            "speed have nothing to balance, and no balancer was designed."
+            f"The first-order inertia forces {'and couples ' * known}of the cylinders cancel one another: "
+            f"{'shafts at crank speed have nothing to balance, and ' * known}no balancer was designed."
         )
 
     def residual(self, name: str) -> Residual:
@@ -250,6 +251,7 @@ class Balance:
         pressed = engine.gas is not None
         gas = engine.gas_harmonics(w, self.load) if pressed else 0.0 * inertia
         force, couple = (one.largest * w**2 for one in engine.crank_shaking)
+        couple = couple if engine.cylinders.couples_known else math.nan * couple
         tiny = 1e-9 * float(np.abs(gas + inertia).max())
         rows = []
         for j in range(1, 13):
@@ -292,7 +294,7 @@ class Balance:
             "speed_fluctuation": engine.speed_fluctuation(self.tuning_speed, self.load),
             "imbalance": self.imbalance,
             "force_per_speed_squared": self.imbalance * RPM**2,
-            "free_couple": abs(free_couple(engine)),
+            "free_couple": abs(free_couple(engine)) if engine.cylinders.couples_known else None,
             "note": self.note,
             "orders": self.orders(),
             "designs": [
@@ -439,7 +441,7 @@ def _residual(
     shaft_force, shaft_couple, _ = engine.shaft_shaking(shafts)
     force = engine.crank_shaking[0] + shaft_force
     couple = engine.crank_shaking[1] + shaft_couple
-    angle = np.outer(engine.orders, PHI)
+    angle, known = np.outer(engine.orders, PHI), 1.0 if engine.cylinders.couples_known else math.nan
     # einsum: threads of a BLAS cost more than such a small product where other processes work too
     swing = np.einsum("sq,qp->sp", left.real, np.cos(angle)) - np.einsum(
         "sq,qp->sp", left.imag, np.sin(angle)
@@ -454,7 +456,7 @@ def _residual(
         moment=np.abs(swing).max(axis=1),
         force=force.largest[1] * w2,
         all_forces=np.abs(force.at(PHI[: PHI.size // 2])).max() * w2,
-        couple=couple.largest[1] * w2,
-        all_couples=np.abs(couple.at(PHI[: PHI.size // 2])).max() * w2,
+        couple=couple.largest[1] * w2 * known,
+        all_couples=np.abs(couple.at(PHI[: PHI.size // 2])).max() * w2 * known,
         shafts=tuple(shafts),
     )

@@ -76,6 +76,7 @@ CYLINDERS, MASSES, COUNTERWEIGHTS, OPERATION, BALANCER, CYCLE = (
     )
 )  # fmt: skip
 SHAFT = replace(BalancerShaft.TABLES[0], many=True)
+USUAL = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed", "speeds"), "rpm")
 TABLES = (TOP, CYLINDERS, MASSES, COUNTERWEIGHTS, CYCLE, INDICATOR, OPERATION, BALANCER, SHAFT)
 
 
@@ -307,7 +308,7 @@ class Engine:
         >>> Engine.from_toml(engine.to_toml()) == engine
         True
         """
-        found = read_document(text, TABLES, "an engine", where=where, also=also)
+        found = read_document(text, TABLES, "an engine", where=where, also=also, usual=USUAL)
         before = f"{where}: " if where else ""
         wrong: list[str] = []
 
@@ -347,7 +348,7 @@ class Engine:
             raise InputError(f"{before}{sentence}" for sentence in error.sentences) from None
 
     def to_toml(self) -> str:
-        """The engine as TOML text in SI, which `from_toml` reads back to an equal one.
+        """The engine as TOML text, which `from_toml` reads back to an equal one.
 
         A measured pressure is not in it: it stands in its own file.
         """

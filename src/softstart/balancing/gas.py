@@ -138,38 +138,21 @@ class SimpleCycle(ParameterSet, kw_only=False):
         "cycle.compression_ratio", "1", "compression ratio", "9.9", "above 0"
     )
     mean_indicated_pressure: Series = parameter(
-        "cycle.mean_indicated_pressure",
-        "Pa",
-        "mean indicated pressure at full load, one or one a speed",
-        '"10 bar"',
-        "above 0",
-        many=True,
-    )
+        "cycle.mean_indicated_pressure", "Pa", "mean indicated pressure at full load, one or one a speed",
+        '"10 bar"', "above 0", many=True,
+    )  # fmt: skip
     speeds: MaybeSeries = parameter(
-        "cycle.speeds",
-        "rad/s",
-        "speeds of these pressures",
-        '["1000 rpm", "5600 rpm"]',
-        "above 0",
-        default=None,
-        many=True,
-    )
+        "cycle.speeds", "rad/s", "speeds of these pressures", '["1000 rpm", "5600 rpm"]', "above 0",
+        default=None, many=True,
+    )  # fmt: skip
     intake_pressure: Number = parameter(
-        "cycle.intake_pressure",
-        "Pa",
-        "pressure during intake at full load",
-        '"0.9 bar"',
-        "above 0",
+        "cycle.intake_pressure", "Pa", "pressure during intake at full load", '"0.9 bar"', "above 0",
         default=90000.0,
-    )
+    )  # fmt: skip
     idle_pressure: Number = parameter(
-        "cycle.idle_pressure",
-        "Pa",
-        "pressure during intake at load 0",
-        '"0.3 bar"',
-        "above 0",
+        "cycle.idle_pressure", "Pa", "pressure during intake at load 0", '"0.3 bar"', "above 0",
         default=30000.0,
-    )
+    )  # fmt: skip
     exhaust_pressure: Number = parameter(
         "cycle.exhaust_pressure", "Pa", "pressure during exhaust", '"1.1 bar"', "above 0", default=110000.0
     )
@@ -183,40 +166,24 @@ class SimpleCycle(ParameterSet, kw_only=False):
         "cycle.expansion_exponent", "1", "polytropic exponent of the expansion", "1.27", default=1.27
     )
     combustion_start: Number = parameter(
-        "cycle.combustion_start",
-        "rad",
-        "crank angle before dead centre at which combustion begins",
-        '"15 deg"',
-        "0 or more",
-        default=math.radians(15.0),
-    )
+        "cycle.combustion_start", "rad", "crank angle before dead centre at which combustion begins",
+        '"15 deg"', "0 or more", default=math.radians(15.0),
+    )  # fmt: skip
     combustion_duration: Number = parameter(
-        "cycle.combustion_duration",
-        "rad",
-        "duration of the combustion",
-        '"55 deg"',
-        "above 0",
+        "cycle.combustion_duration", "rad", "duration of the combustion", '"55 deg"', "above 0",
         default=math.radians(55.0),
-    )
+    )  # fmt: skip
     vibe_exponent: Number = parameter(
         "cycle.vibe_exponent", "1", "shape exponent m of Vibe's law", "2", "above 0", default=2.0
     )
     exhaust_opening: Number = parameter(
-        "cycle.exhaust_opening",
-        "rad",
-        "crank angle after dead centre at which the exhaust opens",
-        '"130 deg"',
-        "above 0",
-        default=math.radians(130.0),
-    )
+        "cycle.exhaust_opening", "rad", "crank angle after dead centre at which the exhaust opens",
+        '"130 deg"', "above 0", default=math.radians(130.0),
+    )  # fmt: skip
     blowdown: Number = parameter(
-        "cycle.blowdown",
-        "rad",
-        "duration of the fall to the exhaust pressure",
-        '"70 deg"',
-        "0 or more",
+        "cycle.blowdown", "rad", "duration of the fall to the exhaust pressure", '"70 deg"', "0 or more",
         default=math.radians(70.0),
-    )
+    )  # fmt: skip
 
     def contradictions(self) -> Sequence[str]:
         """Sentences on values that contradict one another."""

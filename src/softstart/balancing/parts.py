@@ -52,29 +52,17 @@ class Cylinders(ParameterSet, kw_only=False):
         "cylinders.rod_length", "m", "length of the connecting rod", '"121 mm"', "above 0"
     )
     spacing: Number = parameter(
-        "cylinders.spacing",
-        "m",
-        "distance between neighbouring cylinders",
-        '"89 mm"',
-        "0 or more",
+        "cylinders.spacing", "m", "distance between neighbouring cylinders", '"89 mm"', "0 or more",
         default=0.0,
-    )
+    )  # fmt: skip
     firing_angles: Series = parameter(
-        "cylinders.firing_angles",
-        "rad",
-        "crank angles of the firing dead centres, cylinder by cylinder",
-        '["0 deg", "360 deg"]',
-        default=None,
-        many=True,
-    )
+        "cylinders.firing_angles", "rad", "crank angles of the firing dead centres, cylinder by cylinder",
+        '["0 deg", "360 deg"]', default=None, many=True,
+    )  # fmt: skip
     firing_order: MaybeSeries = parameter(
-        "cylinders.firing_order",
-        "1",
-        "order in which the cylinders fire, evenly over two turns",
-        "[1, 3, 4, 2]",
-        default=None,
-        many=True,
-    )
+        "cylinders.firing_order", "1", "order in which the cylinders fire, evenly over two turns",
+        "[1, 3, 4, 2]", default=None, many=True,
+    )  # fmt: skip
 
     def contradictions(self) -> Sequence[str]:
         """The rod, and when the cylinders fire."""
@@ -114,6 +102,11 @@ class Cylinders(ParameterSet, kw_only=False):
     def count(self) -> int:
         """How many cylinders."""
         return len(self.firing_angles)
+
+    @property
+    def couples_known(self) -> bool:
+        """Whether their spacing is given, or there is one."""
+        return self.spacing > 0.0 or self.count == 1
 
     @property
     def crank(self) -> SliderCrank:
@@ -159,13 +152,9 @@ class Masses(ParameterSet, kw_only=False):
         "masses.reciprocating", "kg", "reciprocating mass of one cylinder", '"0.68 kg"', "above 0"
     )
     rotating: Number = parameter(
-        "masses.rotating",
-        "kg",
-        "rotating mass of one throw, at the crank pin",
-        '"0.5 kg"',
-        "0 or more",
+        "masses.rotating", "kg", "rotating mass of one throw, at the crank pin", '"0.5 kg"', "0 or more",
         default=0.0,
-    )
+    )  # fmt: skip
     inertia: MaybeNumber = parameter(
         "masses.inertia", "kg*m^2", "inertia of crank and flywheel", '"0.12 kg*m^2"', "above 0", default=None
     )
@@ -177,21 +166,13 @@ class Counterweights(ParameterSet, kw_only=False):
     WHAT: ClassVar[str] = "a set of counterweights"
 
     reciprocating_share: Number = parameter(
-        "counterweights.reciprocating_share",
-        "1",
-        "share of the reciprocating masses balanced on the crank",
-        "0.5",
-        "from 0 to 1",
-        default=0.0,
-    )
+        "counterweights.reciprocating_share", "1",
+        "share of the reciprocating masses balanced on the crank", "0.5", "from 0 to 1", default=0.0,
+    )  # fmt: skip
     rotating_share: Number = parameter(
-        "counterweights.rotating_share",
-        "1",
-        "share of the rotating masses balanced on the crank",
-        "1",
-        "from 0 to 1",
-        default=1.0,
-    )
+        "counterweights.rotating_share", "1", "share of the rotating masses balanced on the crank", "1",
+        "from 0 to 1", default=1.0,
+    )  # fmt: skip
 
 
 class Operation(ParameterSet, kw_only=False):

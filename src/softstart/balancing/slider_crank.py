@@ -14,11 +14,7 @@ from numpy.typing import ArrayLike
 
 from softstart.arrays import Vector
 
-__all__ = [
-    "SliderCrank",
-    "acceleration_harmonics",
-    "inertia_torque_harmonics",
-]
+__all__ = ["SliderCrank", "acceleration_harmonics", "inertia_torque_harmonics"]
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from softstart.cli.options import (
     read_changes,
 )
 from softstart.errors import InputError, Mistakes
+from softstart.input.parameters import bare
 from softstart.quantities import to_si
 from softstart.views import balances as views
 from softstart.views.drawing import save_figure
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
     """The speeds in rad/s; None if none was given.
 
-    >>> [round(speed, 3) for speed in _read_speeds(["4500rpm", "100"], "--speed")]
+    >>> [round(speed, 3) for speed in _read_speeds(["4500rpm", "100 rad/s"], "--speed")]
     [471.239, 100.0]
     """
     found = []
@@ -53,6 +54,9 @@ def _read_speeds(texts: Sequence[str], option: str) -> list[float] | None:
             speed = float(to_si(text, "rad/s", name=option))
             if not speed > 0.0:
                 raise InputError(f'{option} = "{text}": a speed above 0, as 4500rpm.')
+            if bare(text):
+                both = f'write "{text} rpm" or, if rad/s is meant, "{text} rad/s"'
+                raise InputError(f'{option} = "{text}": no unit; {both}.')
             found.append(speed)
     mistakes.settle()
     return found or None

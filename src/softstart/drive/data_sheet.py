@@ -14,8 +14,7 @@ from softstart.errors import InputError
 from softstart.input.documents import document_text, literal, parsed
 from softstart.input.files import text_of
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
-from softstart.input.parameters import Mistake, Parameter, Wording, read_value
-from softstart.quantities import RefusedError
+from softstart.input.parameters import Mistake, Parameter, Wording, bare, read_value, without_unit
 
 __all__ = [
     "ABOUT", "INSTEAD", "MACHINES", "TYPICAL", "USUAL", "DataSheet", "Machine", "echo", "if_empty", "typed",
@@ -64,7 +63,6 @@ INSTEAD: Mapping[str, str] = {
     "rope_length": "rope_stiffness",
 }  # fmt: skip
 FORMER = {"power": "rated_power", "speed": "rated_speed"}  # keywords of former versions
-_BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _QUOTIENT = re.compile(r"\s*(\d+\.?\d*)\s*[:/]\s*(\d+\.?\d*)\s*")
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # the parameters of the drive that, where they are set themselves, leave nothing of what is assumed here
@@ -273,14 +271,9 @@ class DataSheet(ParameterSet):
     ) -> None:
         """As any parameters; in a file or setting without the bare numbers that may be in another unit."""
         given = {FORMER.get(name, name): value for name, value in given.items()}
-        wrong, toml = list(mistakes), wording.style == "toml"
-        for name in USUAL if toml else ():
-            p, number = self.PARAMETERS[name], _bare(given.get(name))
-            if float(number or 0.0) != 0.0:
-                meant = f"or, if {p.unit} is meant, "
-                reason = f'no unit; write "{number} {USUAL[name]}" {meant}"{number} {p.unit}"'
-                wrong.append(Mistake(wording.refused(p, given[name], RefusedError(reason))))
-        share = _bare(given.get("efficiency"))
+        toml = wording.style == "toml"
+        wrong = [*mistakes, *(without_unit(given, self.PARAMETERS, USUAL, wording) if toml else ())]
+        share = bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
         given |= {name: _quotient(name, given[name]) for name in ("ratio", "reeving") if name in given}
@@ -542,12 +535,6 @@ class DataSheet(ParameterSet):
 # what is typed -------------------------------------------------------------------------------------------
 
 
-def _bare(value: object) -> str:
-    """A number without a unit as it is written; "" for anything else."""
-    text = str(value).strip()
-    return text if not isinstance(value, bool) and _BARE.fullmatch(text) else ""
-
-
 def _quotient(name: str, value: object) -> object:
     """The quotient that "38:1" or "4/2" is where a ratio or a reeving is written; anything else as it is."""
     found = _QUOTIENT.fullmatch(str(value)) if name in ("ratio", "reeving") else None
@@ -561,7 +548,7 @@ def typed(p: Parameter, text: str) -> str:
     ['95 arcmin', '95 kg', '95 %', '95']
     """
     text = str(_quotient(p.name, text))
-    number, unit = _bare(text), USUAL.get(p.name, p.unit)
+    number, unit = bare(text), USUAL.get(p.name, p.unit)
     if p.name == "efficiency" and number and float(number) >= 10.0:
         unit = "%"
     return f"{number} {unit}" if number and unit not in ("", "1") else text.strip()
@@ -588,7 +575,7 @@ def echo(p: Parameter, text: str) -> str:
     ['1460 rpm = 152.9 rad/s', '1460 kg', '']
     """
     written = typed(p, text)
-    if not p.unit or _bare(written):
+    if not p.unit or bare(written):
         return ""
     value = f"{float(f'{read_value(p, written):.4g}'):.10g} {p.unit}".removesuffix(" 1")
     return written if written.endswith(f" {p.unit}") else f"{written} = {value}"

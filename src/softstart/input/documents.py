@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softstart.errors import MOST, InputError
-from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of
+from softstart.input.parameters import Mistake, Parameter, Wording, read_values, sentences_of, without_unit
 from softstart.quantities import doubtful_comma, nearest, shortest, show
 
 T = TypeVar("T")
@@ -70,12 +70,13 @@ def read_document(
     *,
     where: str = "",
     also: Mapping[str, object] | None = None,
+    usual: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """All tables of a TOML text: {table name: {key: value in SI}}, a list of such where there are many.
 
     `what` names what is described, as "a chain"; `where` is put before each sentence; `also` holds changes as
-    typed at a command line, {"table.key": value}, which go before what the text says. Raises one InputError
-    for everything that is wrong.
+    typed at a command line, {"table.key": value}, which go before what the text says; keys in `usual` have
+    units, see `without_unit`. Raises one InputError for everything that is wrong.
 
     >>> shaft = Table("shaft", (Parameter("stiffness", "N*m/rad", "stiffness", '"5 N*m/rad"', "above 0"),))
     >>> read_document("[shaft]\\nstiffness = '2 kN*m/rad'", [shaft], "a test")
@@ -99,7 +100,7 @@ def read_document(
             found[table.name] = None
         else:
             found[table.name], more = read_values(content or {}, table.by_key, wording)
-            mistakes += more
+            mistakes += [*more, *without_unit(content or {}, table.by_key, usual or {}, wording)]
     wrong += [*sentences_of(mistakes), *in_rows]
     if wrong:
         raise InputError(wrong)
@@ -397,9 +398,9 @@ def _misspelt(
 
 
 def table_text(table: Table, values: Mapping[str, object], *, units: bool = True) -> str:
-    """The lines of a table, each with unit and meaning in a comment (`units`); None is left out.
+    """The lines of a table, each with unit and meaning in a comment (`units`), or speeds with units.
 
-    Numbers are in SI, or as `shortest` writes them.
+    Numbers are in SI, or as `shortest` writes them; None is left out.
 
     >>> shaft = Table("shaft", (Parameter("gap", "rad", "total gap", '"0.5 rad"'),))
     >>> print(table_text(shaft, {"gap": 0.5}), table_text(shaft, {"gap": 0.06981317007977318}), sep="\\n")
@@ -412,7 +413,7 @@ def table_text(table: Table, values: Mapping[str, object], *, units: bool = True
     for p in table.parameters:
         value = values.get(p.name)
         if value is not None:
-            text = literal(value, p.unit)
+            text = literal(value, p.unit, always=p.unit == "rad/s" and not units)
             unit = "" if p.unit == "1" or text.startswith('"') else f"{p.unit}: "
             lines.append(f"{p.key} = {text}" + (f"  # {unit}{p.meaning}" if p.unit and units else ""))
     return "\n".join(lines)
@@ -424,7 +425,7 @@ def document_text(blocks: Iterable[tuple[Table, Mapping[str, object]]], *, units
     return "\n\n".join(text for name, text in texts if text and (name == "" or "\n" in text)) + "\n"
 
 
-def literal(value: object, unit: str = "") -> str:
+def literal(value: object, unit: str = "", *, always: bool = False) -> str:
     """A value as TOML; numbers in as few digits as give back their bits, of the quantity with this SI unit.
 
     >>> literal(0.1), literal("a \\"b\\""), literal((1.0, True)), literal(np.array([1.0, 2.0]))
@@ -435,9 +436,10 @@ def literal(value: object, unit: str = "") -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
-        return f"[{', '.join(literal(one, unit) for one in value)}]"
+        return f"[{', '.join(literal(one, unit, always=always) for one in value)}]"
     if isinstance(value, float):
         text = shortest(value, unit)
+        text += f" {unit}" if always and " " not in text else ""
         return f'"{text}"' if " " in text else text
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -12,7 +12,8 @@ import numpy as np
 from softstart.quantities import RefusedError, Value, nearest, parse, show
 
 __all__ = [
-    "REQUIRED", "Limit", "Mistake", "Parameter", "Wording", "read_value", "read_values", "sentences_of",
+    "REQUIRED", "Limit", "Mistake", "Parameter", "Wording", "bare", "read_value", "read_values",
+    "sentences_of", "without_unit",
 ]  # fmt: skip
 
 # beyond these no quantity of a machine lies, in SI, and the powers that physics takes of them overflow
@@ -35,6 +36,7 @@ LIMITS: dict[str, Callable[[Any], Any]] = {
 }
 
 
+_BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 # what steers a terminal, or turns the order of letters round
 _STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -206,6 +208,30 @@ def read_values(
         else:
             values[name] = parameter.default
     return values, mistakes
+
+
+def bare(value: object) -> str:
+    """A number without a unit as it is written; "" for anything else."""
+    text = str(value).strip()
+    return text if not isinstance(value, bool) and _BARE.fullmatch(text) else ""
+
+
+def without_unit(
+    given: Mapping[str, object],
+    parameters: Mapping[str, Parameter],
+    usual: Mapping[str, str],
+    wording: Wording,
+) -> list[Mistake]:
+    """A mistake for each number without a unit, but 0, that may be in SI or in its `usual` unit, by name."""
+    found = []
+    for name in (one for one in usual if one in parameters and one in given):
+        p, value = parameters[name], given[name]
+        numbers = [bare(one) for one in (value if isinstance(value, list) else [value])]
+        if number := next((one for one in numbers if float(one or 0.0) != 0.0), ""):
+            also = f'or, if {p.unit} is meant, "{number} {p.unit}"'
+            reason = f'no unit; write "{number} {usual[name]}" {also}'
+            found.append(Mistake(wording.refused(p, value, RefusedError(reason))))
+    return found
 
 
 def read_value(parameter: Parameter, value: object, *, batch: bool = False) -> Any:

@@ -50,11 +50,11 @@ def sentence_of(error: BaseException, otherwise: str = OWN_MISTAKE) -> str:
 def plain(sentence: str) -> str:
     """A sentence without the words of the command line, which a page does not have.
 
-    >>> plain("minimise = start_time: it is below 0; write --columns speed=NAME (softstart identify --plan).")
-    'it is below 0; write speed=NAME.'
+    >>> plain("minimise = life: it is below 0; leave out --torque-constant (softstart identify --plan).")
+    'it is below 0; leave out torque constant.'
     """
     text = re.sub(r" \([^()]*(--[a-z]|softstart [a-z])[^()]*\)|^minimise = \w+: ", "", sentence)
-    return re.sub(r"( of)? --[a-z][\w-]*", "", text)
+    return re.sub(r"--([a-z][\w-]*)", lambda option: option[1].replace("-", " "), text)
 
 
 def clipped(name: str) -> str:

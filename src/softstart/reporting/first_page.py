@@ -147,7 +147,8 @@ def tiles(best: Row, direct: Row, torque: str, third: tuple[str, str, str]) -> H
         (
             torque,
             f"{digits(run.peak_torque)} N m",
-            f"direct {digits(hard.peak_torque)} N m: {share_saved(best, direct)} less"
+            f"direct {digits(hard.peak_torque)} N m"
+            + (f": {share_saved(best, direct)} less" if best is not direct else "")
             + (f"; {output} N m at the output shaft" if output else ""),
         ),
         (

@@ -100,7 +100,7 @@ def tables(found: Balance) -> list[Table]:
     """Orders, designs, and what is left of first order over the speeds: moment, and couple if any."""
     others = [one for one in found.residuals if not one.name.endswith(COUPLED)]
     shown = [_orders(found), _designs(found), _speeds(found, "moment", "first_order", others)]
-    coupled = any(one.couple.any() for one in found.residuals)
+    coupled = any(np.any(one.couple > 0.0) for one in found.residuals)
     return [*shown, _speeds(found, "couple", "couple", found.residuals)] if coupled else shown
 
 
@@ -204,7 +204,7 @@ def footnotes(found: Balance) -> list[str]:
         f"{designs}. At most: over all speeds.",
         "The crank turns at constant speed; the moments are those that alternate, about the crank axis.",
     ]
-    if found.engine.cylinders.count > 1 and not found.engine.cylinders.spacing:
+    if not found.engine.cylinders.couples_known:
         notes.append("The couples are not known: they need the spacing of the cylinders.")
     if found.engine.assumed:
         notes.append(f"Assumed: {', '.join(found.engine.assumed)}.")
@@ -303,7 +303,7 @@ def residual_figure(found: Balance) -> Any:
     rpm = found.speeds / RPM
     designed = [one for one in found.residuals if one.height is not None]
     with drawing():
-        coupled = found.residuals if any(one.couple.any() for one in found.residuals) else ()
+        coupled = found.residuals if any(np.any(one.couple > 0.0) for one in found.residuals) else ()
         rows = 2 + bool(designed) + bool(coupled)
         figure, panels = new_figure(rows, 1, (8.0, 3.1 * rows), sharex=True)
         moment, force = panels[0], panels[-1 - bool(coupled)]

@@ -111,6 +111,9 @@ highest_speed = "6000 rpm"
     assert couples[1.0] == pytest.approx(1094.0, abs=0.5)
     assert couples[2.0] == pytest.approx(324.0 * (1 + (40 / 135) ** 2 / 4), rel=2e-3)  # A_2, not lambda alone
     assert found["indicated_work"] is None
+    told = as_json("balance", "three.toml", "--set", "cylinders.spacing=0")
+    assert told["free_couple"] is told["orders"][0]["couple"] is told["designs"][0]["largest_couple"] is None
+    assert "forces of the cylinders cancel one another: no balancer" in told["note"]
     assert not (place / "three" / "torque.csv").exists()
 
 
@@ -119,10 +122,12 @@ ONE_SENTENCE = {
     "folder": (["folder"], ["this is a directory"]),
     "empty": (["empty.toml"], ["it is empty"]),
     "speed": (["--speed", "50 Hz"], ["--speed", "Hz is a frequency"]),
+    "bare speed": (["--speed", "4500"], ['"4500": no unit; write "4500 rpm" or, if rad/s is meant']),
     "speed below 0": (["--speed", "-1"], ['--speed = "-1"', "above 0"]),
     "no value": (["--set", "masses.rotating"], ["write a key, an equals sign and a value"]),
     "twice": (["--set", "masses.rotating=1", "--set", "masses.rotating=2"], ["given twice"]),
     "key": (["--set", "masses.rotatin=1"], ["did you mean masses.rotating?"]),
+    "no unit": (["--set", "operation.lowest_speed=9"], ['"9 rpm" or, if rad/s is meant, "9 rad/s"']),
     "value": (["--set", "cylinders.bore=82 N"], ["N is a force, not a length"]),
 }
 
