@@ -103,7 +103,8 @@ def read_document(
             mistakes += [*more, *without_unit(content or {}, table.by_key, usual or {}, wording)]
     wrong += [*sentences_of(mistakes), *in_rows]
     if wrong:
-        raise InputError(wrong)
+        bare = " or as a bare number in rad/s" if usual else "\0"  # it would be refused
+        raise InputError(one.replace(bare, "") for one in wrong)
     return found
 
 
