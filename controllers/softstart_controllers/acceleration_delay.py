@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart import stages
+from softstart import formulas
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
@@ -249,7 +249,7 @@ def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
     """
     half, stride, threshold = window(drive, torque, drop, period)
     dw12, Omega = closing_speed(drive, torque), drive.Omega
-    mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
+    mean = formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
 
     def lost(s: Any) -> Any:
         s = np.maximum(s, 0.0)
@@ -258,7 +258,7 @@ def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
         return (swing + drive.c * dw12 / Omega * (angle - np.sin(angle))) / (drive.J1 * Omega**2)
 
     low = np.zeros(np.broadcast_shapes(np.shape(threshold), drive.shape))
-    high = low + stages.contact_stage_duration(mean, dw12, drive.c, Omega)
+    high = low + formulas.contact_stage(torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12).duration
     back = half * stride * np.asarray(period)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
@@ -269,5 +269,5 @@ def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
 
 def _drop(drive: Drive, torque: Any) -> Any:
     """Half of M12avg/M1 in contact, within 0.05 and 0.3."""
-    mean = np.asarray(stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))
+    mean = np.asarray(formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))
     return np.clip(0.5 * mean / torque, SMALLEST_DROP, DROP)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from softstart import stages
+from softstart import formulas
 from softstart.controller import parameter
 from softstart.drive import Drive
 from softstart_controllers.sampled import number
@@ -69,12 +69,10 @@ def stage_2_duration(drive: Drive, torque: Any) -> Any:
     0.0328
     """
     dw12 = closing_speed(drive, torque)
-    mean = stages.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
-    duration = np.asarray(stages.contact_stage_duration(mean, dw12, drive.c, drive.Omega))
+    contact = (torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12)
+    duration = np.asarray(formulas.contact_stage(*contact).duration)
     if drive.load_kind == "reactive":
-        stuck = stages.reactive_contact_stage_duration(
-            torque, drive.Mc, dw12, J1=drive.J1, J2=drive.J2, c=drive.c
-        )
+        stuck = formulas.contact_stage(*contact, "reactive").duration
         resting = np.asarray(drive.initial_load_speed) == 0.0
         duration = np.where(resting & np.isfinite(stuck), stuck, duration)
     return number(duration)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.controllers.starts import CRANE, raised_at, random_drive
 
-from softstart import Drive, simulate, stages
+from softstart import Drive, formulas, simulate
 from softstart.plant.vector import encoder_count
 from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
 
@@ -26,7 +26,7 @@ def seen_after(drive: Drive, controller: AccelerationDelay = AT_ONCE) -> float:
 def test_delay_is_that_of_the_reduced_torque(raise_at: str | None, share: float) -> None:
     """Until the peak of stage 2, [G](14), or its end, (15)."""
     fitted = AccelerationDelay(torque=0.25 * 62, raise_at=raise_at).fitted(CRANE)
-    nominal = stages.method_2(0.25, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
+    nominal = formulas.two_stages(15.5, 15.5, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
     assert fitted.delay == pytest.approx(share * nominal.contact_duration, rel=1e-12)
 
 

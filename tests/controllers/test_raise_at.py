@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, simulate, stages
+from softstart import Drive, InputError, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart_controllers.acceleration_delay import AccelerationDelay
-from softstart_controllers.reduced import closing_speed, delay_of
+from softstart_controllers.reduced import delay_of
 from softstart_controllers.reduced_two_stage import ReducedTwoStage
 
 CRANE = Drive.load("crane-4amtkf")
@@ -46,11 +46,10 @@ def test_the_crane(name: str) -> None:
 
 def test_the_delays_are_those_of_g() -> None:
     for r in (0.25, 0.5):
-        nominal = stages.method_2(r, Ms=62, J1=0.035, J2=0.175, c=368.465, gap=0.5, Mc=7.16)
-        mean = stages.mean_shaft_torque(62 * r, 0.035, 0.175, 7.16)
-        peak = stages.time_of_peak(mean, closing_speed(CRANE, 62 * r), 368.465, CRANE.Omega)
-        assert delay_of(CRANE, 62 * r, "end") == pytest.approx(nominal.contact_duration, rel=1e-12)
-        assert delay_of(CRANE, 62 * r, "peak") == pytest.approx(peak, rel=1e-12)
+        dw12 = formulas.open_stage(62 * r, 0.035, 0.175, 7.16, 0.5).dw12
+        contact = formulas.contact_stage(62 * r, 0.035, 0.175, 7.16, 368.465, dw12)
+        assert delay_of(CRANE, 62 * r, "end") == pytest.approx(contact.duration, rel=1e-12)
+        assert delay_of(CRANE, 62 * r, "peak") == pytest.approx(contact.peak_time, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softstart import Drive, InputError, Run, Status, simulate, stages
+from softstart import Drive, InputError, Run, Status, formulas, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 DAMPED = CRANE.replace(damping=1.0, load_kind="reactive")
@@ -75,7 +75,7 @@ def test_settling_of_a_damped_drive() -> None:
     run = simulate(DAMPED, "direct", until=2.0)
     settled = run.settling_time(0.1)
     assert 0.0 < settled < 1.0
-    mean = stages.mean_shaft_torque(62.0, 0.035, 0.175, 7.16)
+    mean = formulas.mean_shaft_torque(62.0, 0.035, 0.175, 7.16)
     after = run.at(np.linspace(settled, 2.0, 20_000))["T"]
     assert np.abs(after - mean).max() <= 0.1 * mean * (1 + 1e-6)
     assert abs(float(run.at(settled - 1e-6)["T"]) - mean) > 0.1 * mean * (1 - 1e-3)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softstart import stages
+from softstart import formulas
 from softstart.arrays import Vector
 from softstart.chain import kernel_start as kernel
 from softstart.chain.kernel_records import (
@@ -242,7 +242,7 @@ class ChainRun(BaseRun):
     @property
     def k_dyns(self) -> Vector:
         """Dynamic coefficient of each shaft."""
-        return np.asarray(stages.dynamic_coefficient(self.peak_torques, self.base_torque))
+        return np.asarray(formulas.dynamic_coefficient(self.peak_torques, self.base_torque))
 
     @property
     def shaft_factors(self) -> Vector:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart import stages
+from softstart import formulas
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
@@ -197,8 +197,8 @@ def figures(
 
     peak = np.abs(results[:, at.PEAK])
     first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
-    k_dyn = stages.dynamic_coefficient(np.where(good, peak, 0.0), base)
-    k_first = stages.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
+    k_dyn = formulas.dynamic_coefficient(np.where(good, peak, 0.0), base)
+    k_first = formulas.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
     found: Figures = {
         "k_dyn": (kept(k_dyn), "1", "dynamic coefficient of the whole run, [G](16)"),
         "k_dyn_first_contact": (

@@ -1,6 +1,6 @@
 """The figures by which starts are judged: K_dyn, settling time, energy balance.
 
-Every K_dyn comes from `stages.dynamic_coefficient`.
+Every K_dyn comes from `formulas.dynamic_coefficient`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softstart import stages
+from softstart import formulas
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -80,7 +80,7 @@ def base_torque(drive: Drive) -> Any:
     >>> round(base_torque(crane), 2), round(base_torque(crane.replace(motor_friction=6.0)), 2)
     (52.86, 47.86)
     """
-    return stages.mean_shaft_torque(drive.Ms - drive.motor_friction, drive.J1, drive.J2, drive.Mc)
+    return formulas.mean_shaft_torque(drive.Ms - drive.motor_friction, drive.J1, drive.J2, drive.Mc)
 
 
 def k_dyn(peak_torque: Any, drive: Drive) -> Any:
@@ -89,7 +89,7 @@ def k_dyn(peak_torque: Any, drive: Drive) -> Any:
     >>> round(k_dyn(105.72, Drive.load("crane-4amtkf")), 3)
     2.0
     """
-    return stages.dynamic_coefficient(peak_torque, base_torque(drive))
+    return formulas.dynamic_coefficient(peak_torque, base_torque(drive))
 
 
 def settling_time(run: Recorded, band: float) -> float:
@@ -110,7 +110,7 @@ def settling_time(run: Recorded, band: float) -> float:
         state = run.at(times)
         motor = state["u"] - drive.motor_friction - drive.motor_viscous_friction * state["w1"]
         load = drive.Mc + drive.load_viscous_friction * state["w2"]
-        return np.abs(state["T"] - stages.mean_shaft_torque(motor, drive.J1, drive.J2, load)) - limit
+        return np.abs(state["T"] - formulas.mean_shaft_torque(motor, drive.J1, drive.J2, load)) - limit
 
     begin = run.stages[-1].start
     period = float(drive.elastic_period)

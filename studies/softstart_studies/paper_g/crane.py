@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from softstart import Drive, Run, simulate, stages
+from softstart import Drive, Run, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import Controller, make_controller
 from softstart.start.metrics import base_torque
@@ -43,15 +43,16 @@ def base() -> float:
     return float(base_torque(CRANE))
 
 
-def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None) -> stages.TwoStages:
+def closed_form(drive: Drive, r: Any, method: Method, base: float | None = None) -> formulas.TwoStages:
     """Stages 1 and 2 with M1 = r Ms by [G](3), (15), (17), (18); `base` in N m, else that of the drive.
 
     >>> round(closed_form(crane(), 0.25, 2).k_dyn, 4)
     1.2677
     """
-    compute = stages.method_1 if method == 1 else stages.method_2
     J1, J2, c, gap, Ms, Mc = drive.J1, drive.J2, drive.c, drive.gap, drive.Ms, drive.Mc
-    return compute(r, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, base=base)
+    low = np.asarray(r) * Ms
+    high = Ms if method == 1 else low
+    return formulas.two_stages(low, high, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, base=base)
 
 
 def published(controller: str, **parameters: object) -> Controller:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from softstart import Drive, stages
+from softstart import Drive, formulas
 from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
 from softstart.controller.compiled import ASK_AGAIN, STAGE, STATE, TIME, TORQUE
@@ -35,15 +35,14 @@ def switch_after_contact(parameters: Vector, measured: Vector, state: Vector, co
     command[STATE] = deadline
 
 
-def reduced_stages(drive: Drive, torque: Any) -> stages.TwoStages:
+def reduced_stages(drive: Drive, torque: Any) -> formulas.TwoStages:
     """Stages 1 and 2 of `drive` under a constant motor torque in N m, [G](3), (15), (18).
 
     >>> round(reduced_stages(Drive.load("crane-4amtkf"), 15.5).k_dyn, 4)
     1.2677
     """
-    return stages.method_2(
-        torque / drive.Ms, J1=drive.J1, J2=drive.J2, c=drive.c, gap=drive.gap, Ms=drive.Ms, Mc=drive.Mc
-    )
+    J1, J2, c, gap, Ms, Mc = drive.J1, drive.J2, drive.c, drive.gap, drive.Ms, drive.Mc
+    return formulas.two_stages(torque, torque, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from softstart import Drive, simulate, stages
+from softstart import Drive, formulas, simulate
 
 
 def decades(low: float) -> st.SearchStrategy[float]:
@@ -34,8 +34,8 @@ def test_k_dyn_of_the_first_contact_is_18(
     Mc = load * Ms
     r = 1.0 if strategy == "direct" else r
     # stage 2 must exist: with a torque below the load's, the gap still closes (active load)
-    Omega = math.sqrt(c * (J1 + J2) / (J1 * J2))
-    t1 = stages.open_stage_duration(r * Ms, J1, J2, Mc, gap)
+    second = r if strategy == "reduced-two-stage" else 1.0
+    start = formulas.two_stages(r * Ms, second * Ms, J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc)
     drive = Drive(
         motor_inertia=J1,
         load_inertia=J2,
@@ -45,28 +45,13 @@ def test_k_dyn_of_the_first_contact_is_18(
         load_torque=Mc,
         target_speed=1e9,
     )
-    until = t1 + 2.0 * math.pi / Omega * (1 + 1e-9)  # stage 2 lasts less than one elastic period
+    until = start.open_duration + drive.elastic_period * (1 + 1e-9)  # stage 2 is shorter than this
     given_torque = {} if strategy == "direct" else {"torque": r * Ms}
     given_torque |= {"raise_at": "end"} if strategy == "reduced-two-stage" else {}  # as [G] does
     run = simulate(drive, strategy, until, parameters=given_torque)
-    second = r if strategy == "reduced-two-stage" else 1.0
-    expected = stages.dynamic_coefficient_of_stages(
-        M1_open=r * Ms,
-        M1_contact=second * Ms,
-        J1=J1,
-        J2=J2,
-        c=c,
-        gap=gap,
-        Mc_open=Mc,
-        Mc_contact=Mc,
-        base=stages.mean_shaft_torque(Ms, J1, J2, Mc),
-    )
-    assert run.first_contact == pytest.approx(t1, rel=1e-10)
-    assert run.k_dyn_first_contact == pytest.approx(expected, rel=1e-10)
-    dw12 = stages.impact_speed(r * Ms, J1, J2, Mc, gap)
-    mean = stages.mean_shaft_torque(second * Ms, J1, J2, Mc)
-    duration = stages.contact_stage_duration(mean, dw12, c, Omega)
-    assert run.stage_durations[1] == pytest.approx(duration, rel=1e-9)
+    assert run.first_contact == pytest.approx(start.open_duration, rel=1e-10)
+    assert run.k_dyn_first_contact == pytest.approx(start.k_dyn, rel=1e-10)
+    assert run.stage_durations[1] == pytest.approx(start.contact_duration, rel=1e-9)
 
 
 @settings(max_examples=60, deadline=None)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from softstart import Command, Drive, InputError, PlainController, optimize, simulate, stages, tune
+from softstart import Command, Drive, InputError, PlainController, formulas, optimize, simulate, tune
 from softstart.controller import controller_class, controller_names, make_controller, parameter
 from softstart.processes import Pool
 from softstart.start.recommendation import Row
@@ -88,7 +88,7 @@ def stage_1(torque):
 def start_time(torque, torque_2):
     """When the load has its target speed in stage 2, from the integral of [G](11)."""
     t, dw12, w2 = stage_1(torque)
-    mean = stages.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
+    mean = formulas.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
 
     def short_of(s):
         swing = mean * (s - math.sin(LOW.Omega * s) / LOW.Omega)
@@ -101,8 +101,8 @@ def start_time(torque, torque_2):
 def first_peak(torque, torque_2):
     """K_dyn of stage 2, [G](17) and (18)."""
     _, dw12, _ = stage_1(torque)
-    mean = stages.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
-    full = stages.mean_shaft_torque(LOW.Ms, LOW.J1, LOW.J2, LOW.Mc)
+    mean = formulas.mean_shaft_torque(torque_2, LOW.J1, LOW.J2, LOW.Mc)
+    full = formulas.mean_shaft_torque(LOW.Ms, LOW.J1, LOW.J2, LOW.Mc)
     return mean / full * (1.0 + math.sqrt(1.0 + (LOW.c * dw12 / (LOW.Omega * mean)) ** 2))
 
 
