@@ -142,7 +142,7 @@ def robust() -> Values:
 
 def chains() -> Values:
     """Shipped chains: vibration, reduction, starts with traces, verification."""
-    from softstart import Chain, natural_vibration, reduce_chain, simulate_chain, verify_on_chain
+    from softstart import Chain, natural_vibration, reduce_chain, simulate, verify_on_chain
 
     for name in CHAINS:
         chain = Chain.load(name)
@@ -151,7 +151,7 @@ def chains() -> Values:
         for method in ("lever", "modal"):
             yield f"{name} {method}", outcome(lambda c=chain, m=method: reduce_chain(c, method=m).summary())
         for controller in ready():
-            run = outcome(lambda c=chain, k=controller: simulate_chain(c, k))
+            run = outcome(lambda c=chain, k=controller: simulate(c, k))
             if isinstance(run, str):
                 yield f"{name} {controller}", run
                 continue
@@ -253,7 +253,7 @@ PARTS: dict[str, Callable[[], Values]] = {
 
 def speed() -> Values:
     """Least time in s of three runs of each: batches of starts, single starts, chains."""
-    from softstart import Chain, Drive, simulate, simulate_chain
+    from softstart import Chain, Drive, simulate, simulate
 
     crane = Drive.load("crane-4amtkf")
     chain = Chain.load("crane-4-mass")
@@ -267,8 +267,8 @@ def speed() -> Values:
         "batch direct, damped": lambda: simulate(batch(damped, 10_000), "direct"),
         "start direct": lambda: [simulate(crane, "direct") for _ in range(200)],
         "start ramp with traces": lambda: [simulate(crane, "ramp").T for _ in range(20)],
-        "chain direct": lambda: [simulate_chain(chain, "direct") for _ in range(3)],
-        "chain ramp": lambda: [simulate_chain(chain, "ramp") for _ in range(3)],
+        "chain direct": lambda: [simulate(chain, "direct") for _ in range(3)],
+        "chain ramp": lambda: [simulate(chain, "ramp") for _ in range(3)],
     }
     for name in ready():
         if name != "direct":

@@ -73,9 +73,9 @@ def plain() -> None:
 
 def chain() -> None:
     """Starts of a chain."""
-    from softstart import Chain, simulate_chain
+    from softstart import Chain, simulate
 
-    assert simulate_chain(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
+    assert simulate(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
 
 
 def sensitivities() -> None:

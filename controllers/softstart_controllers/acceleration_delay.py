@@ -12,7 +12,7 @@ from softstart import formulas
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.plant.vector import encoder_count
+from softstart.start.rows import encoder_count
 from softstart_controllers.reduced import (
     RAISE_AT,
     closing_speed,
@@ -226,7 +226,7 @@ def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[Any, Any,
     >>> int(half), int(stride), round(float(threshold) / encoder_count(crane), 1)
     (5, 1, 8.6)
     """
-    rounding = 2.0 * np.asarray(encoder_count(drive))
+    rounding = 2.0 * np.asarray(encoder_count(drive.encoder_lines))
     a = np.asarray(drop) * torque / drive.J1
     samples = np.maximum(np.ceil(np.sqrt(rounding / (ROUNDING_SHARE * a)) / period), SHORTEST_WINDOW)
     stride = np.ceil(samples / LONGEST_WINDOW)

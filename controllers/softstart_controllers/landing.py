@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 
-from softstart.controller.compiled import Vector, inlined, record
+from softstart.controller.compiled import Vector, compiled, record
 from softstart.drive import Drive
-from softstart.plant.jit import compiled
-from softstart.plant.vector import encoder_count
+from softstart.kernel.jit import compiled
+from softstart.start.rows import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
 from softstart_controllers.sampled import mean_torque, number, patience, pulling_load, sample_period
@@ -94,7 +94,7 @@ class State:
 PARAMETERS, STATE = record(Parameters), record(State, ring=RING)
 
 
-@inlined
+@compiled
 def watch(p: Parameters, m: Any, x: State, y: State) -> tuple[float, float]:
     """Motor speed, and how far the second difference is beyond the trigger (-inf between two looks).
 
@@ -132,13 +132,13 @@ def watch(p: Parameters, m: Any, x: State, y: State) -> tuple[float, float]:
     return y.free_speed - y.slope, beyond
 
 
-@inlined
+@compiled
 def drift(p: Parameters, x: State) -> float:
     """By how much the load slows down while the gap is open, rad/s^2."""
     return p.drift if x.contacts == 0.0 else p.pull
 
 
-@inlined
+@compiled
 def load_speed(p: Parameters, x: State, t: float) -> float:
     """Speed of the load while the gap is open; a reactive load comes to rest."""
     began = p.load_speed if x.contacts == 0.0 else x.load_speed
@@ -148,13 +148,13 @@ def load_speed(p: Parameters, x: State, t: float) -> float:
     return speed
 
 
-@inlined
+@compiled
 def sticks(p: Parameters, x: State) -> float:
     """1 where the load is at rest before contact and does not move until T > Mc."""
     return p.sticks if x.contacts == 0.0 else 0.0
 
 
-@inlined
+@compiled
 def approach(p: Parameters, x: State, t: float, speed: float) -> float:
     """The torque that closes the gap, within 0 and the low torque."""
     if x.contacts == 0.0:
@@ -165,7 +165,7 @@ def approach(p: Parameters, x: State, t: float, speed: float) -> float:
     return min(max(p.J1 * (allowed - speed) / p.horizon, 0.0), p.low)
 
 
-@inlined
+@compiled
 def open_again(t: float, motor_speed: float, load_speed_now: float, x: State, y: State) -> None:
     """The flanks have parted: watch anew, from the speeds of motor and load."""
     y.count = 0.0
@@ -288,7 +288,7 @@ def contact_threshold(drive: Drive, low: Any, approach_speed: Any, period: Any) 
     Nor more than half of what the speed control applies to a motor that the shaft holds at rest, which is J1
     approach_speed/(horizon + W): the speed that it knows is as old as the window W = sqrt(6 q J1/threshold).
     """
-    rounding = np.sqrt(6.0 * np.asarray(encoder_count(drive)) * drive.J1)
+    rounding = np.sqrt(6.0 * np.asarray(encoder_count(drive.encoder_lines)) * drive.J1)
     ahead = horizon(drive, period)
     speed = np.asarray(approach_speed) * drive.J1
     root = 2.0 * LOW_SHARE * speed / (rounding + np.sqrt(rounding**2 + 4.0 * LOW_SHARE * ahead * speed))

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, inlined, record, size
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, compiled, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.profile import TorqueProfile
@@ -40,7 +40,7 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 N_PARAMETERS = size(PARAMETERS)
 
 
-@inlined
+@compiled
 def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot: int, y: Any) -> int:
     """The line of the profile that holds at the instant y.ask_again, which becomes its end."""
     t = y.ask_again

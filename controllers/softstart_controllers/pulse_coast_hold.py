@@ -11,7 +11,7 @@ import numpy as np
 from softstart.controller import CompiledController, Effort, parameter, stack
 from softstart.controller.compiled import Vector, size
 from softstart.drive import Drive
-from softstart.plant.vector import encoder_count
+from softstart.start.rows import encoder_count
 from softstart_controllers.pulse_coast_hold_step import RING, STATE, step
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
@@ -156,7 +156,7 @@ class PulseCoastHold(CompiledController):
         h = np.asarray(self.period, float)
         ratio = 1.0 / np.asarray(self.inertia_ratio, float)
         windup = drive.Ms / drive.c
-        count = np.asarray(encoder_count(drive))
+        count = np.asarray(encoder_count(drive.encoder_lines))
         noise = np.asarray(drive.torque_noise)
         free = a * h * np.hypot(TORQUE_DEVIATION * drive.Ms, noise)
         slew = drive.Ms / np.asarray(drive.torque_rate)

@@ -7,7 +7,7 @@ from typing import Any
 
 from softstart.controller import compiled_step
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record
-from softstart.plant.jit import compiled
+from softstart.kernel.jit import compiled
 from softstart_controllers.contact import (
     TIME_DEVIATION,
     lean,

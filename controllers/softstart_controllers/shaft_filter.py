@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.plant.jit import compiled
-from softstart.plant.layout import record
+from softstart.kernel.jit import compiled
+from softstart.kernel.records import record
 
 Matrix = NDArray[np.float64]
 N = 5

@@ -13,7 +13,7 @@ from numba import njit
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.plant.vector import encoder_count
+from softstart.start.rows import encoder_count
 from softstart_controllers.design_store import kept
 from softstart_controllers.sampled import number
 
@@ -105,7 +105,7 @@ def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
     (0.66, 0.0059, True)
     """
     h = np.asarray(period, dtype=np.float64)
-    deviation = np.asarray(encoder_count(drive)) / math.sqrt(12.0)
+    deviation = np.asarray(encoder_count(drive.encoder_lines)) / math.sqrt(12.0)
     noise = np.asarray(uncertainty) * drive.Omega**2 * drive.Ms / np.sqrt(drive.Omega * h) * h**4 / drive.J1
     slowest = 10.0 ** (0.5 * SMALLEST_INDEX)
     fastest = np.maximum((FASTEST * drive.Omega * h) ** 4, slowest)

@@ -11,7 +11,7 @@ import numpy as np
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.plant.jit import compiled
+from softstart.kernel.jit import compiled
 from softstart_controllers import landing
 from softstart_controllers.landing import (
     approach,

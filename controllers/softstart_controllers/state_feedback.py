@@ -11,8 +11,8 @@ import numpy as np
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.plant.jit import compiled
-from softstart.plant.vector import encoder_count
+from softstart.kernel.jit import compiled
+from softstart.start.rows import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains
@@ -349,7 +349,7 @@ class StateFeedback(CompiledController):
         back = feedback_gains(step, ratio, drive.Omega * lag, self.torque_weight, self.rate_weight)
         unit = base_torque(drive) / drive.c
         density = np.asarray(self.uncertainty) ** 2
-        noise = np.asarray(encoder_count(drive)) ** 2 / 12.0 / unit**2 / density
+        noise = np.asarray(encoder_count(drive.encoder_lines)) ** 2 / 12.0 / unit**2 / density
         noise = np.clip(noise, share**2 / step / FASTEST**8, share**2 / step / SLOWEST**8)
         kalman = observer_gains(step, ratio, share, noise)
         return stack(

@@ -4,11 +4,8 @@ from softstart.balancing import Engine as Engine
 from softstart.balancing import PeriodicTorque as PeriodicTorque
 from softstart.balancing import balance as balance
 from softstart.chain import Chain as Chain
-from softstart.chain import ChainRun as ChainRun
 from softstart.chain import natural_vibration as natural_vibration
 from softstart.chain import reduce_chain as reduce_chain
-from softstart.chain import simulate_chain as simulate_chain
-from softstart.chain import simulate_chains as simulate_chains
 from softstart.chain import two_mass_error as two_mass_error
 from softstart.chain import verify_on_chain as verify_on_chain
 from softstart.clutch import Clutch as Clutch

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from softstart import Controller, OptimumError, optimize
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_chains
-from softstart.chain.simulation import drive_of
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
 from softstart.controller import make_controller
 
 CRANE = Chain.load("crane-4-mass")
@@ -99,7 +98,7 @@ def random_chain(rng: np.random.Generator, masses: int) -> Chain:
     # a target speed that takes 6 to 15 elastic periods of the reduction
     slow = replace(base, target_speed=1.0)
     periods = rng.uniform(6.0, 15.0)
-    speed = periods * drive_of(slow).elastic_period / rigid_time(slow)
+    speed = periods * slow.design_drive.elastic_period / rigid_time(slow)
     made = replace(base, target_speed=float(speed))
     return seen(made, float(rng.uniform(0.005, 0.03)), float(rng.uniform()), rng.uniform(-1, 1, masses - 1))
 
@@ -114,14 +113,14 @@ def played(
     chains: Sequence[Chain], controller: str | Controller, fitted_to: Chain | None = None
 ) -> tuple[Any, Any]:
     """K_dyn of each chain over its own mean torque, and start time over the rigid one."""
-    found = simulate_chains(chains, controller, fitted_to=fitted_to, time_limit=10.0, workers=1)
+    found = simulate(chains, controller, fitted_to=fitted_to, time_limit=10.0, workers=1)
     K = found.peak_torque.values / np.array([chain.mean_torque for chain in chains])
     return K, found.start_time.values / np.array([rigid_time(chain) for chain in chains])
 
 
 def without(name: str) -> Controller:
     """`take-up` without one of its parts."""
-    own = make_controller("take-up").fitted(drive_of(NOMINAL)).parameters
+    own = make_controller("take-up").fitted(NOMINAL.design_drive).parameters
     changes = {
         "damping by the load's speed": {"damping_ratio": 0.0},
         "damping by T'": {"rate_damping_ratio": 0.0},
@@ -149,7 +148,7 @@ STRATEGIES = ("take-up", "current-limit-feedback", "pulse-coast-hold", "state-fe
 
 def delay_of(chain: Chain) -> float:
     """Angle in rad by which lag, dead time and a sample delay the torque, at the first elastic frequency."""
-    drive: Any = drive_of(chain)
+    drive: Any = chain.design_drive
     sample = make_controller("take-up").fitted(drive).parameters["period"]
     return float(drive.Omega * (drive.torque_lag + drive.computing_delay + sample))
 
@@ -172,7 +171,7 @@ IDLE = 0.05  # of Ms
 
 def at_speeds(cells: Sequence[Chain], shares: Iterable[float]) -> Any:
     """K_dyn of each start (columns) at shares of the take-up speed (rows), all else as it is."""
-    own = make_controller("take-up").fitted(drive_of(NOMINAL)).parameters
+    own = make_controller("take-up").fitted(NOMINAL.design_drive).parameters
     speed, impulse = own["take_up_speed"], own["contact_share"] * own["take_up_speed"]
     made = [{"take_up_speed": x * speed, "contact_share": impulse / (x * speed)} for x in shares]
     return np.array([played(cells, make_controller("take-up", one), NOMINAL)[0] for one in made])
@@ -183,7 +182,7 @@ def idle_before_the_peak(chain: Chain) -> bool:
 
     The first sign is the first torque of the motor shaft after the first one of the load's shaft.
     """
-    run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+    run = simulate(chain, "take-up", fitted_to=NOMINAL)
     times = np.arange(0.0, run.peak_time, 1e-4)
     T, u = (run.at(times)[name] for name in ("T", "u"))
     met = np.logical_or.accumulate(T[:, -1] > 0.0)
@@ -280,7 +279,7 @@ def place(chain: Chain) -> str:
 
 def beside_the_least(name: str, chain: Chain, fitted_to: Chain | None) -> tuple[float, float]:
     """K_dyn of `take-up` and its ratio to the least found in its own time; its row is printed."""
-    run = simulate_chain(chain, "take-up", fitted_to=fitted_to, base=chain)
+    run = simulate(chain, "take-up", fitted_to=fitted_to, base=chain)
     best = math.nan if name == "undamped" else least(chain, run.start_time)
     peak = chain.shaft_names[int(run.k_dyns.argmax())]
     share = chain.masses[-1].inertia / CRANE.masses[-1].inertia

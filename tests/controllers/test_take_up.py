@@ -17,12 +17,11 @@ from tests.controllers.several_gaps import (
     seen,
 )
 
-from softstart import Drive, InputError, compare, simulate, simulate_chain
-from softstart.chain.simulation import drive_of
+from softstart import Drive, InputError, compare, simulate, simulate
 from softstart.controller import make_controller
 from softstart.drive import library
 
-FIT = drive_of(NOMINAL)
+FIT = NOMINAL.design_drive
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +59,7 @@ def test_never_rattles_once_the_load_is_met():
     The load's own shaft opens at most twice, in the bounce of the first contact.
     """
     for chain in crane_cells(6, 2)["gaps x1"]:
-        run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+        run = simulate(chain, "take-up", fitted_to=NOMINAL)
         after = run.at(np.linspace(0.5 * run.start_time, run.end_time, 4000))["T"]
         assert (after > 0.0).all()
 
@@ -69,14 +68,14 @@ def test_batch_has_the_bits_of_single_starts():
     chains = [*crane_cells(7, 1)["gaps x2"], NOMINAL]
     K, _ = played(chains, "take-up", NOMINAL)
     for chain, of_batch in zip(chains, K, strict=True):
-        run = simulate_chain(chain, "take-up", fitted_to=NOMINAL)
+        run = simulate(chain, "take-up", fitted_to=NOMINAL)
         assert run.peak_torque / chain.mean_torque == of_batch
 
 
 def test_plain_twin_on_a_chain_gives_the_same_bits():
     controller = make_controller("take-up")
-    compiled = simulate_chain(NOMINAL, controller, fitted_to=NOMINAL)
-    plain = simulate_chain(NOMINAL, controller.as_plain(FIT), fitted_to=NOMINAL)
+    compiled = simulate(NOMINAL, controller, fitted_to=NOMINAL)
+    plain = simulate(NOMINAL, controller.as_plain(FIT), fitted_to=NOMINAL)
     assert plain.k_dyns.tolist() == compiled.k_dyns.tolist()
     assert plain.start_time == compiled.start_time
 
@@ -89,7 +88,7 @@ def test_a_light_part_is_no_load():
         masses=(*NOMINAL.masses[:3], NOMINAL.masses[3].replace(torque=0.0)),
     )
     own = make_controller("take-up").fitted(FIT).parameters
-    run = simulate_chain(far, "take-up", until=0.3, fitted_to=NOMINAL)
+    run = simulate(far, "take-up", until=0.3, fitted_to=NOMINAL)
     w1 = run.at(np.linspace(0.05, 0.3, 500))["w"][:, 0]
     assert w1.max() < 1.5 * own["take_up_speed"]
 

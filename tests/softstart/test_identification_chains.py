@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
-from softstart.chain.simulation import simulate_chain
+from softstart.start.simulation import simulate
 from softstart.identification.chains import chain_log, reduced_drive, reduction_note
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
@@ -81,7 +81,7 @@ def test_a_second_gap_at_a_light_mass_adds_to_the_first_and_does_no_harm_at_the_
     found = identify(logged(chain, drive), drive, searches=1)
     assert found["gap"].value == pytest.approx(0.08 + second, rel=0.04)
     for strategy in ("direct", "s-curve"):
-        of_motor = float(simulate_chain(chain, strategy).k_dyns[0])
+        of_motor = float(simulate(chain, strategy).k_dyns[0])
         assert float(simulate(found.drive.design_drive, strategy).k_dyn) == pytest.approx(of_motor, rel=0.02)
 
 
@@ -99,7 +99,7 @@ def test_a_second_gap_at_a_middle_mass_is_noticed_or_does_no_harm_at_the_motor(
     for strategy in ("direct", "s-curve") if not named else ():
         own, each = (
             float(simulate(found.drive.design_drive, strategy).k_dyn),
-            simulate_chain(chain, strategy).k_dyns,
+            simulate(chain, strategy).k_dyns,
         )
         assert float(each[0]) == pytest.approx(own, rel=0.02)
         assert max(map(float, each)) < 1.15 * own

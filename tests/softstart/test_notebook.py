@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from softstart import Chain, Drive, compare, fatigue, optimize, pareto, simulate, simulate_chain
+from softstart import Chain, Drive, compare, fatigue, optimize, pareto, simulate, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 DAMPED = CRANE.replace(damping=1.0, name="<script>alert(1)</script> & co")
@@ -22,7 +22,7 @@ def optimum() -> Any:
 
 MADE: dict[str, tuple[Callable[[], Any], bool]] = {
     "run": (lambda: simulate(DAMPED, "ramp"), True),
-    "chain": (lambda: simulate_chain(Chain.load("crane-4-mass"), "ramp"), True),
+    "chain": (lambda: simulate(Chain.load("crane-4-mass"), "ramp"), True),
     "comparison": (lambda: compare(DAMPED, ["direct", "ramp", "shaped"]), False),
     "optimum": (optimum, True),
     "front": (lambda: pareto(DAMPED.replace(damping=0.0), [0.45, 0.5], controllers=["direct"]), True),

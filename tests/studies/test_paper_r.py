@@ -10,7 +10,7 @@ from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, natural_vibration, reduce_chain
-from softstart.chain.simulation import simulate_chain
+from softstart.start.simulation import simulate
 from softstart.study import Verdict, study_names
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables
 from softstart_studies.paper_r.motion import moved, released
@@ -56,7 +56,7 @@ def test_a_start_of_two_masses_is_that_of_the_exact_plant(damping):
 def test_a_start_of_four_masses_is_that_of_the_chain_simulation():
     """Two independent integrators, three gaps, dozens of contacts."""
     chain = Chain.load("crane-4-mass")
-    run = simulate_chain(chain, "direct", until=0.2)
+    run = simulate(chain, "direct", until=0.2)
     motion = moved(chain, np.zeros(3), 0.2, 1e-3, torque=np.array([62.0, 0.0, 0.0, -7.16]))
     there = run.at(motion.t)
     np.testing.assert_allclose(there["w"], motion.w, atol=1e-8)

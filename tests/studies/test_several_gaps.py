@@ -2,7 +2,7 @@
 
 import pytest
 
-from softstart import optimize, simulate_chain
+from softstart import optimize, simulate
 from softstart.study import Verdict, find_study
 from softstart_studies.several_gaps import Extent, SeveralGaps, chain, claims, find, table
 
@@ -28,7 +28,7 @@ def test_the_claims_hold_here(found):
     said = claims(found)
     assert said[0].verdict is Verdict.CONFIRMED
     assert said[2].verdict is Verdict.CONFIRMED
-    assert simulate_chain(chain(), "s-curve").k_dyn > found.rows[0].gentlest
+    assert simulate(chain(), "s-curve").k_dyn > found.rows[0].gentlest
 
 
 def test_it_is_found():

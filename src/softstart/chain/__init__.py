@@ -14,24 +14,15 @@ from softstart.chain.elements import Mass, Motor, Shaft
 from softstart.chain.model import Chain, ChainArrays
 
 if TYPE_CHECKING:
-    from softstart.chain.batch import simulate_chains
     from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
     from softstart.chain.reduction import Reduction, reduce_chain
-    from softstart.chain.run import ChainRun
-    from softstart.chain.simulation import (
-        TwoMassError,
-        Verification,
-        simulate_chain,
-        two_mass_error,
-        verify_on_chain,
-    )
+    from softstart.chain.two_masses import TwoMassError, Verification, two_mass_error, verify_on_chain
     from softstart.chain.vibration import Vibration, natural_vibration
 
 __all__ = [
     "Chain",
     "ChainArrays",
     "ChainFatigue",
-    "ChainRun",
     "Mass",
     "Motor",
     "Reduction",
@@ -43,8 +34,6 @@ __all__ = [
     "chain_fatigue",
     "natural_vibration",
     "reduce_chain",
-    "simulate_chain",
-    "simulate_chains",
     "two_mass_error",
     "verify_on_chain",
 ]
@@ -52,19 +41,16 @@ __all__ = [
 # loaded when first used: they need compiled code
 _HOME = {
     "ChainFatigue": "softstart.chain.fatigue",
-    "ChainRun": "softstart.chain.run",
     "Reduction": "softstart.chain.reduction",
     "ShaftLife": "softstart.chain.fatigue",
-    "TwoMassError": "softstart.chain.simulation",
-    "Verification": "softstart.chain.simulation",
+    "TwoMassError": "softstart.chain.two_masses",
+    "Verification": "softstart.chain.two_masses",
     "Vibration": "softstart.chain.vibration",
     "chain_fatigue": "softstart.chain.fatigue",
     "natural_vibration": "softstart.chain.vibration",
     "reduce_chain": "softstart.chain.reduction",
-    "simulate_chain": "softstart.chain.simulation",
-    "simulate_chains": "softstart.chain.batch",
-    "two_mass_error": "softstart.chain.simulation",
-    "verify_on_chain": "softstart.chain.simulation",
+    "two_mass_error": "softstart.chain.two_masses",
+    "verify_on_chain": "softstart.chain.two_masses",
 }
 
 

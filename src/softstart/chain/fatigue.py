@@ -10,16 +10,13 @@ from typing import Any
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain import kernel_start as kernel
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import simulate_chain
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.start.fatigue import DEFAULT_SLOPE, STILL, life_ratio, miner, rainflow_cycles, read_slope
 from softstart.start.metrics import REFERENCE
-
-NEGLIGIBLE = 1e-18  # coefficients of a slope below this share of the largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +25,7 @@ class ShaftLife:
 
     Attributes
     ----------
-    run : ChainRun
+    run : Run
         The start; of an unknown position the one that does most damage to this shaft.
     shaft : int
         The index of the shaft.
@@ -44,7 +41,7 @@ class ShaftLife:
         Largest torque over the permissible one of the shaft; NaN where none is given.
     """
 
-    run: ChainRun
+    run: Run
     shaft: int
     turning_points: Matrix
     spectrum: Matrix
@@ -56,7 +53,7 @@ class ShaftLife:
         """The figures under the names used everywhere."""
         return {
             "controller": self.run.controller_name,
-            "shaft": self.run.chain.shaft_names[self.shaft],
+            "shaft": self.run.drive.shaft_names[self.shaft],
             "position": self.run.position,
             "k_dyn": float(self.run.k_dyns[self.shaft]),
             "peak_torque": float(self.run.peak_torques[self.shaft]),
@@ -84,10 +81,10 @@ class ChainFatigue:
 
     Examples
     --------
-    >>> from softstart import Chain, simulate_chain
+    >>> from softstart import Chain, simulate
     >>> from softstart.chain import chain_fatigue
     >>> damped = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
-    >>> lives = chain_fatigue([simulate_chain(Chain.load("crane-4-mass", also=damped), "direct")])
+    >>> lives = chain_fatigue([simulate(Chain.load("crane-4-mass", also=damped), "direct")])
     >>> {life.relative for life in lives.rows[0]}
     {1.0}
 
@@ -111,7 +108,7 @@ class ChainFatigue:
         }
 
 
-def chain_fatigue(runs: ChainRun | Sequence[ChainRun], *, slope: float | None = None) -> ChainFatigue:
+def chain_fatigue(runs: Run | Sequence[Run], *, slope: float | None = None) -> ChainFatigue:
     """How long each shaft of a chain lasts under these starts, beside `direct`.
 
     As `fatigue` does for a drive, shaft by shaft: turning points of its torque are located, a start is
@@ -120,8 +117,8 @@ def chain_fatigue(runs: ChainRun | Sequence[ChainRun], *, slope: float | None = 
 
     Parameters
     ----------
-    runs : ChainRun or sequence of ChainRun
-        Starts of one chain, as `simulate_chain` returns them.
+    runs : Run or sequence of Run
+        Starts of one chain, as `simulate` returns them.
     slope : float, optional
         Slope m of the S-N curve. By default 6.6, pitting of case-hardened gears after ISO 6336-2.
 
@@ -138,8 +135,8 @@ def chain_fatigue(runs: ChainRun | Sequence[ChainRun], *, slope: float | None = 
 
     Examples
     --------
-    >>> from softstart import simulate_chain
-    >>> chain_fatigue(simulate_chain("crane-4-mass", "ramp"))
+    >>> from softstart import simulate
+    >>> chain_fatigue(simulate("crane-4-mass", "ramp"))
     Traceback (most recent call last):
     softstart.errors.InputError: damping is missing in rotor - pinion, pinion - wheel shaft, ...
 
@@ -147,16 +144,16 @@ def chain_fatigue(runs: ChainRun | Sequence[ChainRun], *, slope: float | None = 
     ----------
     ASTM E1049, rainflow counting; ISO 6336-2, life factors; docs/fatigue.md.
     """
-    asked = [runs] if isinstance(runs, ChainRun) else list(runs) if isinstance(runs, list | tuple) else []
-    if not asked or not all(isinstance(one, ChainRun) for one in asked):
-        raise InputError("runs: give one ChainRun or several, as simulate_chain returns them for one chain.")
-    chain = asked[0].chain
-    if any(one.chain is not chain and one.chain != chain for one in asked):
+    asked = [runs] if isinstance(runs, Run) else list(runs) if isinstance(runs, list | tuple) else []
+    if not asked or not all(isinstance(one, Run) for one in asked):
+        raise InputError("runs: give one Run or several, as simulate returns them for one chain.")
+    chain = asked[0].drive
+    if any(one.drive is not chain and one.drive != chain for one in asked):
         raise InputError("runs: these are starts of different chains; give those of one chain.")
     _check(chain)
     curve = SNCurve(DEFAULT_SLOPE if slope is None else read_slope(slope))
     direct = next((run for run in asked if run.controller_name == REFERENCE), None)
-    reference = _counted(direct or simulate_chain(chain, REFERENCE, fitted_to=asked[0].told), curve)
+    reference = _counted(direct or simulate(chain, REFERENCE, fitted_to=asked[0].told), curve)
     rows = [
         tuple(
             ShaftLife(
@@ -186,12 +183,12 @@ def _check(chain: Chain) -> None:
         )
 
 
-def _counted(run: ChainRun, curve: SNCurve) -> list[tuple[ChainRun, Matrix, Matrix, float]]:
+def _counted(run: Run, curve: SNCurve) -> list[tuple[Run, Matrix, Matrix, float]]:
     """Of each shaft the start, from whichever position, that does most damage; its cycles and the damage."""
     found = []
     each = list(run.positions.values()) or [run]
     turned = [shaft_turning_points(one) for one in each]
-    for k in range(len(run.chain.shafts)):
+    for k in range(len(run.drive.shafts)):
         counted = []
         for one, points in zip(each, turned, strict=True):
             spectrum = rainflow_cycles(points[k][:, 1].tolist(), repeated=True)
@@ -200,60 +197,17 @@ def _counted(run: ChainRun, curve: SNCurve) -> list[tuple[ChainRun, Matrix, Matr
     return found
 
 
-def shaft_turning_points(run: ChainRun) -> tuple[Matrix, ...]:
+def shaft_turning_points(run: Run) -> tuple[Matrix, ...]:
     """Times, s, and torques, N m at the motor shaft, where that of each shaft turns, and at both ends.
 
-    In a span the torque is a Taylor polynomial; its extremes are the roots of the derivative. Where damping
-    makes the torque jump at a contact, both sides count.
+    Its extremes in a span are located. Where damping makes the torque jump at a contact, both sides count.
 
-    >>> from softstart import simulate_chain
-    >>> run = simulate_chain("crane-4-mass", "ramp", 0.1)
+    >>> from softstart import simulate
+    >>> run = simulate("crane-4-mass", "ramp", 0.1)
     >>> first, *_ = shaft_turning_points(run)
     >>> bool(abs(first[:, 1]).max() <= run.peak_torques[0] * (1.0 + 1e-9))
     True
     """
-    start, peaks = run._replayed(), run.peak_torques
-    found: list[list[tuple[float, float]]] = [[] for _ in run.chain.shafts]
-    for row, span in enumerate(start.spans):
-        begin, length = float(span["start"]), float(span["end"] - span["start"])
-        n = kernel.restore(start, row)
-        for k, points in enumerate(found):
-            torque = start.shafts["torque"][k, : n + 1]
-            at = np.concatenate([[0.0], extremes(torque), [1.0]])
-            values = np.polynomial.polynomial.polyval(at, torque)
-            points.extend(zip((begin + length * at).tolist(), values.tolist(), strict=True))
-    return tuple(reversals(points, STILL * float(peak)) for points, peak in zip(found, peaks, strict=True))
-
-
-def extremes(series: Vector) -> Vector:
-    """Where in (0, 1) a polynomial may turn, in order: real roots of its derivative.
-
-    >>> extremes(np.array([0.0, 1.0, -1.0])).tolist()
-    [0.5]
-    """
-    slope = series[1:] * np.arange(1.0, series.size)
-    sizes = np.abs(slope)
-    if slope.size < 2 or sizes[0] > sizes[1:].sum():  # it cannot change its sign
-        return np.zeros(0)
-    used = int(np.flatnonzero(sizes > NEGLIGIBLE * sizes.max())[-1]) + 1 if sizes.max() > 0.0 else 0
-    if used < 2:
-        return np.zeros(0)
-    roots = np.polynomial.polynomial.polyroots(slope[:used])
-    real: Vector = np.sort(roots.real[np.abs(roots.imag) <= 1e-9])
-    return real[(real > 0.0) & (real < 1.0)]
-
-
-def reversals(points: Sequence[tuple[float, float]], still: float) -> Matrix:
-    """The first and the last point and those between at which the value turns by more than `still`.
-
-    >>> reversals([(0, 0.0), (1, 2.0), (2, 3.0), (3, 1.0), (4, 1.0)], 0.1).tolist()
-    [[0.0, 0.0], [2.0, 3.0], [3.0, 1.0]]
-    """
-    kept = [points[0]]
-    for point in points[1:]:
-        by = point[1] - kept[-1][1]
-        if len(kept) > 1 and by * (kept[-1][1] - kept[-2][1]) > 0.0:
-            kept[-1] = point
-        elif abs(by) > still:
-            kept.append(point)
-    return np.array(kept, dtype=np.float64)
+    return tuple(
+        run.recorded.turning_points(k, STILL * float(peak)) for k, peak in enumerate(run.peak_torques)
+    )

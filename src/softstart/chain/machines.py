@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.batch import prepared
+from softstart.start.batch import prepared
 from softstart.chain.elements import START, TOP, Shaft
 from softstart.chain.model import Chain, load_machine
-from softstart.chain.simulation import drive_of
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
@@ -51,7 +50,7 @@ def one_machine(given: Machine | str | os.PathLike[str]) -> Machine:
 
 def two_masses(machine: Machine) -> Drive:
     """The drive for which controllers are set up; of a chain its modal reduction to two masses."""
-    return drive_of(machine) if isinstance(machine, Chain) else machine.design_drive
+    return machine.design_drive if isinstance(machine, Chain) else machine.design_drive
 
 
 def here(machine: Machine) -> tuple[float, float]:

@@ -40,10 +40,7 @@ from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document, read_table
 from softstart.input.files import ABSENT, read_text, refusal_of
 from softstart.input.parameters import Wording
-from softstart.late import late
 from softstart.quantities import RefusedError, nearest, show
-
-simulation = late("softstart.chain.simulation")  # above this module; see softstart.late
 
 
 BRANCHES = (
@@ -358,9 +355,59 @@ class Chain:
             return {self.position: self}
         return {one: replace(self, position=one) for one in UNKNOWN_POSITIONS}
 
-    def start(self, controller: Any, until: float | None = None, **options: Any) -> Any:
-        """Its start under a controller: `simulate_chain`."""
-        return simulation.simulate_chain(self, controller, until, **options)
+    @cached_property
+    def design_drive(self) -> Drive:
+        """The two masses that controllers are set up for: the modal reduction, whatever its error."""
+        from softstart.chain.reduction import reduce_chain
+
+        try:
+            return reduce_chain(self, 2, method="modal", force=True).to_drive().design_drive
+        except InputError as error:
+            sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
+            raise InputError(sentences) from None
+
+    @cached_property
+    def elastic_period(self) -> float:
+        """The period of the first natural frequency with all gaps closed, s; 0 where every joint is rigid.
+
+        >>> round(Chain.load("crane-4-mass").elastic_period, 4)
+        0.0548
+        """
+        from softstart.chain.vibration import closed, elastic_frequencies
+
+        arrays = self.at_motor_shaft()
+        if arrays.rigid.all():
+            return 0.0
+        body = closed(arrays)
+        return 2.0 * math.pi / float(elastic_frequencies(body.J, body.c)[0])
+
+    @property
+    def shaft_means(self) -> Vector:
+        """The mean torque of each shaft under full starting torque, N m; NaN without a motor."""
+        torque = math.nan if self.motor is None else self.motor.starting_torque
+        return self.at_motor_shaft().mean_torques(torque)
+
+    @property
+    def permissible_torques(self) -> Vector:
+        """What each shaft permits, N m at the motor shaft; NaN where nothing is given."""
+        return self.at_motor_shaft().permissible
+
+    @property
+    def identity(self) -> dict[str, object]:
+        """What a summary of a start says of the machine."""
+        return {"chain": self.name, "assumed": self.assumed, "warnings": list(self.warnings)}
+
+    def columns_of(self, states: Mapping[str, Vector]) -> dict[str, Vector]:
+        """The states of a start under the headings of a table."""
+        masses = [mass.name for mass in self.masses]
+        columns = {"u [N*m]": states["u"]}
+        for name, unit, parts in (
+            ("phi", "rad", masses), ("w", "rad/s", masses), ("twist", "rad", self.shaft_names),
+            ("T", "N*m", self.shaft_names),
+        ):  # fmt: skip
+            values = states[name].reshape(states["u"].size, -1)
+            columns |= {f"{name} {part} [{unit}]": values[:, i] for i, part in enumerate(parts)}
+        return columns
 
     def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
         """The chain with so many times its gaps, and its load mass with so many times its inertia.

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from softstart.identification.result import Identification
     from softstart.views import chains as views
 else:
-    result, simulation = late("softstart.identification.result"), late("softstart.chain.simulation")
+    result, simulation = late("softstart.identification.result"), late("softstart.chain.two_masses")
     views = late("softstart.views.chains")
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]

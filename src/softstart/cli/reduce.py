@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
     from softstart.chain import reduction, simulation
     from softstart.chain.reduction import Reduction
-    from softstart.chain.simulation import TwoMassError
+    from softstart.chain.two_masses import TwoMassError
     from softstart.chain.vibration import Vibration
     from softstart.views import chain_schemes
     from softstart.views import chains as views
 else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
-    reduction, simulation = late("softstart.chain.reduction"), late("softstart.chain.simulation")
+    reduction, simulation = late("softstart.chain.reduction"), late("softstart.chain.two_masses")
     chain_schemes, views = late("softstart.views.chain_schemes"), late("softstart.views.chains")
 
 METHODS = ("lever", "modal")

@@ -18,7 +18,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.drive import Drive
-from softstart.plant.exchange import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+from softstart.kernel.motor import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
 Kind = Literal["quantity", "text", "object"]
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
-from softstart.plant import exchange, layout
-from softstart.plant.exchange import STEP_SIGNATURE
-from softstart.plant.jit import compiled_as, inlined
-from softstart.plant.layout import MEASURED, Answer, record, size
+from softstart.kernel import motor, records
+from softstart.kernel.jit import compiled, compiled_as, drop_stale
+from softstart.kernel.motor import STEP_SIGNATURE
+from softstart.kernel.records import MEASURED, Answer, record, size
 
 # indices of `measured`
-from softstart.plant.exchange import (  # isort: skip
+from softstart.kernel.motor import (  # isort: skip
     M_LOAD_SPEED as LOAD_SPEED,
     M_MOTOR_ANGLE as MOTOR_ANGLE,
     M_MOTOR_SPEED as MOTOR_SPEED,
@@ -25,7 +25,7 @@ from softstart.plant.exchange import (  # isort: skip
 )
 
 # indices of `command`; the new state follows from STATE on
-from softstart.plant.exchange import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
+from softstart.kernel.motor import ASK_AGAIN, SLOPE, TORQUE, NEW_STATE as STATE  # isort: skip
 
 
 __all__ = [
@@ -44,39 +44,22 @@ __all__ = [
     "TORQUE",
     "Answer",
     "Vector",
+    "compiled",
     "compiled_step",
-    "inlined",
     "keep_state",
     "record",
     "size",
 ]
 
 
-@inlined
+@compiled
 def keep_state(state: Vector, command: Vector) -> None:
     """The new state is the old one, until the step changes it."""
     for i in range(state.shape[0]):
         command[STATE + i] = state[i]
 
 
-INTERFACE = (Path(exchange.__file__), Path(layout.__file__))
-
-
-def _drop_if_stale(function: Callable[..., None], source: Path) -> None:
-    """Drop compiled steps that are older than the interface, or than a file with functions they call.
-
-    The indices above are compiled into every step, and so is every function it calls: numba would notice a
-    change in the step's own file only.
-    """
-    own = _called(function, set())
-    try:
-        changed = max(path.stat().st_mtime for path in {Path(__file__), *INTERFACE, *own})
-        for file in {source, *own}:
-            for path in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]"):
-                if path.stat().st_mtime < changed:
-                    path.unlink(missing_ok=True)
-    except OSError:
-        return  # another process is cleaning, or the folder is read-only: numba decides
+INTERFACE = (Path(__file__), Path(motor.__file__), Path(records.__file__))
 
 
 def _called(function: Any, seen: set[int]) -> set[Path]:
@@ -111,7 +94,8 @@ def compiled_step(function: Callable[..., None]) -> Any:
     file = "<unknown>" if source is None else str(source.co_filename)
     in_a_file = not file.startswith("<")
     if in_a_file:
-        _drop_if_stale(function, Path(file))
+        own = _called(function, set())
+        drop_stale({Path(file), *own}, INTERFACE)
     return _found_once(compiled_as(STEP_SIGNATURE, cache=in_a_file)(function))
 
 

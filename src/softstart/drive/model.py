@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args,
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.drive.checks import FRICTIONS, contradictions, elastic_frequency, wrong_units
 from softstart.drive.limits import Limits, contradicting_limits, limits_of
 from softstart.errors import InputError
@@ -446,6 +447,49 @@ class Drive(ParameterSet):
     def elastic_period(self) -> Value:
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
+
+    # ---- what starts ask of any machine ------------------------------------------------------------------
+
+    @property
+    def mean_torque(self) -> Value:
+        """M12avg_base = (Ms J2 + J1 Mc)/(J1 + J2), N m, [G](16): the mean shaft torque under full torque.
+
+        What the Coulomb friction of the motor takes does not reach the shaft: Ms - friction stands for Ms.
+        Viscous friction is left out, it is zero as the motion begins: K_dyn does not depend on the target
+        speed.
+
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> round(crane.mean_torque, 2), round(crane.replace(motor_friction=6.0).mean_torque, 2)
+        (52.86, 47.86)
+        """
+        push = self.Ms - self.motor_friction
+        return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """The shaft by the masses that it joins."""
+        return ("motor - load",)
+
+    @property
+    def shaft_means(self) -> Vector:
+        """The mean torque of the shaft under full starting torque, N m, as an array."""
+        return np.array([self.mean_torque])
+
+    @property
+    def permissible_torques(self) -> Vector:
+        """What the shaft permits, N m, as an array; NaN where nothing is given."""
+        most = self.permissible_torque
+        return np.array([math.nan if most is None else most])
+
+    @property
+    def identity(self) -> dict[str, object]:
+        """What a summary of a start says of the machine."""
+        return {"drive": self.name, "contact_law": self.contact_law, "load_kind": self.load_kind}
+
+    def columns_of(self, states: Mapping[str, Vector]) -> dict[str, Vector]:
+        """The states of a start under the headings of a table."""
+        units = {"phi1": "rad", "phi2": "rad", "w1": "rad/s", "w2": "rad/s", "u": "N*m", "T": "N*m"}
+        return {f"{name} [{unit}]": states[name] for name, unit in units.items()}
 
     @property
     def limits(self) -> Limits:

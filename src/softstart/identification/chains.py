@@ -11,7 +11,7 @@ import numpy as np
 
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
-from softstart.chain.simulation import simulate_chain
+from softstart.start.simulation import simulate
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
@@ -64,7 +64,7 @@ def chain_log(chain: Chain, log: Log, lines: float) -> Log:
         profile = TorqueProfile(np.repeat(times, 2)[1:], np.repeat(log.torque, 2)[:-1])
     else:
         profile = TorqueProfile(times, log.torque)
-    run = simulate_chain(one, make_controller("profile", {"profile": profile}), until=float(times[-1]))
+    run = simulate(one, make_controller("profile", {"profile": profile}), until=float(times[-1]))
     states = run.at(times)
     angle = states["phi"][:, one.motor_index] - states["phi"][0, one.motor_index]
     if log.kind == "speed":

@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.plant.jit import compiled
+from softstart.kernel.jit import compiled
 from softstart.plant.layout import DEAD_ZONE, PLANT, SEGMENT, Plant, Segment
 
 PHI1, THETA, W1, W2, U, REF, RISE = range(7)  # rows of X; the last is the slope of the demand

@@ -60,7 +60,7 @@ from softstart.linear.systems import (
     unscaled,
     zeros_of,
 )
-from softstart.plant.exchange import M_MOTOR_TORQUE
+from softstart.kernel.motor import M_MOTOR_TORQUE
 
 if TYPE_CHECKING:
     import control

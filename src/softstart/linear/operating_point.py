@@ -28,7 +28,7 @@ from softstart.chain.model import Chain
 from softstart.linear.sampled_plant import SampledPlant, in_contact, motor_of, sampled, sizes_of
 from softstart.linear.sampled_start import Part, Sample, SampledStart, Step
 from softstart.linear.systems import System, moved, part, shown
-from softstart.plant import exchange
+from softstart.kernel import motor as exchange
 
 LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
 MOST_SAMPLES = 20_000

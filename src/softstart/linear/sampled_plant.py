@@ -24,11 +24,10 @@ from softstart.chain.elements import Motor
 from softstart.chain.kernel_records import elastic_period
 from softstart.chain.machines import Machine
 from softstart.chain.model import Chain, ChainArrays
-from softstart.chain.run import mean_torque_of
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.linear.systems import System
-from softstart.plant import exchange
+from softstart.kernel import motor as exchange
 
 TERMS = 18  # of the exponential's series: 2^-18/18! is below rounding
 
@@ -65,7 +64,7 @@ class Sizes:
 
 def sizes_of(machine: Machine) -> Sizes:
     """The sizes of a drive or a chain with all gaps closed."""
-    base = mean_torque_of(machine)
+    base = machine.mean_torque
     if not isinstance(machine, Chain):
         return Sizes(base, base / float(machine.c), float(machine.Omega), float(machine.elastic_period))
     windup, period = base * float((1.0 / machine.at_motor_shaft().c).sum()), elastic_period(machine)

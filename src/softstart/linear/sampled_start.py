@@ -17,12 +17,11 @@ from softstart.arrays import Vector
 from softstart.chain.kernel_records import CONTACT, JOINED, PRESSED, WELDED, Numbers, numbers
 from softstart.chain.machines import Machine, two_masses
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRecorder
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor, label_of
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.linear.sampled_plant import motor_of
-from softstart.plant import exchange, layout
+from softstart.kernel import motor as exchange
 from softstart.plant import start as kernel
 from softstart.plant.vector import plant_vector
 from softstart.start.engine import MAX_EVENTS, Recorder, plain_answer

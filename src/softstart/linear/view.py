@@ -28,7 +28,7 @@ from softstart.linear.operating_point import (
 from softstart.linear.sampled_plant import sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
-from softstart.plant import exchange, layout
+from softstart.kernel import motor as exchange
 
 if TYPE_CHECKING:
     import control

@@ -47,7 +47,7 @@ from softstart.optimal.lp.motion import MARGIN, Contact
 from softstart.optimal.lp.whole import ONE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
-from softstart.plant.jit import compiled, inlined
+from softstart.kernel.jit import compiled
 
 FINER = 3  # each grid has so many times the steps of the one before
 STEEP = 1e4  # N m of P for each N m by which the demand misses the one that holds a steady end

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Vector
 from softstart.chain.machines import Machine, here, two_masses, values_of
-from softstart.chain.run import ChainRun, mean_torque_of
+from softstart.start.run import Run
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
@@ -65,7 +65,7 @@ WITHIN = 1600  # points in a window of the plots: one a pixel, nearly
 PER_PERIOD = 16  # points an elastic period before thinning: its crests are then within 2 % at worst
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
-AnyRun = Run | ChainRun
+AnyRun = Run
 STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
 
 
@@ -515,7 +515,7 @@ def figure(session: Session, found: Strategy, units: Units) -> dict[str, Any]:
     run = found.run
     facts = judged(session, found) | {
         "status": found.status,
-        "base": number(mean_torque_of(session.machine)),
+        "base": number(session.machine.mean_torque),
     }
     if run is not None:
         facts |= {
@@ -644,7 +644,7 @@ def parts_of(run: AnyRun) -> dict[str, Any]:
     }
 
 
-def chain_stages(run: ChainRun, shaft: int) -> list[tuple[float, float, int]]:
+def chain_stages(run: Run, shaft: int) -> list[tuple[float, float, int]]:
     """Contacts and free flights in the gap of one shaft of a chain, the first `MOST_STAGES` of them."""
     events = [event for event in run.events if event.place == shaft and event.kind in CONTACTS][:MOST_STAGES]
     times = np.array([0.0, *(event.time for event in events)])

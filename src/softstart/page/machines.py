@@ -14,7 +14,6 @@ from softstart.arrays import Vector
 from softstart.chain.elements import Shaft
 from softstart.chain.machines import Machine, here, moved, two_masses, values_of
 from softstart.chain.model import Chain, is_chain_text
-from softstart.chain.run import mean_torque_of
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError, SimulationError
@@ -446,4 +445,4 @@ def _k_dyn(chain: Machine, controller: Controller, nominal: Machine | None) -> f
 def bases(machine: Machine, inertias: tuple[float, ...]) -> Vector:
     """The mean torques to which K_dyn refers along the inertias of a map, N m."""
     gap = here(machine)[0]
-    return np.array([mean_torque_of(moved(machine, gap, inertia)) for inertia in inertias])
+    return np.array([moved(machine, gap, inertia).mean_torque for inertia in inertias])

@@ -26,7 +26,7 @@ from softstart.start.simulation import simulate
 from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
-    from softstart.chain.run import ChainRun
+    from softstart.start.run import Run
     from softstart.controller.base import Controller
     from softstart.start.run import Run
 
@@ -44,7 +44,7 @@ class Strategy:
     """
 
     name: str
-    run: Run | ChainRun | None
+    run: Run | None
     trouble: str = ""
     cost: float = 0.0
 
@@ -133,7 +133,7 @@ class Session:
         self._results: dict[str, Strategy] = {}
         self._cases: dict[tuple[str, str], Case] = {}
         self._rows: dict[str, Row] = {}
-        self._direct: list[Run | ChainRun | None] = []  # empty until it is computed
+        self._direct: list[Run | None] = []  # empty until it is computed
         self._reference: tuple[Reference, Strategy] | None = None
 
     # the state -----------------------------------------------------------------------------------------
@@ -410,7 +410,7 @@ class Session:
                 list(self.judged(label))
         return recommend(self.machine, [self._rows[one] for one in self.controllers if one in self._rows])
 
-    def direct(self) -> Run | ChainRun | None:
+    def direct(self) -> Run | None:
         """The start that the others are compared with; None where it fails."""
         if not self._direct:
             known = self._results.get(REFERENCE) if REFERENCE not in self.changed else None

@@ -15,8 +15,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import drive_of
+from softstart.start.run import Run
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
@@ -32,7 +31,7 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.views.printed import RPM, at_output, decimals_of, digits, fixed, short, unit
 
-AnyRun = Run | ChainRun
+AnyRun = Run
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 ALL_CORNERS = 9  # rounded values up to which every combination of half steps is started; of a chain none
 INSTANTS = 20_001  # of a chain's start, in which its motor torque is looked at
@@ -242,7 +241,7 @@ def make_sheet(
 
 def sheet_drive(machine: Drive | Chain) -> Drive:
     """The drive whose motor and numbers a sheet names: of a chain the two masses that stand for it."""
-    return machine if isinstance(machine, Drive) else drive_of(machine)
+    return machine if isinstance(machine, Drive) else machine.design_drive
 
 
 def _start(machine: Drive | Chain, controller: Controller, own: Drive) -> AnyRun:

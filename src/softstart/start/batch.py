@@ -1,27 +1,31 @@
-"""Many starts in one call, with labelled results."""
+"""Many starts in one call, on several cores: the same bits as one start at a time."""
 
 from __future__ import annotations
 
 import math
+import os
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart import formulas
+from softstart.arrays import Matrix, Vector
 from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
+from softstart.kernel import records as at
+from softstart.kernel import start as kernel
+from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.late import late
-from softstart.plant import exchange
-from softstart.plant import layout as at
-from softstart.plant import start as kernel
-from softstart.plant.vector import plant_vector
-from softstart.start import metrics
-from softstart.start.engine import MAX_EVENTS, Recorder, run_one, watched
+from softstart.processes import Pool
+from softstart.start.engine import run_one, watched
+from softstart.start.recorded import Recorder
+from softstart.start.rows import MAX_EVENTS, Rows, joined, rows_of
 from softstart.start.status import status_of
 
 if TYPE_CHECKING:
@@ -30,140 +34,131 @@ else:
     xarray = late("xarray")
 
 Figures = dict[str, tuple[Any, str, str]]  # name -> values, unit, meaning
+Which = NDArray[np.int64]
 
 PATIENCE = 0.2  # s
 FIRST_TURN = 32  # starts
 
-# name in the results, column of the kernel's notes, unit, meaning
+# name in the results, name in the kernel's notes, unit, meaning
 _COLUMNS = (
-    ("start_time", at.START_TIME, "s", "first instant at which the load has its target speed"),
-    ("peak_time", at.PEAK_TIME, "s", "when |T| is largest"),
-    ("first_contact", at.FIRST_CONTACT, "s", "instant of the first contact"),
-    ("stage_2_end", at.STAGE_2_END, "s", "end of the first contact"),
-    ("impact_speed", at.IMPACT_SPEED, "rad/s", "speed at which the flanks first meet"),
-    ("torque_at_contact", at.CONTACT_TORQUE, "N*m", "motor torque at the first contact"),
-    ("contacts", at.CONTACTS, "1", "how often the gap closed"),
-    ("gap_events", at.GAP_EVENTS, "1", "closings and openings of the gap"),
-    ("end_time", at.TIME, "s", "end of the run"),
-    ("torque_excess", at.EXCESS, "N*m", "largest excess of the demand over the torque limits"),
-    ("torque_excess_time", at.EXCESS_TIME, "s", "how long the demand lay beyond the torque limits"),
+    ("start_time", "start_time", "s", "first instant at which the load has its target speed"),
+    ("first_contact", "first_contact", "s", "instant of the first contact"),
+    ("stage_2_end", "stage_2_end", "s", "end of the first contact"),
+    ("impact_speed", "impact_speed", "rad/s", "speed at which the flanks first meet"),
+    ("torque_at_contact", "contact_torque", "N*m", "motor torque at the first contact"),
+    ("contacts", "contacts", "1", "how often the gap closed"),
+    ("gap_events", "gap_events", "1", "closings and openings of the gap"),
+    ("end_time", "time", "s", "end of the run"),
+    ("torque_excess", "excess", "N*m", "largest excess of the demand over the torque limits"),
+    ("torque_excess_time", "excess_time", "s", "how long the demand lay beyond the torque limits"),
 )
+_LATEST = ("start_time", "excess", "excess_time")  # of several positions the largest counts
 
 
-def simulate_many(
-    drives: Drive | Sequence[Drive],
-    controller: Controller,
-    until: float | None,
-    fitted_to: Drive | None,
-    base: Drive | None,
-    time_limit: float | None,
-    max_events: int,
-) -> xarray.Dataset:
-    """`simulate` for a Drive with array fields or a list of Drives; see there.
-
-    The dimension is `start` for a list and for one-dimensional fields, `axis_0`, `axis_1`, ... otherwise;
-    the fields that differ become coordinates. Starts that could not be finished have status sentences of
-    their own and NaN in every figure.
-    """
-    if isinstance(drives, Drive):
-        results = array_starts(drives, controller, until, fitted_to, time_limit, max_events)
-        return _label(drives, results, until, base or drives)
-    listed = list(drives) if isinstance(drives, Sequence) else []
-    if not listed or not all(isinstance(drive, Drive) and drive.shape == () for drive in listed):
-        raise InputError("drive: give one Drive, a Drive with array fields, or a list of Drives, not empty.")
-    rows = [array_starts(drive, controller, until, fitted_to, time_limit, max_events) for drive in listed]
-    return _label_list(listed, np.concatenate(rows), until, base)
-
-
-def array_starts(
-    drive: Drive,
-    controller: Controller,
-    until: float | None = None,
-    fitted_to: Drive | None = None,
-    time_limit: float | None = None,
-    max_events: int = MAX_EVENTS,
-) -> at.Matrix:
-    """The kernel's notes of all starts of a batch: one row a start, last index of the drive fastest.
-
-    The columns are those of `x` in `softstart.plant.layout`; `figures` turns them into labelled figures. The
-    controller's parameters may be arrays of the drive's shape. Unlike `simulate`, nothing is checked.
+@dataclass(frozen=True, eq=False)
+class Notes:
+    """What the kernel notes of many starts: a row for each, of each shaft a column.
 
     >>> from softstart.controller import make_controller
     >>> crane = Drive.load("crane-4amtkf")
     >>> notes = array_starts(crane.replace(gap=[0.5, 2.0]), make_controller("direct"))
-    >>> notes[:, at.PEAK].round(2).tolist()
-    [164.81, 257.18]
+    >>> notes.peaks.round(2).tolist()
+    [[164.81], [257.18]]
     """
-    if len(drive.positions) > 1:
-        told = fitted_to or drive.design_drive
-        return worst_of(
-            [array_starts(one, controller, until, told, time_limit, max_events)
-             for one in drive.positions.values()]
-        )  # fmt: skip
-    p = plant_vector(drive, time_limit, max_events)
-    if not isinstance(controller, PlainController):
-        ready, own = controller.set_up(fitted_to or drive)
-        if isinstance(ready, CompiledController):
-            return _starts(ready, own, p, until)
-    single = fitted_to is None or fitted_to.shape == ()
-    nominal = repeat(fitted_to) if single else fitted_to.elements()  # type: ignore[union-attr]
-    rows = []
-    for i, (one, other) in enumerate(zip(drive.elements(), nominal, strict=False)):
-        ready, own = controller.set_up(other or one)
-        rows.append(_starts(ready, own, p[i : i + 1], until))
-    return np.concatenate(rows)
+
+    starts: NDArray[np.void]
+    shafts: NDArray[np.void]
+
+    def __getitem__(self, name: str) -> Vector:
+        """A column of what is noted of the start."""
+        column: Vector = self.starts[name]
+        return column
+
+    @property
+    def peaks(self) -> Matrix:
+        """Largest |T| of each shaft, N m."""
+        return np.abs(self.shafts["peak"])
+
+    @property
+    def finished(self) -> NDArray[np.bool_]:
+        """Which starts went to their end."""
+        kinds, which = np.unique(self["status"], return_inverse=True)
+        return np.array([status_of(int(one), True, False).finished for one in kinds], dtype=bool)[which]
 
 
-def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
+def joined_notes(notes: Sequence[Notes]) -> Notes:
+    """Those of all starts, in order."""
+    return Notes(np.concatenate([one.starts for one in notes]), np.concatenate([one.shafts for one in notes]))
+
+
+def worst_of(notes: Sequence[Notes]) -> Notes:
     """Of the same starts from several positions the worst, figure by figure.
 
     They are the notes of the position with the largest |T|, or of one whose start could not be finished, with
-    the latest start time, the hardest impact, and the largest |T| of a first contact.
+    the latest start time, the hardest impact, and the largest |T| of each shaft and of a first contact.
     """
-    every, rows = np.stack(notes), np.arange(notes[0].shape[0])
-    broken = np.array(
-        [[not status_of(int(s), True, False).finished for s in one[:, at.STATUS]] for one in every]
-    )
-    broken |= every[:, :, at.HELD] == 1.0
-    which = np.argmax(np.where(broken, np.inf, np.abs(every[:, :, at.PEAK])), axis=0)
-    worst: at.Matrix = every[which, rows]
-    worst[:, at.POSITION] = which + 1.0
-    worst[:, at.START_TIME] = np.max(every[:, :, at.START_TIME], axis=0)
-    worst[:, at.IMPACT_SPEED] = np.fmax.reduce(every[:, :, at.IMPACT_SPEED], axis=0)
-    first = np.where(np.isnan(every[:, :, at.STAGE_2_END]), -1.0, np.abs(every[:, :, at.FIRST_PEAK]))
-    hardest = every[np.argmax(first, axis=0), rows]
-    for column in (at.EXCESS, at.EXCESS_TIME):
-        worst[:, column] = np.max(every[:, :, column], axis=0)
-    for column in (at.FIRST_PEAK, at.STAGE_2_END):
-        worst[:, column] = hardest[:, column]
+    starts, shafts = np.stack([one.starts for one in notes]), np.stack([one.shafts for one in notes])
+    rows = np.arange(starts.shape[1])
+    broken = np.stack([~one.finished for one in notes]) | (starts["braked"] == 1.0)
+    which = np.argmax(np.where(broken, np.inf, np.abs(shafts["peak"]).max(axis=2)), axis=0)
+    worst = Notes(starts[which, rows], shafts[which, rows])
+    worst.starts["position"] = which + 1.0
+    for name in _LATEST:
+        worst.starts[name] = np.max(starts[name], axis=0)
+    worst.starts["impact_speed"] = np.fmax.reduce(starts["impact_speed"], axis=0)
+    first = np.abs(shafts["first_peak"]).max(axis=2)
+    hardest = np.argmax(np.where(np.isnan(starts["stage_2_end"]), -1.0, first), axis=0)
+    worst.starts["stage_2_end"] = starts["stage_2_end"][hardest, rows]
+    worst.shafts["first_peak"] = shafts["first_peak"][hardest, rows]
+    for k in range(shafts.shape[2]):
+        place = np.argmax(np.abs(shafts["peak"][:, :, k]), axis=0)
+        for name in ("peak", "peak_time"):
+            worst.shafts[name][:, k] = shafts[name][place, rows, k]
     return worst
 
 
-def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | None) -> at.Matrix:
-    """The kernel's notes, one row a start."""
+SetUp = list[tuple[Controller, Any]]
+
+
+def notes_of(rows: Rows, set_up: SetUp, until: float | None, workers: int = 1) -> Notes:
+    """The kernel's notes of starts, each under its controller as it is set up, or all under one."""
+    count = rows.machines.shape[0]
+    notes = np.zeros((count, at.N_NOTES))
+    of_shafts = np.zeros((count, rows.count - 1, at.size(at.SHAFT_NOTES)))
+    made = Notes(notes.view(at.NOTES)[:, 0], of_shafts.view(at.SHAFT_NOTES)[..., 0])
     end = math.inf if until is None else float(until)
-    results = np.empty((p.shape[0], at.N_X))
-    if isinstance(controller, CompiledController):
-        numbers = np.asarray(controller.vector(own), dtype=np.float64)
-        if not any(numbers.strides[:-1]):  # one row, broadcast: it serves all starts
-            numbers = numbers[(0,) * (numbers.ndim - 1)]
-        numbers = np.array(numbers.reshape(-1, numbers.shape[-1]), order="C")
-        size = controller.state_size
-        for part in _parts(p.shape[0]):
-            with watched(controller):
-                kernel.run_many(
-                    type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
-                    int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
-                    results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED),
-                    np.zeros(size), np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P),
-                    np.zeros(numbers.shape[1]), np.zeros((0, 0)),
-                )  # fmt: skip
-        return results
-    for row, one in zip(results, p, strict=True):
-        recorder = Recorder(one, int(controller.sensors), recording=False)
-        recorder.x[at.STATUS] = run_one(controller, own, recorder, end)
-        row[:] = recorder.x
-    return results
+    first = set_up[0][0]
+    if not all(isinstance(ready, CompiledController) for ready, _ in set_up):
+        for i in range(count):
+            ready, own = set_up[i if len(set_up) > 1 else 0]
+            recorder = Recorder(rows.taken(slice(i, i + 1)), int(ready.sensors), room=0)
+            run_one(ready, own, recorder, end)
+            notes[i] = recorder.work[: at.N_NOTES]
+            for name in at.SHAFT_NOTES.names:
+                made.shafts[name][i] = recorder.state[name][: rows.count - 1]
+        return made
+    vectors = [np.asarray(ready.vector(own), dtype=np.float64) for ready, own in set_up]  # type: ignore[attr-defined]
+    numbers = np.concatenate([one.reshape(-1, one.shape[-1]) for one in vectors])
+    step, sees, size = type(first).kernel, int(first.sensors), first.state_size  # type: ignore[attr-defined]
+
+    def run(part: slice) -> None:
+        with watched(first):
+            kernel.run_many(
+                step, np.ascontiguousarray(numbers[part]) if numbers.shape[0] > 1 else numbers, sees,
+                bool(sees & Sensor.STAGE), end, rows.machines[part], rows.masses[part], rows.shafts[part],
+                rows.curves[part], notes[part], of_shafts[part], np.zeros(at.N_WORK), np.zeros(N_MEASURED),
+                np.zeros(size), np.zeros(NEW_STATE + size),
+            )  # fmt: skip
+
+    if workers == 1 or count <= FIRST_TURN:
+        for part in _parts(count):
+            run(part)
+    else:
+        parts = [slice(i, i + FIRST_TURN) for i in range(0, count, FIRST_TURN)]
+        with Pool(min(workers, len(parts)), threads=True) as pool:
+            for _ in pool.results(run, iter(parts)):
+                pass
+    return made
 
 
 def _parts(count: int) -> Iterator[slice]:
@@ -177,17 +172,128 @@ def _parts(count: int) -> Iterator[slice]:
         room = max(1, int(room * min(share, 4.0)))
 
 
-def figures(
-    results: at.Matrix, base: Any, until: float | None = None, limits: Limits | None = None
-) -> Figures:
-    """The figures of `array_starts` as name -> (values, unit, meaning).
+def array_starts(
+    drive: Drive,
+    controller: Controller,
+    until: float | None = None,
+    fitted_to: Drive | None = None,
+    time_limit: float | None = None,
+    max_events: int = MAX_EVENTS,
+) -> Notes:
+    """The kernel's notes of all starts of a Drive with array fields, last index of the drive fastest.
+
+    `figures` turns them into labelled figures. The controller's parameters may be arrays of the drive's
+    shape. Unlike `simulate`, nothing is checked.
+    """
+    if len(drive.positions) > 1:
+        told = fitted_to or drive.design_drive
+        return worst_of(
+            [array_starts(one, controller, until, told, time_limit, max_events)
+             for one in drive.positions.values()]
+        )  # fmt: skip
+    rows = rows_of(drive, time_limit, max_events)
+    if not isinstance(controller, PlainController):
+        ready, own = controller.set_up(fitted_to or drive)
+        if isinstance(ready, CompiledController):
+            return notes_of(rows, [(ready, own)], until)
+    single = fitted_to is None or fitted_to.shape == ()
+    nominal = repeat(fitted_to) if single else fitted_to.elements()  # type: ignore[union-attr]
+    each = [controller.set_up(other or one) for one, other in zip(drive.elements(), nominal, strict=False)]
+    return notes_of(rows, each, until)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Machines as rows of the kernel, written once for many calls: a row for each position of each.
+
+    `begins` has the first row of each machine, and one more at the end; `permissible` the torques of shafts.
+    """
+
+    machines: tuple[Any, ...]
+    begins: Which
+    rows: Rows
+    permissible: Matrix
+
+    def figures(
+        self,
+        which: Which,
+        controller: Controller | Sequence[Controller],
+        fitted: Any,
+        base: Any,
+        time_limit: float | None = None,
+        *,
+        until: float | None = None,
+        workers: int = 1,
+    ) -> Figures:
+        """Figures by name of the starts of machines `which[i]` in place i, of several positions the worst.
+
+        The controller is set up for one drive, for a Drive with an element for each place in `which`, or for
+        each of several drives by itself; each place may have its own. `base` is M12avg in N m, one or one a
+        start.
+        """
+        sizes = np.diff(self.begins)[which]
+        if len(set(sizes.tolist())) > 1:
+            raise InputError("start_position: give all machines of one call a known position, or none.")
+        made = [controller] if isinstance(controller, Controller) else list(controller)
+        drives = [fitted] if isinstance(fitted, Drive) else list(fitted)
+        if len(drives) == 1 and drives[0].shape != () and isinstance(made[0], PlainController):
+            drives = list(drives[0].elements())
+        count = max(len(made), len(drives))
+        set_up = [made[i % len(made)].set_up(drives[i % len(drives)]) for i in range(count)]
+        every = [
+            notes_of(self.rows.taken(self.begins[which] + k).limited(time_limit), set_up, until, workers)
+            for k in range(int(sizes[0]))
+        ]
+        notes = every[0] if len(every) == 1 else worst_of(every)
+        return self.read(which, notes, base, until)
+
+    def read(self, which: Which, notes: Notes, base: Any, until: float | None) -> Figures:
+        """The figures in the kernel's notes."""
+        first = self.machines[0]
+        found = figures(notes, base, until)
+        names = first.shaft_names
+        means = np.broadcast_to(np.asarray(base, dtype=np.float64), which.shape)
+        status = found.pop("status")
+        largest = np.where(np.isnan(found["k_dyn"][0])[:, None], np.nan, notes.peaks)
+        if len(names) > 1:
+            for k, place in enumerate(names):
+                found[f"k_dyn_{k + 1}"] = (largest[:, k] / means, "1", f"K_dyn of {place}")
+            for k, place in enumerate(names):
+                found[f"peak_torque_{k + 1}"] = (largest[:, k], "N*m", f"largest |T| of {place}")
+            used = 100.0 * np.nan_to_num(largest / self.permissible[which]).max(axis=1)
+            meaning = "largest |T| over what its shaft permits"
+            found["used_torque"] = (np.where(np.isnan(found["k_dyn"][0]), np.nan, used), "%", meaning)
+        found |= margins(found, first.limits)
+        return {**found, "status": status}
+
+    def named(self) -> Figures:
+        """The names of all figures, with units and meanings, of starts that are not made."""
+        starts, shafts = np.zeros(1, at.NOTES), np.zeros((1, self.rows.count - 1), at.SHAFT_NOTES)
+        starts["release_time"] = math.nan
+        return self.read(np.array([0]), Notes(starts, shafts), 1.0, None)
+
+
+def prepared(
+    machines: Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
+) -> Batch:
+    """Machines that go through one call of the kernel; InputError for machines that do not match."""
+    each = [list(one.positions.values()) for one in machines]
+    rows = [rows_of(one, time_limit, max_events) for several in each for one in several]
+    begins = np.cumsum([0, *(len(several) for several in each)])
+    return Batch(
+        tuple(machines), begins, joined(rows), np.stack([one.permissible_torques for one in machines])
+    )
+
+
+def figures(notes: Notes, base: Any, until: float | None = None, limits: Limits | None = None) -> Figures:
+    """The figures of many starts as name -> (values, unit, meaning).
 
     `base` is the mean torque M12avg_base that K_dyn refers to, in N m, one number or one a start; `limits`
     likewise, whose life is not checked. Starts that could not be finished have NaN.
     """
-    reached = ~np.isnan(results[:, at.START_TIME])
-    held = results[:, at.HELD] == 1.0
-    codes = 4 * results[:, at.STATUS].astype(np.int64) + 2 * held + reached
+    reached = ~np.isnan(notes["start_time"])
+    held = notes["braked"] == 1.0
+    codes = 4 * notes["status"].astype(np.int64) + 2 * held + reached
     ended, which = np.unique(codes, return_inverse=True)
     kinds = [status_of(c // 4, bool(c % 2), until is not None, bool(c & 2)) for c in ended.tolist()]
     good = np.array([kind.finished for kind in kinds])[which]
@@ -195,8 +301,10 @@ def figures(
     def kept(values: Any) -> Any:
         return np.where(good, values, np.nan)
 
-    peak = np.abs(results[:, at.PEAK])
-    first = np.where(np.isnan(results[:, at.STAGE_2_END]), np.nan, np.abs(results[:, at.FIRST_PEAK]))
+    rows, worst = np.arange(good.size), notes.peaks.argmax(axis=1)
+    peak = notes.peaks[rows, worst]
+    first = np.abs(notes.shafts["first_peak"]).max(axis=1)
+    first = np.where(np.isnan(notes["stage_2_end"]), np.nan, first)
     k_dyn = formulas.dynamic_coefficient(np.where(good, peak, 0.0), base)
     k_first = formulas.dynamic_coefficient(np.where(good & ~np.isnan(first), first, 0.0), base)
     found: Figures = {
@@ -207,13 +315,14 @@ def figures(
             "dynamic coefficient of stage 2, [G](17), (18)",
         ),
         "peak_torque": (kept(peak), "N*m", "largest |T| of the run"),
+        "peak_time": (kept(notes.shafts["peak_time"][rows, worst]), "s", "when |T| is largest"),
     }
     for name, column, unit, meaning in _COLUMNS:
-        found[name] = (kept(results[:, column]), unit, meaning)
-    if not np.all(np.isnan(results[:, at.RELEASE_TIME])):
-        found["release_time"] = (kept(results[:, at.RELEASE_TIME]), "s", "when the brake was released")
-    if np.any(results[:, at.POSITION]):
-        names = np.array(["", *UNKNOWN_POSITIONS])[results[:, at.POSITION].astype(np.int64)]
+        found[name] = (kept(notes[column]), unit, meaning)
+    if not np.all(np.isnan(notes["release_time"])):
+        found["release_time"] = (kept(notes["release_time"]), "s", "when the brake was released")
+    if np.any(notes["position"]):
+        names = np.array(["", *UNKNOWN_POSITIONS])[notes["position"].astype(np.int64)]
         found["position"] = (names, "", "position with the largest |T|, of those that are possible")
     if limits is not None:
         found |= margins(found, limits)
@@ -239,20 +348,67 @@ def margins(found: Figures, limits: Limits) -> Figures:
     }
 
 
-def _label(drive: Drive, results: at.Matrix, until: float | None, base: Drive) -> xarray.Dataset:
-    shape = drive.shape
-    dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
-    per_start = np.broadcast_to(metrics.base_torque(base), shape).reshape(-1)
+def simulate_many(
+    machines: Drive | Sequence[Any],
+    controller: Controller,
+    until: float | None,
+    fitted_to: Any,
+    base: Any,
+    time_limit: float | None,
+    max_events: int,
+    workers: int | None = None,
+) -> xarray.Dataset:
+    """`simulate` for a Drive with array fields or a list of machines; see there.
+
+    The dimension is `start` for a list and for one-dimensional fields, `axis_0`, `axis_1`, ... otherwise;
+    the fields that differ become coordinates. Machines with several shafts have `k_dyns` and `peak_torques`
+    too, with the dimension `shaft`.
+    """
+    if isinstance(machines, Drive):
+        notes = array_starts(machines, controller, until, fitted_to, time_limit, max_events)
+        shape = machines.shape
+        dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
+        mean = np.broadcast_to((base or machines).mean_torque, shape).reshape(-1)
+        found = figures(notes, mean, until, limits_of_each(machines))
+        coordinates = {
+            name: (dims, np.broadcast_to(values, shape).copy())
+            for name in PARAMETERS
+            if isinstance(values := getattr(machines, name), np.ndarray)
+        }
+        return _dataset({name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, coordinates)
+    listed = list(machines)
+    nominal = fitted_to.design_drive if fitted_to is not None else [one.design_drive for one in listed]
+    means = np.array([(base or one).mean_torque for one in listed], dtype=np.float64)
+    batch = prepared(listed, time_limit, max_events)
+    found = batch.figures(
+        np.arange(len(listed)), controller, nominal, means, until=until, workers=workers or os.cpu_count() or 1
+    )
+    names = listed[0].shaft_names
     data = {
-        name: (dims, values.reshape(shape), {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in figures(results, per_start, until, limits_of_each(drive)).items()
+        name: (("start",), *one) for name, one in found.items() if name.rstrip("0123456789")[-1] != "_"
     }
-    coordinates = {
-        name: (dims, np.broadcast_to(values, shape).copy())
-        for name in PARAMETERS
-        if isinstance(values := getattr(drive, name), np.ndarray)
-    }
-    return xarray.Dataset(data, coords=coordinates)
+    if len(names) > 1:
+        for one, many in (("k_dyn", "k_dyns"), ("peak_torque", "peak_torques")):
+            columns = [found[f"{one}_{k + 1}"] for k in range(len(names))]
+            values = np.stack([column[0] for column in columns], axis=1)
+            data[many] = (("start", "shaft"), values, columns[0][1], f"{found[one][2]}, of each shaft")
+    coordinates = {"drive": (("start",), [one.name for one in listed])}
+    if len(names) > 1 and len({one.shaft_names for one in listed}) == 1:
+        coordinates["shaft"] = (("shaft",), list(names))
+    if all(isinstance(one, Drive) for one in listed):
+        for name in PARAMETERS:
+            given = [getattr(one, name) for one in listed]
+            if name != "name" and not PARAMETERS[name].many and any(value != given[0] for value in given):
+                coordinates[name] = (("start",), given)
+    return _dataset(data, coordinates)
+
+
+def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.Dataset:
+    return xarray.Dataset(
+        {name: (dims, values, {"units": unit, "long_name": meaning})
+         for name, (dims, values, unit, meaning) in data.items()},
+        coords=coordinates,
+    )  # fmt: skip
 
 
 def limits_of_each(drive: Drive) -> Limits:
@@ -263,30 +419,3 @@ def limits_of_each(drive: Drive) -> Limits:
 
     limits = drive.limits
     return replace(limits, shaft_torque=flat(limits.shaft_torque), start_time=flat(limits.start_time))
-
-
-def _limits_of_list(drives: list[Drive]) -> Limits:
-    """Those of each drive; a drive without one may have any figure."""
-
-    def each(name: str) -> Any:
-        own = [getattr(drive.limits, name) for drive in drives]
-        return None if all(one is None for one in own) else np.array([one or math.inf for one in own])
-
-    return Limits(each("shaft_torque"), each("start_time"))
-
-
-def _label_list(
-    drives: list[Drive], results: at.Matrix, until: float | None, base: Drive | None
-) -> xarray.Dataset:
-    per_start = np.array([metrics.base_torque(base or drive) for drive in drives])
-    found = figures(results, per_start, until, _limits_of_list(drives))
-    data = {
-        name: (("start",), values, {"units": unit, "long_name": meaning})
-        for name, (values, unit, meaning) in found.items()
-    }
-    coordinates: dict[str, Any] = {"drive": (("start",), [drive.name for drive in drives])}
-    for name in PARAMETERS:
-        values = [getattr(drive, name) for drive in drives]
-        if name != "name" and not PARAMETERS[name].many and any(value != values[0] for value in values):
-            coordinates[name] = (("start",), values)
-    return xarray.Dataset(data, coords=coordinates)

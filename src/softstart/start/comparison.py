@@ -19,7 +19,7 @@ from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
-from softstart.start.run import BaseRun
+from softstart.start.run import Run
 from softstart.start.simulation import Startable, models, simulate
 
 notebook = late("softstart.views.notebook")
@@ -54,7 +54,7 @@ class Uncertain(Protocol):
 
 
 def intervals(
-    run: BaseRun,
+    run: Run,
     drawn: Drive,
     controller: str | Controller,
     until: float | None = None,
@@ -155,7 +155,7 @@ def compare(
     ----------
     drive : Drive, Chain, Identification or str
         One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
-        in `simulate_chain`. With an identification each row has `intervals` over 200 drives that its
+        in `simulate`. With an identification each row has `intervals` over 200 drives that its
         logs leave possible, and limits must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
         Names, `path/to/file.py:ClassName`, files of tuned gains, or Controller objects. By default all
@@ -250,7 +250,7 @@ def make_controllers(
 def compared(
     drive: Drive | Startable,
     controller: Controller,
-    direct: BaseRun | None,
+    direct: Run | None,
     until: float | None = None,
     fitted_to: Drive | None = None,
     worst_case: tuple[str, ...] = CASES,

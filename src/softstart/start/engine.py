@@ -19,16 +19,12 @@ from softstart.controller.base import (
     PlainController,
     Sensor,
 )
-from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
-from softstart.plant import exchange
-from softstart.plant import layout as at
-from softstart.plant import start as kernel
-from softstart.plant.advance import advance_vectors
+from softstart.kernel import records as at
+from softstart.kernel.motor import M_TIME, NEW_STATE
+from softstart.start.recorded import Recorder
 from softstart.start.status import Status, status_of
 
-MAX_EVENTS = 1_000_000  # events and control instants of one start
-FIRST_ROWS = 256
 SILENCE = 10.0  # s after which a controller that has not returned is named
 _watched: dict[int, tuple[float, str]] = {}  # of each thread: since when which controller computes
 _watcher: list[threading.Thread] = []
@@ -75,93 +71,39 @@ def _watch() -> None:
                 )
 
 
-class Recorder:
-    """One start of a drive in the kernel: its state, scratch and growing records.
-
-    `p` is the drive as the kernel has it, `sees` the sensors of the controller.
-    """
-
-    def __init__(self, p: at.Vector, sees: int, recording: bool = True) -> None:
-        self.p, self.sees = p, sees
-        rows = FIRST_ROWS if recording else 0
-        self.x = np.zeros(at.N_X)
-        self.m = np.zeros(at.N_M)
-        self.measured = np.zeros(exchange.N_MEASURED)
-        self.segments = np.zeros((rows, at.N_SEGMENT))
-        self.events = np.zeros((rows, at.N_EVENT))
-        self.stages = np.zeros((rows, at.N_STAGE))
-
-    def begin(self, until: float) -> None:
-        """The state at t = 0; without an end `until` is infinite."""
-        kernel.begin(self.p, self.x, until, self.events)
-
-    def advance(self) -> int:
-        """To the next control instant, the end, or a full record; returns which."""
-        reason: int = advance_vectors(self.p, self.x, self.m, self.segments, self.events, self.stages)
-        return reason
-
-    def run(self, step: Any, numbers: at.Vector, state: at.Vector, command: at.Vector) -> int:
-        """To the end, or a full record, under a compiled controller."""
-        reason: int = kernel.run(
-            step, self.p, numbers, self.sees, self.x, self.m, self.measured, state, command,
-            self.segments, self.events, self.stages,
-        )  # fmt: skip
-        return reason
-
-    def measure(self) -> None:
-        """Fill `measured` with what the controller sees now."""
-        kernel.measure(self.p, self.x, self.sees, self.measured)
-
-    def grow(self) -> None:
-        """Twice the room for whatever is nearly full."""
-        for name, count in (("segments", at.N_SEGMENTS), ("events", at.N_EVENTS), ("stages", at.N_STAGES)):
-            rows = getattr(self, name)
-            if self.x[count] + 8 >= rows.shape[0]:
-                setattr(self, name, np.concatenate([rows, np.zeros_like(rows)]))
-
-    def rows(self) -> tuple[at.Matrix, at.Matrix, at.Matrix]:
-        """The records that are filled."""
-        return (
-            self.segments[: int(self.x[at.N_SEGMENTS])].copy(),
-            self.events[: int(self.x[at.N_EVENTS])].copy(),
-            self.stages[: int(self.x[at.N_STAGES])].copy(),
-        )
-
-
-def run_one(controller: Controller, drive: Drive, recorder: Recorder, until: float | None) -> int:
-    """A start from its beginning to `until`; returns why it ended.
+def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until: float | None) -> int:
+    """A start from its beginning to `until`; returns why it ended. Without a controller the motor is off.
 
     `drive` is the one for which the (fitted) controller is set up.
     """
-    recorder.begin(math.inf if until is None else float(until))
-    recorder.x[at.ASK_ON_GAP] = 1.0 if controller.sensors & Sensor.STAGE else 0.0
+    sees = 0 if controller is None else controller.sensors
+    recorder.begin(math.inf if until is None else float(until), bool(sees & Sensor.STAGE))
     if isinstance(controller, CompiledController):  # the loop itself runs in the kernel
         # a copy: the kernel takes no read-only numbers
         numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
         size = controller.state_size
-        memory, command = np.zeros(size), np.zeros(exchange.NEW_STATE + size)
+        memory, command = np.zeros(size), np.zeros(NEW_STATE + size)
         with watched(controller):
-            while (
-                reason := recorder.run(type(controller).kernel, numbers, memory, command)
-            ) == at.BUFFER_FULL:
+            while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
                 recorder.grow()
         return reason
-    if not isinstance(controller, PlainController):
+    if controller is None:
+        recorder.state.ask_at = math.inf
+    elif not isinstance(controller, PlainController):
         raise InputError(
             f"controller = {type(controller).__name__}: derive it from PlainController or CompiledController."
         )
-    state = tuple(controller.initial_state)
+    state = tuple(controller.initial_state) if controller else ()
     while True:
         reason = recorder.advance()
         if reason == at.BUFFER_FULL:
             recorder.grow()
-        elif reason == at.ASK:
+        elif reason == at.ASK and controller:
             recorder.measure()
             torque, ask_again, state, slope = plain_answer(controller, recorder.measured, state)
-            taken: int = kernel.obey(recorder.p, recorder.x, recorder.m, torque, ask_again, slope)
-            if taken != at.ASK:
-                return taken
-        else:
+            reason = recorder.answer(torque, ask_again, slope)
+        if reason not in (at.ASK, at.BUFFER_FULL):
+            recorder.state.status = reason
             return reason
 
 
@@ -176,7 +118,7 @@ def plain_answer(
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise SimulationError(
             f"The start was given up: the controller {type(controller).__name__} failed at "
-            f"t = {measured[exchange.M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
+            f"t = {measured[M_TIME]:.6g} s in {place.filename}, line {place.lineno} "
             f"({type(error).__name__}: {error})."
         ) from error
     try:
@@ -211,14 +153,14 @@ def _time(name: str, value: object, remedy: str) -> float | None:
     raise InputError(f"{name} = {value}: give a time above 0 s as a number; {remedy}.")
 
 
-def ended(x: at.Vector, reason: int, until: float | None, max_events: int, start: str) -> Status:
+def ended(notes: Any, reason: int, until: float | None, max_events: int, start: str) -> Status:
     """How a start ended; raises SimulationError, which names the `start`, if it could not be finished."""
-    status = status_of(reason, not math.isnan(x[at.START_TIME]), until is not None, x[at.HELD] == 1.0)
+    status = status_of(reason, not math.isnan(notes.start_time), until is not None, notes.braked == 1.0)
     if status.finished:
         return status
     remedy = ""
     if status is Status.TOO_MANY_EVENTS:
         remedy = f" That is {max_events:,}: end the run earlier, sample less often, or allow more."
     raise SimulationError(
-        f"{status.value}{remedy} {start}, t = {x[at.TIME]:.6g} s, {int(x[at.EVENTS])} events."
+        f"{status.value}{remedy} {start}, t = {notes.time:.6g} s, {int(notes.events)} events."
     )

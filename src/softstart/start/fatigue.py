@@ -13,8 +13,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive, SNCurve
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
-from softstart.plant import layout as at
-from softstart.plant import record
+from softstart.kernel import records as at
 from softstart.quantities import to_si
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
@@ -296,18 +295,7 @@ def turning_points(run: Run) -> Matrix:
     >>> [round(float(torque), 1) for torque in points[:2, 1]]
     [120.0, 180.8]
     """
-    still = STILL * run.peak_torque
-    rows = 64 + run.segments.shape[0]
-    while True:
-        points = np.zeros((rows, 2))
-        count = record.turning_points(
-            run.plant, run.segments, still, np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(4), points
-        )
-        if count == record.NOT_LOCATED:
-            raise SimulationError("An extreme of the shaft torque could not be located.")
-        if count != record.NO_ROOM:
-            return points[:count].copy()
-        rows *= 4
+    return run.recorded.turning_points(run.worst_shaft, STILL * run.peak_torque)
 
 
 def rainflow_cycles(torques: Iterable[float], *, repeated: bool = False) -> Matrix:
@@ -340,16 +328,15 @@ def impacts(run: Run) -> Vector:
     >>> impacts(simulate("hoist-15kw", "direct")).size
     0
     """
-    rows, drive = run.segments, run.drive
-    closed = rows[:, at.S_SIDE] != 0.0
+    side, w = run.recorded.of_shafts(2)[:, 0], run.recorded.of_masses(0)
+    mode, drive = run.recorded.of_shafts(1)[:, 0], run.drive
+    closed = np.isin(mode, [at.CONTACT, at.DOUBLED])
     meets = (closed[1:] > closed[:-1]).nonzero()[0] + 1
-    if not meets.size:
-        return np.zeros(0)
     # not above 0 where flanks that overlap still take hold again
-    speed = rows[meets, at.S_SIDE] * rows[meets, at.S_V]
-    inertia = np.where(rows[meets, at.S_HELD] == 1.0, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2))
-    energy: Vector = (0.5 * inertia * speed**2)[speed > 0.0]
-    return energy
+    speed = side[meets] * (w[meets, 0] - w[meets, 1])
+    held = run.recorded.states[meets, at.S_BRAKED] == 1.0
+    energy: Vector = (0.5 * np.where(held, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2)) * speed**2)
+    return energy[speed > 0.0]
 
 
 def damping_ratio(drive: Drive) -> float:

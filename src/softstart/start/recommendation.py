@@ -17,7 +17,7 @@ from typing import Any, Final
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive, Limit, Limits
 from softstart.start.fatigue import worst_damage
-from softstart.start.run import BaseRun, Run
+from softstart.start.run import Run, Run
 
 SLOW: Final = 2.0  # times the time of `direct`
 HARDER: Final = 1.001  # times the K_dyn of `direct`
@@ -50,7 +50,7 @@ class Case:
     used_torque: float = 0.0
 
     @staticmethod
-    def of(run: BaseRun | None) -> Case:
+    def of(run: Run | None) -> Case:
         """That of a start; None is one that failed."""
         if run is None:
             return Case(math.nan, math.nan, math.nan, math.nan, math.nan)
@@ -129,8 +129,8 @@ class Row:
     `cases` that must keep the limits, besides the drive as it is.
     """
 
-    run: Any  # Run, or ChainRun
-    direct: BaseRun | None
+    run: Any  # Run, or Run
+    direct: Run | None
     cases: Mapping[str, Case] = field(default_factory=dict)
     worst_case: tuple[str, ...] = CASES
     label: str = ""  # a name of its own in tables
@@ -228,7 +228,7 @@ class Row:
         }
 
 
-def flags(run: BaseRun, direct: BaseRun | None) -> tuple[Flag, ...]:
+def flags(run: Run, direct: Run | None) -> tuple[Flag, ...]:
     """Why this strategy is never recommended; empty if it may be.
 
     Slow is what takes more than twice as long as `direct` until the load has settled, unless the drive has a

@@ -3,64 +3,67 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, NamedTuple, Self, TypeVar
+from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softstart import formulas
+from softstart.arrays import Vector
 from softstart.controller.base import Controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.input.files import write_whole
-from softstart.late import late
-from softstart.plant import layout as at
-from softstart.plant import record
+from softstart.kernel import records as at
 from softstart.start import metrics
-from softstart.start.engine import MAX_EVENTS, Recorder, run_one
+from softstart.start.engine import run_one
+from softstart.start.recorded import Recorded, Recorder
+from softstart.start.rows import MAX_EVENTS
 from softstart.start.status import Status, status_of
-
-Vector = NDArray[np.float64]
-notebook = late("softstart.views.notebook")
-starts = late("softstart.views.starts")  # above this module; see softstart.late
 
 EVENT_NAMES = {
     at.CLOSED: "gap closed",
     at.OPENED: "gap opened",
-    at.LOAD_STARTS: "load starts",
-    at.LOAD_STOPS: "load stops",
+    at.STARTS: "load starts",
+    at.STOPS: "load stops",
     at.TARGET_REACHED: "target speed reached",
     at.RELEASED: "brake released",
-    at.MOTOR_STARTS: "motor starts",
-    at.MOTOR_STOPS: "motor stops",
+    at.IMPACT: "impact",
+    at.SETTLED: "impacts over, flanks press",
 }
-AnyRun = TypeVar("AnyRun", bound="BaseRun")
+OF_MOTOR = {at.STARTS: "motor starts", at.STOPS: "motor stops"}
+OF_GEAR = {at.STARTS: "gear lets go", at.STOPS: "gear holds"}
 PLOT_POINTS = 1500
 SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a load must keep its speed
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happened at a located instant: time in s, what, and with which flank or sign."""
+class Event(NamedTuple):
+    """Something that happened at a located instant.
+
+    `value` is the flank, the sign of the motion, the speed reached, or what an impact loses in J; `place` is the
+    index of the shaft or mass; `impulse` that of an impact in N m s.
+    """
 
     time: float
     kind: str
     value: float
+    place: int = 0
+    impulse: float = 0.0
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A span with the gap open (odd number) or closed (even), [G]; times in s, peak torque in N m."""
+    """A span with a gap between motor and load open (odd number) or none (even), [G]; times in s."""
 
     number: int
     start: float
     end: float
-    side: int  # 0 gap open, +1 driving flank, -1 other flank
-    peak_torque: float  # signed, largest |T| of the stage
+    side: int  # 0 gap open, +1 driving flank, -1 other flank, of the shaft beside the motor
+    peak_torque: float  # signed, N m: largest |T| of the stage, of the shaft that is loaded most
     peak_time: float
 
     @property
@@ -76,62 +79,107 @@ class Clipped(NamedTuple):
     time: float
 
 
-class BaseRun(ABC):
-    """What finished starts of drives and of chains have in common."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """One start under one controller. Angles in rad, speeds and torques at the motor shaft, in SI units.
 
-    drive: Any  # Drive or Chain
+    It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
+    peaks and events are located, not read off the traces. N is the number of masses, 2 for a drive.
+
+    Attributes
+    ----------
+    drive : Drive or Chain
+        The machine that was started.
+    controller : Controller or None
+        The controller as it was set up; None where the motor was off.
+    base : Drive, Chain or None
+        The machine to whose mean torque K_dyn refers, if not `drive`.
+    status : Status
+        How the start ended.
+    t : array of shape (n,)
+        Instants of the traces, s.
+    phi1, phi2, w1, w2, theta : array of shape (n,)
+        Angles and speeds of motor and load, and phi1 - phi2.
+    phi, w : array of shape (n, N)
+        Angles and speeds of all masses.
+    twist : array of shape (n, N - 1)
+        Twists of the shafts.
+    u : array of shape (n,)
+        Motor torque after limits and lag, N m.
+    T : array of shape (n,) or (n, N - 1)
+        Torque of the one shaft, or of each, N m.
+    k_dyn, k_dyn_first_contact : float
+        Dynamic coefficient of the whole run, and of stage 2 alone, of the shaft that is loaded most.
+    k_dyns, utilisation : array of shape (N - 1,)
+        K_dyn of each shaft, and its torque over its permissible torque (NaN where none is given).
+    peak_torques, peak_times, peak_impulses : array of shape (N - 1,)
+        Largest |T| of each shaft, N m, its instant, s, and the largest impulse of its impacts, N m s.
+    peak_torque, peak_time : float
+        Largest |T| of all shafts, N m, and its instant, s.
+    clipped : Clipped
+        How far (`excess`, N m) and for how long (`time`, s) the controller's demand lay beyond the torque
+        limits of the drive, where it is cut off.
+    start_time, end_time : float
+        First instant at which the load has its target speed (NaN if never), and end of the run, s.
+    events : tuple of Event
+        Contacts and others, in order of time.
+    stages : tuple of Stage
+        Spans with a gap between motor and load open (odd number), or none (even).
+    energy : metrics.Energy
+        Energy balance, J.
+    recorded : Recorded
+        The records of the kernel.
+    position : str
+        Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
+        with the largest |T|, to which traces, events and stages belong.
+    positions : mapping of str to Run
+        The starts from each position, if it is unknown. Then K_dyn, peaks, impact speed, start and settled
+        time are the largest among them.
+    told : Drive or None
+        The drive whose numbers the controller works with, if not `drive`.
+
+    Examples
+    --------
+    >>> from softstart import Drive, simulate
+    >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
+    >>> run.status.value
+    'The load reached its target speed.'
+    >>> [round(stage.duration, 4) for stage in run.stages[:2]]
+    [0.0166, 0.0367]
+    >>> float(run.at(run.peak_time)["T"].round(6)) == round(run.peak_torque, 6)
+    True
+    >>> simulate("crane-4-mass", "direct").k_dyns.round(2)
+    array([6.3 , 3.78, 3.63])
+
+    References
+    ----------
+    [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); docs/theory/stages.md.
+    Everything at one shaft: [R], docs/theory/reduction.md; accuracy: docs/theory/numerics.md.
+    """
+
+    drive: Any
     controller: Controller | None
+    base: Any
     status: Status
-    positions: Mapping[str, Any]
+    recorded: Recorded
+    told: Drive | None = None
+    positions: Mapping[str, Run] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """One line that says what came out.
+
+        >>> from softstart import Drive, simulate
+        >>> simulate(Drive.load("crane-4amtkf"), "direct")
+        <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
+        """
+        known = f"K_dyn {self.k_dyn:.3f}" if self._has_base else f"peak torque {self.peak_torque:.4g} N m"
+        return f"<Run: {self.controller_name} on {self.drive.name}, {known}, {self._outcome}>"
 
     def _repr_html_(self) -> Any:
         """What a notebook shows."""
+        from softstart.views import notebook
+
         return notebook.of_run(self)
-
-    @property
-    @abstractmethod
-    def elastic_period(self) -> float:
-        """Its elastic period, s."""
-
-    @property
-    @abstractmethod
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the whole run, [G](16)."""
-
-    @property
-    @abstractmethod
-    def _continued(self) -> Self:
-        """The same start to the end of settling at least; this one where it fails beyond its own end."""
-
-    @abstractmethod
-    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
-        """Speed of the load, rad/s, and the torque that speeds it up, N m, at any instants of the run."""
-
-    @property
-    @abstractmethod
-    def peak_torque(self) -> float:
-        """Largest |T| of the (motor's) shaft, N m, located."""
-
-    @property
-    @abstractmethod
-    def _final(self) -> Vector:
-        """The kernel's state at the end."""
-
-    @abstractmethod
-    def at(self, times: ArrayLike) -> dict[str, Vector]:
-        """States at any instants within the run."""
-
-    @abstractmethod
-    def _edges(self) -> Vector:
-        """Times of the events, s."""
-
-    @abstractmethod
-    def _peak_times(self) -> Vector:
-        """Times of the peaks that are located, s."""
-
-    @abstractmethod
-    def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
-        """The columns of `to_csv` after the time, by their headings."""
 
     @property
     def controller_name(self) -> str:
@@ -154,10 +202,106 @@ class BaseRun(ABC):
             return max(self.positions, key=lambda name: float(self.positions[name].peak_torque))
         return str(next(iter(self.drive.positions)))
 
-    def _worst(self, figure: Callable[[Any], float], worst: Any = np.maximum) -> float:
+    def _worst(self, figure: Callable[[Run], float], worst: Any = np.maximum) -> float:
         """A figure of this start, or the largest of those from each position."""
         runs = self.positions.values() or (self,)
         return float(worst.reduce([figure(run) for run in runs]))
+
+    # figures -------------------------------------------------------------------------------------------
+
+    @property
+    def _notes(self) -> Any:
+        return self.recorded.notes
+
+    @property
+    def peak_torques(self) -> Vector:
+        """Largest |T| of each shaft, N m, located; impacts of rigid flanks have `peak_impulses` instead."""
+        runs = self.positions.values() or (self,)
+        peaks: Vector = np.max([np.abs(run.recorded.shafts["peak"]) for run in runs], axis=0)
+        return peaks
+
+    @property
+    def peak_times(self) -> Vector:
+        """When |T| of each shaft is largest, s."""
+        times: Vector = self.recorded.shafts["peak_time"].copy()
+        return times
+
+    @property
+    def peak_impulses(self) -> Vector:
+        """Largest impulse of each shaft's impacts, N m s; 0 where none was."""
+        impulses: Vector = self.recorded.shafts["impulse"].copy()
+        return impulses
+
+    @property
+    def motor_shaft(self) -> int:
+        """The index of the shaft beside the motor, on the way to the load."""
+        return self.recorded.rows.motor_shaft
+
+    @property
+    def worst_shaft(self) -> int:
+        """The index of the shaft with the largest torque at the motor shaft."""
+        return int(self.peak_torques.argmax())
+
+    @property
+    def peak_torque(self) -> float:
+        """Largest |T| of all shafts, N m."""
+        return float(self.peak_torques[self.worst_shaft])
+
+    @property
+    def peak_time(self) -> float:
+        """When that is, s."""
+        return float(self.peak_times[self.worst_shaft])
+
+    @property
+    def _has_base(self) -> bool:
+        return self.base is not None or getattr(self.drive, "motor", True) is not None
+
+    @property
+    def base_torque(self) -> float:
+        """The mean torque to which K_dyn refers, N m: M12avg of `base`, or of the machine itself, [G](16)."""
+        return float((self.base or self.drive).mean_torque)
+
+    @property
+    def k_dyn(self) -> float:
+        """Dynamic coefficient of the whole run, [G](16): largest torque of all shafts over `base_torque`."""
+        return float(self.k_dyns[self.worst_shaft])
+
+    @property
+    def k_dyns(self) -> Vector:
+        """Dynamic coefficient of each shaft."""
+        return np.asarray(formulas.dynamic_coefficient(self.peak_torques, self.base_torque))
+
+    @property
+    def k_dyn_first_contact(self) -> float:
+        """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one.
+
+        Where the run ends within stage 2 it is the one so far. A start in contact begins with stage 2.
+        """
+
+        def own(run: Run) -> float:
+            first = float(np.abs(run.recorded.shafts["first_peak"]).max())
+            if math.isnan(run.recorded.notes["stage_2_end"]):
+                return math.nan
+            return float(formulas.dynamic_coefficient(first, self.base_torque))
+
+        return self._worst(own, np.fmax)
+
+    @property
+    def shaft_factors(self) -> Vector:
+        """Largest |T| of each shaft over its own mean torque under full starting torque; NaN if that is 0."""
+        mean = np.abs(self.drive.shaft_means)
+        return self.peak_torques / np.where(mean > 0.0, mean, np.nan)
+
+    @property
+    def utilisation(self) -> Vector:
+        """Largest |T| of each shaft over its permissible torque; NaN where none is given."""
+        found: Vector = self.peak_torques / self.drive.permissible_torques
+        return found
+
+    @property
+    def used_torque(self) -> float:
+        """Largest |T| over the permissible torque of its shaft, %; 0 where none is given."""
+        return 100.0 * float(np.nan_to_num(self.utilisation).max())
 
     @property
     def start_time(self) -> float:
@@ -165,7 +309,7 @@ class BaseRun(ABC):
 
         Counted from the command of the start, so that it includes what the torque takes to release a brake.
         """
-        return self._worst(lambda run: float(run._final[at.START_TIME]))
+        return self._worst(lambda run: float(run.recorded.notes["start_time"]))
 
     @cached_property
     def settled_time(self) -> float:
@@ -181,254 +325,56 @@ class BaseRun(ABC):
         """Until when it is judged whether the load has settled, s."""
         return self.start_time + SETTLING_PERIODS * self.elastic_period
 
+    def settling_time(self, band: float = 0.1) -> float:
+        """From when on the shaft torque stays settled, s; NaN if it does not within the run.
+
+        That of the load speed is `settled_time`.
+
+        Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean torque
+        of the shaft beside the motor under the torques of the instant, of a drive (u J2 + Mc J1)/(J1 + J2).
+        """
+        return self._worst(lambda run: metrics.settling_time(run, band))
+
     @property
-    def used_torque(self) -> float:
-        """Largest |T| over the permissible torque of its shaft, %; 0 where none is given for it."""
-        return 0.0
+    def elastic_period(self) -> float:
+        """The period of the first natural frequency with all gaps closed, 2 pi/Omega, s."""
+        return float(self.recorded.rows.machine["period"])
 
     @property
     def end_time(self) -> float:
         """End of the run, s."""
-        return float(self._final[at.TIME])
-
-    @property
-    def clipped(self) -> Clipped:
-        """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
-        excess = self._worst(lambda run: float(run._final[at.EXCESS]))
-        return Clipped(excess, self._worst(lambda run: float(run._final[at.EXCESS_TIME])))
-
-    def _instants(self, times: ArrayLike) -> Vector:
-        """The times as one row; raises ValueError for one outside of the run."""
-        flat = np.ascontiguousarray(np.asarray(times, dtype=np.float64).ravel())
-        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
-            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
-        return flat
-
-    @cached_property
-    def t(self) -> Vector:
-        """Instants of the traces, s: an even grid and every event and located peak."""
-        edges = self._edges()
-        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
-        when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), self._peak_times()])
-        return np.unique(when.clip(0.0, self.end_time))
-
-    @cached_property
-    def _traces(self) -> dict[str, Vector]:
-        return self.at(self.t)
-
-    @property
-    def u(self) -> Vector:
-        """Motor torque, N m."""
-        return self._traces["u"]
-
-    @property
-    def T(self) -> Vector:
-        """Shaft torque, N m; of a chain a column for each shaft."""
-        return self._traces["T"]
-
-    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
-        """Write the states under a header with units, at `times` or the plot's instants."""
-        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
-        columns = {"t [s]": when, **self._columns(self.at(when))}
-        header, table = ",".join(columns), np.column_stack(list(columns.values()))
-
-        def write(stream: IO[Any]) -> None:
-            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
-
-        write_whole(Path(path), write)
-
-    def by_position(self) -> dict[str, Any]:
-        """K_dyn and start time from each position, and which is the worst for the shaft."""
-        each = {
-            name: {"k_dyn": run.k_dyn, "start_time": run.start_time, "settled_time": run.settled_time}
-            for name, run in self.positions.items()
-        }
-        return {"worst": self.position, **each}
-
-    def _controller_and_status(self) -> dict[str, Any]:
-        """What every summary says of them."""
-        return {
-            "controller": self.controller_name,
-            "parameters": {} if self.controller is None else self.controller.parameters,
-            "status": self.status.name,
-            "status_text": self.status.value,
-            "clipped": self.clipped._asdict(),
-        }
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Run(BaseRun):
-    """One start under one controller. All angles in rad at the motor shaft, SI units.
-
-    It is returned by `simulate`. The traces are for plotting; `at(times)` evaluates any instant exactly;
-    peaks and events are located, not read off the traces.
-
-    Attributes
-    ----------
-    drive : Drive
-        The drive that was started.
-    controller : Controller
-        The controller as it was set up.
-    base : Drive
-        The drive to whose mean torque K_dyn refers.
-    status : Status
-        How the start ended.
-    t : array of shape (n,)
-        Instants of the traces, s.
-    phi1, phi2 : array of shape (n,)
-        Angles of motor and load, rad.
-    w1, w2 : array of shape (n,)
-        Speeds of motor and load, rad/s.
-    theta : array of shape (n,)
-        Twist phi1 - phi2, rad.
-    u, T : array of shape (n,)
-        Motor torque after limits and lag, and shaft torque, N m.
-    k_dyn, k_dyn_first_contact : float
-        Dynamic coefficient of the whole run, and of stage 2 alone.
-    peak_torque, peak_time : float
-        Largest |T|, N m, and its instant, s.
-    clipped : Clipped
-        How far (`excess`, N m) and for how long (`time`, s) the controller's demand lay beyond the torque
-        limits of the drive, where it is cut off.
-    start_time, end_time : float
-        First instant at which the load has its target speed (NaN if never), and end of the run, s.
-    events : tuple of Event
-        Contacts and others, in order of time.
-    stages : tuple of Stage
-        Spans with the gap open (odd number) or closed (even).
-    plant, final : array of one dimension
-        Parameters of the drive as the kernel has them, and its state and figures at the end.
-    segments, event_rows, stage_rows : array of two dimensions
-        Records of the kernel: a row for each span, event and stage.
-    position : str
-        Where the start begins: a word of `start_position`, "" for an angle. Of an unknown position the one
-        with the largest |T|, to which traces, events and stages belong.
-    positions : mapping of str to Run
-        The starts from each position, if it is unknown. Then K_dyn, impact speed, start and settled time are
-        the largest among them.
-    told : Drive or None
-        The drive whose numbers the controller works with, if not `drive`.
-
-    Examples
-    --------
-    >>> from softstart import Drive, simulate
-    >>> run = simulate(Drive.load("crane-4amtkf"), "direct")
-    >>> run.status.value
-    'The load reached its target speed.'
-    >>> [round(stage.duration, 4) for stage in run.stages[:2]]
-    [0.0166, 0.0367]
-    >>> float(run.at(run.peak_time)["T"].round(6)) == round(run.peak_torque, 6)
-    True
-
-    References
-    ----------
-    [G]: the stages (1) to (15), K_dyn (16), of the first contact (17) and (18); docs/theory/stages.md.
-    """
-
-    drive: Drive
-    controller: Controller
-    base: Drive
-    status: Status
-    plant: Vector
-    final: Vector
-    segments: at.Matrix
-    event_rows: at.Matrix
-    stage_rows: at.Matrix
-    positions: Mapping[str, Run] = field(default_factory=dict)
-    told: Drive | None = None
-
-    def __repr__(self) -> str:
-        """One line that says what came out.
-
-        >>> from softstart import Drive, simulate
-        >>> simulate(Drive.load("crane-4amtkf"), "direct")
-        <Run: direct on Crane travel drive 4AMTKF(H)112L6, K_dyn 3.118, start time 0.3735 s>
-        """
-        name = f"{self.controller_name} on {self.drive.name}"
-        return f"<Run: {name}, K_dyn {self.k_dyn:.3f}, {self._outcome}>"
-
-    # figures -------------------------------------------------------------------------------------------
-
-    @property
-    def peak_torque(self) -> float:
-        """Largest |T| of the run, N m, located."""
-        return abs(float(self.final[at.PEAK]))
-
-    @property
-    def peak_time(self) -> float:
-        """When |T| is largest, s."""
-        return float(self.final[at.PEAK_TIME])
-
-    @property
-    def k_dyn(self) -> float:
-        """Dynamic coefficient of the whole run, [G](16): peak torque over the mean torque of `base`."""
-        return float(metrics.k_dyn(self.peak_torque, self.base))
-
-    @property
-    def elastic_period(self) -> float:
-        """The elastic period of the drive, 2 pi/Omega, s."""
-        return float(self.drive.elastic_period)
-
-    def load_at(self, times: ArrayLike) -> tuple[Vector, Vector]:
-        """Speed of the load, rad/s, and the torque that speeds it up, N m, at any instants of the run."""
-        states = self.at(times)
-        return states["w2"], states["T"] - self.drive.Mc - self.drive.load_viscous_friction * states["w2"]
-
-    @property
-    def _continued(self) -> Run:
-        """The same start to the end of settling at least; this one where it fails beyond its own end."""
-        if not self.end_time < self.settling_end:
-            return self
-        p = self.plant.copy()
-        p.view(at.PLANT)[0]["event_cap"] = MAX_EVENTS
-        recorder = Recorder(p, int(self.controller.sensors))
-        try:
-            reason = run_one(self.controller, self.told or self.drive, recorder, self.settling_end)
-        except SimulationError:
-            return self
-        if not status_of(reason, True, True).finished:
-            return self
-        segments, events, stages = recorder.rows()
-        final = recorder.x.copy()
-        return replace(self, final=final, segments=segments, event_rows=events, stage_rows=stages)
+        return float(self._notes["time"])
 
     @property
     def release_time(self) -> float:
         """When the brake was released, s; NaN without a brake, or if it was not."""
-        return float(self.final[at.RELEASE_TIME])
-
-    @property
-    def k_dyn_first_contact(self) -> float:
-        """Dynamic coefficient of stage 2 alone, the one that [G] gives in (17) and (18); NaN without one.
-
-        Where the run ends within stage 2 it is the one so far. A start in contact begins with stage 2.
-        """
-
-        def own(run: Run) -> float:
-            ended = not math.isnan(run.final[at.STAGE_2_END])
-            return float(metrics.k_dyn(run.final[at.FIRST_PEAK], self.base)) if ended else math.nan
-
-        return self._worst(own, np.fmax)
+        return float(self._notes["release_time"])
 
     @property
     def first_contact(self) -> float:
-        """Instant of the first contact, s: the length of stage 1."""
-        return float(self.final[at.FIRST_CONTACT])
+        """Instant of the first contact, s: the length of stage 1. Of a chain, when the last gap closes."""
+        return float(self._notes["first_contact"])
 
     @property
     def impact_speed(self) -> float:
         """Speed at which the flanks first meet, rad/s: dw12 of [G](10)."""
-        return self._worst(lambda run: float(run.final[at.IMPACT_SPEED]), np.fmax)
+        return self._worst(lambda run: float(run.recorded.notes["impact_speed"]), np.fmax)
 
     @property
     def torque_at_contact(self) -> float:
         """Motor torque at the first contact, N m."""
-        return float(self.final[at.CONTACT_TORQUE])
+        return float(self._notes["contact_torque"])
 
     @property
     def contacts(self) -> int:
-        """How often the gap closed; a start in contact counts as one, though there is no event."""
-        return int(self.final[at.CONTACTS])
+        """How often the gaps between motor and load came to be closed; a start in contact counts as one."""
+        return int(self._notes["contacts"])
+
+    @property
+    def clipped(self) -> Clipped:
+        """How far, and for how long, the demand lay beyond the torque limits; inf: an infinite excess."""
+        excess = self._worst(lambda run: float(run.recorded.notes["excess"]))
+        return Clipped(excess, self._worst(lambda run: float(run.recorded.notes["excess_time"])))
 
     @property
     def stage_durations(self) -> tuple[float, float]:
@@ -438,114 +384,202 @@ class Run(BaseRun):
         first, second = (by_number[n].duration if n in by_number and n != last else math.nan for n in (1, 2))
         return first, second
 
+    def _kind(self, event: Any) -> str:
+        kind, place, given = int(event["kind"]), int(event["place"]), self.recorded.rows
+        if kind in OF_GEAR:
+            mass = given.masses[0, place].view(at.MASS)[0]
+            if mass.friction > 0.0 and place == int(given.machine.motor):
+                return OF_MOTOR[kind]
+            if mass.Mc == 0.0:
+                return OF_GEAR[kind]
+        return EVENT_NAMES[kind]
+
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """All events in order of time."""
-        return tuple(Event(float(t), EVENT_NAMES[float(kind)], float(v)) for t, kind, v in self.event_rows)
+        rows = self.recorded.events[np.argsort(self.recorded.events["time"], kind="stable")]
+        return tuple(
+            Event(float(e["time"]), self._kind(e), float(e["value"]), int(e["place"]), float(e["impulse"]))
+            for e in rows
+        )
 
     @cached_property
     def stages(self) -> tuple[Stage, ...]:
-        """All stages; the last one ends with the run."""
-        return tuple(
-            Stage(int(n), float(start), float(end), int(side), float(peak), float(when))
-            for n, start, end, side, peak, when in self.stage_rows
-        )
+        """All stages that take time; the last one ends with the run."""
+        peaks, sides = self.recorded.stage_peaks(), self.recorded.of_shafts(2)[:, self.motor_shaft]
+        at_start = self.recorded.index(peaks[:, 1])
+        found = []
+        for row, span in zip(peaks, at_start, strict=True):
+            number, torques, times = int(row[0]), row[3::2], row[4::2]
+            worst = int(np.abs(torques).argmax())
+            side = 0 if number % 2 else int(sides[span])
+            found.append(
+                Stage(number, float(row[1]), float(row[2]), side, float(torques[worst]), float(times[worst]))
+            )
+        return tuple(found)
+
+    @property
+    def _continued(self) -> Run:
+        """The same start to the end of settling at least; this one where it fails beyond its own end."""
+        if self.controller is None or not self.end_time < self.settling_end:
+            return self
+        recorder = Recorder(self.recorded.rows.limited(max_events=MAX_EVENTS), int(self.controller.sensors))
+        try:
+            reason = run_one(self.controller, self.told or self.drive, recorder, self.settling_end)
+        except SimulationError:
+            return self
+        if not status_of(reason, True, True).finished:
+            return self
+        return replace(self, recorded=recorder.finished())
 
     # states --------------------------------------------------------------------------------------------
 
     def at(self, times: ArrayLike) -> dict[str, Vector]:
-        """States at any instants within the run, evaluated from the closed forms.
+        """States at any instants within the run, evaluated from the series of their spans.
 
-        Returns arrays of the shape of `times` under phi1, phi2, w1, w2, u, T, theta (= phi1 - phi2) and v
-        (= w1 - w2). At an instant where a torque jumps the value is the one after the jump.
+        Returns arrays of the shape of `times` under phi1, phi2, w1, w2 (of motor and load), theta (= phi1 -
+        phi2), v (= w1 - w2), u, and T of a single shaft; phi, w have a last axis of masses, twist and T of
+        several a last axis of shafts. At an instant where something jumps the value is the one after the jump.
         """
         when = np.asarray(times, dtype=np.float64)
-        flat = self._instants(when)
-        index = np.searchsorted(self.segments[:, at.S_START], flat, side="right") - 1
-        states = self.states_in(index.clip(0), flat)
-        return {name: values.reshape(when.shape) for name, values in states.items()}
+        flat = np.ascontiguousarray(when.ravel())
+        if flat.size and not (flat.min() >= 0.0 and flat.max() <= self.end_time * (1 + 1e-12)):
+            raise ValueError(f"times must lie within the run, 0 to {self.end_time:.6g} s.")
+        states = self.recorded.at(flat)
+        machine = self.recorded.rows.machine
+        motor, load = int(machine.motor), int(machine.load)
+        between = states["twist"][:, min(motor, load) : max(motor, load)].sum(axis=1)
+        of_masses = {
+            "phi1": states["phi"][:, motor], "phi2": states["phi"][:, load], "w1": states["w"][:, motor],
+            "w2": states["w"][:, load], "theta": between if motor < load else -between,
+        }  # fmt: skip
+        found = {**states, **of_masses, "v": of_masses["w1"] - of_masses["w2"]}
+        single = self.recorded.rows.count == 2
+        return {
+            name: values.reshape(when.shape)
+            if values.ndim == 1 or (single and name == "T")
+            else values.reshape(*when.shape, -1)
+            for name, values in found.items()
+        }
 
-    def states_in(self, segment: NDArray[np.int64], times: Vector) -> dict[str, Vector]:
-        """States at `times` by the motion of the given recorded spans: at a jump, the side one wants."""
-        out = np.empty((times.size, record.N_OUT))
-        flat = np.ascontiguousarray(times.ravel())
-        scratch = np.zeros(at.N_X), np.zeros(at.N_M)
-        record.states_at(self.plant, self.segments, segment.ravel(), flat, *scratch, out)
-        names = ("phi1", "phi2", "w1", "w2", "u", "T", "theta", "v")
-        return {name: out[:, i].reshape(times.shape) for i, name in enumerate(names)}
+    @cached_property
+    def t(self) -> Vector:
+        """Instants of the traces, s: an even grid and every event and located peak."""
+        edges = self.recorded.events["time"]
+        grid = np.linspace(0.0, self.end_time, PLOT_POINTS)
+        peaks = [self.peak_times, [stage.peak_time for stage in self.stages]]
+        when = np.concatenate([grid, edges, np.nextafter(edges, 0.0), *peaks])
+        return np.unique(when.clip(0.0, self.end_time))
+
+    @cached_property
+    def _traces(self) -> dict[str, Vector]:
+        return self.at(self.t)
 
     @property
-    def _final(self) -> Vector:
-        return self.final
+    def phi(self) -> Vector:
+        """Angles of the masses, rad; that of the load is 0 at the start."""
+        return self._traces["phi"]
 
-    def _edges(self) -> Vector:
-        return self.event_rows[:, at.E_TIME]
+    @property
+    def w(self) -> Vector:
+        """Speeds of the masses, rad/s."""
+        return self._traces["w"]
 
-    def _peak_times(self) -> Vector:
-        return self.stage_rows[:, at.G_PEAK_TIME]
+    @property
+    def twist(self) -> Vector:
+        """Twists of the shafts, rad."""
+        return self._traces["twist"]
 
-    def _columns(self, states: dict[str, Vector]) -> dict[str, Vector]:
-        units = {"phi1": "rad", "phi2": "rad", "w1": "rad/s", "w2": "rad/s", "u": "N*m", "T": "N*m"}
-        return {f"{name} [{unit}]": states[name] for name, unit in units.items()}
+    @property
+    def T(self) -> Vector:
+        """Shaft torque, N m; of several shafts a column for each."""
+        return self._traces["T"]
+
+    @property
+    def u(self) -> Vector:
+        """Motor torque, N m."""
+        return self._traces["u"]
 
     @property
     def phi1(self) -> Vector:
-        """Motor angle, rad."""
+        """Angle of the motor, rad."""
         return self._traces["phi1"]
 
     @property
     def phi2(self) -> Vector:
-        """Load angle, rad."""
+        """Angle of the load, rad."""
         return self._traces["phi2"]
 
     @property
     def w1(self) -> Vector:
-        """Motor speed, rad/s."""
+        """Speed of the motor, rad/s."""
         return self._traces["w1"]
 
     @property
     def w2(self) -> Vector:
-        """Load speed, rad/s."""
+        """Speed of the load, rad/s."""
         return self._traces["w2"]
 
     @property
     def theta(self) -> Vector:
-        """Twist phi1 - phi2, rad; contact is at |theta| = gap/2."""
+        """Twist phi1 - phi2, rad."""
         return self._traces["theta"]
 
-    # what follows from them ----------------------------------------------------------------------------
+    def to_csv(self, path: str | Path, times: ArrayLike | None = None) -> None:
+        """Write the states under a header with units, at `times` or the plot's instants."""
+        when = self.t if times is None else np.asarray(times, dtype=np.float64).ravel()
+        states = self.at(when)
+        columns = {"t [s]": when, **self.drive.columns_of(states)}
+        header, table = ",".join(columns), np.column_stack(list(columns.values()))
 
-    def settling_time(self, band: float = 0.1) -> float:
-        """From when on the shaft torque stays settled, s; NaN if it does not within the run.
+        def write(stream: IO[Any]) -> None:
+            np.savetxt(stream, table, delimiter=",", header=header, comments="", fmt="%.17g")
 
-        That of the load speed is `settled_time`.
-
-        Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean shaft
-        torque (u J2 + Mc J1)/(J1 + J2) under the motor torque of the instant, less its friction.
-        """
-        return self._worst(lambda run: metrics.settling_time(run, band))
+        write_whole(Path(path), write)
 
     @cached_property
     def energy(self) -> metrics.Energy:
         """Energy balance of the run."""
-        return metrics.energy_balance(self)
+        return metrics.energy_balance(self.recorded)
 
     def plot(self) -> Any:
         """Torques, speeds and twist over time, stages shaded."""
+        from softstart.views import starts
+
         return starts.run_figure(self)
+
+    def by_position(self) -> dict[str, Any]:
+        """K_dyn and start time from each position, and which is the worst for the shaft."""
+        each = {
+            name: {"k_dyn": run.k_dyn, "start_time": run.start_time, "settled_time": run.settled_time}
+            for name, run in self.positions.items()
+        }
+        return {"worst": self.position, **each}
 
     def summary(self) -> dict[str, Any]:
         """All figures under the names used everywhere (JSON, tables, docs)."""
         first, second = self.stage_durations
+        known = self._has_base
         return {
-            "drive": self.drive.name,
-            **self._controller_and_status(),
-            "contact_law": self.drive.contact_law,
-            "load_kind": self.drive.load_kind,
-            "k_dyn": self.k_dyn,
-            "k_dyn_first_contact": self.k_dyn_first_contact,
+            **self.drive.identity,
+            "controller": self.controller_name,
+            "parameters": {} if self.controller is None else self.controller.parameters,
+            "status": self.status.name,
+            "status_text": self.status.value,
+            "clipped": self.clipped._asdict(),
+            "k_dyn": self.k_dyn if known else None,
+            "k_dyn_first_contact": self.k_dyn_first_contact if known else None,
+            "base": None if self.base is None else self.base.name,
+            "base_torque": self.base_torque if known else None,
+            "k_dyns": self.k_dyns.tolist() if known else None,
+            "shaft_factors": [None if math.isnan(one) else one for one in self.shaft_factors.tolist()],
+            "worst_shaft": self.drive.shaft_names[self.worst_shaft],
+            "utilisation": [None if math.isnan(one) else one for one in self.utilisation.tolist()],
             "peak_torque": self.peak_torque,
             "peak_time": self.peak_time,
+            "peak_torques": self.peak_torques.tolist(),
+            "peak_times": self.peak_times.tolist(),
+            "peak_impulses": self.peak_impulses.tolist(),
             "start_time": self.start_time,
             "first_contact": self.first_contact,
             "contacts": self.contacts,
@@ -553,21 +587,20 @@ class Run(BaseRun):
             "torque_at_contact": self.torque_at_contact,
             "stage_1_duration": first,
             "stage_2_duration": second,
+            "stages": int(self._notes["stage"]),
+            "events": len(self.recorded.events),
             "settled_time": self.settled_time,
-            "torque_settling_time": self.settling_time(),
-            "energy": asdict(self.energy),
+            "torque_settling_time": self.settling_time() if known else None,
+            "energy": {**asdict(self.energy), "dissipated": self.energy.dissipated},
             "end_time": self.end_time,
-            **({} if self.drive.brake == "none" else {"release_time": self.release_time}),
+            **({} if math.isnan(self.release_time) else {"release_time": self.release_time}),
             **({"positions": self.by_position()} if self.positions else {}),
         }
 
 
-def worst_run(runs: Mapping[str, AnyRun], **machine: Any) -> AnyRun:
-    """The start of a drive or chain whose position is unknown, from those of each position.
-
-    `machine` is its field: `drive`, or `chain`.
-    """
+def worst_run(runs: Mapping[str, Run], machine: Any) -> Run:
+    """The start of a machine whose position is unknown, from those of each position."""
     hardest = max(runs.values(), key=lambda run: run.peak_torque)
     statuses = [run.status for run in runs.values()]
     status = next((one for one in statuses if one is not Status.REACHED), Status.REACHED)
-    return replace(hardest, **machine, status=status, positions=dict(runs))  # type: ignore[type-var]
+    return replace(hardest, drive=machine, status=status, positions=dict(runs))

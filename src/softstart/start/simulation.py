@@ -3,68 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, cast, overload, runtime_checkable
+from numbers import Integral
+from typing import TYPE_CHECKING, Any, Protocol, overload, runtime_checkable
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.late import late
-from softstart.plant.vector import plant_vector
 from softstart.start.batch import simulate_many
-from softstart.start.engine import MAX_EVENTS, Recorder, check_limits, ended, run_one
+from softstart.start.engine import check_limits, ended, run_one
+from softstart.start.recorded import Recorder
+from softstart.start.rows import MAX_EVENTS, Rows, rows_of
 from softstart.start.run import Run, worst_run
 
 if TYPE_CHECKING:
     import xarray
 
-# above this module; see softstart.late
-models, batches = late("softstart.chain.model"), late("softstart.chain.batch")
+    from softstart.balancing.periodic_torque import PeriodicTorque
 
 
 @runtime_checkable
-class Startable(Protocol):
-    """A machine other than a drive that `simulate` and `compare` start: `softstart.chain.Chain`."""
+class Machine(Protocol):
+    """What a start asks of a machine: `softstart.drive.Drive` and `softstart.chain.Chain` are both one."""
 
     @property
     def name(self) -> str: ...
     @property
-    def positions(self) -> Mapping[str, Any]: ...
-    def start(self, controller: str | Controller, until: float | None = ..., **options: Any) -> Any:
-        """The start under a controller, with the options of `simulate`."""
+    def positions(self) -> Mapping[str, Any]:
+        """The machine at each position at which it may start: one, or three if that is unknown."""
 
-    def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
-        """The machine with so many times its gaps, and its load inertia."""
+    @property
+    def design_drive(self) -> Drive:
+        """The two masses that controllers are set up for."""
+
+    @property
+    def mean_torque(self) -> Any:
+        """M12avg, N m at the motor shaft, to which K_dyn refers, [G](16)."""
+
+    @property
+    def limits(self) -> Any: ...
+    @property
+    def shaft_names(self) -> tuple[str, ...]: ...
 
 
 @overload
 def simulate(
-    drive: Drive | str,
-    controller: str | Controller,
-    until: float | None = ...,
-    *,
-    parameters: Mapping[str, object] | None = ...,
-    fitted_to: Drive | None = ...,
-    base: Drive | None = ...,
-    time_limit: float | None = ...,
-    max_events: int = ...,
-) -> Run: ...
-@overload
-def simulate(
-    drive: Sequence[Drive],
-    controller: str | Controller,
-    until: float | None = ...,
-    *,
-    parameters: Mapping[str, object] | None = ...,
-    fitted_to: Drive | None = ...,
-    base: Drive | None = ...,
-    time_limit: float | None = ...,
-    max_events: int = ...,
-) -> xarray.Dataset: ...
-@overload
-def simulate(
-    drive: Startable,
-    controller: str | Controller,
+    drive: Drive | Machine | str,
+    controller: str | Controller | None,
     until: float | None = ...,
     *,
     parameters: Mapping[str, object] | None = ...,
@@ -72,10 +57,26 @@ def simulate(
     base: Any = ...,
     time_limit: float | None = ...,
     max_events: int = ...,
-) -> Any: ...
+    excitation: Mapping[str | int, PeriodicTorque] | None = ...,
+    workers: int | None = ...,
+) -> Run: ...
+@overload
 def simulate(
-    drive: Drive | str | Sequence[Drive] | Startable,
-    controller: str | Controller,
+    drive: Sequence[Drive] | Sequence[Machine],
+    controller: str | Controller | None,
+    until: float | None = ...,
+    *,
+    parameters: Mapping[str, object] | None = ...,
+    fitted_to: Any = ...,
+    base: Any = ...,
+    time_limit: float | None = ...,
+    max_events: int = ...,
+    excitation: Mapping[str | int, PeriodicTorque] | None = ...,
+    workers: int | None = ...,
+) -> xarray.Dataset: ...
+def simulate(
+    drive: Any,
+    controller: str | Controller | None,
     until: float | None = None,
     *,
     parameters: Mapping[str, object] | None = None,
@@ -83,40 +84,50 @@ def simulate(
     base: Any = None,
     time_limit: float | None = None,
     max_events: int = MAX_EVENTS,
+    excitation: Mapping[str | int, PeriodicTorque] | None = None,
+    workers: int | None = None,
 ) -> Any:
     """Simulate the start of a drive under a controller, exactly.
 
-    Between two events the motion is a closed form; events are located to machine precision. There is no
-    step size and no output grid. A drive whose start position is unknown is started from both flanks and from
-    mid-gap by the same controller, which is not told where; every figure is the worst of the three.
+    Between two events a machine is linear: its Taylor series are summed to the last digit, and events are
+    certified first roots of them. There is no step size and no output grid. A drive whose start position is
+    unknown is started from both flanks and from mid-gap by the same controller, which is not told where;
+    every figure is the worst of the three. A shaft without a gap is a spring that pulls too; rigid gaps close
+    by impacts, angular momentum kept; those that pile up are followed to their known end.
 
     Parameters
     ----------
     drive : Drive, Chain, sequence of them or str
-        A drive, one whose fields hold arrays, a list of drives, a chain (see `simulate_chain`), a list of
-        chains (see `simulate_chains`), or the name or file of a drive or chain.
-    controller : str or Controller
-        A name, `path/to/file.py:ClassName`, or a Controller object.
+        A drive, one whose fields hold arrays, a chain, a list of drives or of chains (with the same number of
+        masses, their motors and loads on the same ones), or the name or file of a drive or chain.
+    controller : str, Controller or None
+        A name, `path/to/file.py:ClassName`, or a Controller object; None leaves the motor off.
     until : float, optional
         End of the run, s. By default one elastic period 2 pi/Omega after the start time, the instant at
         which the load first has its target speed.
     parameters : mapping, optional
         Parameters of a controller given by name: SI numbers or strings with a unit.
-    fitted_to : Drive, optional
-        The drive from which the controller's own defaults are derived, if not `drive`: what happens to a
-        controller set up for one drive when the gap has worn or the load changed.
-    base : Drive, optional
-        The drive to whose mean torque K_dyn refers, if not `drive`.
+    fitted_to : Drive or Chain, optional
+        The machine from which the controller's own defaults are derived, if not `drive`: what happens to a
+        controller set up for one drive when the gap has worn or the load changed. Of a chain it is the modal
+        reduction to two masses, whatever its error; in a list of chains that takes longer than a start.
+    base : Drive or Chain, optional
+        The machine to whose mean torque K_dyn refers, if not `drive`.
     time_limit : float, optional
         Time after which a start that has not reached its target speed ends as not reached, s.
     max_events : int
         Largest number of events and of control instants of one start; more of them is an error, not a
         result.
+    excitation : mapping, optional
+        Periodic torques, N m, by the names (or indices) of the masses on which they act, each at the speed
+        of its own shaft; of a single chain.
+    workers : int, optional
+        How many threads compute a list. By default one for each processor.
 
     Returns
     -------
-    Run, ChainRun or xarray.Dataset
-        A Run for one drive, a ChainRun for a chain. For many a Dataset with one entry for each start:
+    Run or xarray.Dataset
+        A Run for one machine. For many a Dataset with one entry for each start:
         dimension `start`, or `axis_0`, `axis_1`, ... for fields of more than one dimension; a start that
         cannot be finished has a status of its own and NaN in every figure.
 
@@ -136,63 +147,73 @@ def simulate(
 
     References
     ----------
-    [G] (1) to (18); the closed forms, and why no event is missed: docs/theory/stages.md; accuracy:
-    docs/theory/numerics.md.
+    K_dyn: [G] (16), docs/theory/stages.md; everything at one shaft: [R], docs/theory/reduction.md; why no
+    event is missed, and accuracy: docs/theory/numerics.md.
     """
     if isinstance(drive, str):
-        drive = cast("Drive | Startable", models.load_machine(drive))
-    if not isinstance(drive, Drive) and isinstance(drive, Startable):  # the protocol is slow to look for
-        return drive.start(
-            controller, until, parameters=parameters, fitted_to=fitted_to, base=base, time_limit=time_limit,
-            max_events=max_events,
-        )  # fmt: skip
-    if isinstance(drive, Sequence) and drive and isinstance(drive[0], Startable):
-        return batches.simulate_chains(
-            drive, controller, until, fitted_to=fitted_to, parameters=parameters, base=base,
-            time_limit=time_limit, max_events=max_events,
-        )  # fmt: skip
-    made = make_controller(controller, parameters)
+        from softstart.chain.model import load_machine
+
+        drive = load_machine(drive)
+    made = None if controller is None else make_controller(controller, parameters)
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
-    if not isinstance(drive, Drive) or drive.shape != ():
-        return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events)
+    if isinstance(drive, list | tuple) or getattr(drive, "shape", ()) != ():
+        if not isinstance(drive, Drive) and not (drive and all(isinstance(one, Machine) for one in drive)):
+            raise InputError("drive: give one machine, a Drive with array fields, or a list, not empty.")
+        if made is None:
+            raise InputError("controller is missing: many starts need one.")
+        if workers is not None and (isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1):
+            raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
+        return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
+    if not isinstance(drive, Machine):
+        raise InputError("drive: give one Drive or Chain, a list of them, the path of a file, or a name.")
     positions = drive.positions
-    if len(positions) > 1:
-        told, counted = fitted_to or drive.design_drive, base or drive
-        return worst_run(
-            {
-                name: simulate(
-                    one,
-                    made,
-                    until,
-                    fitted_to=told,
-                    base=counted,
-                    time_limit=time_limit,
-                    max_events=max_events,
-                )
-                for name, one in positions.items()
-            },
-            drive=drive,
-        )
-    fitted, own = made.set_up(fitted_to or drive)
-    p = plant_vector(drive, time_limit, max_events)[0]
-    recorder = Recorder(p, int(fitted.sensors))
-    reason = run_one(fitted, own, recorder, until)
-    name = fitted.name or type(fitted).__name__
-    status = ended(recorder.x, reason, until, max_events, f"Drive {drive.name}, controller {name}")
-    return Run(drive, fitted, base or drive, status, p, recorder.x.copy(), *recorder.rows(), told=own)
+    given = {name: rows_of(one, time_limit, max_events, excitation) for name, one in positions.items()}
+    check_end(drive, made, until, next(iter(given.values())))
+    nominal = None if made is None else (fitted_to or drive).design_drive
+    ready, own = (None, None) if made is None else made.set_up(nominal)
+    of = "no motor torque" if ready is None else ready.name or type(ready).__name__
+    runs = {}
+    for name, rows in given.items():
+        recorder = Recorder(rows, 0 if ready is None else int(ready.sensors))
+        reason = run_one(ready, own, recorder, until)
+        status = ended(recorder.state, reason, until, max_events, f"{drive.name}, controller {of}")
+        runs[name] = Run(positions[name], ready, base, status, recorder.finished(), own)
+    return worst_run(runs, drive) if len(runs) > 1 else next(iter(runs.values()))
 
 
 def _check_other(name: str, other: object, drive: object) -> None:
-    """A drive given beside the simulated one: a single one, or one for each start of a batch."""
+    """A machine given beside the simulated one: a single one, or one for each start of a batch."""
     if other is None:
         return
-    if not isinstance(other, Drive):
-        raise InputError(f"{name} = {other!r}: give a Drive; Drive.load reads one from a file or by name.")
-    own = drive.shape if isinstance(drive, Drive) else ()
-    if other.shape not in {(), own}:
+    if not isinstance(other, Machine):
+        raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
+    shape, own = getattr(other, "shape", ()), getattr(drive, "shape", ())
+    if shape not in {(), own}:
         raise InputError(
-            f"{name}: a Drive with fields of shape {other.shape} does not go with starts of shape {own}; "
+            f"{name}: a Drive with fields of shape {shape} does not go with starts of shape {own}; "
             "give a single drive or one of the same shape."
         )
+
+
+def check_end(machine: Any, controller: object, until: float | None, rows: Rows) -> None:
+    """A run needs an end, and a controller a motor."""
+    motor = getattr(machine, "motor", True)
+    if controller is not None and motor is None:
+        raise InputError(
+            "[motor] is missing: a controller needs one; add it to the chain, or give None as the controller."
+        )
+    if until is not None or rows.machine["time_limit"] < float("inf"):
+        return
+    if controller is None or machine.target_speed is None:
+        raise InputError(
+            "until is missing: without motor and target speed nothing else ends the run; give it in s."
+        )
+    arrays = machine.at_motor_shaft()
+    load = float((arrays.Mc / arrays.efficiency_from_motor).sum())
+    lossy = " and through its gears" if (arrays.efficiency < 1.0).any() else ""
+    raise InputError(
+        f"starting_torque: it is not above the load torques, {load:.6g} N*m at the motor "
+        f"shaft{lossy}, so the load may never reach its target speed; give until or time_limit."
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from softstart.plant import layout as at
+from softstart.kernel import records as at
 
 
 class Status(Enum):

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from softstart.chain.batch import prepared
+from softstart.start.batch import prepared
 from softstart.chain.machines import Machine, two_masses, with_values
 from softstart.chain.model import Chain
-from softstart.chain.run import mean_torque_of
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive, Limits
 from softstart.errors import InputError, Mistakes
@@ -157,7 +156,7 @@ def _of_chains(
     """One start after another where the controller's parameters differ, else one call for all."""
     chains = [_chain_of(question.drive, changes, index) for index in range(count)]
     starts = prepared(chains, question.time_limit)
-    base = np.array([mean_torque_of(question.base or question.fitted_to or chain) for chain in chains])
+    base = np.array([(question.base or question.fitted_to or chain).mean_torque for chain in chains])
     nominal = None if question.fitted_to is None else two_masses(question.fitted_to)
     drives = [nominal or two_masses(chain) for chain in chains]
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}

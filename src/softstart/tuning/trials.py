@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from softstart.arrays import Vector
 from softstart.chain.machines import Starts, starts_of, taken, two_masses
 from softstart.chain.model import Chain
-from softstart.chain.run import mean_torque_of
 from softstart.controller import Controller, PlainController, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -67,7 +66,7 @@ class Trials:
         gaps, inertias = (np.array(axis) for axis in zip(*question.cells, strict=True))
         self.gap, self.load_inertia = gaps, inertias
         self.starts = self._starts()
-        bases = [mean_torque_of(question.base or question.drive_of(i)) for i in range(len(gaps))]
+        bases = [(question.base or question.drive_of(i)).mean_torque for i in range(len(gaps))]
         self.base_torque = np.array(bases, dtype=np.float64)
         self.fitted = question.fitted()
         self.nominal = question.drive if isinstance(question.drive, Drive) else two_masses(question.drive)

@@ -17,8 +17,8 @@ from softstart.views.printed import units_of
 if TYPE_CHECKING:
     from softstart.chain.model import Chain
     from softstart.chain.reduction import Reduction
-    from softstart.chain.run import ChainRun
-    from softstart.chain.simulation import TwoMassError, Verification
+    from softstart.start.run import Run
+    from softstart.chain.two_masses import TwoMassError, Verification
     from softstart.chain.vibration import Vibration
 
 MOST_MODES = 12
@@ -48,7 +48,7 @@ def chain_lines(chain: Chain) -> list[str]:
     return lines
 
 
-def figure_rows(run: ChainRun) -> list[list[str]]:
+def figure_rows(run: Run) -> list[list[str]]:
     """The figures of a start, as words and numbers."""
 
     def with_unit(value: float, unit: str) -> str:
@@ -69,7 +69,7 @@ def figure_rows(run: ChainRun) -> list[list[str]]:
     return rows
 
 
-def shaft_table(run: ChainRun) -> Table:
+def shaft_table(run: Run) -> Table:
     """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
     own = run.peak_torques / run.chain.at_motor_shaft().torque_ratio
     cells = {
@@ -85,7 +85,7 @@ def shaft_table(run: ChainRun) -> Table:
     return Table.of("Shafts", cells, ("shaft",))
 
 
-def event_rows(run: ChainRun) -> list[list[object]]:
+def event_rows(run: Run) -> list[list[object]]:
     """The events, full numbers, each with the shaft or mass on which it happened."""
     masses, shafts = [mass.name for mass in run.chain.masses], run.chain.shaft_names
     return [
@@ -94,7 +94,7 @@ def event_rows(run: ChainRun) -> list[list[object]]:
     ]
 
 
-def event_table(run: ChainRun, most: int) -> Table:
+def event_table(run: Run, most: int) -> Table:
     """The first events: time, what happened and where."""
     rows = event_rows(run)
     cells = {
@@ -398,7 +398,7 @@ def reduction_figure(reduction: Reduction) -> Any:
     return figure
 
 
-def run_figure(run: ChainRun) -> Any:
+def run_figure(run: Run) -> Any:
     """Shaft torques with their located peaks, speeds of the masses, and where each twist is in its gap."""
     masses = [mass.name for mass in run.chain.masses]
     shafts = [f"{a} - {b}" for a, b in pairwise(masses)]

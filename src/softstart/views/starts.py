@@ -44,7 +44,7 @@ from softstart.views.numbers import Table, column_of, first_of, number, short
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softstart.chain.run import ChainRun
+    from softstart.start.run import Run
 
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
 EVENT_COLUMNS = ("time s", "event", "value")
@@ -94,7 +94,7 @@ def figure_rows(run: Run) -> list[list[str]]:
     ]
 
 
-def position_notes(runs: Sequence[Run | ChainRun]) -> list[str]:
+def position_notes(runs: Sequence[Run]) -> list[str]:
     """From where each start is the worst, if the position is unknown, and what to do if it is not."""
     worst = [f"{run.controller_name} {run.position}" for run in runs if run.positions]
     if not worst:
@@ -125,7 +125,7 @@ def clipped_torque(run: Any) -> str:
     return f"the demand is {over} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
 
 
-def outcome(run: Run | ChainRun) -> str:
+def outcome(run: Run) -> str:
     """How the start ended, and what was cut off the demand."""
     clipped = clipped_torque(run)
     return f"{run.status.value} Torque cut off: {clipped}." if clipped else run.status.value
@@ -210,7 +210,7 @@ def event_table(run: Run, most: int) -> Table:
     return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event",))
 
 
-def write_start(run: Run | ChainRun, folder: Path, command: str, fitted_to: Drive | None) -> None:
+def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
     """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
     stem = file_stem(run.controller_name)
     _write_run(run, folder, stem)
@@ -234,12 +234,12 @@ def write_start(run: Run | ChainRun, folder: Path, command: str, fitted_to: Driv
     write_drive_report(folder, parts, run.drive, command, fitted_to)
 
 
-def _write_run(run: Run | ChainRun, folder: Path, stem: str) -> None:
+def _write_run(run: Run, folder: Path, stem: str) -> None:
     save_figure(run.plot(), folder, f"run-{stem}")
     run.to_csv(folder / f"trace-{stem}.csv")
 
 
-def _strategy(run: Run | ChainRun, stem: str) -> str:
+def _strategy(run: Run, stem: str) -> str:
     assert run.controller is not None
     cls = type(run.controller)
     values = ", ".join(f"{key} = {value}" for key, value in run.controller.parameters.items())

@@ -20,8 +20,7 @@ from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.reduction import reduce_chain
-from softstart.chain.run import angles_of
-from softstart.chain.simulation import simulate_chain
+from softstart.start.simulation import simulate
 from softstart.chain.vibration import natural_vibration
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
@@ -122,7 +121,7 @@ def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, perio
     rows = zip(arrays.c, arrays.gap, twist, strict=True)
     shafts = [Shaft(float(c), gap=float(gap), start_position=float(at)) for c, gap, at in rows]
     length = periods * 2.0 * math.pi / Omega
-    run = simulate_chain(Chain(masses, shafts), None, length)
+    run = simulate(Chain(masses, shafts), None, length)
     t = np.linspace(0.0, length, 64 * periods + 1)
     relative = angles_of(run.at(t)["twist"])  # the rigid motion has no part in a shape
     along = relative @ (arrays.J * shape)
@@ -316,7 +315,7 @@ def _steady(
     period = 2.0 * math.pi / w
     first = math.ceil(settle / period)
     end = (first + PERIODS) * period
-    run = simulate_chain(Chain(masses, shafts), None, end, excitation=acting)
+    run = simulate(Chain(masses, shafts), None, end, excitation=acting)
     t = np.linspace(first * period, end, PERIODS * SAMPLES, endpoint=False)
     found = run.at(t)
     swing = _about_mean(arrays, angles_of(found["twist"]))

@@ -12,8 +12,8 @@ from tests.softstart.plant.pieces import Pieces
 
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import simulate_chain
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 from softstart.drive import Drive
 
 NAMES = {
@@ -97,7 +97,7 @@ def both(
     motor: int, t_end: float, target: float, rtol: float = 1e-12, efficiency: np.ndarray | None = None,
     gear: np.ndarray | None = None, check: bool = True, u0: float = 0.0,
     curves: dict[int, tuple[np.ndarray, np.ndarray, bool]] | None = None, load: int = -1,
-) -> tuple[ChainRun, ChainOracle]:  # fmt: skip
+) -> tuple[Run, ChainOracle]:  # fmt: skip
     """The same start by the kernel and, to `check` it, by the oracle."""
     reactive = reactive & (Mc > 0)
     target = max(target, float(w0[load]) + 1e-2)
@@ -127,7 +127,7 @@ def both(
         for i, omega, cosine, sine in tones
     }
     controller = Pieces(pieces=tuple(pieces), end=math.inf)
-    run = simulate_chain(chain, controller, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
+    run = simulate(chain, controller, t_end, fitted_to=ANY_DRIVE, excitation=excitation)
     given = Given(
         J,
         Mc,
@@ -153,7 +153,7 @@ def both(
     return run, oracle.go() if check else oracle
 
 
-def differences(run: ChainRun, oracle: ChainOracle) -> dict[str, float]:
+def differences(run: Run, oracle: ChainOracle) -> dict[str, float]:
     """Largest differences in units of what occurs."""
     last = run.at(run.end_time)
     speeds = np.abs(run.w).max()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, simulate
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_chains
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
 from softstart.controller import make_controller
 
 DAMPED = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}
@@ -37,10 +37,10 @@ def various(count: int = 40) -> list[Chain]:
 @pytest.mark.parametrize("controller", ["direct", "ramp", "pulse-coast-hold", "state-feedback"])
 def test_a_batch_has_the_bits_of_single_starts(controller):
     chains = various()
-    found = simulate_chains(chains, controller, fitted_to=CRANE, workers=2)
-    alone = simulate_chains(chains, controller, fitted_to=CRANE, workers=1)
+    found = simulate(chains, controller, fitted_to=CRANE, workers=2)
+    alone = simulate(chains, controller, fitted_to=CRANE, workers=1)
     for i, chain in enumerate(chains):
-        run = simulate_chain(chain, controller, fitted_to=CRANE)
+        run = simulate(chain, controller, fitted_to=CRANE)
         row = found.isel(start=i)
         assert np.array_equal(row.peak_torques.values, run.peak_torques)
         assert np.array_equal(row.k_dyns.values, run.k_dyns)
@@ -56,20 +56,20 @@ def test_each_chain_has_its_own_controller_unless_one_is_given():
     chains = [CHAIN, CHAIN.changed(gaps=2.0)]
     found = simulate(chains, "pulse-coast-hold")
     for i, chain in enumerate(chains):
-        assert found.k_dyn.values[i] == simulate_chain(chain, "pulse-coast-hold").k_dyn
+        assert found.k_dyn.values[i] == simulate(chain, "pulse-coast-hold").k_dyn
 
 
 def test_plain_controllers_have_the_same_bits():
     chains = various(3)
     made = make_controller("ramp", {"time": 0.1}).as_plain(CRANE)
-    found = simulate_chains(chains, made, fitted_to=CRANE)
-    assert found.k_dyn.values.tolist() == [simulate_chain(c, made, fitted_to=CRANE).k_dyn for c in chains]
+    found = simulate(chains, made, fitted_to=CRANE)
+    assert found.k_dyn.values.tolist() == [simulate(c, made, fitted_to=CRANE).k_dyn for c in chains]
 
 
 def test_the_worst_of_an_unknown_position():
     unknown = replace(CHAIN, position="unknown")
-    found = simulate_chains([CHAIN, unknown], "ramp")
-    run = simulate_chain(unknown, "ramp")
+    found = simulate([CHAIN, unknown], "ramp")
+    run = simulate(unknown, "ramp")
     assert np.array_equal(found.k_dyns.values[1], run.k_dyns)
     assert found.k_dyn.values[1] == run.k_dyn
     assert found.start_time.values[1] == run.start_time
@@ -77,7 +77,7 @@ def test_the_worst_of_an_unknown_position():
 
 
 def test_what_cannot_be_finished_has_a_status_and_no_figures():
-    found = simulate_chains(various(4), "direct", fitted_to=CRANE, max_events=60)
+    found = simulate(various(4), "direct", fitted_to=CRANE, max_events=60)
     failed = found.status.values == "TOO_MANY_EVENTS"
     assert failed.any()
     assert np.isnan(found.k_dyn.values[failed]).all()
@@ -87,17 +87,17 @@ def test_what_cannot_be_finished_has_a_status_and_no_figures():
 @pytest.mark.parametrize(
     ("call", "reason"),
     [
-        (lambda: simulate_chains([], "direct"), "not empty"),
-        (lambda: simulate_chains("crane-4-mass", "direct"), "give a list of Chains"),
-        (lambda: simulate_chains([CHAIN], "direct", workers=0), "whole number of 1 or more"),
+        (lambda: simulate([], "direct"), "not empty"),
+        (lambda: simulate("crane-4-mass", "direct"), "give a list of Chains"),
+        (lambda: simulate([CHAIN], "direct", workers=0), "whole number of 1 or more"),
         (lambda: simulate([CHAIN, CRANE], "direct"), "give a list of Chains"),
         (
-            lambda: simulate_chains(
+            lambda: simulate(
                 [CHAIN, Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)], Motor(5.0), target_speed=1.0)], "direct"
             ),
             "same number of masses",
         ),
-        (lambda: simulate_chains([Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)])], "direct"), "motor"),
+        (lambda: simulate([Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)])], "direct"), "motor"),
     ],
 )
 def test_what_is_refused(call, reason):

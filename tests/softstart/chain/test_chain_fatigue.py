@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softstart import Chain, Drive, InputError, fatigue, simulate, simulate_chain
+from softstart import Chain, Drive, InputError, fatigue, simulate, simulate
 from softstart.chain import chain_fatigue
 from softstart.chain.fatigue import reversals, shaft_turning_points
 from softstart.start.fatigue import rainflow_cycles, turning_points
@@ -25,7 +25,7 @@ def chain() -> Chain:
 def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
     """The plant locates its turning points in closed forms, the chain in its series."""
     run = simulate(CRANE, name)
-    other = simulate_chain(Chain.from_drive(CRANE), name, fitted_to=CRANE)
+    other = simulate(Chain.from_drive(CRANE), name, fitted_to=CRANE)
     mine, theirs = turning_points(run), shaft_turning_points(other)[0]
     assert mine.shape == theirs.shape
     np.testing.assert_allclose(theirs, mine, rtol=1e-7, atol=1e-7 * run.peak_torque)
@@ -35,7 +35,7 @@ def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
 
 
 def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
-    run = simulate_chain(chain, "ramp")
+    run = simulate(chain, "ramp")
     t = np.linspace(0.0, run.end_time, 100_000)
     sampled = run.at(t)["T"]
     for k, points in enumerate(shaft_turning_points(run)):
@@ -53,7 +53,7 @@ def test_turning_points_are_those_of_dense_samples(chain: Chain) -> None:
 
 def test_each_shaft_beside_direct_and_its_permissible_torque(chain: Chain) -> None:
     strong = Chain.load("crane-4-mass", also={**DAMPED, "shaft[1].permissible_torque": "300 N*m"})
-    found = chain_fatigue([simulate_chain(strong, name) for name in ("direct", "ramp")])
+    found = chain_fatigue([simulate(strong, name) for name in ("direct", "ramp")])
     direct, ramp = found.rows
     assert [life.relative for life in direct] == [1.0, 1.0, 1.0]
     for hard, gentle in zip(direct, ramp, strict=True):
@@ -66,8 +66,8 @@ def test_each_shaft_beside_direct_and_its_permissible_torque(chain: Chain) -> No
 
 def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(chain: Chain) -> None:
     anywhere = replace(chain, position="unknown")
-    (found,) = chain_fatigue(simulate_chain(anywhere, "ramp")).rows
-    runs = [simulate_chain(one, "ramp", fitted_to=found[0].run.told) for one in anywhere.positions.values()]
+    (found,) = chain_fatigue(simulate(anywhere, "ramp")).rows
+    runs = [simulate(one, "ramp", fitted_to=found[0].run.told) for one in anywhere.positions.values()]
     each = [chain_fatigue(run).rows[0] for run in runs]
     for k, life in enumerate(found):
         assert life.equivalent_torque == pytest.approx(max(row[k].equivalent_torque for row in each))
@@ -75,8 +75,8 @@ def test_an_unknown_position_counts_with_the_start_that_damages_a_shaft_most(cha
 
 def test_what_cannot_be_counted_is_refused(chain: Chain) -> None:
     with pytest.raises(InputError, match="damping is missing in rotor - pinion"):
-        chain_fatigue(simulate_chain("crane-4-mass", "ramp"))
+        chain_fatigue(simulate("crane-4-mass", "ramp"))
     with pytest.raises(InputError, match="slope = -1"):
-        chain_fatigue(simulate_chain(chain, "ramp"), slope=-1)
-    with pytest.raises(InputError, match="give one ChainRun or several"):
+        chain_fatigue(simulate(chain, "ramp"), slope=-1)
+    with pytest.raises(InputError, match="give one Run or several"):
         chain_fatigue([])  # type: ignore[arg-type]

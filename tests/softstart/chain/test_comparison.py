@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, InputError, PlainController, compare, simulate, simulate_chain
+from softstart import Command, Drive, InputError, PlainController, compare, simulate, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.model import load_machine
 from softstart.cli import main
@@ -125,7 +125,7 @@ def test_a_name_is_that_of_a_drive_or_of_a_chain(tmp_path):
     assert load_machine(mine) == CHAIN
     assert load_machine(str(mine)) == CHAIN
     assert isinstance(load_machine("crane-4amtkf"), Drive)
-    assert simulate(str(mine), "direct").k_dyn == simulate_chain(CHAIN, "direct").k_dyn
+    assert simulate(str(mine), "direct").k_dyn == simulate(CHAIN, "direct").k_dyn
 
 
 def test_the_commands_take_chains(tmp_path, capsys):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import ANY_DRIVE, both, differences, random_chain, with_losses
 from tests.softstart.plant.pieces import Pieces
 
-from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, simulate_chain, verify_on_chain
+from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, simulate, verify_on_chain
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 5))
@@ -61,8 +61,8 @@ def driven(efficiency: float, J2: float, Mc: float, side: str = "before") -> Cha
 def test_driven_forward_a_load_behind_a_gear_is_heavier_by_its_efficiency():
     """eta T - Mc = J2 w2' is T - Mc/eta = (J2/eta) w2', as long as power flows forward."""
     push = Pieces(pieces=((0.0, 20.0),))
-    lossy = simulate_chain(driven(0.8, 2.0, 8.0), push, 3.0, fitted_to=ANY_DRIVE)
-    heavier = simulate_chain(driven(1.0, 2.5, 10.0), push, 3.0, fitted_to=ANY_DRIVE)
+    lossy = simulate(driven(0.8, 2.0, 8.0), push, 3.0, fitted_to=ANY_DRIVE)
+    heavier = simulate(driven(1.0, 2.5, 10.0), push, 3.0, fitted_to=ANY_DRIVE)
     times = np.linspace(0.0, 3.0, 60)
     assert np.all(lossy.at(times)["T"] > 0.0)
     assert lossy.at(times)["w"] == pytest.approx(heavier.at(times)["w"], rel=1e-12)
@@ -79,14 +79,14 @@ def held(torque: float, efficiency: float = 0.6, load: float = 10.0) -> Chain:
 @pytest.mark.parametrize("torque", [10.0 / 0.6 * (1 - 1e-9), 10.0, 10.0 * 0.6 * (1 + 1e-9)])
 def test_a_gear_holds_at_rest_what_lies_between_driving_and_being_driven(torque):
     """eta T <= Mc <= T/eta: the load neither rises nor sinks."""
-    run = simulate_chain(held(torque), None, 1.0)
+    run = simulate(held(torque), None, 1.0)
     assert np.all(run.w[:, 1] == 0.0)
     assert run.events == ()
 
 
 @pytest.mark.parametrize(("torque", "way"), [(10.0 / 0.6 * (1 + 1e-9), 1.0), (6.0 * (1 - 1e-9), -1.0)])
 def test_beyond_that_it_lets_go_at_once(torque, way):
-    run = simulate_chain(held(torque), None, 0.01)
+    run = simulate(held(torque), None, 0.01)
     assert [(e.kind, e.time, e.value) for e in run.events][:1] == [("gear lets go", 0.0, way)]
     assert np.sign(run.w[5:-1, 1]).tolist() == [way] * (run.w.shape[0] - 6)
 
@@ -100,7 +100,7 @@ def test_free_vibration_dies_in_a_gear_by_half_waves():
     eta, c = 0.7, 50.0
     chain = Chain([Mass(1e15), Mass(1.0)], [Shaft(c, efficiency=eta, start_position=0.4)])
     quarter = 0.5 * np.pi * (1 / np.sqrt(eta * c) + np.sqrt(eta / c))
-    run = simulate_chain(chain, None, 4.5 * quarter)
+    run = simulate(chain, None, 4.5 * quarter)
     turned = [e.time for e in run.events if e.kind == "gear holds"]
     assert turned == pytest.approx([n * quarter for n in range(1, 5)], rel=1e-12)
     assert np.abs(run.at(turned)["T"][:, 0]) == pytest.approx([20.0 * eta**n for n in range(1, 5)], rel=1e-12)
@@ -114,7 +114,7 @@ def test_the_gear_stays_at_its_mass_when_the_chain_is_brought_to_one_shaft():
         target_speed=30.0,
     )
     push = Pieces(pieces=((0.0, 20.0),))
-    a, b = (simulate_chain(one, push, 2.0, fitted_to=ANY_DRIVE) for one in (chain, chain.brought_to("motor")))
+    a, b = (simulate(one, push, 2.0, fitted_to=ANY_DRIVE) for one in (chain, chain.brought_to("motor")))
     assert a.energy.gears == pytest.approx(b.energy.gears, rel=1e-10)
     assert a.energy.gears > 0.0
     assert a.peak_torques == pytest.approx(b.peak_torques, rel=1e-10)

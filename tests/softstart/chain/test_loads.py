@@ -12,9 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import both, differences, random_chain
 
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chain, simulate_chains
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
 from softstart.chain.reduction import reduce_chain
-from softstart.chain.simulation import drive_of
 from softstart.chain.vibration import natural_vibration
 from softstart.errors import InputError
 from softstart.optimal.chains.problem import ChainProblem, momentum_bound
@@ -60,7 +59,7 @@ def test_impacts_on_a_wall(restitution, mirrored):
     way = -1 if mirrored else 1
     masses = [Mass(1.0, initial_speed=way), Mass(2.0, initial_speed=3 * way), Mass("inf", name="wall")]
     shafts = [Shaft(50.0), Shaft(gap=0.002, restitution=restitution)]
-    run = simulate_chain(Chain(masses[::way], shafts[::way]), None, 2.0)
+    run = simulate(Chain(masses[::way], shafts[::way]), None, 2.0)
     first = next(event for event in run.events if event.impulse)
     before = math.cos(math.sqrt(75.0) * first.time) * 2.0 / 3.0 + 7.0 / 3.0  # of their common motion
     assert abs(first.impulse) == pytest.approx(2.0 * (1.0 + restitution) * before, rel=1e-12)
@@ -78,7 +77,7 @@ def test_a_mass_on_a_shaft_to_ground():
         Motor(10.0),
         target_speed=1.0,
     )  # fmt: skip
-    run = simulate_chain(chain, "direct", 0.7, fitted_to=Chain.load("crane-4-mass"))
+    run = simulate(chain, "direct", 0.7, fitted_to=Chain.load("crane-4-mass"))
     assert run.at(0.7)["T"][1] == pytest.approx(10.0 * (1.0 - math.cos(5.0 * 0.7)), rel=1e-13)
     assert run.peak_torques[1] == pytest.approx(20.0, rel=1e-13)
     assert natural_vibration(chain).Omega[1] == pytest.approx(5.0, rel=1e-14)
@@ -118,10 +117,10 @@ def test_a_fan_settles_where_its_curve_meets_the_torque():
     """One body under 20 N m against 0.4 N m s w: 50 rad/s (1 - exp(-0.4 t/J)); beyond its points 4 N m."""
     fan = Mass(1.0, name="fan", curve_speed=[0.0, 100.0], curve_torque=[0.0, 40.0])
     chain = Chain([Mass(1.0), fan], [Shaft(stiffness="inf")], Motor(20.0), target_speed=40.0)
-    run = simulate_chain(chain, "direct", 3.0, fitted_to=Chain.load("crane-4-mass"))
+    run = simulate(chain, "direct", 3.0, fitted_to=Chain.load("crane-4-mass"))
     assert run.at(3.0)["w"][1] == pytest.approx(50.0 * (1.0 - math.exp(-0.6)), rel=1e-13)
     low = replace(chain, masses=(chain.masses[0], fan.replace(curve_speed=[0, 10], curve_torque=[0, 4])))
-    run = simulate_chain(low, "direct", 3.0, fitted_to=Chain.load("crane-4-mass"))
+    run = simulate(low, "direct", 3.0, fitted_to=Chain.load("crane-4-mass"))
     since = -math.log(0.8) / 0.2
     assert run.at(3.0)["w"][1] == pytest.approx(10.0 + 8.0 * (3.0 - since), rel=1e-13)
 
@@ -174,13 +173,13 @@ def test_a_file_with_all_of_them():
     chain = Chain.from_toml(FILE)
     assert chain.load_mass == "mass 2"
     assert Chain.from_toml(chain.to_toml()) == chain
-    run = simulate_chain(chain, "direct")
-    there = simulate_chain(chain.brought_to("motor"), "direct")
+    run = simulate(chain, "direct")
+    there = simulate(chain.brought_to("motor"), "direct")
     assert there.peak_torques == pytest.approx(run.peak_torques, rel=1e-10)
-    batch = simulate_chains([chain, chain.changed(gaps=2.0), chain], "direct")
+    batch = simulate([chain, chain.changed(gaps=2.0), chain], "direct")
     assert batch.peak_torques[0].values.tolist() == batch.peak_torques[2].values.tolist()
     assert batch.peak_torques[0].values.tolist() == run.peak_torques.tolist()
-    assert drive_of(chain).load_inertia == pytest.approx(0.2)
+    assert chain.design_drive.load_inertia == pytest.approx(0.2)
 
 
 def test_ground_is_drawn_and_the_rest_is_said():

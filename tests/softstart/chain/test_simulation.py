@@ -14,8 +14,8 @@ from softstart import Command, Drive, InputError, PlainController, Run, Simulati
 from softstart.balancing import Engine
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import simulate_chain
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 from softstart.start import metrics
 
 CRANE = Drive.load("crane-4amtkf")
@@ -35,7 +35,7 @@ DRIVES = {
 CONTROLLERS = ("direct", "ramp", "current-limit-feedback", "reduced-two-stage")
 
 
-def same_as_plant(run: ChainRun, plant: Run) -> None:
+def same_as_plant(run: Run, plant: Run) -> None:
     assert run.k_dyn == pytest.approx(plant.k_dyn, rel=1e-10)
     if run.peak_time != pytest.approx(plant.peak_time, abs=1e-10):  # one of several that are equal
         assert abs(plant.at(run.peak_time)["T"]) == pytest.approx(plant.peak_torque, rel=1e-10)
@@ -57,14 +57,14 @@ def same_as_plant(run: ChainRun, plant: Run) -> None:
 @pytest.mark.parametrize("kind", DRIVES)
 def test_two_masses_are_the_two_mass_plant(kind, controller):
     drive = CRANE.replace(**DRIVES[kind])
-    run = simulate_chain(Chain.from_drive(drive), controller, fitted_to=drive)
+    run = simulate(Chain.from_drive(drive), controller, fitted_to=drive)
     same_as_plant(run, simulate(drive, controller))
     assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
 
 
 def test_no_bit_depends_on_the_time_limit():
     """Undamped, the crane rattles and all its masses fly at times: a span lasts an elastic period at most."""
-    starts = [simulate_chain("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
+    starts = [simulate("crane-4-mass", "direct", time_limit=limit) for limit in (None, 0.6, 2.0, 1e3)]
     assert len({start.k_dyn for start in starts}) == 1
     assert len({start.start_time for start in starts}) == 1
 
@@ -83,7 +83,7 @@ def test_the_shaft_torque_the_load_speed_and_the_stage_are_seen():
             torque = 60.0 - 0.1 * measured.shaft_torque - 0.2 * measured.load_speed + 0.5 * measured.stage
             return Command(torque, measured.time + 0.003)
 
-    run = simulate_chain(Chain.from_drive(CRANE), Seeing(), fitted_to=CRANE)
+    run = simulate(Chain.from_drive(CRANE), Seeing(), fitted_to=CRANE)
     same_as_plant(run, simulate(CRANE, Seeing()))
 
 
@@ -92,22 +92,22 @@ def test_plain_and_compiled_controllers_agree_to_the_bit():
     from softstart.controller.finding import make_controller
 
     made = make_controller("ramp", None)
-    compiled = simulate_chain(chain, made, 0.15, fitted_to=CRANE)
-    plain = simulate_chain(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
+    compiled = simulate(chain, made, 0.15, fitted_to=CRANE)
+    plain = simulate(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
     for name in ("spans", "span_masses", "span_shafts", "events"):
         assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
 
 
 def test_the_motor_may_sit_at_the_other_end():
     chain = Chain.load("crane-4-mass")
-    forward = simulate_chain(chain, "direct", fitted_to=CRANE)
+    forward = simulate(chain, "direct", fitted_to=CRANE)
     turned = Chain(
         reversed(chain.brought_to("motor").masses),
         reversed(chain.brought_to("motor").shafts),
         chain.motor,
         load_mass=chain.load_mass,
     )
-    back = simulate_chain(turned, "direct", fitted_to=CRANE)
+    back = simulate(turned, "direct", fitted_to=CRANE)
     assert back.k_dyn == pytest.approx(forward.k_dyn, rel=1e-9)
     assert back.start_time == pytest.approx(forward.start_time, rel=1e-10)
     assert back.peak_torques[::-1] == pytest.approx(forward.peak_torques, rel=1e-9)
@@ -116,13 +116,13 @@ def test_the_motor_may_sit_at_the_other_end():
 def test_gears_change_nothing_but_the_shaft_on_which_things_are_said():
     geared = Chain.load("crane-4-mass")
     plain = geared.brought_to("motor")
-    a, b = (simulate_chain(chain, "ramp", fitted_to=CRANE) for chain in (geared, plain))
+    a, b = (simulate(chain, "ramp", fitted_to=CRANE) for chain in (geared, plain))
     assert a.k_dyn == pytest.approx(b.k_dyn, rel=1e-12)
     hum = PeriodicTorque(0.0, [1.0], [30.0], [0.0], speed=50.0)
-    hummed = simulate_chain(geared, "ramp", fitted_to=CRANE, excitation={"crane": hum})
+    hummed = simulate(geared, "ramp", fitted_to=CRANE, excitation={"crane": hum})
     ratio = geared.speed_ratios()[3]
     slow = PeriodicTorque(0.0, [1.0], [30.0 * ratio], [0.0], speed=50.0)
-    same = simulate_chain(plain, "ramp", fitted_to=CRANE, excitation={"crane": slow})
+    same = simulate(plain, "ramp", fitted_to=CRANE, excitation={"crane": slow})
     assert hummed.peak_torque == pytest.approx(same.peak_torque, rel=1e-12)
     assert hummed.peak_torque != pytest.approx(a.peak_torque, rel=1e-6)
 
@@ -131,7 +131,7 @@ def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
     """Each torque over what its shaft may carry, and over its own mean; K_dyn over that of the chain."""
     most = {"shaft[1].permissible_torque": 400.0, "shaft[3].permissible_torque": 2000.0}
     chain = Chain.load("crane-4-mass", also={"shaft[2].damping_ratio": 0.02, **most})
-    run = simulate_chain(chain, "direct")
+    run = simulate(chain, "direct")
     own = run.peak_torques * np.array([1.0, 1.0, 20.0])  # shaft 3 lies behind gears of 4 and 5
     assert run.utilisation[[0, 2]] == pytest.approx(own[[0, 2]] / [400.0, 2000.0], rel=1e-13)
     assert np.isnan(run.utilisation[1])
@@ -140,7 +140,7 @@ def test_k_dyn_is_that_of_the_worst_shaft_at_the_motor_shaft():
     masses = chain.at_motor_shaft()
     needed = masses.J * (62.0 - masses.Mc.sum()) / masses.J.sum() + masses.Mc
     assert run.shaft_factors * [sum(needed[k:]) for k in (1, 2, 3)] == pytest.approx(run.peak_torques)
-    assert simulate_chain(chain, "direct", base=CRANE).k_dyn == pytest.approx(
+    assert simulate(chain, "direct", base=CRANE).k_dyn == pytest.approx(
         max(run.peak_torques) / float(metrics.base_torque(CRANE)), rel=1e-14
     )
 
@@ -151,7 +151,7 @@ def test_two_masses_on_a_shaft_with_a_damping_ratio_swing_with_it():
     shaft = Shaft(c, damping_ratio=zeta, start_position=0.01)
     omega = np.sqrt(c * (1.0 / J1 + 1.0 / J2))
     period = 2.0 * np.pi / (omega * np.sqrt(1.0 - zeta**2))
-    run = simulate_chain(Chain([Mass(J1), Mass(J2)], [shaft]), None, 2.0 * period)
+    run = simulate(Chain([Mass(J1), Mass(J2)], [shaft]), None, 2.0 * period)
     swings = run.at([0.0, period, 2.0 * period])["twist"][:, 0]
     decrement = np.exp(-2.0 * np.pi * zeta / np.sqrt(1.0 - zeta**2))
     assert swings == pytest.approx(0.01 * decrement ** np.arange(3.0), rel=1e-12)
@@ -172,7 +172,7 @@ def free_chain(gap: float = 0.03, damping: float = 0.0, law: str = "no-pull") ->
 @pytest.mark.parametrize("damping", [0.0, 0.4])
 def test_momentum_and_energy_without_torque(damping, law):
     chain = free_chain(damping=damping, law=law)
-    run = simulate_chain(chain, None, 3.0)
+    run = simulate(chain, None, 3.0)
     J = chain.at_motor_shaft().J
     moment = run.w @ J
     assert moment == pytest.approx(moment[0], abs=1e-12 * float(J @ np.abs(run.w[0])))
@@ -194,7 +194,7 @@ def test_a_spring_without_a_gap_pulls_too():
     """Modes superpose: the free vibration of two joined masses is a cosine, at any instant."""
     J1, J2, c = 2.0, 3.0, 40.0
     Omega = math.sqrt(c * (1 / J1 + 1 / J2))
-    run = simulate_chain(Chain([Mass(J1), Mass(J2)], [Shaft(c, start_position=0.1)]), None, 7.0)
+    run = simulate(Chain([Mass(J1), Mass(J2)], [Shaft(c, start_position=0.1)]), None, 7.0)
     times = np.linspace(0.0, 7.0, 50)
     assert run.at(times)["T"][:, 0] == pytest.approx(4.0 * np.cos(Omega * times), abs=1e-12 * 4.0)
     assert run.peak_torques[0] == pytest.approx(4.0, rel=1e-14)
@@ -205,7 +205,7 @@ def test_forced_vibration_is_that_of_the_formula():
     J, c, d, omega = 0.2, 80.0, 1.5, 17.0
     chain = Chain([Mass(J), Mass(1e14)], [Shaft(c, damping=d)])
     hum = PeriodicTorque(0.0, [1.0], [3.0], [2.0], speed=omega)
-    run = simulate_chain(chain, None, 30.0, excitation={"mass 1": hum})
+    run = simulate(chain, None, 30.0, excitation={"mass 1": hum})
     times = np.linspace(25.0, 30.0, 40)
     answer = (3.0 - 2.0j) / (c - J * omega**2 + 1j * omega * d)
     assert run.at(times)["twist"][:, 0] == pytest.approx(
@@ -220,7 +220,7 @@ def test_an_engine_drives_a_chain():
     J, c, d, ratio = (0.05, 0.3), 900.0, 3.0, 2.5
     drum = Mass(J[1] * ratio**2, name="drum", damping=0.2 * ratio**2)
     chain = Chain([Mass(J[0], name="crank"), drum], [Shaft(c, damping=d, ratio=ratio)])
-    run = simulate_chain(chain, None, 0.5, excitation={"crank": torque})
+    run = simulate(chain, None, 0.5, excitation={"crank": torque})
 
     def slopes(t, y):
         T = c * y[0] + d * (y[1] - y[2])
@@ -237,7 +237,7 @@ def test_an_engine_drives_a_chain():
 def test_work_of_exciting_torques_by_quadrature():
     chain = free_chain(damping=0.3)
     hum = PeriodicTorque(0.7, [0.5, 2.0], [0.3, -0.1], [0.2, 0.4], speed=30.0)
-    run = simulate_chain(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
+    run = simulate(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
     nodes, weights = leggauss(8)
     starts, ends = run.recorded.spans["start"], run.recorded.spans["end"]
     half = 0.5 * (ends - starts)
@@ -249,7 +249,7 @@ def test_work_of_exciting_torques_by_quadrature():
 
 
 def test_peaks_are_not_below_a_fine_grid_and_are_taken():
-    run = simulate_chain("crane-4-mass", "direct", 0.2, fitted_to=CRANE)
+    run = simulate("crane-4-mass", "direct", 0.2, fitted_to=CRANE)
     fine = np.abs(run.at(np.linspace(0.0, 0.2, 20_001))["T"]).max(axis=0)
     assert np.all(fine <= run.peak_torques * (1 + 1e-13))
     assert run.peak_torques == pytest.approx(fine, rel=1e-4)  # (1630 rad/s * 5e-6 s)^2/2 = 3e-5
@@ -269,7 +269,7 @@ def test_a_stuck_mass_in_the_middle_holds_the_chain_behind_it():
         Motor(50.0, torque_rate=rate),
         target_speed=1.0,
     )
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 50.0),)), fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 50.0),)), fitted_to=CRANE)
     starts = next(e for e in run.events if e.kind == "load starts")
     before = run.at(np.linspace(0.0, starts.time * (1 - 1e-9), 20))
     assert np.all(before["w"][:, 1:] == 0.0)
@@ -281,7 +281,7 @@ def test_a_stuck_mass_in_the_middle_holds_the_chain_behind_it():
 
 def test_friction_stops_a_coasting_chain_and_holds_it():
     masses = [Mass(1.0, torque=2.0, kind="reactive", initial_speed=3.0), Mass(0.5, initial_speed=3.0)]
-    run = simulate_chain(Chain(masses, [Shaft(400.0, damping=3.0)]), None, 6.0)
+    run = simulate(Chain(masses, [Shaft(400.0, damping=3.0)]), None, 6.0)
     assert run.w[-1] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert run.w[-1][0] == 0.0
     assert sum(e.kind == "load stops" for e in run.events) == 1 + sum(
@@ -325,20 +325,20 @@ def two(**shaft) -> Chain:
 )
 def test_bad_input_is_refused_in_a_sentence(chain, arguments, said):
     with pytest.raises(InputError, match=said):
-        simulate_chain(chain, **arguments)
+        simulate(chain, **arguments)
 
 
 def test_a_load_that_cannot_be_moved_needs_an_end():
     chain = Chain([Mass(1.0), Mass(1.0, torque=9.0)], [Shaft(10.0)], Motor(5.0), target_speed=10.0)
     with pytest.raises(InputError, match="not above the load torques"):
-        simulate_chain(chain, "direct", fitted_to=CRANE)
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 5.0),)), fitted_to=CRANE, time_limit=1.0)
+        simulate(chain, "direct", fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 5.0),)), fitted_to=CRANE, time_limit=1.0)
     assert run.status.name == "NOT_REACHED"
 
 
 def test_too_many_events_are_an_error():
     with pytest.raises(SimulationError, match="That is 20"):
-        simulate_chain("crane-4-mass", "direct", fitted_to=CRANE, max_events=20)
+        simulate("crane-4-mass", "direct", fitted_to=CRANE, max_events=20)
 
 
 def test_a_controller_that_fails_is_named():
@@ -349,13 +349,13 @@ def test_a_controller_that_fails_is_named():
             return 1 / 0
 
     with pytest.raises(SimulationError, match="Broken failed at t = 0 s"):
-        simulate_chain("crane-4-mass", Broken())
+        simulate("crane-4-mass", Broken())
 
 
 def test_the_summary_is_plain_data_and_the_figure_draws():
     import json
 
-    run = simulate_chain("crane-4-mass", "direct", fitted_to=CRANE, until=0.1)
+    run = simulate("crane-4-mass", "direct", fitted_to=CRANE, until=0.1)
     told = json.loads(json.dumps(run.summary()))
     assert told["peak_torques"] == run.peak_torques.tolist()
     assert told["assumed"] == run.chain.assumed

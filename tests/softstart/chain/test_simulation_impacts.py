@@ -12,7 +12,7 @@ from tests.softstart.plant.pieces import Pieces
 
 from softstart import Drive
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.chain.simulation import simulate_chain
+from softstart.start.simulation import simulate
 from softstart.errors import InputError
 
 CRANE = Drive.load("crane-4amtkf")  # what the pieces are set up for: they take nothing from it
@@ -33,7 +33,7 @@ def test_momentum_is_kept_and_energy_lost_by_the_restitution(J, w, restitution):
     """Three free masses: each impact keeps momentum to 1e-12 and loses (1 - e^2) of the relative energy."""
     shafts = [Shaft(gap=0.2, restitution=restitution), Shaft(gap=0.3, restitution=restitution)]
     chain = Chain([Mass(J[i], initial_speed=w[i]) for i in range(3)], shafts)
-    run = simulate_chain(chain, None, 1.0)
+    run = simulate(chain, None, 1.0)
     inertia = np.array(J)
     scale = float(inertia @ np.abs(run.w).max(axis=0)) + 1e-300
     times = np.array([event.time for event in run.events])
@@ -59,7 +59,7 @@ def bounced(restitution: float):
     """Three equal masses: the first meets the second, which bounces between it and the third."""
     masses = [Mass(1.0, initial_speed=1.0), Mass(1.0), Mass(1.0, initial_speed=-1.0)]
     shafts = [Shaft(gap=0.2, restitution=restitution), Shaft(gap=0.21, restitution=restitution)]
-    return simulate_chain(Chain(masses, shafts), None, 2.0)
+    return simulate(Chain(masses, shafts), None, 2.0)
 
 
 def test_three_masses_collapse_below_the_known_restitution():
@@ -83,7 +83,7 @@ def pressed(restitution: float, until: float, torque: float = 3.0):
     chain = Chain(
         [Mass(1.0), Mass(2.0)], [Shaft(gap=0.2, restitution=restitution)], Motor(torque), target_speed=1e3
     )
-    return simulate_chain(chain, Pieces(pieces=((0.0, torque),)), until, fitted_to=CRANE)
+    return simulate(chain, Pieces(pieces=((0.0, torque),)), until, fitted_to=CRANE)
 
 
 @given(restitution=st.floats(0.0, 0.97))
@@ -124,7 +124,7 @@ def test_pressed_flanks_part_when_they_would_have_to_pull():
         Motor(3.0, minimum_torque=-3.0, torque_rate=2.0),
         target_speed=1e3,
     )
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 3.0), (4.0, -3.0))), 7.0, fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 3.0), (4.0, -3.0))), 7.0, fitted_to=CRANE)
     opened = [e for e in run.events if e.kind == "gap opened"]
     assert [e.time for e in opened] == pytest.approx([5.5], rel=1e-13)
     assert run.at(5.5 * (1 - 1e-9))["T"][0] == pytest.approx(0.0, abs=1e-7)
@@ -143,7 +143,7 @@ def test_a_pressed_body_is_struck_as_one_and_let_go_by_a_blow_that_pulls():
         Shaft(gap=0.4, restitution=1.0),
     ]
     chain = Chain(masses, shafts, Motor(1.0, mass="mass 2"), target_speed=1e3)
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 1.0),)), 0.5, fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 1.0),)), 0.5, fitted_to=CRANE)
     assert (run.events[0].kind, run.events[0].time) == ("impacts over, flanks press", 0.0)
     blow = next(e for e in run.events if e.kind == "impact")
     assert blow.place == 0
@@ -166,7 +166,7 @@ def test_a_blow_from_behind_opens_pressed_flanks():
     masses = [Mass(0.5), Mass(0.7), Mass(2.0, initial_speed=3.0)]
     shafts = [Shaft(gap=0.2, restitution=0.0, start_position=0.1), Shaft(gap=0.2, restitution=0.5)]
     chain = Chain(masses, shafts, Motor(1.0), target_speed=1e3)
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 1.0),)), 0.1, fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 1.0),)), 0.1, fitted_to=CRANE)
     blow = next(e for e in run.events if e.kind == "impact" and e.place == 1)
     before, after = around(run, blow.time)
     assert before[0] == before[1]
@@ -179,9 +179,9 @@ def test_a_rigid_joint_carries_what_moves_the_masses_behind_it():
     chain = Chain(
         [Mass(1.0), Mass(2.0), Mass(3.0)], [Shaft("inf"), Shaft(1e3)], Motor(12.0), target_speed=2.0
     )
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
     joined = Chain([Mass(3.0), Mass(3.0)], [Shaft(1e3)], Motor(12.0), target_speed=2.0)
-    same = simulate_chain(joined, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
+    same = simulate(joined, Pieces(pieces=((0.0, 12.0),)), fitted_to=CRANE)
     assert run.start_time == pytest.approx(same.start_time, rel=1e-13)
     assert run.peak_torques[1] == pytest.approx(same.peak_torques[0], rel=1e-13)
     T = run.at(run.t)["T"]
@@ -193,18 +193,18 @@ def test_masses_joined_rigidly_through_a_gear_start_with_one_speed_but_for_round
     joint = Shaft("inf", ratio=1.7)
     for typed in (10.0 / 1.7, 5.8823529):
         chain = Chain([Mass(1.0, initial_speed=10.0), Mass(2.0, initial_speed=typed)], [joint])
-        run = simulate_chain(chain, None, 1.0)
+        run = simulate(chain, None, 1.0)
         assert run.at(1.0)["w"].tolist() == [10.0, 10.0]
     chain = Chain([Mass(1.0, initial_speed=10.0), Mass(2.0, initial_speed=5.8823)], [joint])
     with pytest.raises(InputError, match=r"they have 10 and 9\.99991 rad/s"):
-        simulate_chain(chain, None, 1.0)
+        simulate(chain, None, 1.0)
 
 
 def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
     """Two masses with friction 1 and 2 on a rigid joint: they break away at 3 N m, not before."""
     masses = [Mass(1.0, torque=1.0, kind="reactive"), Mass(2.0, torque=2.0, kind="reactive"), Mass(1.0)]
     chain = Chain(masses, [Shaft("inf"), Shaft(100.0)], Motor(6.0, torque_rate=1.0), target_speed=0.5)
-    run = simulate_chain(chain, Pieces(pieces=((0.0, 6.0),)), fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, 6.0),)), fitted_to=CRANE)
     starts = [e for e in run.events if e.kind == "load starts"]
     assert [(e.place, e.time) for e in starts] == [(0, pytest.approx(3.0)), (1, pytest.approx(3.0))]
     # friction is shared as it can hold: a third of the motor's torque stays at mass 1
@@ -217,7 +217,7 @@ def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
     flanks = Shaft(gap=0.1, restitution=0.0, start_position=0.05)
     geared = Shaft(100.0, efficiency=0.5, side="after", start_position=0.001)
     chain = Chain(masses, [flanks, geared], Motor(4.0, minimum_torque=-4.0), target_speed=1.0)
-    run = simulate_chain(chain, Pieces(pieces=((0.0, -4.0),)), 0.5, fitted_to=CRANE)
+    run = simulate(chain, Pieces(pieces=((0.0, -4.0),)), 0.5, fitted_to=CRANE)
     assert [e.kind for e in run.events] == ["gear lets go", "impacts over, flanks press", "gear holds"]
     assert run.events[-1].time == 0.0
     found = run.at(np.linspace(0.0, 0.5, 101))
@@ -227,7 +227,7 @@ def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
 
 def test_a_blow_moves_a_stuck_mass():
     masses = [Mass(1.0, initial_speed=1.0), Mass(1.0, torque=5.0, kind="reactive")]
-    run = simulate_chain(Chain(masses, [Shaft(gap=0.2, restitution=0.0)]), None, 1.0)
+    run = simulate(Chain(masses, [Shaft(gap=0.2, restitution=0.0)]), None, 1.0)
     kinds = [e.kind for e in run.events]
     assert kinds[:2] == ["impact", "load starts"]
     assert kinds[-1] == "load stops" or "load stops" in kinds
@@ -277,7 +277,7 @@ def test_whatever_rattles_keeps_its_energy_and_its_flanks(block):
     """Energy balance to 1e-12, and no flank is ever passed."""
     for seed in range(40 * block, 40 * (block + 1)):
         chain, pieces = rattling(seed)
-        run = simulate_chain(chain, pieces, 2.0, fitted_to=CRANE)
+        run = simulate(chain, pieces, 2.0, fitted_to=CRANE)
         energy, arrays = run.energy, chain.at_motor_shaft()
         moved = abs(energy.motor) + abs(energy.kinetic) + abs(energy.load) + abs(energy.impacts)
         assert abs(energy.residual) <= 1e-12 * moved, seed

@@ -8,7 +8,7 @@ from tests.softstart.plant.pieces import Pieces
 from tests.softstart.plant.test_against_oracle import case, drive_of
 
 from softstart import Drive, simulate
-from softstart.chain import Chain, simulate_chain
+from softstart.chain import Chain, simulate
 
 BLOCKS = 6
 STARTS_PER_BLOCK = 50
@@ -22,10 +22,10 @@ def compare(seed: int, overdamped: bool = False) -> None:
     if overdamped:
         critical = 2.0 * np.sqrt(drawn["c"] * drawn["J1"] * drawn["J2"] / (drawn["J1"] + drawn["J2"]))
         drawn["d"] = float(critical * 10 ** np.random.default_rng(seed).uniform(0.0, 1.5))
-    drive = drive_of(drawn)
+    drive = drawn.design_drive
     played = Pieces(pieces=tuple(drawn["torque_pieces"]), end=drawn["t_end"])
     plant = simulate(drive, played, until=drawn["t_end"])
-    chain = simulate_chain(Chain.from_drive(drive), played, until=drawn["t_end"], fitted_to=drive)
+    chain = simulate(Chain.from_drive(drive), played, until=drawn["t_end"], fitted_to=drive)
     there, here = plant.at(plant.end_time), chain.at(chain.end_time)
     speed = max(np.abs(plant.w1).max(), np.abs(plant.w2).max())
     twist = max(np.abs(plant.theta).max(), drawn["gap"])
@@ -61,7 +61,7 @@ def test_a_lag_far_longer_than_the_start():
         torque_lag=1e5, torque_rate=62e6, load_torque=1e-9, start_position="mid-gap"
     )
     plant = simulate(drive, "direct", until=30.0)
-    chain = simulate_chain(Chain.from_drive(drive), "direct", until=30.0, fitted_to=drive)
+    chain = simulate(Chain.from_drive(drive), "direct", until=30.0, fitted_to=drive)
     t = np.array([1e-7, 1e-6, 1e-3, 10.0, 30.0])
     late = 0.5e-6  # as if the whole step came in the middle of the slewing
     step = -62.0 * np.expm1((late - t[2:]) / 1e5)
@@ -81,7 +81,7 @@ def test_a_lag_far_longer_than_the_start():
 def test_the_anchors_of_fifty_digits(start, peak, events, twist):
     """Drive of [G], gap 2 rad, 62 N m, 1 s; from the flank it grazes that flank after each rebound."""
     drive = Drive.load("crane-4amtkf").replace(gap=2.0, start_position=start)
-    run = simulate_chain(Chain.from_drive(drive), "direct", 1.0, fitted_to=drive)
+    run = simulate(Chain.from_drive(drive), "direct", 1.0, fitted_to=drive)
     assert run.peak_torque == pytest.approx(peak, rel=1e-13)
     assert sum(e.kind.startswith("gap") for e in run.events) == events
     assert run.at(1.0)["twist"][0] == pytest.approx(twist, abs=1e-12)

@@ -12,8 +12,8 @@ import pytest
 from tests.controllers.several_gaps import random_chains
 
 from softstart import Drive, InputError, SimulationError, simulate
-from softstart.chain import Chain, Mass, reduce_chain, simulate_chain, two_mass_error, verify_on_chain
-from softstart.chain.simulation import drive_of, error_under, torques_to_try
+from softstart.chain import Chain, Mass, reduce_chain, simulate, two_mass_error, verify_on_chain
+from softstart.chain.two_masses import drive_of, error_under, torques_to_try
 
 CHAIN = Chain.load("crane-4-mass")
 DRIVE = reduce_chain(CHAIN, to=2).to_drive()
@@ -25,7 +25,7 @@ def test_both_sides_are_the_starts_themselves(controller):
     alone = simulate(DRIVE, controller)
     assert found.drive.k_dyn == alone.k_dyn
     assert found.drive.start_time == alone.start_time
-    whole = simulate_chain(CHAIN, controller, fitted_to=DRIVE)
+    whole = simulate(CHAIN, controller, fitted_to=DRIVE)
     assert found.chain.peak_torque == whole.peak_torque
     assert found.chain_k_dyn == whole.k_dyn
     assert found.error == pytest.approx(whole.k_dyn / alone.k_dyn - 1.0, rel=1e-14)
@@ -84,7 +84,7 @@ def test_a_strategy_that_does_not_start_the_chain_counts(monkeypatch):
             raise SimulationError("too many events")
         return verify_on_chain(chain, drive, controller, *rest, **more)
 
-    monkeypatch.setattr("softstart.chain.simulation.verify_on_chain", refused)
+    monkeypatch.setattr("softstart.chain.two_masses.verify_on_chain", refused)
     found = two_mass_error("crane-4-mass", controllers=["direct", "ramp"])
     assert found.failed == {"ramp": "too many events"}
     assert found.error == np.inf
@@ -115,7 +115,7 @@ def chains_of_all_kinds(seed: int, count: int) -> Iterator[Chain]:
 def too_small(chain: Chain, rng: np.random.Generator) -> tuple[float, float]:
     """How many times the predicted error is too small for 60 other torques, and the predicted error."""
     found = two_mass_error(chain)
-    drive = drive_of(chain)
+    drive = chain.design_drive
     others = max(error_under(chain, drive, profile) for profile in torques_to_try(drive, rng, 60))
     return others / found.error, found.error
 

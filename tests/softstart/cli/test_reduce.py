@@ -124,7 +124,7 @@ def test_bad_input_in_one_sentence(run, nothing_left, arguments, said):
 
 def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
     from softstart import simulate
-    from softstart.chain.simulation import simulate_chain
+    from softstart.start.simulation import simulate
 
     code, out, _ = run("reduce", "--verify", "direct,ramp", "--out", "found", "--json")
     assert code == 0
@@ -133,7 +133,7 @@ def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
     drive = reduce_chain(Chain.load("crane-4-mass"), 2).to_drive()
     for one in told:
         assert one["k_dyn"] == simulate(drive, one["controller"]).k_dyn
-        whole = simulate_chain("crane-4-mass", one["controller"], fitted_to=drive)
+        whole = simulate("crane-4-mass", one["controller"], fitted_to=drive)
         assert one["chain_k_dyn"] == whole.k_dyn
         assert one["chain_start_time"] == whole.start_time
         assert one["worst_shaft"] == "rotor - pinion"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softstart import InputError, optimize, simulate_chain
+from softstart import InputError, optimize, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.optimal.chains import collocation
 from softstart.optimal.chains.problem import ChainProblem
@@ -38,7 +38,7 @@ def test_both_answers_are_told_and_the_better_one_returned(confirmed):
 
 def test_the_answer_replays_exactly(confirmed):
     until = START_TIME + confirmed.run.elastic_period
-    again = simulate_chain(three_masses(), "profile", until, parameters={"profile": confirmed.profile})
+    again = simulate(three_masses(), "profile", until, parameters={"profile": confirmed.profile})
     assert again.k_dyn == pytest.approx(confirmed.claimed, rel=1e-6)
     assert float(again.at(START_TIME)["w"][-1]) >= 20.0 * (1.0 - 1e-6)
 
@@ -91,7 +91,7 @@ def test_loads_that_hold_and_the_other_contact_law(given):
 )
 def test_what_it_does_not_cover_is_said(given, said):
     chain = three_masses(**given)
-    run = simulate_chain(chain, "direct", 0.4)
+    run = simulate(chain, "direct", 0.4)
     with pytest.raises(InputError, match=said):
         ChainProblem(chain, START_TIME).casadi(run)
 
@@ -99,4 +99,4 @@ def test_what_it_does_not_cover_is_said(given, said):
 def test_a_start_that_ends_too_early_is_refused():
     chain = three_masses()
     with pytest.raises(InputError, match="an elastic period after"):
-        ChainProblem(chain, START_TIME).casadi(simulate_chain(chain, "direct", 0.19))
+        ChainProblem(chain, START_TIME).casadi(simulate(chain, "direct", 0.19))

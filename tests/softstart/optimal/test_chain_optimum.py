@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from softstart import InputError, optimize, pareto, simulate_chain
+from softstart import InputError, optimize, pareto, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import SimulationError
 from softstart.optimal.chains import global_search
@@ -50,7 +50,7 @@ def test_the_crane_starts_more_gently_than_any_torque_known_before(crane):
 
 def test_the_claim_is_the_exact_replay(crane):
     until = 0.42 + crane.run.elastic_period
-    again = simulate_chain(damped(), "profile", until, parameters={"profile": crane.profile})
+    again = simulate(damped(), "profile", until, parameters={"profile": crane.profile})
     assert again.k_dyn == pytest.approx(crane.claimed, rel=1e-6)
     assert again.peak_torques.max() == pytest.approx(crane.run.peak_torque, rel=1e-9)
     assert float(again.at(0.42)["w"][-1]) >= damped().target_speed * (1.0 - 1e-6)
@@ -60,7 +60,7 @@ def test_the_claim_is_the_exact_replay(crane):
 def test_searches_around_a_start_keep_the_time_and_the_better_one():
     """Also from where a few programs have led; without time nothing is tried."""
     search = Search(ChainProblem(damped(), 0.42), Player(damped()))
-    run = simulate_chain(damped(), "s-curve")
+    run = simulate(damped(), "s-curve")
     times = np.linspace(0.0, min(run.end_time, search.until), 2001)
     first = search.descended(search.sampled(times, run.at(times)["u"]), 6, 5e-3)
     assert first is not None
@@ -93,7 +93,7 @@ def test_a_small_miss_at_the_end_changes_torques_at_their_limits_by_little():
 
 def test_no_strategy_as_quick_is_gentler(crane):
     for name in ("s-curve", "shaped", "ramp", "acceleration-delay", "state-feedback", "direct"):
-        run = simulate_chain(damped(), name)
+        run = simulate(damped(), name)
         assert run.start_time > 0.4201 or run.k_dyn > crane.k_dyn
 
 
@@ -155,7 +155,7 @@ def test_the_check_names_what_does_not_hold():
     chain = damped()
     problem = ChainProblem(chain, 0.42)
     profile = TorqueProfile([0.0], [63.0])
-    run = simulate_chain(chain, "profile", 0.3, parameters={"profile": profile})
+    run = simulate(chain, "profile", 0.3, parameters={"profile": profile})
     with pytest.raises(OptimumError) as caught:
         check(problem, run, profile, 0.3, 1.0, LowerBound(9.0, "momentum", ""))
     for part in ("beyond its limits", "was claimed", "terminal condition", "below its lower bound"):
@@ -222,7 +222,7 @@ def test_an_undamped_chain_is_approached_through_damped_ones():
     assert chain.warnings
     best = optimize(chain, 0.2, seeds=["s-curve"], tolerance=0.05, time_limit=0.0)
     assert "similar problem" in best.why or "s-curve" in best.why
-    assert best.bound.k_dyn <= best.k_dyn <= simulate_chain(chain, "direct").k_dyn
+    assert best.bound.k_dyn <= best.k_dyn <= simulate(chain, "direct").k_dyn
 
 
 def test_the_global_search_is_repeatable_and_named_where_it_is_missing(monkeypatch):
@@ -269,11 +269,11 @@ def test_load_curves_and_ground(chain):
     """K_dyn replays exactly, no strategy as quick is gentler, and the bound says what it covers."""
     best = optimize(chain, 0.25, time_limit=0.0)
     until = 0.25 + best.run.elastic_period
-    again = simulate_chain(chain, "profile", until, parameters={"profile": best.profile})
+    again = simulate(chain, "profile", until, parameters={"profile": best.profile})
     assert again.k_dyn == pytest.approx(best.claimed, rel=1e-6)
     assert float(again.at(best.end_time)["w"][chain.load_index]) >= chain.target_speed * (1.0 - 1e-6)
     for name in ("direct", "s-curve", "ramp", "take-up"):
-        run = simulate_chain(chain, name)
+        run = simulate(chain, name)
         assert not run.start_time <= best.end_time or run.k_dyn > best.k_dyn
     if chain.masses[2].curve is None:
         assert best.bound.kind == "momentum"

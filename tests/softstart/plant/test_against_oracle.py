@@ -71,7 +71,7 @@ def drive_of(drawn: dict[str, Any]) -> Drive:
 def run_of(drawn: dict[str, Any]) -> Run:
     """The same start by the plant under test."""
     played = Pieces(pieces=tuple(drawn["torque_pieces"]), end=drawn["t_end"])
-    return simulate(drive_of(drawn), played, until=drawn["t_end"])
+    return simulate(drawn.design_drive, played, until=drawn["t_end"])
 
 
 def in_other_units(drawn: dict[str, Any], mass: float, time: float) -> dict[str, Any]:

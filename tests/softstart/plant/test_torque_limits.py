@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from softstart import Drive, TorqueProfile, compare, simulate, simulate_chain
+from softstart import Drive, TorqueProfile, compare, simulate, simulate
 from softstart.cli import main
 from softstart.controller import Command, Controller, PlainController, make_controller
 from softstart.controller.base import CompiledController, Measured
@@ -59,7 +59,7 @@ def test_batch_recorded_start_and_plain_twin_give_the_same_bits() -> None:
 
 
 def test_chains_measure_it_too() -> None:
-    run = simulate_chain("crane-4-mass", played(ABOVE), END)
+    run = simulate("crane-4-mass", played(ABOVE), END)
     np.testing.assert_allclose(run.clipped, WANTED, rtol=1e-12)
     assert run.summary()["clipped"] == run.clipped._asdict()
 

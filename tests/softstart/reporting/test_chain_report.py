@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from softstart import Chain, InputError, simulate_chain
+from softstart import Chain, InputError, simulate
 from softstart.chain import chain_fatigue
 from softstart.reporting import ChainReport, Project, report_chain
 from softstart.reporting.limit import bound_at
@@ -23,7 +23,7 @@ def made() -> ChainReport:
 
 def test_the_figures_are_those_of_the_starts_on_the_chain(made):
     page = untypeset(made.to_html())
-    ramp, gentle, direct = (simulate_chain(CHAIN, name) for name in ("ramp", "take-up", "direct"))
+    ramp, gentle, direct = (simulate(CHAIN, name) for name in ("ramp", "take-up", "direct"))
     assert made.chosen.name == "take-up"
     assert f"{gentle.peak_torque:.2f} N m instead of {direct.peak_torque:.1f} N m" in made.headline
     assert f"takes {gentle.start_time:.4f} s instead of {direct.start_time:.4f} s" in made.headline
@@ -39,12 +39,12 @@ def test_the_figures_are_those_of_the_starts_on_the_chain(made):
 
 
 def test_no_start_is_below_the_bound_and_the_sheet_is_started_on_the_chain(made):
-    """Rounded values give the figures of `simulate_chain`."""
-    gentle = simulate_chain(CHAIN, "take-up")
+    """Rounded values give the figures of `simulate`."""
+    gentle = simulate(CHAIN, "take-up")
     assert bound_at(CHAIN, gentle.start_time) < gentle.k_dyn
     (sheet,) = made.sheets
     values = {one.name: one.rounded for one in sheet.settings}
-    again = simulate_chain(CHAIN, "take-up", parameters=values)
+    again = simulate(CHAIN, "take-up", parameters=values)
     assert sheet.rounded.k_dyn == pytest.approx(again.k_dyn, rel=1e-12)
     assert sheet.worst_k_dyn >= sheet.rounded.k_dyn
     assert sheet.variants == 2 * len(sheet.varied) + 2
@@ -66,7 +66,7 @@ def test_lives_of_shafts_are_those_of_fatigue_and_parameters_have_their_units(ma
     assert "take up speed 25.83 rpm, " in page  # the chain has its speed in rpm
     damped = Chain.load("crane-4-mass", also={f"shaft[{k}].damping_ratio": "0.02" for k in (1, 2, 3)})
     page = report_chain(damped, controllers=["take-up"], budget=0.0).to_html()
-    found = chain_fatigue([simulate_chain(damped, name) for name in ("take-up", "direct")])
+    found = chain_fatigue([simulate(damped, name) for name in ("take-up", "direct")])
     last = re.findall(r">take-up</th>(.*?)</tr>", page)[-2]  # the last one is beside the bound
     relative = [float(cell) for cell in re.findall(r">([\d.]+)<", last)]
     assert relative == pytest.approx([life.relative for life in found.rows[0]], rel=5e-3)

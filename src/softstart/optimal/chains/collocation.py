@@ -30,7 +30,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.kernel_records import CONTACT, JOINED, OPEN
-from softstart.chain.run import ChainRun
+from softstart.start.run import Run
 from softstart.errors import InputError
 from softstart.optimal.chains.problem import ChainProblem, carried_loads
 from softstart.optimal.collocation.search import QUIET, CasadiProblem
@@ -69,7 +69,7 @@ class Phase:
         return self.end - self.begin
 
 
-def phases_of(problem: ChainProblem, run: ChainRun) -> list[Phase]:
+def phases_of(problem: ChainProblem, run: Run) -> list[Phase]:
     """The phases of a start that reaches to one elastic period after the start time, which ends one too."""
     assert problem.start_time is not None
     spans, shafts, masses = (getattr(run.recorded, name) for name in ("spans", "span_shafts", "span_masses"))
@@ -275,7 +275,7 @@ class _Statement:
                     build.zero((T - load) / self.base)
 
 
-def as_casadi(problem: ChainProblem, run: ChainRun, straight: bool = False) -> CasadiProblem:
+def as_casadi(problem: ChainProblem, run: Run, straight: bool = False) -> CasadiProblem:
     """The problem in the order of contacts of `run`; see `ChainProblem.casadi`.
 
     With `straight` the first guess has straight lines between the ends of the phases of `run`, and the mean
@@ -363,7 +363,7 @@ def as_casadi(problem: ChainProblem, run: ChainRun, straight: bool = False) -> C
     )
 
 
-def _guess(run: ChainRun, phase: Phase, elements: int, points: list[float], straight: bool) -> Any:
+def _guess(run: Run, phase: Phase, elements: int, points: list[float], straight: bool) -> Any:
     """Instants, states there (twists, speeds, realised torque), demands at the ends of elements."""
     shares = ((np.arange(elements)[:, None] + np.array(points[1:])) / elements).ravel()
     times = np.minimum(phase.begin + phase.length * shares, run.end_time)
@@ -382,7 +382,7 @@ def _guess(run: ChainRun, phase: Phase, elements: int, points: list[float], stra
     return times, rows, np.full(elements, mean)
 
 
-def solve(problem: ChainProblem, run: ChainRun, straight: bool = False) -> tuple[TorqueProfile, float]:
+def solve(problem: ChainProblem, run: Run, straight: bool = False) -> tuple[TorqueProfile, float]:
     """The demand of the least peak torque in the order of contacts of `run`, and that K_dyn as claimed.
 
     Raises

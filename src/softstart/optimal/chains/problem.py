@@ -44,7 +44,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRun, mean_torque_of
+from softstart.start.run import Run
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
@@ -143,9 +143,9 @@ class ChainProblem(Problem):
     @property
     def base_torque(self) -> float:
         """The mean torque to which K_dyn refers, N m."""
-        return mean_torque_of(self.base or self.drive)
+        return (self.base or self.drive).mean_torque
 
-    def casadi(self, run: ChainRun | None = None) -> Any:
+    def casadi(self, run: Run | None = None) -> Any:
         """The problem in one order of contacts as a nonlinear program of CasADi: `Problem.casadi` of a chain.
 
         The order is that of `run`, a start of this chain that lasts to one elastic period after the start
@@ -171,10 +171,10 @@ class ChainProblem(Problem):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChainOptimum(Optimum):
-    """The best start of a chain that was found: an `Optimum` whose `run` is a `ChainRun`."""
+    """The best start of a chain that was found: an `Optimum` whose `run` is a `Run`."""
 
     problem: ChainProblem
-    run: ChainRun  # type: ignore[assignment]
+    run: Run  # type: ignore[assignment]
 
     @property
     def k_dyn(self) -> float:
@@ -256,7 +256,7 @@ def earliest_pull(problem: ChainProblem) -> float:
 # the check -------------------------------------------------------------------------------------------------
 
 
-def check(problem: ChainProblem, run: ChainRun, profile: TorqueProfile, end: float, claimed: float,
+def check(problem: ChainProblem, run: Run, profile: TorqueProfile, end: float, claimed: float,
           bound: LowerBound) -> None:  # fmt: skip
     """OptimumError with a sentence for each thing that does not hold; `run` is the exact start."""
     low, high = problem.lowest_torque, problem.highest_torque

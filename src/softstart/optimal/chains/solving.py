@@ -12,8 +12,8 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import simulate_chain
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 from softstart.controller import make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
@@ -137,7 +137,7 @@ def _checked(search: Search, found: Found, bound: LowerBound, began: float, why:
     problem = search.problem
     profile = search.profile(found.torques).simplified()
     player = make_controller("profile", {"profile": profile})
-    run = simulate_chain(problem.drive, player, search.until, base=problem.base or problem.drive)
+    run = simulate(problem.drive, player, search.until, base=problem.base or problem.drive)
     end = search.end
     if problem.terminal == "reached" and run.start_time <= end:
         end = run.start_time
@@ -187,7 +187,7 @@ def _confirmed(search: Search, best: ChainOptimum, began: float) -> ChainOptimum
     return replace(best, tried=tried, seconds=time.perf_counter() - began)
 
 
-def _collocated(problem: ChainProblem, run: ChainRun, known: float) -> tuple[TorqueProfile, float]:
+def _collocated(problem: ChainProblem, run: Run, known: float) -> tuple[TorqueProfile, float]:
     """From straight lines between the contacts; where that leads to no start as gentle, from `run` itself."""
     found, failed = [], None
     for straight in (True, False):
@@ -278,7 +278,7 @@ def _demands(search: Search, name: str) -> list[Callable[[], Vector]]:
         return [searched(run) for run in range(RUNS)]
 
     def traced() -> Vector:
-        run = simulate_chain(search.problem.drive, name)
+        run = simulate(search.problem.drive, name)
         times = np.linspace(0.0, min(run.end_time, search.until), TRACE)
         return search.sampled(times, run.at(times)["u"])
 

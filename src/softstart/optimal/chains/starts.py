@@ -15,8 +15,6 @@ from softstart.chain import kernel_start as kernel
 from softstart.chain.kernel_records import MOTOR, ORDERS, Numbers, Start, numbers
 from softstart.chain.kernel_sensitivity import sensitivities
 from softstart.chain.model import Chain
-from softstart.chain.run import ChainRecorder
-from softstart.chain.simulation import drive_of
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.plant import layout
@@ -103,7 +101,7 @@ class Player:
     def __init__(self, chain: Chain, nominal: Drive | None = None) -> None:
         self.chain = chain
         self.given = numbers(chain, None, None, MAX_EVENTS)
-        self.nominal = drive_of(chain) if nominal is None else nominal
+        self.nominal = chain.design_drive if nominal is None else nominal
         self.plays = 0
         self._rows = 1024
 

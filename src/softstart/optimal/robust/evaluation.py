@@ -23,8 +23,8 @@ from softstart.drive import Drive
 from softstart.plant import exchange, record
 from softstart.plant import layout as at
 from softstart.plant import start as kernel
-from softstart.plant.exchange import N_MEASURED, STEP_SIGNATURE
-from softstart.plant.jit import compiled_as
+from softstart.kernel.motor import N_MEASURED, STEP_SIGNATURE
+from softstart.kernel.jit import compiled_as
 from softstart.plant.vector import plant_vector
 from softstart.profile import TorqueProfile
 from softstart.start.engine import Recorder

@@ -13,11 +13,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate_chains
-from softstart.chain.batch import prepared
+from softstart.chain import Chain, Mass, Motor, Shaft, simulate
+from softstart.start.batch import prepared
 from softstart.chain.kernel_records import elastic_period
-from softstart.chain.run import ChainRun
-from softstart.chain.simulation import drive_of, simulate_chain
+from softstart.start.run import Run
+from softstart.chain.two_masses import drive_of, simulate
 from softstart.controller import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
@@ -79,9 +79,9 @@ class Case:
         assert motor is not None
         return Problem(self.chain, motor.starting_torque, elastic_period(self.chain), self.ramp)
 
-    def ours(self) -> ChainRun:
+    def ours(self) -> Run:
         """By softstart, with everything that a run notes."""
-        return simulate_chain(self.chain, self.controller, fitted_to=ANY_DRIVE)
+        return simulate(self.chain, self.controller, fitted_to=ANY_DRIVE)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def batch_cases() -> tuple[BatchCase, ...]:
 
 
 class BenchmarkChains(Study):
-    """Starts of chains with several gaps: one `simulate_chain` call against LSODA with located events.
+    """Starts of chains with several gaps: one `simulate` call against LSODA with located events.
 
     Then batches of chains in one compiled call on one core, with the starts/s that were asked for.
 
@@ -206,7 +206,7 @@ class BenchmarkChains(Study):
                 "lsoda",
                 "solve_ivp, rtol = atol = 1e-8, a right-hand side for each mode, restarted at each event",
             ),
-            ("softstart", f"{__version__}: simulate_chain with its record; events, peaks and states located"),
+            ("softstart", f"{__version__}: simulate with its record; events, peaks and states located"),
             ("passes, in turns; medians", self.passes),
         ]
         return StudyResult(
@@ -264,7 +264,7 @@ def measured_batch(case: BatchCase, passes: int) -> tuple[Any, ...]:
     chains = case.chains()
     nominal = Case(chains[len(chains) // 2], case.ramp)
     controller = make_controller(case.feedback) if case.feedback else nominal.controller
-    batch, told = prepared(chains), drive_of(nominal.chain)
+    batch, told = prepared(chains), nominal.chain.design_drive
     which, means = np.arange(len(chains)), np.array([chain.mean_torque for chain in chains])
     batch.figures(which[:1], controller, told, means[:1])
     ours, theirs = [], []
@@ -273,9 +273,9 @@ def measured_batch(case: BatchCase, passes: int) -> tuple[Any, ...]:
         found = batch.figures(which, controller, told, means)
         ours.append(len(chains) / (time.process_time() - begin))
     fresh = case.chains()
-    simulate_chains(case.chains()[:1], controller, fitted_to=told, workers=1)
+    simulate(case.chains()[:1], controller, fitted_to=told, workers=1)
     begin = time.process_time()
-    simulate_chains(fresh, controller, fitted_to=told, workers=1)
+    simulate(fresh, controller, fitted_to=told, workers=1)
     prepared_too = len(chains) / (time.process_time() - begin)
     apart: list[float] = []
     for i, chain in enumerate([] if case.damped else chains[:PEER_STARTS]):

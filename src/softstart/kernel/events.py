@@ -1,0 +1,489 @@
+"""The event that ends a span: gaps that close and open, damping regimes, friction, the target speed.
+
+Events are first roots of Taylor polynomials on [0, 1], certified: at x, with f > 0 and |f'''| <= M3 up to the
+end, `f(x + d) >= f + f' d + f'' d^2/2 - M3 d^3/6`, so a step up to which this is above zero provably passes no
+zero of f. The steps shrink onto a simple zero, always from the left. The largest torque of each shaft is
+located in the same way, never read off a grid.
+"""
+
+from __future__ import annotations
+
+import math
+
+from softstart.arrays import Matrix, Vector
+from softstart.kernel.jit import compiled
+from softstart.kernel.records import (
+    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, CURVE, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
+    MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
+    SWITCH, TURNED, UNSOLVED, UPPER, Record,
+)  # fmt: skip
+from softstart.kernel.series import by_angle, grip
+
+NONE = -1.0
+LOST = -2.0  # the iteration did not end: reported as an error, never passed over
+EPS = 2.220446049250313e-16
+MAX_STEPS = 20_000
+CLEARLY = 1e4  # what is above so many times its rounding is not zero
+FAINT = 1e-10  # a leading coefficient below this share of what follows is taken for rounding
+
+
+@compiled
+def value(f: Vector, n: int, x: float) -> float:
+    """The polynomial f_0 + ... + f_n x^n."""
+    square = x * x  # even and odd powers apart: each step waits for the one before it
+    even, odd = 0.0, 0.0
+    top = n - n % 2
+    if top < n:
+        odd = f[n]
+    for i in range(top, 0, -2):
+        even = even * square + f[i]
+        odd = odd * square + f[i - 1]
+    return even * square + f[0] + odd * x
+
+
+@compiled
+def safe_step(y: float, dy: float, bend: float, third: float, room: float) -> float:
+    """A step d <= room up to which y + dy x + bend x^2/2 - third x^3/6 is certainly above zero."""
+    reach = room
+    step = 0.0
+    for _ in range(3):
+        most = third * reach / 3.0 - bend  # -f'' in the mean, up to `reach`
+        if most <= 0.0:
+            last = reach if dy >= 0.0 or y + dy * reach >= 0.0 else -y / dy
+        else:
+            root = math.sqrt(dy * dy + 2.0 * most * y)
+            last = 2.0 * y / (root - dy) if dy < 0.0 else (root + dy) / most
+        if last >= reach:
+            return reach
+        if last <= 1.5 * step:
+            return max(last, step)
+        step = last
+        reach = math.sqrt(step * reach)
+    return step
+
+
+@compiled
+def crossing(f: Vector, low: int, n: int, begin: float, end: float) -> float:
+    """First x in [begin, end] at which f/x^low falls through zero; it is positive, or rises, at `begin`."""
+    third = 0.0
+    power = 1.0
+    for i in range(3, n - low + 1):
+        third += i * (i - 1) * (i - 2) * abs(f[low + i]) * power
+        power *= end
+    x = begin
+    for _ in range(MAX_STEPS):
+        y = f[n]
+        dy = 0.0
+        bend = 0.0  # half of f''
+        size = abs(y)  # of its terms: rounding is in proportion
+        for i in range(n - 1, low - 1, -1):
+            bend = bend * x + dy
+            dy = dy * x + y
+            y = y * x + f[i]
+            size = size * x + abs(f[i])
+        if y <= EPS * size:
+            if dy < 0.0:
+                return x
+            # it touches zero, or leaves it: beyond the next instant at which it is surely above
+            most = third * (end - x) / 3.0 - 2.0 * bend
+            if most <= 0.0:
+                return NONE
+            x += max(2.0 * dy / most, 2.0 * math.sqrt(EPS * size / most), EPS * end)
+        else:
+            step = safe_step(y, dy, 2.0 * bend, third, end - x)
+            if x + step >= end:
+                return NONE
+            if x + step <= x:
+                return x
+            x += step
+        if x > end:
+            return NONE
+    return LOST
+
+
+@compiled
+def first_root(f: Vector, n: int, end: float, zeros: int, noise: float, faint: float) -> float:
+    """First x in [0, end] at which f falls below zero.
+
+    The first `zeros` coefficients are zero by the nature of what has just happened, unless f_0 clearly is
+    not, where speeds have jumped. Of the others `noise` (of f_0) and `faint` (of the rest) say what may be
+    rounding. Where f begins at zero it is divided by powers of x, and the first coefficient that counts says
+    whether it falls at once.
+    """
+    low = zeros
+    if f[0] > CLEARLY * noise:
+        low = 0
+    elif zeros == 0:
+        if f[0] < -noise:
+            return 0.0
+        if f[0] <= noise:
+            low = 1
+    if low > 0:
+        while True:
+            if low > n:
+                return NONE
+            rest = 0.0
+            for i in range(low + 1, n + 1):
+                rest += abs(f[i])
+            least = max(faint, FAINT * rest)
+            if f[low] > least:
+                break
+            if f[low] < -least:
+                return 0.0
+            low += 1
+    rest = 0.0
+    power = end
+    for i in range(low + 1, n + 1):
+        rest += abs(f[i]) * power
+        power *= end
+    if f[low] > rest * (1.0 + 1e-12):
+        return NONE
+    return crossing(f, low, n, 0.0, end)
+
+
+# events of shafts -----------------------------------------------------------------------------------
+
+ROUNDING = 4.0 * EPS
+# a flank that is touched, or left, by less than this share of the gap is grazed: no event
+GRAZE = 1e-12
+# impacts that pile up within this share of a span are over: the accumulation time is known
+PILED_UP = 1e-9
+# flanks as elastic as this may bounce indefinitely: once they rise by GRAZE of the gap or less, they rest
+ELASTIC = 0.999
+# `zeros` of a contact whose torque has just come back: it begins at zero
+REJOINED = 3
+
+
+@compiled
+def swing(f: Vector, n: int) -> float:
+    """How far a polynomial is from its beginning at most."""
+    total = 0.0
+    for o in range(1, n + 1):
+        total += abs(f[o])
+    return total * (1.0 + 1e-12)
+
+
+@compiled
+def set_line(f: Vector, series: Vector, n: int, constant: float, factor: float) -> None:
+    """F = constant + factor * series."""
+    for o in range(n + 1):
+        f[o] = factor * series[o]
+    f[0] += constant
+
+
+@compiled
+def rounding_of_torque(s: Record, k: int) -> float:
+    """Rounding errors of c times the overlap."""
+    return ROUNDING * s.c[k] * (abs(s.theta[k]) + s.half[k])
+
+
+@compiled
+def influence(s: Record, i: int) -> float:
+    """The torques on the body of mass i over its inertia."""
+    return s.scale[s.first[i]] / s.body_J[s.first[i]]
+
+
+@compiled
+def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
+    """The flank of an open gap that is reached first, or the end of impacts that pile up on one."""
+    half, theta = s.half[k], s.theta[k]
+    twist = s.twist[k]
+    if swing(twist, n) < half - abs(theta):
+        return NO_EVENT, end
+    faint = 1e-14 * h * h * (influence(s, k) + influence(s, k + 1))
+    if s.rigid[k] != 0.0 and s.zeros[k] == 0 and abs(theta) == half and half > 0.0:
+        side = math.copysign(1.0, theta)
+        rebound = -side * twist[1]
+        press = side * twist[2]
+        e = s.restitution[k]
+        if press > faint and rebound >= 0.0:
+            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * GRAZE * half
+            if flat or rebound <= PILED_UP * (1.0 - e) * press:
+                return SETTLE, 0.0
+    event = NO_EVENT
+    for which in range(2):
+        side = 1.0 - 2.0 * which
+        zeros = s.zeros[k] if s.side[k] == side else 0
+        set_line(s.f, twist, n, half, -side)
+        x = first_root(s.f, n, end, zeros, ROUNDING * half, faint)
+        if x < NONE:
+            return UNSOLVED, 0.0
+        if x >= 0.0:
+            event = UPPER if which == 0 else LOWER
+            end = x
+    return event, end
+
+
+@compiled
+def set_damping_excess(s: Record, k: int, n: int, sign: float) -> None:
+    """F = sign (c z - d z') of a contact, which says where `modelica` caps the damping."""
+    for o in range(n + 1):
+        s.f[o] = sign * (s.c[k] * s.twist[k, o] - s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
+    s.f[0] -= sign * s.c[k] * s.slack[k]
+
+
+@compiled
+def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+    """The instant at which flanks in contact part, or at which the damping regime changes."""
+    side = s.side[k]
+    event = NO_EVENT
+    rejoined = s.zeros[k] == REJOINED
+    zeros = 1 if rejoined else 0
+    noise = rounding_of_torque(s, k)
+    if s.law[k] == MODELICA and s.d[k] > 0.0:
+        doubled = s.mode[k] == DOUBLED
+        set_damping_excess(s, k, n, -side if doubled else side)
+        x = first_root(s.f, n, end, 0 if rejoined else s.zeros[k], noise, 0.0)
+        if x < NONE:
+            return UNSOLVED, 0.0
+        if x >= 0.0:
+            event = SWITCH
+            end = x
+        if doubled:
+            return event, end
+        set_line(s.f, s.torque[k], n, 0.0, side)
+    elif s.law[k] != DEAD_ZONE and s.d[k] > 0.0:
+        if swing(s.torque[k], n) < side * s.torque[k, 0]:
+            return NO_EVENT, end
+        set_line(s.f, s.torque[k], n, 0.0, side)
+    else:
+        if swing(s.twist[k], n) < side * s.theta[k] - s.half[k]:
+            return NO_EVENT, end
+        set_line(s.f, s.twist[k], n, -s.half[k], side)
+        noise = ROUNDING * s.half[k]
+    x = first_root(s.f, n, end, zeros, noise, 0.0)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    return (EXIT, x) if x >= 0.0 else (event, end)
+
+
+@compiled
+def returning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+    """From overlapping flanks without torque: the torque comes back, or they part."""
+    side = s.side[k]
+    for o in range(n + 1):
+        s.f[o] = -side * (s.c[k] * s.twist[k, o] + s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
+    s.f[0] += s.c[k] * s.half[k]
+    event = NO_EVENT
+    x = first_root(s.f, n, end, s.zeros[k], rounding_of_torque(s, k), 0.0)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    if x >= 0.0:
+        event = REJOIN
+        end = x
+    set_line(s.f, s.twist[k], n, -s.half[k], side)
+    x = first_root(s.f, n, end, 0, ROUNDING * s.half[k], 0.0)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    return (BACK, x) if x >= 0.0 else (event, end)
+
+
+@compiled
+def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+    """Rigid flanks part when they would have to pull."""
+    if swing(s.torque[k], n) < s.side[k] * s.torque[k, 0]:
+        return NO_EVENT, end
+    set_line(s.f, s.torque[k], n, 0.0, s.side[k])
+    noise = 1e-14 * s.scale[s.first[k]]
+    x = first_root(s.f, n, end, 0, noise, noise)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    return (RELEASE, x) if x >= 0.0 else (NO_EVENT, end)
+
+
+@compiled
+def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
+    """The instant at which the torque of a shaft that may pull changes its sign."""
+    pulls = s.mode[k] == CONTACT and s.law[k] == DEAD_ZONE and s.d[k] > 0.0
+    if not pulls and s.mode[k] != JOINED:
+        return NO_EVENT, end
+    set_line(s.f, s.torque[k], n, 0.0, s.sign[k])
+    noise = s.c[k] * (abs(s.theta[k]) + s.half[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
+    noise += s.scale[s.first[k]]  # a twist near 0 has the rounding of those before it
+    x = first_root(s.f, n, end, s.zeros[k], ROUNDING * noise, 0.0)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    return (TURNED, x) if x >= 0.0 else (NO_EVENT, end)
+
+
+# friction, brake, the target speed, and the first of all --------------------------------------------
+
+
+@compiled
+def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
+    """Breakaway or stop of the body that begins with mass i, or that its torque lets the brake go."""
+    noise = ROUNDING * (s.scale[i] + s.hold[i])
+    event = NO_EVENT
+    if s.braked != 0.0 and s.first[s.at_motor] == i:
+        if s.release_at < math.inf:  # released by time
+            return event, end
+        set_line(s.f, s.held[i], n, 0.0, -1.0)
+        x = first_root(s.f, n, end, 0, noise, noise)
+        if x < NONE:
+            return UNSOLVED, 0.0
+        return (LET_GO, x) if x >= 0.0 else (event, end)
+    if s.rubbing[i] == 0:
+        return event, end
+    if s.stuck[i] != 0:
+        if s.gears[i] == 0 and swing(s.held[i], n) < s.hold[i] - abs(s.held[i, 0]):
+            return event, end
+        for which in range(2):
+            set_line(s.f, s.held[i], n, s.hold[i], -1.0 + 2.0 * which)
+            if s.gears[i] != 0:
+                for o in range(n + 1):
+                    s.f[o] += grip(s, i, 1.0 - 2.0 * which, o)
+            x = first_root(s.f, n, end, 0, noise, noise)
+            if x < NONE:
+                return UNSOLVED, 0.0
+            if x >= 0.0:
+                event = BREAK_FORWARD if which == 0 else BREAK_BACK
+                end = x
+        return event, end
+    j = i
+    while s.rubs[j] == 0.0:
+        j += 1
+    if swing(s.speed[i], n) < s.direction[j] * s.w[i]:
+        return event, end
+    set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
+    faint = 1e-14 * h * (s.scale[i] + s.hold[i]) / s.body_J[i]
+    x = first_root(s.f, n, end, 0, 0.0, faint)
+    if x < NONE:
+        return UNSOLVED, 0.0
+    return (STOP, x) if x >= 0.0 else (event, end)
+
+
+@compiled
+def next_point(s: Record, i: int, curves: Matrix, h: float, n: int, end: float) -> tuple[int, float]:
+    """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
+    curve = curves[s.curve[i]].view(CURVE)[0]
+    angular = by_angle(s, i, curves)
+    course = s.turned[i] if angular else s.speed[i]
+    faint = 1e-14 * h * influence(s, i) * (h if angular else 1.0)
+    event = NO_EVENT
+    for which in range(2):
+        sign = 1.0 - 2.0 * which
+        piece = s.piece[i] if which == 0 else s.piece[i] - 1
+        if piece < 0 or piece >= curve.points:
+            continue
+        point = curve.at[piece]
+        set_line(s.f, course, n, sign * point, -sign)
+        zeros = 1 if s.passed[i] == -sign else 0
+        if zeros == 0 and swing(s.f, n) < s.f[0]:
+            continue
+        x = first_root(s.f, n, end, zeros, ROUNDING * abs(point), faint)
+        if x < NONE:
+            return UNSOLVED, 0.0
+        if x >= 0.0:
+            event = POINT_ABOVE if which == 0 else POINT_BELOW
+            end = x
+    return event, end
+
+
+@compiled
+def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
+    """The next event of shaft k by its mode."""
+    mode = s.mode[k]
+    event = NO_EVENT
+    if mode == OPEN:
+        event, end = flanks(s, k, h, n, end)
+    elif mode in (CONTACT, DOUBLED):
+        event, end = parting(s, k, n, end)
+    elif mode == BEYOND:
+        event, end = returning(s, k, n, end)
+    elif mode == PRESSED:
+        event, end = releasing(s, k, n, end)
+    if s.eta[k] != 1.0 and event != UNSOLVED:
+        turned, end = turning(s, k, n, end)
+        if turned != NO_EVENT:
+            event = turned
+    return event, end
+
+
+@compiled
+def next_event(s: Record, curves: Matrix, h: float, n: int) -> tuple[int, int, float]:
+    """The first event of the span, on which shaft or mass, and where on [0, 1]."""
+    first, where, end = NO_EVENT, 0, 1.0
+    for k in range(s.n - 1):
+        event, x = event_of_shaft(s, k, h, n, end)
+        if event != NO_EVENT:
+            first, where, end = event, k, x
+        if event == UNSOLVED:
+            return first, where, end
+    for i in range(s.n):
+        if s.first[i] == i and (s.rubbing[i] != 0 or s.braked != 0.0):
+            event, x = friction(s, i, h, n, end)
+            if event != NO_EVENT:
+                first, where, end = event, i, x
+            if event == UNSOLVED:
+                return first, where, end
+        if s.curve[i] >= 0:
+            event, x = next_point(s, i, curves, h, n, end)
+            if event != NO_EVENT:
+                first, where, end = event, i, x
+            if event == UNSOLVED:
+                return first, where, end
+    load = s.at_load
+    if math.isnan(s.start_time) and swing(s.speed[load], n) >= s.target - s.w[load]:
+        set_line(s.f, s.speed[load], n, s.target, -1.0)
+        x = first_root(s.f, n, end, 0, ROUNDING * s.target, 0.0)
+        if x < NONE:
+            return UNSOLVED, load, 0.0
+        if x >= 0.0:
+            first, where, end = REACHED, load, x
+    return first, where, end
+
+
+# the largest torque ---------------------------------------------------------------------------------
+
+SAME = 1e-12  # peaks that differ by less are equal but for rounding
+
+
+@compiled
+def keep_peak(s: Record, k: int, torque: float, time: float) -> None:
+    """Note a candidate for the largest |T|; of those equal but for rounding the first has the time."""
+    largest = abs(s.peak[k])
+    if abs(torque) > largest:
+        if abs(torque) > largest * (1.0 + SAME):
+            s.peak_time[k] = time
+        s.peak[k] = torque
+
+
+@compiled
+def peak_within(s: Record, k: int, n: int, end: float, h: float) -> bool:
+    """Note the largest |T| of shaft k up to `end` if it is above the largest so far; False if it is lost."""
+    f, torque = s.f, s.torque[k]
+    if abs(torque[0]) + swing(torque, n) <= abs(s.peak[k]):
+        return True
+    keep_peak(s, k, torque[0], s.time)
+    keep_peak(s, k, value(torque, n, end), s.time + end * h)
+    bend = 0.0
+    for o in range(2, n + 1):
+        bend += o * abs(torque[o])
+    if end == 0.0 or bend * (1.0 + 1e-12) < abs(torque[1]):
+        return True  # it rises or falls all the way
+    for which in range(2):
+        sign = 1.0 - 2.0 * which
+        begin = 0.0
+        while True:
+            # where it rises above the largest so far
+            set_line(f, torque, n, abs(s.peak[k]) * (1.0 + ROUNDING), -sign)
+            above = first_root(f, n, end, 0, 0.0, 0.0) if begin == 0.0 else crossing(f, 0, n, begin, end)
+            if above < NONE:
+                return False
+            if above < 0.0:
+                break
+            # and the extreme behind it
+            for o in range(n):
+                f[o] = sign * (o + 1.0) * torque[o + 1]
+            f[n] = 0.0
+            top = crossing(f, 0, n - 1, above, end)
+            if top < NONE:
+                return False
+            if top < 0.0:
+                break  # it rises to the end, which is noted
+            highest = value(torque, n, top)
+            if sign * highest <= abs(s.peak[k]):
+                break
+            keep_peak(s, k, highest, s.time + top * h)
+            begin = top
+    return True

@@ -1,0 +1,47 @@
+"""How the kernel's functions are compiled: once, cached on disk, without the interpreter lock.
+
+`_nrt=False` leaves out numba's reference counting. The kernel allocates nothing, so there is nothing to
+count; take the option out and `softstart study benchmark-starts` shows what counting nothing costs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+_njit: Any = numba.njit
+
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
+
+compiled: Any = _njit(**OPTIONS)
+
+
+def compiled_as(signature: object, cache: bool = True) -> Any:
+    """Compile with one explicit signature, as soon as the function is defined."""
+    return _njit(signature, **{**OPTIONS, "cache": cache})
+
+
+def drop_stale(sources: Iterable[Path], needed: Iterable[Path] = ()) -> None:
+    """Drop what numba has cached of these files if one of them, or of those they need, has changed since.
+
+    Numba notices a change in a function's own file, but not in the functions it calls: wrong numbers without
+    a word.
+    """
+    files = set(sources)
+    try:
+        cached = [
+            one
+            for file in files
+            for one in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]")
+        ]
+        if not cached:
+            return
+        changed = max(file.stat().st_mtime for file in {*files, *needed})
+        if changed > min(one.stat().st_mtime for one in cached):
+            for one in cached:
+                one.unlink(missing_ok=True)
+    except OSError:
+        return  # another process is compiling or cleaning, or the folder is read-only: numba decides

@@ -1,0 +1,333 @@
+"""What changes at an event: springs and rigid flanks meet and part, friction and brake hold and let go."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from softstart.arrays import Matrix
+from softstart.kernel.events import GRAZE, REJOINED
+from softstart.kernel.jit import compiled
+from softstart.kernel.records import (
+    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EVENT, EXIT, IMPACT, JOINED,
+    LET_GO, LOWER, MODELICA, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE,
+    RELEASED, SETTLE, SETTLED, STARTS, STOP, STOPS, SWITCH, TARGET_REACHED, TURNED, UPPER, WELDED, Record,
+)  # fmt: skip
+from softstart.kernel.series import by_angle, find_piece, set_piece
+
+# a rigid flank that is reached more slowly than this, against what presses it on within the span, is settled
+SLOW = 1e-10
+# so many impacts of one shaft at one instant are the collapse of masses that bounce between one another:
+# infinitely many in a finite time without any torque that presses, which end with all of them at one speed
+# (S. McNamara, W. R. Young, Phys. Fluids A 4 (1992) 496-504, doi:10.1063/1.858323)
+COLLAPSE = 100
+
+
+@compiled
+def note(
+    s: Record, events: Matrix, time: float, kind: int, place: int, value: float, impulse: float = 0.0
+) -> None:
+    """One event; `events` may have no rows, then it is only counted."""
+    s.events += 1.0
+    if events.shape[0] > 0:
+        event = events[int(s.n_events)].view(EVENT)[0]
+        event.time = time
+        event.kind = kind
+        event.place = place
+        event.value = value
+        event.impulse = impulse
+        s.n_events += 1.0
+
+
+@compiled
+def turn_mass(s: Record, events: Matrix, i: int, direction: float) -> None:
+    """Friction holds mass i from now on (0), or lets it go in a direction."""
+    if direction == 0.0:
+        note(s, events, s.time, STOPS, i, s.direction[i], 0.0)
+    else:
+        note(s, events, s.time, STARTS, i, direction, 0.0)
+    s.direction[i] = direction
+
+
+@compiled
+def path_closed(s: Record, but: int) -> bool:
+    """Whether no gap between motor and load is open, but for that of one shaft."""
+    for k in range(s.path, s.path_end):
+        if k != but and (s.mode[k] == OPEN or s.mode[k] == BEYOND):
+            return False
+    return True
+
+
+@compiled
+def engage(s: Record, k: int, side: float) -> None:
+    """The spring begins to act, in its damping regime."""
+    s.side[k] = side
+    s.mode[k] = CONTACT
+    z = side * s.theta[k] - s.half[k]
+    v = side * (s.w[k] - s.w[k + 1])
+    if s.law[k] == MODELICA and s.d[k] * v > s.c[k] * z:
+        s.mode[k] = DOUBLED
+    pulls = s.law[k] == DEAD_ZONE and s.c[k] * z + s.d[k] * v < 0.0
+    s.sign[k] = -side if pulls else side
+
+
+@compiled
+def begin_modes(s: Record) -> None:
+    """The modes at t = 0."""
+    for i in range(s.n):
+        s.w[i] = s.w0[i]
+        s.direction[i] = np.sign(s.w[i]) if s.rubs[i] != 0.0 else 1.0
+    for k in range(s.n - 1):
+        theta, half = s.theta0[k], s.half[k]
+        torque = s.c[k] * (abs(theta) - half)
+        torque += s.d[k] * math.copysign(1.0, theta) * (s.w[k] - s.w[k + 1])
+        s.theta[k] = theta
+        s.zeros[k] = 0
+        s.side[k] = 0.0
+        s.sign[k] = 1.0
+        s.peak[k] = 0.0
+        s.peak_time[k] = 0.0
+        s.impulse[k] = 0.0
+        s.first_peak[k] = 0.0
+        s.struck[k] = -1.0
+        s.blows[k] = 0.0
+        s.mode[k] = OPEN
+        if s.rigid[k] != 0.0:
+            if half == 0.0:
+                s.mode[k] = WELDED
+        elif half == 0.0:
+            s.mode[k] = JOINED
+            s.sign[k] = math.copysign(1.0, theta) if torque >= 0.0 else -math.copysign(1.0, theta)
+        elif abs(theta) > half:
+            if s.law[k] != DEAD_ZONE and torque < 0.0:
+                s.mode[k] = BEYOND
+                s.side[k] = math.copysign(1.0, theta)
+            else:
+                engage(s, k, math.copysign(1.0, theta))
+
+
+@compiled
+def goes_with(s: Record, k: int, side: float, kind: int) -> bool:
+    """Whether joint k takes the mass behind it along when a flank `side` beside it is struck.
+
+    Where impacts have piled up no impulse is left that could part flanks: their torque decides.
+    """
+    if s.mode[k] == PRESSED:
+        return kind == SETTLED or s.side[k] == side
+    return s.mode[k] == WELDED
+
+
+@compiled
+def strike(
+    s: Record, events: Matrix, curves: Matrix, k: int, restitution: float, kind: int, time: float
+) -> None:
+    """The rigid flanks of shaft k meet: new speeds by momentum and restitution, noted as an event `kind`.
+
+    What is rigidly joined on either side goes with it, pressed flanks too where the impact presses them on;
+    where it would have to pull they part. Friction is too weak to matter in an impact.
+    """
+    side = s.side[k]
+    a = k
+    b = k + 1
+    J_a = s.J[a]
+    J_b = s.J[b]
+    while a > 0 and goes_with(s, a - 1, side, kind):
+        a -= 1
+        J_a += s.J[a]
+    while b + 1 < s.n and goes_with(s, b, side, kind):
+        b += 1
+        J_b += s.J[b]
+    if s.braked != 0.0 and a <= s.at_motor <= b:
+        if s.at_motor <= k:
+            J_a = math.inf
+        else:
+            J_b = math.inf
+    w_a = s.w[k]
+    w_b = s.w[k + 1]
+    v = w_a - w_b
+    walled = math.isinf(J_a + J_b)  # one of them stays at rest
+    reduced = min(J_a, J_b) if walled else J_a * J_b / (J_a + J_b)
+    impulse = (1.0 + restitution) * reduced * v
+    loss = 0.5 * (1.0 - restitution * restitution) * reduced * v * v
+    note(s, events, time, kind, k, loss, impulse)
+    s.impulse[k] = max(s.impulse[k], abs(impulse))
+    if restitution == 0.0 and walled:
+        w_a = w_b = 0.0
+    elif restitution == 0.0:
+        w_a = w_b = (J_a * w_a + J_b * w_b) / (J_a + J_b)
+    else:
+        w_a -= impulse / J_a
+        w_b += impulse / J_b
+    for i in range(a, b + 1):
+        s.w[i] = w_a if i <= k else w_b
+        if s.curve[i] >= 0 and not by_angle(s, i, curves):
+            find_piece(s, i, curves)
+        direction = np.sign(s.w[i])
+        if s.rubs[i] != 0.0 and direction != s.direction[i]:
+            if s.direction[i] != 0.0:
+                turn_mass(s, events, i, 0.0)
+            if direction != 0.0:
+                turn_mass(s, events, i, direction)
+    for j in range(max(a - 1, 0), min(b + 1, s.n - 1)):
+        s.zeros[j] = 0  # speeds have jumped: nothing is zero by its nature any more
+    for edge in range(2):
+        j = a - 1 if edge == 0 else b
+        if 0 <= j < s.n - 1 and s.mode[j] == PRESSED:
+            s.mode[j] = OPEN
+            note(s, events, s.time, OPENED, j, s.side[j], 0.0)
+
+
+@compiled
+def settle(s: Record, events: Matrix, curves: Matrix, k: int, rest: float) -> None:
+    """Rigid flanks lie on each other from now on; `rest` is how much longer the last impacts take."""
+    strike(s, events, curves, k, 0.0, SETTLED, s.time + rest)
+    s.mode[k] = PRESSED
+
+
+@compiled
+def meet(s: Record, events: Matrix, curves: Matrix, k: int, side: float, press: float, h: float) -> None:
+    """A flank is reached; `press` is the relative acceleration towards it."""
+    v = side * (s.w[k] - s.w[k + 1])
+    s.theta[k] = side * s.half[k]
+    s.side[k] = side
+    if s.rigid[k] != 0.0:
+        e = s.restitution[k]
+        at_once = s.time - s.struck[k] <= 1e-15 * s.time
+        s.blows[k] = s.blows[k] + 1.0 if at_once else 0.0
+        s.struck[k] = s.time
+        if v <= SLOW * abs(press) * h or (s.blows[k] > COLLAPSE and e < 1.0):
+            rest = 0.0
+            if press > 0.0 and e < 1.0:
+                rest = 2.0 * max(e * v, -v) / (press * (1.0 - e))
+            settle(s, events, curves, k, rest)
+        else:
+            strike(s, events, curves, k, e, IMPACT, s.time)
+    elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half[k]:
+        s.events += 1.0
+        s.zeros[k] = 2
+    else:
+        note(s, events, s.time, CLOSED, k, side, 0.0)
+        engage(s, k, side)
+
+
+@compiled
+def part(s: Record, events: Matrix, k: int) -> None:
+    """The flanks of shaft k cease to act."""
+    note(s, events, s.time, OPENED, k, s.side[k], 0.0)
+    if s.law[k] != DEAD_ZONE and s.d[k] > 0.0 and s.side[k] * s.theta[k] > s.half[k]:
+        s.mode[k] = BEYOND
+        s.zeros[k] = 1
+    else:
+        s.mode[k] = OPEN
+        s.theta[k] = s.side[k] * s.half[k]
+
+
+@compiled
+def turn(s: Record, events: Matrix, i: int, direction: float) -> None:
+    """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
+    for j in range(i, s.n):
+        if s.first[j] != i:
+            break
+        if s.rubs[j] != 0.0:
+            turn_mass(s, events, j, direction)
+        if direction == 0.0:
+            s.w[j] = 0.0
+
+
+@compiled
+def release(s: Record, events: Matrix) -> None:
+    """The brake lets the motor go; its friction may still hold it."""
+    s.braked = 0.0
+    s.release_time = s.time
+    s.changed = 1.0
+    note(s, events, s.time, RELEASED, s.at_motor, s.u, 0.0)
+
+
+@compiled
+def note_stage(s: Record, bounced: bool) -> None:
+    """The path from motor to load has closed or opened, or both at once (`bounced`)."""
+    if s.stage == 2.0 or (s.stage == 1.0 and bounced):
+        s.stage_2_end = s.time
+        for k in range(s.n - 1):
+            s.first_peak[k] = s.peak[k]
+    steps = 2.0 if bounced else 1.0
+    s.stage += steps
+    s.gap_events += steps
+    if s.stage % 2.0 == 0.0 or bounced:
+        s.contacts += 1.0
+
+
+@compiled
+def handle(
+    s: Record, events: Matrix, curves: Matrix, event: int, k: int, press: float, rest: float, h: float
+) -> bool:
+    """Change of mode at an event on shaft or mass k; True if the path from motor to load closed or opened."""
+    was = path_closed(s, -1)
+    bounced = False
+    speed = 0.0
+    s.changed = 1.0
+    if event in (UPPER, LOWER):
+        side = 1.0 if event == UPPER else -1.0
+        speed = side * (s.w[k] - s.w[k + 1])
+        meet(s, events, curves, k, side, press, h)
+        bounced = s.rigid[k] != 0.0 and s.path <= k < s.path_end and s.mode[k] == OPEN and s.zeros[k] == 0
+    elif event == STOP:
+        turn(s, events, k, 0.0)
+    elif event in (BREAK_FORWARD, BREAK_BACK):
+        turn(s, events, k, 1.0 if event == BREAK_FORWARD else -1.0)
+    elif event == LET_GO:
+        release(s, events)
+    elif event in (POINT_ABOVE, POINT_BELOW):
+        s.events += 1.0
+        s.passed[k] = 1 if event == POINT_ABOVE else -1
+        set_piece(s, k, curves, s.piece[k] + s.passed[k])
+    elif event == REACHED:
+        s.start_time = s.time
+        s.changed = 0.0
+        note(s, events, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
+        if s.t_end == math.inf:
+            s.t_end = s.time + s.period
+    else:
+        if event == REJOIN:
+            speed = s.side[k] * (s.w[k] - s.w[k + 1])
+        change(s, events, curves, event, k, rest)
+    now = path_closed(s, -1)
+    bounced = bounced and not was and path_closed(s, k)  # closed, and opened at once
+    if now == was and not bounced:
+        return False
+    if math.isnan(s.first_contact) and (now or bounced):
+        s.first_contact = s.time
+        s.impact_speed = speed
+        s.contact_torque = s.u
+    note_stage(s, bounced)
+    return True
+
+
+@compiled
+def change(s: Record, events: Matrix, curves: Matrix, event: int, k: int, rest: float) -> None:
+    """Change of mode of shaft k, whose flanks are in contact or overlap."""
+    if event == SETTLE:
+        s.side[k] = math.copysign(1.0, s.theta[k])
+        settle(s, events, curves, k, rest)
+    elif event == REJOIN:
+        note(s, events, s.time, CLOSED, k, s.side[k], 0.0)
+        engage(s, k, s.side[k])
+        s.zeros[k] = REJOINED
+    elif event == EXIT:
+        part(s, events, k)
+    elif event == RELEASE:
+        note(s, events, s.time, OPENED, k, s.side[k], 0.0)
+        s.mode[k] = OPEN
+        s.zeros[k] = 2
+    else:
+        s.events += 1.0
+        s.zeros[k] = 1
+        if event == BACK:
+            s.theta[k] = s.side[k] * s.half[k]
+            s.mode[k] = OPEN
+            s.zeros[k] = 0
+        elif event == SWITCH:
+            s.mode[k] = CONTACT if s.mode[k] == DOUBLED else DOUBLED
+        elif event == TURNED:
+            s.sign[k] = -s.sign[k]

@@ -1,0 +1,337 @@
+"""The records of the kernel: what is given of a machine, the work of one start, what is noted of it.
+
+Outside of the kernel a record is a row of float64 numbers; `row.view(WORK)[0]` is the same memory with names:
+`s.time`, `s.c[k]`. Everything is at the motor shaft and in SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+MOST_MASSES: Final = 64
+ORDERS: Final = 36  # room for Taylor coefficients
+MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
+MOST_POINTS: Final = 16  # of a load curve
+
+Record = Any  # a record of one of these types, in compiled code
+
+
+def record(*fields: type, whole: Sequence[str] = (), **parts: Any) -> Any:
+    """The NumPy type of a record: a float64 for each field of the classes, in order.
+
+    A field named in `parts` is an array of so many numbers or of this shape, or a record within the record;
+    those named in `whole` hold int64.
+
+    >>> class Point:
+    ...     x: float
+    ...     y: float
+    >>> row = np.array([3.0, 4.0])
+    >>> float(row.view(record(Point))[0].y)
+    4.0
+    """
+    types: list[Any] = []
+    for name in (name for one in fields for name in one.__annotations__):
+        part, number = parts.get(name), np.int64 if name in whole else np.float64
+        types.append((name, number, part) if isinstance(part, int | tuple) else (name, part or number))
+    # np.record has such attributes too, but takes 6 us for each; a compiled function knows the memory only
+    scalar = type(fields[-1].__name__, (np.void,), {name: _field(name) for name, *_ in types})
+    return np.dtype((scalar, np.dtype(types)))
+
+
+def _field(name: str) -> property:
+    """A field as an attribute, outside of compiled functions."""
+    return property(lambda row: row[name], lambda row, value: row.__setitem__(name, value))
+
+
+def size(dtype: Any) -> int:
+    """How many float64 numbers a record takes."""
+    return int(dtype.itemsize) // 8
+
+
+class Machine:
+    """What is given of motor, encoder and start."""
+
+    lag: float  # of the realised torque, s
+    rate: float  # of the slew limiter, N m/s
+    u_min: float
+    u_max: float
+    encoder: float  # angle of one count; 0 for an ideal encoder
+    encoder_phase: float
+    torque_noise: float
+    noise_seed: float
+    dead_time: float
+    release_at: float  # when the motor's brake is released: 0 no brake, inf by torque proving
+    initial_torque: float
+    target: float
+    period: float  # of the first natural frequency with all gaps closed; 0 where every joint is rigid
+    time_limit: float
+    longest: float  # a start that lasts so long is given up
+    event_cap: float
+    motor: float  # indices of masses
+    load: float
+
+
+class Mass:
+    """What is given of a mass."""
+
+    J: float
+    ground: float  # damping to the ground
+    active: float  # load torque that acts always, less the mean of exciting torques
+    Mc: float  # reactive load torque
+    friction: float  # Coulomb friction of the motor
+    w0: float
+
+
+class Shaft:
+    """What is given of the shaft behind a mass."""
+
+    c: float
+    d: float
+    half: float  # half the gap
+    rigid: float
+    restitution: float
+    law: float  # one of the contact laws below
+    theta0: float
+    eta: float  # efficiency of its gear
+    gear: float  # the gear sits at mass k + gear: 0 before, 1 after
+
+
+class Curve:
+    """A load curve: linear between `points` rising speeds or angles, constant beyond them."""
+
+    mass: float
+    points: float
+    by_angle: float
+    at: float
+    torque: float
+
+
+class Tone:
+    """One harmonic of an exciting torque."""
+
+    mass: float
+    omega: float
+    cosine: float
+    sine: float
+
+
+class Notes:
+    """What is noted of a start."""
+
+    status: float
+    start_time: float
+    time: float  # at the end that of the run
+    stage: float  # odd while a gap between motor and load is open, even while none is
+    gap_events: float
+    contacts: float
+    first_contact: float
+    impact_speed: float  # at which the flanks first meet
+    contact_torque: float  # of the motor then
+    stage_2_end: float
+    release_time: float  # of the brake
+    braked: float  # 1 while the brake holds the motor
+    excess: float  # how far a demand of the controller went beyond the torque limits, N m
+    excess_time: float  # for how long, s
+    events: float
+    asked: float
+    n_spans: float
+    n_events: float
+    position: float  # of an unknown one, that with the largest peak: its place in UNKNOWN_POSITIONS
+
+
+class ShaftNotes:
+    """What is noted of a shaft."""
+
+    peak: float
+    peak_time: float
+    impulse: float  # largest of its impacts
+    first_peak: float  # largest |T| up to the end of stage 2
+
+
+class Places:
+    """Indices of masses; the shafts from `path` to before `path_end` lead from motor to load."""
+
+    n: float  # how many masses there are
+    at_motor: float
+    at_load: float
+    path: float
+    path_end: float
+    motor_shaft: float
+
+
+class OfMasses:
+    """State of a mass, and what follows from the modes."""
+
+    w: float
+    direction: float  # 0 held by friction, else the sign of the speed that it opposes; 1 without friction
+    angle: float  # with a load curve
+    rubs: float  # 1 where friction acts: reactive load, motor, a gear with losses
+    push: float  # torque from outside that is constant within the span
+    # of the body, the masses that move as one: its first mass, and in the place of that mass the rest
+    first: float
+    inverse: float  # one over its inertia; 0 while it is held
+    body_J: float
+    hold: float  # how much its friction can hold
+    stuck: float
+    rubbing: float  # how many of its masses rub
+    gears: float  # how many of its gears have losses
+    scale: float  # sum of the absolute torques: the scale of rounding
+    # load curves: which one the mass has, -1 none; its straight piece
+    curve: float
+    piece: float  # how many of the points lie before
+    offset: float  # the curve is offset + incline * (speed or angle) there
+    incline: float
+    passed: float  # +1 or -1: a point has just been passed upwards or downwards
+
+
+class OfShafts:
+    """State of a shaft, and what follows from the modes."""
+
+    theta: float
+    mode: float
+    side: float
+    sign: float  # of the torque
+    peak: float
+    peak_time: float
+    impulse: float
+    first_peak: float
+    struck: float  # time of the last impact
+    blows: float  # impacts at that very instant
+    zeros: float  # how many leading coefficients of the event just fired are zero by its nature
+    stiff: float  # stiffness and damping that act
+    damp: float
+    slack: float  # twist at which the spring is slack
+    before: float  # share of the torque that acts on the mass before; not 1 at a gear with losses
+    after: float
+
+
+class OfSpan:
+    """Taylor coefficients over the span, whose length is 1."""
+
+    speed: float
+    twist: float
+    torque: float
+    outside: float  # exciting torques
+    held: float  # torques on a mass, but for those of rigid joints; on its body in the place of the first
+    turned: float  # angles with a load curve
+
+
+class State:
+    """The rest of the state of a start."""
+
+    t_end: float
+    phi: float  # angle of the motor
+    u: float  # its realised torque
+    ref: float  # the demand after the slew limiter
+    demand: float
+    demand_slope: float
+    slope: float  # of the slew limiter's output in this span
+    slew_end: float  # when, in this span, it has come to the demand; inf if it does not
+    follows: float  # 1 where the lag's exponential has died away: u is a line
+    ask_at: float
+    ask_on_gap: float
+    sample_angle: float
+    sample_time: float
+    pending: float  # how many demands wait: for the computing delay, or for the corner of a cut line
+    over: float  # 1 while the last answer lies beyond the torque limits: the line from `over_since` on
+    over_since: float
+    over_torque: float
+    over_slope: float
+    due_time: float  # when each of them takes effect, and what it is
+    due_demand: float
+    due_slope: float
+    changed: float  # 1 where what follows from the modes is to be computed again
+    bodies: float  # 1 where masses move as one
+    fastest: float  # upper bound of the machine's rates in the present modes, 1/s
+    tone_rate: float  # of the exciting torques
+    torque_u: float  # Taylor coefficients of the motor torque and of its angle
+    angle_u: float
+    f: float  # scratch: an event function
+
+
+class EventRow:
+    """A recorded event: `place` is a shaft or a mass; of an impact `value` is the loss in J."""
+
+    time: float
+    kind: float
+    place: float
+    value: float
+    impulse: float
+
+
+class Measured(NamedTuple):
+    """What is measured at the instant of asking. What the controller has not declared is NaN."""
+
+    time: float  # s since the start
+    motor_angle: float  # rad, rounded to the encoder's counts
+    motor_speed: float  # rad/s, difference of encoder angles since the last asking
+    motor_torque: float  # N m, the realised torque, after limits, slew and lag
+    stage: float  # 1, 2, ... as in [G]: odd gap open, even gap closed
+    shaft_torque: float  # N m
+    load_speed: float  # rad/s
+
+
+class Answer:
+    """What a controller answers; its new state follows."""
+
+    torque: float
+    ask_again: float
+    slope: float
+
+
+_WHOLE = (
+    "n at_motor at_load path path_end motor_shaft first stuck rubbing gears curve piece passed mode zeros"
+)  # numbers that are counted
+
+
+def _parts() -> dict[str, Any]:
+    """The arrays in the work of a start."""
+    shapes: dict[str, Any] = dict.fromkeys(("torque_u", "angle_u", "f"), ORDERS)
+    shapes |= dict.fromkeys(("due_time", "due_demand", "due_slope"), MOST_PENDING)
+    shapes |= dict.fromkeys(OfSpan.__annotations__, (MOST_MASSES, ORDERS))
+    for part in (Mass, Shaft, OfMasses, OfShafts):
+        shapes |= dict.fromkeys(part.__annotations__, MOST_MASSES)
+    return shapes
+
+
+MACHINE, MASS, SHAFT, TONE = record(Machine), record(Mass), record(Shaft), record(Tone)
+CURVE = record(Curve, at=MOST_POINTS, torque=MOST_POINTS)
+NOTES, SHAFT_NOTES, EVENT = record(Notes), record(ShaftNotes), record(EventRow)
+MEASURED, ANSWER = record(Measured), record(Answer)
+WORK = record(Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts())
+N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
+
+# a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and
+# sign of each shaft
+S_START, S_END, S_U, S_REF, S_SLOPE, S_PHI, S_BRAKED, S_STAGE, S_MASSES = range(9)
+OF_MASS, OF_SHAFT = 4, 4
+
+
+def span_size(masses: int) -> int:
+    """How many numbers a recorded span of so many masses takes."""
+    return S_MASSES + OF_MASS * masses + OF_SHAFT * (masses - 1)
+
+
+# contact laws
+NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
+
+# mode of a shaft: gap open; spring in contact; the same while `modelica` caps its damping; flanks overlap
+# without torque; rigid flanks that press; a spring without a gap; a rigid joint
+OPEN, CONTACT, DOUBLED, BEYOND, PRESSED, JOINED, WELDED = range(7)
+
+# kinds of recorded events
+(
+    CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED,
+) = range(1, 9)  # fmt: skip
+
+# why `advance` came back
+ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)
+
+# what a span ends with
+(
+    NO_EVENT, UPPER, LOWER, REJOIN, BACK, EXIT, SWITCH, SETTLE, RELEASE, BREAK_FORWARD, BREAK_BACK, STOP,
+    REACHED, UNSOLVED, TURNED, POINT_ABOVE, POINT_BELOW, LET_GO,
+) = range(18)  # fmt: skip

@@ -1,0 +1,361 @@
+"""The Taylor polynomials of one span.
+
+Between two events the machine is linear, and the torques on it are sums of a line, an exponential and
+harmonics; so all coefficients follow from one another, in three passes for each order: torques of the shafts,
+accelerations of the bodies, twists. A span reaches three over the fastest rate of the machine in its present
+modes, where some thirty coefficients leave nothing but rounding; shorter ones take fewer.
+
+Masses joined by rigid shafts, or by rigid flanks that press, are one body; what their joints carry follows
+from the balance of each mass.
+
+A gear of efficiency eta sits between its shaft and the mass on the other side of it, and has the speed w of
+that mass. Of the shaft torque T it passes `eta T` on to the mass when power flows that way, and takes `T/eta`
+from it when power flows back. The difference is friction on the mass, against its motion:
+
+    (1 - eta) |T|      where the shaft drives the mass
+    (1/eta - 1) |T|    where the mass drives the shaft
+
+It passes continuously through T = 0, and jumps where the speed changes its sign with a torque on: there the
+mass sticks while the torque that moves it lies between the two (A. F. Filippov, Differential Equations with
+Discontinuous Righthand Sides, 1988), as one with a reactive load does, with limits that go with T.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from softstart.arrays import Matrix
+from softstart.kernel.jit import compiled
+from softstart.kernel.motor import expand_torque
+from softstart.kernel.records import CONTACT, CURVE, DOUBLED, JOINED, ORDERS, PRESSED, TONE, WELDED, Record
+
+REACH = 3.0
+TRUNCATION = 1e-18
+LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
+
+
+# load curves, bodies and gears ----------------------------------------------------------------------
+
+
+@compiled
+def set_piece(s: Record, i: int, curves: Matrix, piece: int) -> None:
+    """The straight piece of its load curve on which mass i is: `piece` of the points lie before it."""
+    curve = curves[s.curve[i]].view(CURVE)[0]
+    s.piece[i] = piece
+    s.incline[i] = 0.0
+    s.changed = 1.0
+    last = int(curve.points)
+    if piece == 0:
+        s.offset[i] = curve.torque[0]
+    elif piece == last:
+        s.offset[i] = curve.torque[last - 1]
+    else:
+        rise = curve.torque[piece] - curve.torque[piece - 1]
+        s.incline[i] = rise / (curve.at[piece] - curve.at[piece - 1])
+        s.offset[i] = curve.torque[piece - 1] - s.incline[i] * curve.at[piece - 1]
+
+
+@compiled
+def find_piece(s: Record, i: int, curves: Matrix) -> None:
+    """The same by the present speed or angle, as at the start and where a blow has changed the speed."""
+    if s.curve[i] < 0:
+        return
+    curve = curves[s.curve[i]].view(CURVE)[0]
+    where = s.angle[i] if curve.by_angle != 0.0 else s.w[i]
+    piece = 0
+    while piece < curve.points and curve.at[piece] <= where:
+        piece += 1
+    s.passed[i] = 0
+    set_piece(s, i, curves, piece)
+
+
+@compiled
+def by_angle(s: Record, i: int, curves: Matrix) -> bool:
+    """Whether mass i has a load curve over its angle."""
+    return s.curve[i] >= 0 and curves[s.curve[i]].view(CURVE)[0].by_angle != 0.0
+
+
+@compiled
+def apply_modes(s: Record, curves: Matrix) -> None:
+    """What follows from the modes: bodies and what holds them, springs that act, gears, the fastest rate."""
+    first = 0
+    s.bodies = 0.0
+    for i in range(s.n):
+        if i == 0 or (s.mode[i - 1] != WELDED and s.mode[i - 1] != PRESSED):
+            first = i
+            s.body_J[i] = 0.0
+            s.hold[i] = 0.0
+            s.stuck[i] = 0
+            s.rubbing[i] = 0
+            s.gears[i] = 0
+        else:
+            s.bodies = 1.0
+        s.first[i] = first
+        s.body_J[first] += s.J[i]
+        s.push[i] = -s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
+        if s.curve[i] >= 0:
+            s.push[i] -= s.offset[i]
+        if s.rubs[i] != 0.0:
+            s.rubbing[first] += 1
+            s.hold[first] += s.Mc[i] + s.friction[i]
+            if s.direction[i] == 0.0:
+                s.stuck[first] = 1
+        if s.braked != 0.0 and i == s.at_motor:
+            s.stuck[first] = 1
+    for i in range(s.n):
+        first = s.first[i]
+        s.inverse[i] = 0.0 if s.stuck[first] != 0 else 1.0 / s.body_J[first]
+    for k in range(s.n - 1):
+        spring = s.mode[k] == CONTACT or s.mode[k] == JOINED
+        s.stiff[k] = s.c[k] if spring else (2.0 * s.c[k] if s.mode[k] == DOUBLED else 0.0)
+        s.damp[k] = s.d[k] if spring else 0.0
+        s.slack[k] = s.side[k] * s.half[k]
+        set_gear(s, k)
+    s.fastest = fastest_rate(s, curves)
+    s.changed = 0.0
+
+
+@compiled
+def set_gear(s: Record, k: int) -> None:
+    """The share of the torque of shaft k that acts on the masses beside it, in the present directions."""
+    s.before[k] = 1.0
+    s.after[k] = 1.0
+    if s.eta[k] == 1.0:
+        return
+    i = k + int(s.gear[k])
+    s.gears[s.first[i]] += 1
+    forward = s.sign[k] * s.direction[i]  # power flows towards the last mass
+    if forward == 0.0:
+        return
+    if i == k:
+        s.before[k] = 1.0 / s.eta[k] if forward > 0.0 else s.eta[k]
+    else:
+        s.after[k] = s.eta[k] if forward > 0.0 else 1.0 / s.eta[k]
+
+
+@compiled
+def grip(s: Record, i: int, direction: float, o: int) -> float:
+    """The coefficient of order o of the friction of the gears at the body i, were it to move so."""
+    total = 0.0
+    for k in range(s.n - 1):
+        j = k + int(s.gear[k])
+        if s.eta[k] == 1.0 or s.first[j] != i:
+            continue
+        driven = s.sign[k] * direction if j > k else -s.sign[k] * direction
+        share = (1.0 - s.eta[k] if driven > 0.0 else 1.0 / s.eta[k] - 1.0) * s.sign[k]
+        total += share * s.torque[k, o]
+    return total
+
+
+# the length of a span -------------------------------------------------------------------------------
+
+
+@compiled
+def fastest_rate(s: Record, curves: Matrix) -> float:
+    """An upper bound of the rates of the machine in its present modes, 1/s.
+
+    Gershgorin's theorem on the matrix of the shafts, c_k (1/J_a + 1/J_b) with sqrt(c_k c_l)/J beside it, and
+    the same of the dampings; of load curves the largest slope over its inertia, whatever its sign.
+    """
+    springs, dampers, ground, held = 0.0, 0.0, 0.0, 0.0
+    before_c, before_d, before_row, before_damping = 0.0, 0.0, 0.0, 0.0
+    i = 0
+    while i < s.n:
+        shared = s.inverse[i]
+        to_ground, incline = 0.0, 0.0
+        j = i
+        while j < s.n and s.first[j] == i:
+            to_ground += s.ground[j]
+            if s.curve[j] >= 0:
+                if by_angle(s, j, curves):
+                    incline += abs(s.incline[j])
+                else:
+                    to_ground += abs(s.incline[j])
+            j += 1
+        ground = max(ground, to_ground * shared)
+        held = max(held, incline * shared)
+        if j == s.n:
+            break
+        k = j - 1
+        share = max(s.before[k], s.after[k])
+        c, d = s.stiff[k] * share, s.damp[k] * share
+        coupling = math.sqrt(c * before_c) * shared
+        friction = math.sqrt(d * before_d) * shared
+        springs = max(springs, before_row + coupling)
+        dampers = max(dampers, before_damping + friction)
+        before_row = c * (shared + s.inverse[j]) + coupling
+        before_damping = d * (shared + s.inverse[j]) + friction
+        before_c, before_d = c, d
+        i = j
+    springs = max(springs, before_row) + held
+    dampers = max(dampers, before_damping) + ground
+    return 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
+
+
+def needed(reach: float) -> int:
+    """How many coefficients a span of so many inverse rates needs."""
+    n = 0
+    term = 1.0
+    while term > TRUNCATION and n < MOST - 2:
+        n += 1
+        term *= reach / n
+    return max(n + 2, LEAST)
+
+
+def largest_reach(n: int) -> float:
+    """The largest reach for which n coefficients are enough."""
+    low, high = 0.0, 2.0 * REACH
+    while math.nextafter(low, high) < high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if needed(middle) <= n else (low, middle)
+    return low
+
+
+REACHES = np.array([largest_reach(n) for n in range(LEAST, MOST)])
+
+
+@compiled
+def orders(reach: float) -> int:
+    """How many coefficients a span of so many inverse rates needs: `needed`, from a table."""
+    n = LEAST
+    while n < MOST and reach > REACHES[n - LEAST]:
+        n += 1
+    return n
+
+
+# the series -----------------------------------------------------------------------------------------
+
+
+@compiled
+def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
+    """The coefficients of the exciting torques."""
+    for i in range(s.n):
+        for o in range(n + 1):
+            s.outside[i, o] = 0.0
+    for row in range(tones.shape[0]):
+        tone = tones[row].view(TONE)[0]
+        i = int(tone.mass)
+        phase = tone.omega * s.time
+        cos = math.cos(phase)
+        sin = math.sin(phase)
+        turn = tone.omega * h
+        even = tone.cosine * cos + tone.sine * sin
+        odd = (tone.sine * cos - tone.cosine * sin) * turn
+        for o in range(0, n + 1, 2):
+            s.outside[i, o] += even
+            even *= -turn * turn / ((o + 1.0) * (o + 2.0))
+            if o < n:
+                s.outside[i, o + 1] += odd
+                odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
+
+
+@compiled
+def curve_torque(s: Record, i: int, curves: Matrix, o: int, share: float) -> float:
+    """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
+    if by_angle(s, i, curves):
+        if o == 0:
+            s.turned[i, 0] = s.angle[i]
+        s.turned[i, o + 1] = share * s.speed[i, o]
+        return s.incline[i] * s.turned[i, o]
+    return s.incline[i] * s.speed[i, o]
+
+
+@compiled
+def expand(s: Record, tones: Matrix, curves: Matrix, h: float, n: int) -> None:
+    """All coefficients of the span of length h that begins with the present state and modes."""
+    speed, twist, torque, held = s.speed, s.twist, s.torque, s.held
+    count, motor = s.n, s.at_motor
+    forced, curved, bodies = tones.shape[0] > 0, curves.shape[0] > 0, s.bodies != 0.0
+    expand_torque(s, h, n)
+    if forced:
+        expand_tones(s, tones, h, n)
+    s.angle_u[0] = s.phi
+    for i in range(count):
+        speed[i, 0] = s.w[i]
+    for k in range(count - 1):
+        twist[k, 0] = s.theta[k]
+    for o in range(n + 1):
+        share = h / (o + 1.0)
+        passed_on = 0.0
+        for i in range(count):
+            w = speed[i, o]
+            total = passed_on - s.ground[i] * w
+            if i == motor:
+                total += s.torque_u[o]
+            if o == 0:
+                total += s.push[i]
+            if forced:
+                total += s.outside[i, o]
+            if curved and s.curve[i] >= 0:
+                total -= curve_torque(s, i, curves, o, share)
+            if i + 1 < count:
+                v = w - speed[i + 1, o]
+                z = twist[i, o] - s.slack[i] if o == 0 else twist[i, o]
+                T = s.stiff[i] * z + s.damp[i] * v
+                torque[i, o] = T
+                twist[i, o + 1] = share * v
+                total -= s.before[i] * T
+                passed_on = s.after[i] * T
+            held[i, o] = total
+            speed[i, o + 1] = share * s.inverse[i] * total
+        if bodies:
+            join(s, o, share)
+        s.angle_u[o + 1] = share * speed[motor, o]
+    note_scale(s, forced)
+
+
+@compiled
+def join(s: Record, o: int, share: float) -> None:
+    """The masses of each body move as one, and its rigid joints carry what the masses before them leave.
+
+    What each of several masses that rub holds is not determined: here each its share of what can hold.
+    """
+    i = 0
+    while i < s.n:
+        total = 0.0
+        end = i
+        while end < s.n and s.first[end] == i:
+            total += s.held[end, o]
+            end += 1
+        rise = total * s.inverse[i]
+        carried = 0.0
+        for j in range(i, end):
+            s.speed[j, o + 1] = share * rise
+            carried += s.held[j, o] - (total if math.isinf(s.J[j]) else s.J[j] * rise)
+            if s.stuck[i] != 0:
+                if s.braked != 0.0 and s.first[s.at_motor] == i:
+                    carried -= total if j == s.at_motor else 0.0
+                elif s.hold[i] > 0.0:
+                    carried -= total * (s.Mc[j] + s.friction[j]) / s.hold[i] if s.rubs[j] != 0.0 else 0.0
+                elif s.rubs[j] != 0.0:
+                    carried -= total / s.rubbing[i]
+            if j + 1 < end:
+                s.torque[j, o] = carried
+        s.held[i, o] = total
+        i = end
+
+
+@compiled
+def note_scale(s: Record, forced: bool) -> None:
+    """The sum of the absolute torques on each body, which is the scale of its rounding."""
+    i = 0
+    while i < s.n:
+        scale = 0.0
+        if i > 0:
+            scale += s.after[i - 1] * abs(s.torque[i - 1, 0])
+        j = i
+        while True:
+            scale += abs(s.push[j]) + abs(s.ground[j] * s.w[j])
+            if j == s.at_motor:
+                scale += abs(s.torque_u[0])
+            if forced:
+                scale += abs(s.outside[j, 0])
+            j += 1
+            if j == s.n or s.first[j] != i:
+                break
+        if j < s.n:
+            scale += s.before[j - 1] * abs(s.torque[j - 1, 0])
+        s.scale[i] = scale
+        i = j

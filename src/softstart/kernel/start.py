@@ -1,0 +1,378 @@
+"""A start, span after span under a controller, and many of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from softstart.arrays import Matrix, Vector
+from softstart.kernel.events import next_event, peak_within, swing, value
+from softstart.kernel.jit import compiled, compiled_as
+from softstart.kernel.modes import begin_modes, handle, path_closed, release
+from softstart.kernel.motor import (
+    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, along_line, begin_torque, move_demand, next_in_queue,
+    note_excess, sample, take_answer,
+)  # fmt: skip
+from softstart.kernel.records import (
+    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT_LIMIT, LOWER, MASS, MEASURED, NO_EVENT, NOT_FINITE,
+    NOT_LOCATED, N_MACHINE, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, ORDERS, PRESSED, SETTLE, SHAFT,
+    SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
+    UNSOLVED, UPPER, WELDED, WORK, Record,
+)  # fmt: skip
+from softstart.kernel.series import REACH, apply_modes, expand, find_piece, orders
+
+_A = types.Array(types.float64, 1, "C")
+_M = types.Array(types.float64, 2, "C")
+_T = types.Array(types.float64, 3, "C")
+_STEP = types.FunctionType(STEP_SIGNATURE)
+FIRST_MACHINE = N_NOTES  # place of the machine's numbers in the work of a start
+
+
+@compiled_as(types.void(_A, _A, _M, _M, _M, _M))
+def load_machine(
+    work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix
+) -> None:
+    """Put what is given into the work of a start."""
+    s = work.view(WORK)[0]
+    for j in range(machine.shape[0]):
+        work[FIRST_MACHINE + j] = machine[j]
+    s.n = masses.shape[0]
+    s.at_motor = int(s.motor)
+    s.at_load = int(s.load)
+    s.path = min(s.at_motor, s.at_load)
+    s.path_end = max(s.at_motor, s.at_load)
+    s.motor_shaft = s.at_motor if s.at_load > s.at_motor or s.at_motor == 0 else s.at_motor - 1
+    for i in range(s.n):
+        mass = masses[i].view(MASS)[0]
+        s.J[i] = mass.J
+        s.ground[i] = mass.ground
+        s.active[i] = mass.active
+        s.Mc[i] = mass.Mc
+        s.friction[i] = mass.friction
+        s.w0[i] = mass.w0
+        s.rubs[i] = 1.0 if mass.Mc > 0.0 or mass.friction > 0.0 else 0.0
+        s.curve[i] = -1
+    for k in range(s.n - 1):
+        shaft = shafts[k].view(SHAFT)[0]
+        s.c[k] = shaft.c
+        s.d[k] = shaft.d
+        s.half[k] = shaft.half
+        s.rigid[k] = shaft.rigid
+        s.restitution[k] = shaft.restitution
+        s.law[k] = shaft.law
+        s.theta0[k] = shaft.theta0
+        s.eta[k] = shaft.eta
+        s.gear[k] = shaft.gear
+        if shaft.eta != 1.0:
+            s.rubs[k + int(shaft.gear)] = 1.0
+    for row in range(curves.shape[0]):
+        mass_of_curve = int(curves[row].view(CURVE)[0].mass)
+        if mass_of_curve >= 0:
+            s.curve[mass_of_curve] = row
+    s.tone_rate = 0.0
+    for row in range(tones.shape[0]):
+        s.tone_rate = max(s.tone_rate, tones[row].view(TONE)[0].omega)
+
+
+@compiled
+def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> None:
+    """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
+    s = work.view(WORK)[0]
+    for j in range(N_NOTES):
+        work[j] = 0.0
+    s.pending = 0.0
+    s.over = 0.0
+    s.ask_at = 0.0
+    s.ask_on_gap = 1.0 if on_gap else 0.0
+    s.demand_slope = 0.0
+    s.sample_angle = 0.0
+    s.sample_time = 0.0
+    s.t_end = until if until == math.inf else min(until, s.longest)
+    s.start_time = s.release_time = s.first_contact = s.impact_speed = math.nan
+    s.contact_torque = s.stage_2_end = math.nan
+    s.braked = 1.0 if s.release_at > 0.0 else 0.0
+    begin_modes(s)
+    for i in range(s.n):  # the load mass begins at the angle 0
+        s.angle[i] = 0.0
+        for k in range(min(i, s.at_load), max(i, s.at_load)):
+            s.angle[i] += s.theta[k] if i < s.at_load else -s.theta[k]
+        s.passed[i] = 0
+        s.offset[i] = 0.0
+        s.incline[i] = 0.0
+        find_piece(s, i, curves)
+    s.phi = s.angle[s.at_motor]
+    s.u = s.ref = s.demand = s.initial_torque
+    s.stage = 1.0
+    s.changed = 1.0
+    if path_closed(s, -1):
+        s.stage = 2.0
+        for k in range(s.path, s.path_end):
+            if s.half[k] > 0.0 and s.contacts == 0.0:
+                s.contacts = 1.0
+                s.first_contact = 0.0
+                s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
+
+
+@compiled
+def note_span(s: Record, row: Vector, h: float) -> None:
+    """What is needed to evaluate any instant of this span again."""
+    row[S_START] = s.time
+    row[S_END] = s.time + h
+    row[S_U] = s.u
+    row[S_REF] = s.ref
+    row[S_SLOPE] = s.slope
+    row[S_PHI] = s.phi
+    row[S_BRAKED] = s.braked
+    row[S_STAGE] = s.stage
+    for i in range(s.n):
+        at = S_MASSES + OF_MASS * i
+        row[at] = s.w[i]
+        row[at + 1] = s.direction[i]
+        row[at + 2] = s.angle[i]
+        row[at + 3] = s.piece[i]
+    for k in range(s.n - 1):
+        at = S_MASSES + OF_MASS * s.n + OF_SHAFT * k
+        row[at] = s.theta[k]
+        row[at + 1] = s.mode[k]
+        row[at + 2] = s.side[k]
+        row[at + 3] = s.sign[k]
+
+
+@compiled
+def move(s: Record, n: int, x: float, time: float) -> None:
+    """The state after the share x of the span, `time` seconds later."""
+    for i in range(s.n):
+        s.w[i] = value(s.speed[i], n, x)
+        if s.curve[i] >= 0:
+            s.passed[i] = 0
+            s.angle[i] = value(s.turned[i], n, x)
+    for k in range(s.n - 1):
+        s.zeros[k] = 0
+        if s.mode[k] != PRESSED and s.mode[k] != WELDED:
+            s.theta[k] = value(s.twist[k], n, x)
+    s.phi = value(s.angle_u, n, x)
+    s.u = value(s.torque_u, 1 if s.follows != 0.0 else n, x)
+    move_demand(s, time)
+    s.time += time
+
+
+@compiled
+def pressing(twist: Vector, n: int, x: float, h: float, side: float) -> float:
+    """The relative acceleration towards the flank `side`, rad/s^2."""
+    total = 0.0
+    for o in range(n, 1, -1):
+        total = total * x + o * (o - 1.0) * twist[o]
+    return side * total / (h * h)
+
+
+@compiled
+def rate_of(s: Record, curves: Matrix) -> float:
+    """An upper bound of all rates of the span, 1/s."""
+    if s.changed != 0.0:
+        apply_modes(s, curves)
+    rate = max(s.fastest, s.tone_rate)
+    return rate if s.follows != 0.0 else max(rate, 1.0 / s.lag)
+
+
+@compiled
+def stands(s: Record, spans: Matrix, events: Matrix) -> int:
+    """Why the start does not go on from here: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
+    if spans.shape[0] > 0 and (
+        s.n_spans >= spans.shape[0] or s.n_events + 4 * s.n + 8 >= events.shape[0]
+    ):
+        return BUFFER_FULL
+    stop = s.t_end
+    if math.isnan(s.start_time) and stop == math.inf:
+        stop = s.time_limit
+    if s.time >= stop:
+        note_excess(s)
+        if s.stage == 2.0:
+            s.stage_2_end = s.time
+        if s.stage <= 2.0:
+            for k in range(s.n - 1):
+                s.first_peak[k] = s.peak[k]
+        return ENDED if s.time < s.longest else TOO_LONG
+    while s.pending > 0.0 and s.time >= s.due_time[0]:
+        next_in_queue(s)
+    if s.time >= s.ask_at:
+        return ASK if s.asked < s.event_cap else EVENT_LIMIT
+    return -1
+
+
+@compiled
+def horizon(s: Record) -> float:
+    """The instant up to which nothing changes from outside."""
+    stop = s.t_end
+    if math.isnan(s.start_time) and stop == math.inf:
+        stop = s.time_limit
+    until = min(s.ask_at, stop)
+    if s.pending > 0.0:
+        until = min(until, s.due_time[0])
+    if s.braked != 0.0:
+        until = min(until, s.release_at)
+    return until
+
+
+@compiled_as(types.int64(_A, _M, _M, _M, _M))
+def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: Matrix) -> int:
+    """Go on until the controller must be asked, the start has ended, or something stands in the way.
+
+    `spans` and `events` are filled row by row; with no rows nothing is recorded.
+    """
+    s = work.view(WORK)[0]
+    while True:
+        reason = stands(s, spans, events)
+        if reason >= 0:
+            return reason
+        begin_torque(s)
+        if s.braked != 0.0 and s.time >= s.release_at:
+            release(s, events)
+        until = horizon(s)
+        h = until - s.time
+        cut = s.slew_end < h
+        if cut:
+            h = s.slew_end
+        # no span is longer: in free flight it would reach to the time limit, and rounding depended on that
+        if s.period > 0.0 and h > s.period:
+            cut = True
+            h = s.period
+        rate = rate_of(s, curves)
+        if rate * h > REACH:
+            cut = True
+            h = REACH / rate
+        n = orders(rate * h)
+        expand(s, tones, curves, h, n)
+        event, where, x = next_event(s, curves, h, n)
+        if event == UNSOLVED:
+            return NOT_LOCATED
+        for k in range(s.n - 1):
+            if s.mode[k] != OPEN and s.mode[k] != BEYOND and not peak_within(s, k, n, x, h):
+                return NOT_LOCATED
+        if x > 0.0:
+            if spans.shape[0] > 0:
+                note_span(s, spans[int(s.n_spans)], x * h)
+                s.n_spans += 1.0
+            move(s, n, x, x * h)
+        total = s.u
+        for i in range(s.n):
+            total += s.w[i]
+        if not math.isfinite(total):
+            return NOT_FINITE
+        if event == NO_EVENT:
+            if not cut:
+                s.time = until
+            continue
+        press = 0.0
+        rest = 0.0
+        if event in (UPPER, LOWER):
+            press = pressing(s.twist[where], n, x, h, 1.0 if event == UPPER else -1.0)
+        elif event == SETTLE and s.restitution[where] < 1.0:
+            ratio = -s.twist[where, 1] / s.twist[where, 2]
+            rest = h * ratio / (1.0 - s.restitution[where])
+        if handle(s, events, curves, event, where, press, rest, h) and s.ask_on_gap != 0.0:
+            s.ask_at = s.time
+        if s.events > s.event_cap:
+            return EVENT_LIMIT
+
+
+@compiled
+def torque_now(s: Record, k: int, tones: Matrix, curves: Matrix) -> float:
+    """The torque of shaft k in the present state; of rigid joints as a span of no length has it."""
+    mode = s.mode[k]
+    if mode == OPEN or mode == BEYOND:
+        return 0.0
+    if s.changed != 0.0:
+        apply_modes(s, curves)
+    if mode == PRESSED or mode == WELDED:
+        begin_torque(s)
+        expand(s, tones, curves, 0.0, 2)
+        return float(s.torque[k, 0])
+    return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
+
+
+@compiled_as(types.void(_A, types.int64, _M, _M, _A))
+def measure(work: Vector, sees: int, tones: Matrix, curves: Matrix, measured: Vector) -> None:
+    """What the controller sees now."""
+    s = work.view(WORK)[0]
+    seen = measured.view(MEASURED)[0]
+    sample(s, sees, seen)
+    if sees & SEES_SHAFT_TORQUE:
+        sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
+        seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones, curves)
+
+
+@compiled_as(types.int64(_A, types.float64, types.float64, types.float64))
+def answer(work: Vector, torque: float, ask_again: float, slope: float) -> int:
+    """Take the controller's answer; returns ASK, or why it cannot be taken."""
+    return take_answer(work.view(WORK)[0], torque, ask_again, slope)
+
+
+@compiled_as(types.void(_A, _A))
+def note_state(work: Vector, row: Vector) -> None:
+    """The present state, as a span of no length."""
+    note_span(work.view(WORK)[0], row, 0.0)
+
+
+@compiled_as(types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean))
+def begin(
+    work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix, until: float,
+    on_gap: bool,
+) -> None:  # fmt: skip
+    """A start of this machine, at t = 0."""
+    load_machine(work, machine, masses, shafts, curves, tones)
+    begin_start(work, curves, until, on_gap)
+
+
+@compiled_as(types.int64(_STEP, _A, types.int64, _A, _M, _M, _M, _M, _A, _A, _A))
+def run(  # type: ignore[no-untyped-def]
+    step, parameters, sees, work, tones, curves, spans, events, measured, state, command
+) -> int:
+    """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
+    s = work.view(WORK)[0]
+    told = command[:NEW_STATE].view(ANSWER)[0]
+    while True:
+        reason = advance(work, tones, curves, spans, events)
+        if reason == ASK:
+            measure(work, sees, tones, curves, measured)
+            told.slope = 0.0
+            step(parameters, measured, state, command)
+            reason = take_answer(s, told.torque, told.ask_again, told.slope)
+        if reason != ASK:
+            s.status = reason
+            return reason
+        for j in range(state.shape[0]):
+            state[j] = command[NEW_STATE + j]
+
+
+@compiled_as(
+    types.void(
+        _STEP, _M, types.int64, types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A
+    )
+)
+def run_many(  # type: ignore[no-untyped-def]
+    step, parameters, sees, on_gap, until, machines, masses, shafts, curves, notes, shaft_notes, work, measured,
+    state, command,
+) -> None:  # fmt: skip
+    """Start i has row i of machines, masses, shafts, curves and parameters (one row serves all).
+
+    What is noted goes to notes[i] and shaft_notes[i]. The arrays from `work` on are scratch: the kernel
+    allocates nothing.
+    """
+    s = work.view(WORK)[0]
+    nothing = curves[0, :0]
+    for i in range(notes.shape[0]):
+        for j in range(state.shape[0]):
+            state[j] = 0.0
+        begin(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
+        own = parameters[i if parameters.shape[0] > 1 else 0]
+        run(step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command)
+        for j in range(notes.shape[1]):
+            notes[i, j] = work[j]
+        for k in range(s.n - 1):
+            shaft = shaft_notes[i, k].view(SHAFT_NOTES)[0]
+            shaft.peak = s.peak[k]
+            shaft.peak_time = s.peak_time[k]
+            shaft.impulse = s.impulse[k]
+            shaft.first_peak = s.first_peak[k]

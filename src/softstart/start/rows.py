@@ -1,0 +1,271 @@
+"""A machine as the rows of numbers that the kernel works on: the one place where both kinds are written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softstart.arrays import Matrix, Vector
+from softstart.drive import Drive
+from softstart.errors import InputError
+from softstart.kernel import records as at
+
+if TYPE_CHECKING:
+    from softstart.chain.model import Chain, ChainArrays
+
+LAWS: Final = {"no-pull": at.NO_PULL, "dead-zone": at.DEAD_ZONE, "modelica": at.MODELICA}
+COUNTS_PER_LINE: Final = 4  # quadrature
+LONGEST: Final = 100_000  # elastic periods of one start
+MAX_EVENTS: Final = 1_000_000  # events and control instants of one start
+SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
+
+
+def encoder_count(lines: Any) -> Any:
+    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
+
+    >>> round(encoder_count(Drive.load("crane-4amtkf").encoder_lines) * 1e6, 2)
+    383.5
+    """
+    lines = np.asarray(lines, dtype=np.float64)
+    count = np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * np.maximum(lines, 1.0)), 0.0)
+    return count if count.ndim else float(count)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Starts as rows: of each its motor and limits, its N masses, its N - 1 shafts, its load curves.
+
+    `tones` are the harmonics of exciting torques, which all starts have alike.
+    """
+
+    machines: Matrix
+    masses: NDArray[np.float64]
+    shafts: NDArray[np.float64]
+    curves: NDArray[np.float64]
+    tones: Matrix
+
+    @property
+    def machine(self) -> Any:
+        """The first row of `machines`, by names."""
+        return self.machines[0].view(at.MACHINE)[0]
+
+    @property
+    def count(self) -> int:
+        """How many masses there are."""
+        return int(self.masses.shape[1])
+
+    @property
+    def motor_shaft(self) -> int:
+        """The index of the shaft beside the motor, on the way to the load."""
+        motor, load = int(self.machine.motor), int(self.machine.load)
+        return motor if load > motor or motor == 0 else motor - 1
+
+    def taken(self, which: Any) -> Rows:
+        """Some of the starts."""
+        return Rows(
+            self.machines[which], self.masses[which], self.shafts[which], self.curves[which], self.tones
+        )
+
+    def limited(self, time_limit: float | None = None, max_events: int | None = None) -> Rows:
+        """The same with another time limit or cap on events."""
+        machines = self.machines.copy()
+        named = machines.view(at.MACHINE)[:, 0]
+        if time_limit is not None:
+            named["time_limit"] = np.minimum(time_limit, named["longest"])
+        if max_events is not None:
+            named["event_cap"] = max_events
+        return Rows(machines, self.masses, self.shafts, self.curves, self.tones)
+
+
+def joined(rows: Sequence[Rows]) -> Rows:
+    """Starts in one call; InputError for machines that do not match."""
+    motors = {(one.count, one.machine.motor, one.machine.load) for one in rows}
+    if len(motors) > 1:
+        raise InputError(
+            "chains: starts in one call have the same number of masses, and motors and loads on the same "
+            "ones; sort the chains by that."
+        )
+    most = max(one.curves.shape[1] for one in rows)
+    curves = [np.pad(one.curves, ((0, 0), (0, most - one.curves.shape[1]), (0, 0))) for one in rows]
+    for one, padded in zip(rows, curves, strict=True):
+        padded[:, one.curves.shape[1] :, 0] = -1.0  # of no mass
+    return Rows(
+        np.concatenate([one.machines for one in rows]),
+        np.concatenate([one.masses for one in rows]),
+        np.concatenate([one.shafts for one in rows]),
+        np.concatenate(curves),
+        rows[0].tones,
+    )
+
+
+def rows_of(
+    machine: Drive | Chain,
+    time_limit: float | None = None,
+    max_events: int = MAX_EVENTS,
+    excitation: Mapping[str | int, Any] | None = None,
+) -> Rows:
+    """A machine as rows of the kernel: one, or one for each element of a Drive with array fields.
+
+    Without `time_limit` a start that never reaches its target speed is given up after a hundred times
+    the duration of a stiff machine's start plus a hundred elastic periods, counted from a brake's release. No
+    start lasts more than `LONGEST` elastic periods: its figures are integrals over each of them.
+    """
+    if isinstance(machine, Drive):
+        made, stiff = _of_drive(machine)
+    else:
+        made, stiff = _of_chain(machine, excitation or {})
+    named = made.machines.view(at.MACHINE)[:, 0]
+    named["event_cap"] = max_events
+    named["longest"] = np.where(named["period"] > 0.0, LONGEST * named["period"], math.inf)
+    longest = named["longest"]
+    if time_limit is not None:
+        named["time_limit"] = np.minimum(time_limit, longest)
+        return made
+    limit = 100.0 * (stiff + named["period"])
+    limit = limit + np.where(named["release_at"] < math.inf, named["release_at"], 0.0)
+    # a tenth of it is more than any start takes: then it is not too long, but does not reach its target
+    ample = (limit > longest) & (0.1 * limit < longest)
+    limit = np.where(ample, 0.999 * longest, np.minimum(limit, longest))
+    named["time_limit"] = np.where(np.isfinite(stiff), limit, math.inf)
+    return made
+
+
+def _blank(shape: tuple[int, ...], masses: int, curves: int = 0) -> Rows:
+    count = math.prod(shape)
+    return Rows(
+        np.zeros((count, at.N_MACHINE)),
+        np.zeros((count, masses, at.size(at.MASS))),
+        np.zeros((count, masses - 1, at.size(at.SHAFT))),
+        np.zeros((count, curves, at.size(at.CURVE))),
+        np.zeros((0, at.size(at.TONE))),
+    )
+
+
+def _motor(named: Any, motor: Any, column: Any = lambda values: values) -> None:
+    """What a drive and the motor of a chain have under the same names."""
+    for name, values in (
+        ("rate", motor.torque_rate),
+        ("u_min", motor.minimum_torque),
+        ("u_max", motor.maximum_torque),
+        ("encoder", encoder_count(motor.encoder_lines)),
+        ("encoder_phase", motor.encoder_phase),
+        ("torque_noise", motor.torque_noise),
+        ("noise_seed", motor.noise_seed),
+        ("dead_time", motor.computing_delay),
+    ):
+        named[name] = column(values)
+    # a lag below 1e-12 of the elastic period changes no digit, but its rate would overflow
+    lag = column(motor.torque_lag)
+    named["lag"] = np.where(lag > 1e-12 * named["period"], lag, 0.0)
+
+
+def _of_drive(drive: Drive) -> tuple[Rows, Vector]:
+    """The rows of a drive, and how long a stiff one takes."""
+    shape = drive.shape
+    made = _blank(shape, 2)
+
+    def column(values: object) -> Vector:
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), shape).ravel()
+
+    named = made.machines.view(at.MACHINE)[:, 0]
+    masses, shaft = made.masses.view(at.MASS)[..., 0], made.shafts.view(at.SHAFT)[:, 0, 0]
+    J1, J2, c, Mc, Ms = map(column, (drive.J1, drive.J2, drive.c, drive.Mc, drive.Ms))
+    friction, b1, b2 = map(column, drive.frictions)
+    w1, w2 = column(drive.initial_motor_speed), column(drive.initial_load_speed)
+    target = column(drive.target_speed)
+    named["period"] = 2.0 * math.pi / np.sqrt(c * (1.0 / J1 + 1.0 / J2))
+    _motor(named, drive, column)
+    named["target"], named["release_at"] = target, column(drive.release_time)
+    named["load"] = 1.0
+    masses["J"], masses["ground"] = np.stack([J1, J2], axis=1), np.stack([b1, b2], axis=1)
+    masses["friction"][:, 0] = friction
+    masses["w0"] = np.stack([w1, w2], axis=1)
+    # a reactive load without torque never sticks: it is the same as an active one
+    reactive = (Mc > 0.0) & (drive.load_kind == "reactive")
+    masses["Mc"][:, 1], masses["active"][:, 1] = np.where(reactive, Mc, 0.0), np.where(reactive, 0.0, Mc)
+    shaft["c"], shaft["d"], shaft["half"] = c, column(drive.d), 0.5 * column(drive.gap)
+    shaft["law"], shaft["eta"] = LAWS[drive.contact_law], 1.0
+    shaft["theta0"] = column(drive.theta0)
+    net = np.maximum(Ms - Mc - (friction + (b1 + b2) * target), 1e-3 * (Ms - Mc))
+    return made, (J1 + J2) * (target + np.abs(w2) + np.abs(w1)) / net
+
+
+def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, Vector]:
+    """The row of a chain, and how long a stiff one takes: infinite where that is not known."""
+    arrays = chain.at_motor_shaft()
+    _refuse(chain, arrays)
+    count = arrays.J.size
+    if count > at.MOST_MASSES:
+        raise InputError(f"mass: {count} masses; a start takes {at.MOST_MASSES} at most, so join some first.")
+    curved = [(i, mass) for i, mass in enumerate(chain.masses) if mass.curve is not None]
+    made = _blank((), count, len(curved))
+    named = made.machines.view(at.MACHINE)[:, 0]
+    masses, shafts = made.masses.view(at.MASS)[0, :, 0], made.shafts.view(at.SHAFT)[0, :, 0]
+    reactive = arrays.reactive & (arrays.Mc > 0.0)
+    masses["J"], masses["ground"], masses["w0"] = arrays.J, arrays.d_ground, arrays.w0
+    masses["Mc"], masses["active"] = np.where(reactive, arrays.Mc, 0.0), np.where(reactive, 0.0, arrays.Mc)
+    for curve, (i, mass) in zip(made.curves[0].view(at.CURVE)[:, 0], curved, strict=True):
+        ratio = float(arrays.speed_ratio[i])
+        at_points, torques, by_angle = mass.curve  # type: ignore[misc]
+        curve["mass"], curve["points"], curve["by_angle"] = i, len(at_points), by_angle
+        curve["at"][: len(at_points)] = np.array(at_points) / ratio
+        curve["torque"][: len(at_points)] = np.array(torques) * ratio
+    for k in range(count - 1):
+        if _welded(arrays, k):  # one body has one speed, not two that differ by rounding
+            masses["w0"][k + 1] = masses["w0"][k]
+    shafts["c"] = np.where(arrays.rigid, 0.0, arrays.c)
+    shafts["d"], shafts["half"], shafts["rigid"] = arrays.d, 0.5 * arrays.gap, arrays.rigid
+    shafts["restitution"] = np.nan_to_num(arrays.restitution)
+    shafts["law"], shafts["theta0"] = [LAWS[law] for law in arrays.law], arrays.theta0
+    shafts["eta"], shafts["gear"] = arrays.efficiency, arrays.gear - np.arange(count - 1)
+    named["motor"], named["load"] = arrays.motor, arrays.load
+    named["period"] = chain.elastic_period
+    named["rate"] = math.inf
+    named["target"] = math.inf if chain.target_speed is None else chain.target_speed
+    tones = []
+    for place, torque in excitation.items():
+        i = chain.index(place)
+        brought = float(arrays.speed_ratio[i])
+        masses["active"][i] -= brought * torque.mean
+        for omega, cosine, sine in zip(torque.frequencies, torque.cosine, torque.sine, strict=True):
+            tones.append((i, omega, brought * cosine, brought * sine))
+    if tones:
+        made = Rows(made.machines, made.masses, made.shafts, made.curves, np.array(tones, dtype=np.float64))
+    motor = chain.motor
+    if motor is None:
+        return made, np.array([math.inf])
+    _motor(named, motor)
+    named["initial_torque"] = motor.initial_torque
+    heavier = 1.0 / arrays.efficiency_from_motor
+    left = motor.starting_torque - float((arrays.Mc * heavier).sum())
+    speeds = float(named["target"][0]) + float(np.abs(arrays.w0).sum())
+    stiff = float((arrays.moving_J * heavier).sum()) * speeds / left if left > 0.0 else math.inf
+    return made, np.array([stiff])
+
+
+def _welded(arrays: ChainArrays, k: int) -> bool:
+    """Whether shaft k joins its masses rigidly, without a gap."""
+    return bool(arrays.rigid[k] and arrays.gap[k] == 0.0)
+
+
+def _refuse(chain: Chain, arrays: ChainArrays) -> None:
+    wrong = []
+    for k, shaft in enumerate(chain.shafts):
+        if shaft.efficiency != 1.0 and arrays.rigid[k]:
+            wrong.append(
+                f"[shaft] {k + 1}, efficiency = {shaft.efficiency}: the loss of a gear goes with the torque "
+                "of a spring, and this shaft is rigid; give it a stiffness, or leave the efficiency out."
+            )
+        if _welded(arrays, k) and not math.isclose(arrays.w0[k], arrays.w0[k + 1], rel_tol=SAME_SPEED):
+            wrong.append(
+                f"[shaft] {k + 1}: it is rigid, so the masses it joins start with one speed, and they have "
+                f"{arrays.w0[k]:.12g} and {arrays.w0[k + 1]:.12g} rad/s at the motor shaft; give both the "
+                "same initial_speed, divided by the ratio."
+            )
+    if wrong:
+        raise InputError(wrong)
