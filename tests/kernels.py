@@ -19,32 +19,25 @@ Parts = dict[str, tuple[tuple[str, ...], Callable[[], None]]]
 PATIENCE = 900.0  # s that a worker waits for another one which compiles
 
 
-def spans() -> None:
-    """A span of a start and how it ends, which drives and chains need."""
-    import_module("softstart.plant.span")
-
-
 def steps() -> None:
     """The steps of all controllers."""
     for one in iter_modules(import_module("softstart_controllers").__path__, "softstart_controllers."):
         import_module(one.name)
 
 
-def drive() -> None:
+def start() -> None:
     """The loop of starts."""
-    import_module("softstart.plant.start")
+    import_module("softstart.kernel.start")
 
 
-def stepwise() -> None:
-    """From one control instant to the next, for controllers in Python: the same code as in `drive`, again."""
-    number = import_module("numba").float64
-    row, rows = number[::1], number[:, ::1]
-    import_module("softstart.plant.advance").advance_vectors.compile((row, row, row, rows, rows, rows))
+def replay() -> None:
+    """What is read back of a recorded start."""
+    import_module("softstart.kernel.replay")
 
 
-def series() -> None:
-    """The loop of starts of a chain."""
-    import_module("softstart.chain.kernel_start")
+def sensitivity() -> None:
+    """How a start answers to its demand."""
+    import_module("softstart.kernel.sensitivity")
 
 
 def controllers() -> None:
@@ -71,22 +64,6 @@ def plain() -> None:
     simulate(crane.replace(gap=[0.5, 2.0]), twin)
 
 
-def chain() -> None:
-    """Starts of a chain."""
-    from softstart import Chain, simulate
-
-    assert simulate(Chain.load("crane-4-mass"), "ramp").k_dyn > 1.0
-
-
-def sensitivities() -> None:
-    """How a start of a chain answers to its demand."""
-    from softstart import Chain, TorqueProfile
-    from softstart.optimal.chains.starts import Player
-
-    played = Player(Chain.load("crane-4-mass")).play(TorqueProfile([0.0, 0.1], [20.0, 40.0]), 0.1)
-    assert played.answer([0.1]).torques.shape == (1, 3, 2)
-
-
 def robust() -> None:
     """Optima over several drives."""
     from softstart import Drive, optimize_robust
@@ -97,16 +74,13 @@ def robust() -> None:
 
 # what must be compiled before, and what compiles it; the longest are taken first
 PARTS: Parts = {
-    "spans": ((), spans),
-    "drive": (("spans",), drive),
-    "series": (("spans",), series),
+    "start": ((), start),
     "steps": ((), steps),
-    "stepwise": (("spans",), stepwise),
-    "chain": (("series", "drive"), chain),
-    "controllers": (("drive", "steps"), controllers),
-    "sensitivities": (("chain", "controllers"), sensitivities),
+    "replay": (("start",), replay),
+    "sensitivity": (("replay",), sensitivity),
+    "controllers": (("replay", "steps"), controllers),
     "robust": (("controllers",), robust),
-    "plain": (("controllers", "stepwise"), plain),
+    "plain": (("controllers",), plain),
 }
 
 

@@ -36,7 +36,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))  # run by hand
 
 from tests.oracle import Start, integrate
-from tests.softstart.plant.test_against_oracle import KINDS
+from tests.softstart.kernel.test_against_oracle import KINDS
 
 from softstart import Drive, InputError, Run, SimulationError, Status, TorqueProfile, simulate
 from softstart.controller import Command, Controller, PlainController, make_controller

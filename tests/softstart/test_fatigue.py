@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.softstart.plant.test_against_oracle import case, run_of
+from tests.softstart.kernel.test_against_oracle import case, run_of
 
 from softstart import Command, Drive, InputError, PlainController, Run, fatigue, simulate
 from softstart.drive import SNCurve

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from tests.oracle import integrate
-from tests.softstart.plant.test_brake import HOIST
+from tests.softstart.kernel.test_brake import HOIST
 
 from softstart import Chain, Drive, InputError, compare, linear_view, simulate
 from softstart.chain import reduce_chain

@@ -96,17 +96,4 @@ def compiled_step(function: Callable[..., None]) -> Any:
     if in_a_file:
         own = _called(function, set())
         drop_stale({Path(file), *own}, INTERFACE)
-    return _found_once(compiled_as(STEP_SIGNATURE, cache=in_a_file)(function))
-
-
-def _found_once(step: Any) -> Any:
-    """The step with its address, which numba would look up for each start: half the time of a call.
-
-    `__wrapper_address__` is numba's protocol for functions that are passed to compiled ones. There is one
-    signature, and so one result of compiling.
-    """
-    found = step.get_compile_result(STEP_SIGNATURE)
-    address = found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name)
-    step.__wrapper_address__ = lambda: address
-    step.get_compile_result = lambda signature: found
-    return step
+    return compiled_as(STEP_SIGNATURE, cache=in_a_file)(function)

@@ -448,6 +448,15 @@ class Drive(ParameterSet):
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
 
+    def changed(self, gaps: float = 1.0, load_inertia: float = 1.0) -> Self:
+        """The drive with so many times its gap, its start where it was in the gap, and its load inertia.
+
+        >>> Drive.load("crane-4amtkf").changed(gaps=4.0).gap
+        2.0
+        """
+        one = self if gaps == 1.0 else self.with_gap(gaps * self.gap)
+        return one if load_inertia == 1.0 else one.replace(load_inertia=load_inertia * self.load_inertia)
+
     # ---- what starts ask of any machine ------------------------------------------------------------------
 
     @property

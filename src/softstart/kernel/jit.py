@@ -19,9 +19,24 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, 
 compiled: Any = _njit(**OPTIONS)
 
 
-def compiled_as(signature: object, cache: bool = True) -> Any:
-    """Compile with one explicit signature, as soon as the function is defined."""
-    return _njit(signature, **{**OPTIONS, "cache": cache})
+def compiled_as(signature: Any, cache: bool = True) -> Any:
+    """Compile with one explicit signature, as soon as the function is defined; it may be handed to a kernel.
+
+    A kernel that calls a function by its address does not compile it again: LLVM would otherwise optimise
+    what a function calls within each caller, and each caller of that one.
+    """
+
+    def compile_now(function: Any) -> Any:
+        made = _njit(signature, **{**OPTIONS, "cache": cache})(function)
+        # the address, which numba would look up for each call: `__wrapper_address__` is its protocol for
+        # functions that are passed to compiled ones. There is one signature, and so one result of compiling
+        found = made.get_compile_result(signature)
+        address = found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name)
+        made.__wrapper_address__ = lambda: address
+        made.get_compile_result = lambda _: found
+        return made
+
+    return compile_now
 
 
 def drop_stale(sources: Iterable[Path], needed: Iterable[Path] = ()) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
 from numba import types
 
 from softstart.arrays import Matrix, Vector
@@ -106,12 +106,13 @@ def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> Non
     s.u = s.ref = s.demand = s.initial_torque
     s.stage = 1.0
     s.changed = 1.0
-    if path_closed(s, -1):
+    if path_closed(s, -1):  # a start in contact begins with stage 2
         s.stage = 2.0
+        s.contacts = 1.0
+        s.first_contact = 0.0
+        s.impact_speed = 0.0
         for k in range(s.path, s.path_end):
-            if s.half[k] > 0.0 and s.contacts == 0.0:
-                s.contacts = 1.0
-                s.first_contact = 0.0
+            if s.half[k] > 0.0:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
 
 
@@ -215,7 +216,11 @@ def horizon(s: Record) -> float:
     return until
 
 
-@compiled_as(types.int64(_A, _M, _M, _M, _M))
+_ADVANCE = types.int64(_A, _M, _M, _M, _M)
+_ADVANCES = types.FunctionType(_ADVANCE)
+
+
+@compiled_as(_ADVANCE)
 def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: Matrix) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way.
 
@@ -292,7 +297,11 @@ def torque_now(s: Record, k: int, tones: Matrix, curves: Matrix) -> float:
     return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
 
-@compiled_as(types.void(_A, types.int64, _M, _M, _A))
+_MEASURE = types.void(_A, types.int64, _M, _M, _A)
+_MEASURES = types.FunctionType(_MEASURE)
+
+
+@compiled_as(_MEASURE)
 def measure(work: Vector, sees: int, tones: Matrix, curves: Matrix, measured: Vector) -> None:
     """What the controller sees now."""
     s = work.view(WORK)[0]
@@ -315,7 +324,10 @@ def note_state(work: Vector, row: Vector) -> None:
     note_span(work.view(WORK)[0], row, 0.0)
 
 
-@compiled_as(types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean))
+_BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
+
+
+@compiled_as(_BEGIN)
 def begin(
     work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix, until: float,
     on_gap: bool,
@@ -325,17 +337,20 @@ def begin(
     begin_start(work, curves, until, on_gap)
 
 
-@compiled_as(types.int64(_STEP, _A, types.int64, _A, _M, _M, _M, _M, _A, _A, _A))
-def run(  # type: ignore[no-untyped-def]
-    step, parameters, sees, work, tones, curves, spans, events, measured, state, command
+_RUN = types.int64(_ADVANCES, _MEASURES, _STEP, _A, types.int64, _A, _M, _M, _M, _M, _A, _A, _A)
+
+
+@compiled_as(_RUN)
+def run_on(  # type: ignore[no-untyped-def]
+    go_on, look, step, parameters, sees, work, tones, curves, spans, events, measured, state, command
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
     s = work.view(WORK)[0]
     told = command[:NEW_STATE].view(ANSWER)[0]
     while True:
-        reason = advance(work, tones, curves, spans, events)
+        reason = go_on(work, tones, curves, spans, events)
         if reason == ASK:
-            measure(work, sees, tones, curves, measured)
+            look(work, sees, tones, curves, measured)
             told.slope = 0.0
             step(parameters, measured, state, command)
             reason = take_answer(s, told.torque, told.ask_again, told.slope)
@@ -346,14 +361,21 @@ def run(  # type: ignore[no-untyped-def]
             state[j] = command[NEW_STATE + j]
 
 
+def run(*start: Any) -> int:
+    """One start from where it stands to its end: the arguments of `run_on` from the step on."""
+    reason: int = run_on(advance, measure, *start)
+    return reason
+
+
 @compiled_as(
     types.void(
-        _STEP, _M, types.int64, types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A
+        types.FunctionType(_RUN), _ADVANCES, _MEASURES, types.FunctionType(_BEGIN), _STEP, _M, types.int64,
+        types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A,
     )
-)
-def run_many(  # type: ignore[no-untyped-def]
-    step, parameters, sees, on_gap, until, machines, masses, shafts, curves, notes, shaft_notes, work, measured,
-    state, command,
+)  # fmt: skip
+def run_all(  # type: ignore[no-untyped-def]
+    run_one, go_on, look, begin_one, step, parameters, sees, on_gap, until, machines, masses, shafts, curves,
+    notes, shaft_notes, work, measured, state, command,
 ) -> None:  # fmt: skip
     """Start i has row i of machines, masses, shafts, curves and parameters (one row serves all).
 
@@ -365,9 +387,9 @@ def run_many(  # type: ignore[no-untyped-def]
     for i in range(notes.shape[0]):
         for j in range(state.shape[0]):
             state[j] = 0.0
-        begin(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
+        begin_one(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
         own = parameters[i if parameters.shape[0] > 1 else 0]
-        run(step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command)
+        run_one(go_on, look, step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command)
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):
@@ -376,3 +398,8 @@ def run_many(  # type: ignore[no-untyped-def]
             shaft.peak_time = s.peak_time[k]
             shaft.impulse = s.impulse[k]
             shaft.first_peak = s.first_peak[k]
+
+
+def run_many(*starts: Any) -> None:
+    """Many starts to their ends: the arguments of `run_all` from the step on."""
+    run_all(run_on, advance, measure, begin, *starts)

@@ -20,7 +20,7 @@ from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import Startable, models, simulate
+from softstart.start.simulation import Machine, simulate
 
 notebook = late("softstart.views.notebook")
 
@@ -141,7 +141,7 @@ class Comparison:
 
 
 def compare(
-    drive: Drive | Startable | Uncertain | str = DEFAULT_DRIVE,
+    drive: Machine | Uncertain | str = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -198,16 +198,18 @@ def compare(
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
     if isinstance(drive, str):
-        drive = cast("Drive | Startable", models.load_machine(drive))
+        from softstart.chain.model import load_machine
+
+        drive = load_machine(drive)
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    if not isinstance(drive, Drive | Startable):
+    if not isinstance(drive, Machine):
         raise InputError(
             f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
         )
-    if isinstance(drive, Drive) and drive.shape != ():
+    if getattr(drive, "shape", ()) != ():
         raise InputError("drive: compare takes one drive; for a batch, simulate each controller.")
     if fitted_to is not None and not (isinstance(fitted_to, Drive) and fitted_to.shape == ()):
         raise InputError("fitted_to: give the one Drive for which the controllers are set up.")
@@ -248,7 +250,7 @@ def make_controllers(
 
 
 def compared(
-    drive: Drive | Startable,
+    drive: Machine,
     controller: Controller,
     direct: Run | None,
     until: float | None = None,
@@ -273,22 +275,14 @@ def compared(
 
 
 def changed_case(
-    drive: Drive | Startable,
+    drive: Machine,
     controller: Controller,
     case: str,
     until: float | None = None,
     fitted_to: Drive | None = None,
 ) -> Case:
     """A controller set up for `drive` with 4 times its gap, or 0.4 of its load inertia."""
-    changed: Any
-    if not isinstance(drive, Drive):
-        changed = (
-            drive.changed(gaps=WORN_GAP) if case == "gap x4" else drive.changed(load_inertia=LIGHT_INERTIA)
-        )
-    elif case == "gap x4":
-        changed = drive.with_gap(WORN_GAP * drive.gap)
-    else:
-        changed = drive.replace(load_inertia=LIGHT_INERTIA * drive.load_inertia)
+    changed = drive.changed(gaps=WORN_GAP) if case == "gap x4" else drive.changed(load_inertia=LIGHT_INERTIA)
     try:
         return Case.of(simulate(changed, controller, until, fitted_to=fitted_to or drive, base=drive))
     except SimulationError:

@@ -44,6 +44,8 @@ class Machine(Protocol):
     def limits(self) -> Any: ...
     @property
     def shaft_names(self) -> tuple[str, ...]: ...
+    def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
+        """The machine with so many times its gaps, and its load inertia."""
 
 
 @overload

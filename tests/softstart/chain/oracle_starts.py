@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from tests.oracle_torque import TorquePath
 from tests.softstart.chain.chain_oracle import ChainOracle, Given
-from tests.softstart.plant.pieces import Pieces
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft

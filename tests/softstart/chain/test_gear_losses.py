@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import ANY_DRIVE, both, differences, random_chain, with_losses
-from tests.softstart.plant.pieces import Pieces
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, simulate, verify_on_chain
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import solve_ivp
-from tests.softstart.plant.pieces import Pieces
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
 from softstart.balancing import Engine

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.softstart.plant.pieces import Pieces
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Drive
 from softstart.chain import Chain, Mass, Motor, Shaft

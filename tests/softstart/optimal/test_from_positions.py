@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.softstart.optimal.test_momentum import random_drive, random_torque, slack
-from tests.softstart.plant.test_brake import HOIST
+from tests.softstart.kernel.test_brake import HOIST
 
 from softstart import Drive, InputError, TorqueProfile, optimize, pareto, simulate
 from softstart.controller import ready_controller_names

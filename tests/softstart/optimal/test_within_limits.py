@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.softstart.plant.test_brake import HOIST
+from tests.softstart.kernel.test_brake import HOIST
 
 from softstart import Drive, InputError, TorqueProfile, compare, optimize, simulate
 from softstart.controller import ready_controller_names

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.polynomial import polyfromroots, polymul, polyval
 
-from softstart.chain.kernel_events import NONE, first_root, value
+from softstart.kernel.events import NONE, first_root, value
 
 
 def root(coefficients, end=1.0, zeros=0, noise=0.0, faint=0.0) -> float:

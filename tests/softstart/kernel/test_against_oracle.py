@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from tests.oracle import integrate, random_case
-from tests.softstart.plant.pieces import Pieces
+from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Drive, Run, simulate
 
@@ -71,7 +71,7 @@ def drive_of(drawn: dict[str, Any]) -> Drive:
 def run_of(drawn: dict[str, Any]) -> Run:
     """The same start by the plant under test."""
     played = Pieces(pieces=tuple(drawn["torque_pieces"]), end=drawn["t_end"])
-    return simulate(drawn.design_drive, played, until=drawn["t_end"])
+    return simulate(drive_of(drawn), played, until=drawn["t_end"])
 
 
 def in_other_units(drawn: dict[str, Any], mass: float, time: float) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """A motor held by its brake until torque proving or a time: against the oracle, and in closed form.
 
-`python -m tests.softstart.plant.test_brake 300` compares 300 random drives and prints the worst differences.
+`python -m tests.softstart.kernel.test_brake 300` compares 300 random drives and prints the worst differences.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.oracle import integrate
-from tests.softstart.plant.pieces import Pieces, TwoSteps
-from tests.softstart.plant.test_against_oracle import KINDS, case, run_of
+from tests.softstart.kernel.pieces import Pieces, TwoSteps
+from tests.softstart.kernel.test_against_oracle import KINDS, case, run_of
 
 from softstart import Drive, InputError, Status, simulate
 

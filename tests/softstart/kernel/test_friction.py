@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.softstart.plant.pieces import Pieces, TwoSteps
-from tests.softstart.plant.test_against_oracle import case_with_friction, in_other_units, run_of
+from tests.softstart.kernel.pieces import Pieces, TwoSteps
+from tests.softstart.kernel.test_against_oracle import case_with_friction, in_other_units, run_of
 
 from softstart import Chain, Drive, InputError, Run, optimize, simulate
 from softstart.start.metrics import base_torque

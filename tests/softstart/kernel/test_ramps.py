@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from tests.softstart.plant.pieces import Pieces
-from tests.softstart.plant.test_against_oracle import case, compare_with_oracle
+from tests.softstart.kernel.pieces import Pieces
+from tests.softstart.kernel.test_against_oracle import case, compare_with_oracle
 
 from softstart import (
     Command,

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.softstart.plant.pieces import Pieces, TwoSteps
-from tests.softstart.plant.test_against_oracle import case, in_other_units, run_of
+from tests.softstart.kernel.pieces import Pieces, TwoSteps
+from tests.softstart.kernel.test_against_oracle import case, in_other_units, run_of
 
 from softstart import Drive, TorqueProfile, controller, simulate
-from softstart.plant.layout import S_SIDE, S_THETA
+from softstart.kernel.records import BEYOND, OPEN
+
 
 SEEDS = st.integers(1_000, 100_000)
 
@@ -33,7 +34,8 @@ def test_energy_balance(seed: int) -> None:
     assert abs(energy.residual) < 1e-9 * turnover
     # damping only ever takes energy; but a flank that pulls away and is pressed again while still overlapped
     # finds its spring loaded (these laws have no memory of its creeping back), which may give some back
-    side, beyond = run.segments[:, S_SIDE], np.abs(run.segments[:, S_THETA]) - 0.5 * run.drive.gap
+    mode, beyond = run.recorded.of_shafts(1), np.abs(run.recorded.of_shafts(0)) - 0.5 * run.drive.gap
+    side = np.where(np.isin(mode, [OPEN, BEYOND]), 0.0, run.recorded.of_shafts(2))
     pressed_again = (side[:-1] == 0.0) & (side[1:] != 0.0) & (beyond[1:] > 1e-9 * (run.drive.gap + 1e-6))
     if not pressed_again.any():
         assert energy.dissipated > -1e-9 * turnover
@@ -49,7 +51,7 @@ def test_total_momentum(seed: int) -> None:
     start, end = run.at(0.0), run.at(run.end_time)
     J1, J2 = run.drive.J1, run.drive.J2
     # u is smooth within each recorded span: 20 Gauss nodes a span are exact to rounding
-    rows = run.segments
+    rows = run.recorded.spans
     nodes, weights = np.polynomial.legendre.leggauss(20)
     impulse, size = -drawn["Mc"] * run.end_time, drawn["Mc"] * run.end_time
     for index, row in enumerate(rows):
