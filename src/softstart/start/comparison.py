@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
-from typing import Any, Final, NamedTuple, Protocol, cast, runtime_checkable
+from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import Startable, models, simulate
+from softstart.start.simulation import Machine, simulate
 
 notebook = late("softstart.views.notebook")
 
@@ -141,7 +141,7 @@ class Comparison:
 
 
 def compare(
-    drive: Drive | Startable | Uncertain | str = DEFAULT_DRIVE,
+    drive: Drive | Machine | Uncertain | str = DEFAULT_DRIVE,
     controllers: Sequence[str | Controller] | str | Controller | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -198,12 +198,14 @@ def compare(
     K_dyn: [G] (16), docs/theory/stages.md; the strategies: docs/controllers.md.
     """
     if isinstance(drive, str):
-        drive = cast("Drive | Startable", models.load_machine(drive))
+        from softstart.chain.model import load_machine
+
+        drive = load_machine(drive)
     drawn = None
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    if not isinstance(drive, Drive | Startable):
+    if not isinstance(drive, Drive | Machine):
         raise InputError(
             f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
         )
@@ -248,7 +250,7 @@ def make_controllers(
 
 
 def compared(
-    drive: Drive | Startable,
+    drive: Drive | Machine,
     controller: Controller,
     direct: Run | None,
     until: float | None = None,
@@ -273,7 +275,7 @@ def compared(
 
 
 def changed_case(
-    drive: Drive | Startable,
+    drive: Drive | Machine,
     controller: Controller,
     case: str,
     until: float | None = None,
