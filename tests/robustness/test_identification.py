@@ -43,7 +43,6 @@ from softstart.identification.planning import (
     _edges,
     made_up_log,
 )  # fmt: skip
-from softstart.plant import layout as at
 from softstart.start.batch import array_starts
 
 DRIVE = Drive.load("crane-4amtkf").replace(
@@ -140,7 +139,7 @@ def planned(number: int) -> dict[str, Any]:
     for one in plan.experiments:
         play = make_controller("profile", {"profile": one.profile})
         found = array_starts(wide.replace(start_position=places), play, until=one.end)
-        worst = float(places[np.argmax(np.abs(found[:, at.PEAK]))])
+        worst = float(places[np.argmax(found.peaks[:, 0])])
         run = simulate(wide.replace(start_position=worst), play, until=one.end)
         runs[one.name] = {
             "k_dyn": run.k_dyn, "over": run.peak_torque / limit - 1.0, "by": one.found_by,

@@ -20,7 +20,6 @@ from softstart.identification.fitting import Errors, Fitter, Solution, Space, co
 from softstart.identification.model import FILTER, LogModel, filtered
 from softstart.identification.planning import Experiment, Plan, _Bench, _profile, made_up_log
 from softstart.identification.solving import _advice
-from softstart.plant import record
 from softstart.profile import TorqueProfile
 from softstart.views.identification import estimates_table
 
@@ -49,7 +48,7 @@ def found(log: Log):  # type: ignore[no-untyped-def]
     return identify(log, GUESS, searches=3)
 
 
-def played(log: Log, torque: Vector, values: dict[str, float]) -> Vector:
+def played(log: Log, torque: Vector, values: dict[str, float]) -> dict[str, Vector]:
     """States of the true drive under this demand."""
     blank = Log(log.time, torque, angle=900.0 * log.time**2.1, torque_is="demand")
     return LogModel(blank, TRUTH.replace(start_position="mid-gap")).states(values)
@@ -82,8 +81,8 @@ def test_a_torque_error_moves_the_signal_as_its_response_says(log: Log) -> None:
     response = model.torque_responses(values)
     assert response.shape == (log.time.size, log.time.size)
     error = 1e-3 * np.random.default_rng(1).standard_normal(log.time.size)
-    moved = played(log, log.torque + error, values)[:, record.PHI1_OUT]
-    moved = moved - played(log, log.torque, values)[:, record.PHI1_OUT]
+    moved = played(log, log.torque + error, values)["phi"][:, 0]
+    moved = moved - played(log, log.torque, values)["phi"][:, 0]
     assert response @ error == pytest.approx(moved, abs=2e-3 * float(np.max(np.abs(moved))))
     assert np.all(np.triu(response, 1)[:-1] == 0.0)  # no error moves what came before it
 
@@ -371,7 +370,7 @@ def test_where_another_machine_made_the_log_no_interval_is_stated(
         waves = 9.0 * coarse.time if other == "not realised" else 5.0 * angle
         resisting = 8.0 * np.sin(waves)
         states = played(coarse, torque - resisting, {"position": -0.6})
-        angle = np.floor(states[:, record.PHI1_OUT] / coarse.count + 0.3) * coarse.count
+        angle = np.floor(states["phi"][:, 0] / coarse.count + 0.3) * coarse.count
     found = identify(Log(coarse.time, torque, angle=angle, torque_is="demand"), TRUTH, searches=1)
     assert not found.stated
     assert any("something else moves this drive" in note for note in found.notes)
@@ -410,7 +409,7 @@ def test_a_cut_log_and_a_wrong_unit_of_speed_are_noticed(log: Log, wrong: str) -
     if wrong == "cut":
         bad = Log(time, torque, angle=log.values[kept], torque_is="demand")
     else:
-        turned = played(log, log.torque, {"position": -0.6})[:, record.W1_OUT]
+        turned = played(log, log.torque, {"position": -0.6})["w"][:, 0]
         bad = Log(time, torque, speed=turned * 30.0 / math.pi, torque_is="demand")
     notes = identify(bad, TRUTH, searches=1).notes
     told = "something else moves this drive" if wrong == "cut" else "look at the units of the log"

@@ -14,7 +14,6 @@ from softstart import InputError, Log, identify
 from softstart.arrays import Vector
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
-from softstart.plant import record
 
 GUESS = TRUTH.replace(gap=0.2, stiffness=200, load_inertia=0.4, motor_inertia=0.02, load_torque=12)
 
@@ -31,7 +30,7 @@ def replayed(time: Vector, demand: Vector, position: float, seed: int, ripple: f
     blank = Log(time, torque, angle=900.0 * (time - time[0]) ** 2.1, torque_is="demand")
     states = LogModel(blank, TRUTH.replace(start_position="mid-gap")).states({"position": position})
     count = 2.0 * math.pi / 4096.0
-    angle = np.floor(states[:, record.PHI1_OUT] / count + generator.uniform()) * count
+    angle = np.floor(states["phi"][:, 0] / count + generator.uniform()) * count
     return Log(time, demand, angle=angle, torque_is="demand", name=f"seed {seed}")
 
 
@@ -272,7 +271,7 @@ def test_channels_with_instants_of_their_own_tell_what_common_ones_tell(
     # the plant under the merged log moves as under the torque alone, sampled at the instants of the angle
     whole = Log(coarse, torque, angle=900.0 * coarse**2.1, torque_is=torque_is)  # type: ignore[arg-type]
     drive = TRUTH.replace(start_position="mid-gap")
-    merged = LogModel(read, drive).states({})[:, record.W1_OUT]
+    merged = LogModel(read, drive).states({})["w"][:, 0]
     first = float(read.time[0])
     assert first == pytest.approx(0.0007)
     # from the same start: the torque before the first common instant is cut off in both
@@ -280,7 +279,7 @@ def test_channels_with_instants_of_their_own_tell_what_common_ones_tell(
     begin = np.interp(first, coarse, torque) if torque_is == "measured" else torque[0]
     cut = Log(np.r_[first, late], np.r_[begin, torque[coarse > first]], angle=np.r_[0.0, late] ** 2.1,
               torque_is=torque_is)  # type: ignore[arg-type]  # fmt: skip
-    alone = LogModel(cut, drive).states({})[:, record.W1_OUT]
+    alone = LogModel(cut, drive).states({})["w"][:, 0]
     common = np.isin(read.time, cut.time)
     assert common.sum() == (cut.time <= read.time[-1]).sum()
     assert merged[common] == pytest.approx(alone[: common.sum()], rel=1e-11, abs=1e-12)

@@ -11,13 +11,13 @@ import numpy as np
 
 from softstart.chain.model import Chain
 from softstart.chain.reduction import reduce_chain
-from softstart.start.simulation import simulate
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
 from softstart.identification.logs import TURN, Log
 from softstart.identification.result import Estimate
 from softstart.profile import TorqueProfile
+from softstart.start.simulation import simulate
 
 DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
 WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it

@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Final, cast
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.controller import CompiledController, make_controller
+from softstart.controller import Controller, make_controller
 from softstart.drive import Drive
 from softstart.errors import SimulationError
 from softstart.identification.logs import Log
-from softstart.identification.sensitivity import torque_sensitivities
-from softstart.plant import exchange, record
-from softstart.plant import layout as at
-from softstart.plant.vector import plant_vector
+from softstart.kernel.records import ENDED, MACHINE, S_PHI
 from softstart.profile import TorqueProfile
-from softstart.start.engine import Recorder
+from softstart.start.engine import run_one
+from softstart.start.recorded import Recorded, Recorder
+from softstart.start.rows import Rows, rows_of
 
 POSITION: Final = "position"  # where in the gap a log begins, from -1 (opposite flank) to 1 (driving flank)
 DEAD_TIME: Final = "computing_delay"
@@ -54,11 +54,9 @@ class LogModel:
         self.dead_time = float(self.drive.computing_delay)
         self.drive = self.drive.replace(computing_delay=0.0)
         self.times = log.time - log.time[0]
-        self.recorder = _recorder(self.times.size)
-        self.player = _player(TorqueProfile([0.0], [0.0]))
         self.error: Vector | None = None  # of the torque, as the fit knows it: scaled, one for each block
         self.shift: Vector | None = None  # what the linear response to it adds to the signal
-        self.last: tuple[dict[str, float] | None, Matrix] = None, np.empty((0, 0))  # values and their row
+        self.last: tuple[dict[str, float], list[Rows]] = {"": math.nan}, []  # values and their row
         self.block = max(1, math.ceil(self.times.size / MOST_BLOCKS))
 
     def first(self, share: float) -> LogModel:
@@ -69,8 +67,8 @@ class LogModel:
         one.times = self.times[:count]
         return one
 
-    def plants(self, values: Sequence[Mapping[str, float]]) -> Matrix:
-        """A row of the kernel's parameters for each set of values."""
+    def plants(self, values: Sequence[Mapping[str, float]]) -> list[Rows]:
+        """The rows of the kernel for each set of values."""
         if len(values) == 1 and values[0] == self.last[0]:
             return self.last[1]
         names = {name for row in values for name in row} - {POSITION, DEAD_TIME, FILTER}
@@ -79,64 +77,83 @@ class LogModel:
             gaps = np.array([row.get("gap", float(self.drive.gap)) for row in values])
             changes["start_position"] = 0.5 * gaps * np.array([row[POSITION] for row in values])
         elif not changes:
-            changes = {"gap": np.array([float(self.drive.gap)])}
+            changes = {"gap": np.full(len(values), float(self.drive.gap))}
         # numbers already, and within their ranges: to read and check them takes longer than the motion
         drive = object.__new__(Drive)
         vars(drive).update(vars(self.drive) | changes)
-        rows = plant_vector(drive, time_limit=1e9 + float(self.times[-1]))
-        rows.view(at.PLANT)[:, 0]["longest"] = math.inf
-        self.last = dict(values[0]), rows[:1]
-        return rows
+        rows = rows_of(drive)
+        named = rows.machines.view(MACHINE)[:, 0]
+        named["longest"], named["time_limit"] = math.inf, 1e9 + float(self.times[-1])
+        each = [rows.taken(slice(i, i + 1)) for i in range(len(values))]
+        self.last = dict(values[0]), each[:1]
+        return each
 
-    def numbers(self, dead_time: float) -> Vector:
-        """The torque of the log as the kernel's `profile` controller takes it."""
-        log, times, torque = self.log, self.times, self.log.torque
+    def player(self, values: Mapping[str, float]) -> Controller:
+        """What plays the torque of the log."""
+        knots, owners = self._knots(values)
+        torque = self.log.torque
         if self.error is not None:
             torque = torque + np.repeat(self.error, self.block)[: torque.size] / math.sqrt(self.block)
-        if log.torque_is == "demand":
-            knots, torques = np.repeat(times, 2)[1:], np.repeat(torque, 2)[:-1]
-        else:
-            knots, torques = times, torque
-        knots = knots + dead_time
-        if dead_time > 0.0:
-            knots, torques = np.concatenate([[0.0], knots]), np.concatenate([[torques[0]], torques])
-        player = _player(TorqueProfile(knots, torques))
-        return np.array(player.vector(self.drive), dtype=np.float64).ravel()
+        return make_controller("profile", {"profile": TorqueProfile(knots, torque[owners])})
+
+    def _knots(self, values: Mapping[str, float]) -> tuple[Vector, NDArray[np.int64]]:
+        """The knots of the torque, and to which sample each belongs."""
+        times, owners = self.times, np.arange(self.times.size)
+        if self.log.torque_is == "demand":
+            times, owners = np.repeat(times, 2)[1:], np.repeat(owners, 2)[:-1]
+        delay = values.get(DEAD_TIME, self.dead_time)
+        if delay > 0.0:
+            times, owners = np.append(0.0, times + delay), np.append(0, owners)
+        return times, owners
 
     def signals(self, values: Sequence[Mapping[str, float]]) -> Matrix:
         """What would have been logged under each set of values: a row for each."""
-        rows = self.plants(values)
+        players = {row.get(DEAD_TIME): self.player(row) for row in values}
         out = np.empty((len(values), self.times.size))
-        delays = [row.get(DEAD_TIME, self.dead_time) for row in values]
-        numbers = {delay: self.numbers(delay) for delay in set(delays)}
-        for i, row in enumerate(values):
-            out[i] = self._signal(rows[min(i, len(rows) - 1)], numbers[delays[i]], row.get(FILTER, 0.0))
+        for i, (row, plant) in enumerate(zip(values, self.plants(values), strict=True)):
+            motion, lag = self._motion(plant, players[row.get(DEAD_TIME)]), row.get(FILTER, 0.0)
+            if lag > 0.0 and self.log.kind == "speed":
+                out[i] = filtered(self._fine, motion.at(self._fine)["w"][:, 0], lag)[::FINE]
+            elif self.log.kind == "speed":
+                out[i] = motion.at(self.times)["w"][:, 0]
+            else:
+                out[i] = motion.at(self.times)["phi"][:, 0] - motion.of_shafts(0)[0, 0]
         return out
 
-    def torque_responses(self, values: Mapping[str, float], plant: Vector | None = None) -> Matrix:
+    def torque_responses(self, values: Mapping[str, float], plant: Rows | None = None) -> Matrix:
         """How the signal moves, a column for each block of samples, per N m of error in the torque there.
 
         Scaled by 1/sqrt(samples in a block): with independent errors of the samples, the covariance of the
         signal is their variance times this matrix and its transpose. `plant` is the row of these values, if
         it is known.
         """
-        p, lag = self.plants([values])[0] if plant is None else plant, values.get(FILTER, 0.0)
-        dead_time, speed = values.get(DEAD_TIME, self.dead_time), self.log.kind == "speed"
+        plant, lag = self.plants([values])[0] if plant is None else plant, values.get(FILTER, 0.0)
+        knots, owners = self._knots(values)
+        speed = self.log.kind == "speed"
         smoothed = speed and lag > 0.0
-        found = torque_sensitivities(
-            p, self._segments(p, self.numbers(dead_time)), self.times + dead_time,
-            held=self.log.torque_is == "demand", block=self.block,
-            times=self._fine if smoothed else self.times, speed=speed,
-        )  # fmt: skip
+        found = self._motion(plant, self.player(values)).sensitivities(
+            knots, marks=self._fine if smoothed else self.times, owners=owners // self.block,
+            parts=slice(1, 2) if speed else slice(4, 5),
+        )[1][:, 0]  # fmt: skip
         if smoothed:
             found = filtered(self._fine, found.T, lag).T[::FINE]
         found /= math.sqrt(self.block)
         return found
 
-    def states(self, values: Mapping[str, float]) -> Matrix:
-        """The states at the samples, in the columns of `plant.record`."""
-        numbers = self.numbers(values.get(DEAD_TIME, self.dead_time))
-        return self._states(self.plants([values])[0], numbers)
+    def states(self, values: Mapping[str, float]) -> dict[str, Vector]:
+        """The states at the samples, as `Recorded.at` has them."""
+        return self.motion(values).at(self.times)
+
+    def motion(self, values: Mapping[str, float]) -> Recorded:
+        """The start under the torque of the log."""
+        return self._motion(self.plants([values])[0], self.player(values))
+
+    def _motion(self, plant: Rows, player: Controller) -> Recorded:
+        recorder = Recorder(plant, 0, 4 * self.times.size + 256)
+        reason = run_one(player, self.drive, recorder, float(self.times[-1]) * (1.0 + 1e-9))
+        if reason != ENDED:
+            raise SimulationError(f"The start of the log could not be computed (status {reason}).")
+        return recorder.finished()
 
     @property
     def _fine(self) -> Vector:
@@ -144,48 +161,16 @@ class LogModel:
         fine: Vector = np.interp(np.arange(FINE * (count - 1) + 1) / FINE, np.arange(count), self.times)
         return fine
 
-    def _signal(self, p: Vector, numbers: Vector, lag: float = 0.0) -> Vector:
-        if lag > 0.0 and self.log.kind == "speed":
-            return filtered(self._fine, self._states(p, numbers, self._fine)[:, record.W1_OUT], lag)[::FINE]
-        states = self._states(p, numbers)
-        if self.log.kind == "speed":
-            return states[:, record.W1_OUT].copy()
-        angle: Vector = states[:, record.PHI1_OUT] - p[at.index(at.PLANT, "theta_0")]
-        return angle
-
-    def _states(self, p: Vector, numbers: Vector, times: Vector | None = None) -> Matrix:
-        times = self.times if times is None else times
-        segments = self._segments(p, numbers)
-        starts = segments[:, at.index(at.SEGMENT, "start")]
-        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
-        out = np.empty((times.size, record.N_OUT))
-        record.states_at(p, segments, index, times, np.zeros(at.N_X), np.zeros(at.N_M), out)
-        return out
-
-    def _segments(self, p: Vector, numbers: Vector) -> Matrix:
-        """The spans of the motion; they hold until the next call."""
-        player, one = self.player, self.recorder
-        one.p = p
-        one.m[:] = 0.0
-        one.begin(float(self.times[-1]) * (1.0 + 1e-9))
-        memory, command = np.zeros(player.state_size), np.zeros(exchange.NEW_STATE + player.state_size)
-        while (reason := one.run(type(player).kernel, numbers, memory, command)) == at.BUFFER_FULL:
-            one.grow()
-        if reason != at.ENDED:
-            raise SimulationError(f"The start of the log could not be computed (status {reason}).")
-        return one.segments[: int(one.x[at.index(at.STATE, "n_segments")])]
-
     def travels(self, values: Sequence[Mapping[str, float]]) -> Matrix:
         """How far the load moves at most under each set of values, and how often the gap opens and closes.
 
         Seen at events and samples: exact for a reactive load, which turns at events only.
         """
-        numbers, found = self.numbers(self.dead_time), np.empty((len(values), 2))
-        for row, p in zip(found, self.plants(values), strict=True):
-            angles = self._segments(p, numbers)[:, at.S_PHI2]
-            last = float(self.recorder.x[at.PHI2])
-            row[0] = np.max(np.abs(np.append(angles, last) - angles[0]))
-            row[1] = self.recorder.x[at.GAP_EVENTS]
+        player, found = self.player({}), np.empty((len(values), 2))
+        for row, plant in zip(found, self.plants(values), strict=True):
+            motion = self._motion(plant, player)
+            angles = motion.states[:, S_PHI] - motion.of_shafts(0)[:, 0]
+            row[:] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
         return found
 
 
@@ -206,16 +191,3 @@ def filtered(time: Vector, signal: Vector, lag: float) -> Vector:
     for i, share in enumerate(kept.tolist()):
         out[..., i + 1] = value = share * value + pushed[..., i]
     return out
-
-
-def _recorder(samples: int) -> Recorder:
-    one = Recorder(np.zeros(at.N_P), 0)
-    rows = 4 * samples + 256
-    one.segments = np.zeros((rows, at.N_SEGMENT))
-    one.events = np.zeros((rows, at.N_EVENT))
-    one.stages = np.zeros((rows, at.N_STAGE))
-    return one
-
-
-def _player(profile: TorqueProfile) -> CompiledController:
-    return cast(CompiledController, make_controller("profile", {"profile": profile}))

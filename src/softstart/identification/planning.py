@@ -22,12 +22,11 @@ from softstart.identification.model import POSITION, LogModel
 from softstart.identification.result import CONFIDENCE
 from softstart.identification.traces import FEWEST, Kind
 from softstart.late import late
-from softstart.plant import layout as at
-from softstart.plant import record
 from softstart.profile import TorqueProfile
 from softstart.quantities import nearest, show, to_si
 from softstart.start.batch import array_starts
-from softstart.start.engine import MAX_EVENTS, ended
+from softstart.start.engine import ended
+from softstart.start.rows import MAX_EVENTS
 
 views = late("softstart.views.identification")  # above this module; see softstart.late
 
@@ -328,12 +327,12 @@ def made_up_log(
     played = demand + ripple * generator.standard_normal(time.size)
     model = LogModel(_demand(time, played, signal), _at_rest(drive))
     states = model.states({POSITION: position} if float(drive.gap) > 0.0 and _moving(drive) else {})
-    angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
+    angle = states["phi"][:, 0] - states["phi"][0, 0]
     count = 2.0 * math.pi / (4.0 * float(drive.encoder_lines)) if drive.encoder_lines else 0.0
     if count:
         angle = np.floor(angle / count + phase) * count
-    speed = states[:, record.W1_OUT] if not count else np.diff(angle, prepend=angle[0]) / log_period
-    torque = demand if torque_is == "demand" else states[:, record.U_OUT]
+    speed = states["w"][:, 0] if not count else np.diff(angle, prepend=angle[0]) / log_period
+    torque = demand if torque_is == "demand" else states["u"]
     values = {signal: speed if signal == "speed" else angle}
     return Log(time, torque, **values, torque_is=torque_is, name="made-up log")
 
@@ -464,8 +463,8 @@ class _Bench:
             + ([0.0] if self.signal == "angle" else [])
         )
         states = model.states(space.values(x, 0))
-        angle = states[:, record.PHI1_OUT] - states[0, record.PHI1_OUT]
-        vars(model.log)["values"] = angle if self.signal == "angle" else states[:, record.W1_OUT]
+        angle = states["phi"][:, 0] - states["phi"][0, 0]
+        vars(model.log)["values"] = angle if self.signal == "angle" else states["w"][:, 0]
         vars(model.log)["count"] = self.count if self.signal == "angle" else self.count / period
         fitter = Fitter([model], space)
         # a longer period stands for samples left out: the same error of the torque in each of them
@@ -492,9 +491,9 @@ class _Bench:
     def peaks(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
         """Peak of the shaft torque from each of these positions, and how often the gap opens and closes."""
         notes = array_starts(self._starts(places), _player(profile), until=end)
-        for x in notes:
-            ended(x, int(x[at.STATUS]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
-        return np.abs(notes[:, at.PEAK]), notes[:, at.GAP_EVENTS]
+        for one in notes.starts:
+            ended(one, int(one["status"]), end, MAX_EVENTS, f"Experiment of {end:.4g} s,")
+        return notes.peaks[:, 0], notes["gap_events"]
 
     def travels(self, profile: TorqueProfile, end: float, places: Vector) -> tuple[Vector, Vector]:
         """Travel of the load from each of these positions, and how often the gap opens and closes."""

@@ -1,13 +1,14 @@
 """How a recorded start answers to the torques of its demand: variational equations, exactly.
 
-The demand is linear between knots (two at one instant are a step), and column q belongs to the torque of
-knot q. Between two events the machine is linear, so that the sensitivity X of its state x (twists, speeds,
-realised motor torque) follows
+The demand is linear between knots (two at one instant are a step), and column q belongs to the torque of the
+knots that q owns. Between two events the machine is linear, so that the sensitivity X of its state x (twists, speeds,
+realised motor torque and, if it is asked for, angle of the motor) follows
 
-    X' = A X + B r        r: the sensitivity of the demand, a hat about knot q
+    X' = A X + B r        r: the sensitivity of the demand, a hat about each knot of q
 
 with the A of the span's modes; it goes from one end of a span to the other by the same Taylor series as the
-start itself. Knots are control instants, so that r is a line in each span. At an event the instant moves with
+start itself. Knots are control instants, so that r is a line in each span; while a demand that is constant is beyond the
+slew limiter, r stays as it was. At an event the instant moves with
 the torques, by dt = -dg/g' for the event function g, and
 
     X(+) = X(-) + (x'(-) - x'(+)) dt
@@ -34,21 +35,24 @@ from softstart.kernel.series import REACH, orders
 from softstart.kernel.start import rate_of
 
 Rows = NDArray[np.float64]
+Owners = NDArray[np.int64]
+_I = types.Array(types.int64, 1, "C")
 _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
 
 
 @compiled
-def transition(s: Record, h: float, n: int, series: Rows) -> None:
+def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
     """Taylor coefficients over a span of length h of the answers to a unit of each part of the state.
 
     `series[i, j]` is the answer of part i to part j: to twists, speeds, realised torque (if there is a lag),
-    a demand that is 1, and one that rises by 1 over the span. Part `size` is the demand itself.
+    angle of the motor (if `size` has room for it), a demand that is 1, and one that rises by 1 over the span.
+    Part `size` is the demand itself.
     """
     count = s.n
     joints = count - 1
-    size = joints + count + 1
+    motor = joints + count
     for j in range(size + 2):
         for i in range(size + 1):
             series[i, j, 0] = 0.0
@@ -63,11 +67,13 @@ def transition(s: Record, h: float, n: int, series: Rows) -> None:
         for o in range(n):
             share = h / (o + 1.0)
             if s.lag > 0.0:
-                u = series[size - 1, j, o]
-                series[size - 1, j, o + 1] = share * (series[size, j, o] - u) / s.lag
+                u = series[motor, j, o]
+                series[motor, j, o + 1] = share * (series[size, j, o] - u) / s.lag
             else:
                 u = series[size, j, o]
-                series[size - 1, j, o + 1] = 0.0
+                series[motor, j, o + 1] = 0.0
+            if size > motor + 1:
+                series[motor + 1, j, o + 1] = share * series[joints + s.at_motor, j, o]
             T = 0.0
             for i in range(count):
                 w = series[joints + i, j, o]
@@ -86,15 +92,18 @@ def transition(s: Record, h: float, n: int, series: Rows) -> None:
 
 
 @compiled
-def carried(series: Rows, n: int, x: float, size: int, X: Rows, hat: Rows, active: int, into: Rows) -> None:
-    """X after the share x of the span, into `into`; columns from `active` on have not begun."""
-    for i in range(size):
+def carried(
+    series: Rows, n: int, x: float, X: Rows, hat: Rows, active: int, first: int, into: Rows
+) -> None:  # fmt: skip
+    """X after the share x of the span, its rows from `first` on, into `into`; later columns have not begun."""
+    size = X.shape[0]
+    for i in range(into.shape[0]):
         for q in range(active):
             into[i, q] = 0.0
         for j in range(size + 2):
-            share = series[i, j, n]
+            share = series[first + i, j, n]
             for o in range(n - 1, -1, -1):
-                share = share * x + series[i, j, o]
+                share = share * x + series[first + i, j, o]
             if share == 0.0:
                 continue
             for q in range(active):
@@ -112,7 +121,7 @@ def carried_torque(
     if c == 0.0:
         return
     w = s.n - 1 + k
-    size = 2 * s.n
+    size = X.shape[0]
     for j in range(size + 2):
         share = 0.0
         for o in range(n, -1, -1):
@@ -124,26 +133,26 @@ def carried_torque(
 
 
 @compiled
-def demand_hats(knots: Vector, t: float, h: float, hat: Rows) -> int:
-    """The hats at t and their rise until t + h; returns how many columns have begun."""
+def demand_hats(s: Record, knots: Vector, owners: Owners, at: int, t: float, h: float, hat: Rows) -> int:
+    """The hats at t and their rise until t + h; returns the knot before, sought from `at` on."""
     middle = t + 0.5 * h
     last = knots.shape[0] - 1
-    at = 0
     while at < last and knots[at + 1] <= middle:
         at += 1
-    for q in range(at + 1):
-        hat[0, q] = 0.0
-        hat[1, q] = 0.0
-    if at == last:
-        hat[0, at] = 1.0
-        return at + 1
-    length = knots[at + 1] - knots[at]
-    share = (t - knots[at]) / length
-    hat[0, at] = 1.0 - share
-    hat[1, at] = -h / length
-    hat[0, at + 1] = share
-    hat[1, at + 1] = h / length
-    return at + 2
+    q, after = owners[at], owners[min(at + 1, last)]
+    limited = q == after and abs(s.slope) == s.rate  # by the slew limiter: the demand does not rise by itself
+    for p in range(after + 1):
+        hat[0, p] = hat[0, p] + hat[1, p] if limited else 0.0
+        hat[1, p] = 0.0
+    if limited:
+        return at
+    share = 0.0 if at == last else max(t - knots[at], 0.0) / (knots[at + 1] - knots[at])
+    rise = 0.0 if at == last or middle < knots[0] else h / (knots[at + 1] - knots[at])
+    hat[0, q] += 1.0 - share
+    hat[0, after] += share
+    hat[1, q] -= rise
+    hat[1, after] += rise
+    return at
 
 
 @compiled
@@ -182,21 +191,23 @@ def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> N
             X[joints + i, q] *= kept
 
 
-@compiled_as(types.void(_A, _M, _M, _M, _A, _A, _T, _A, _T, _M, _M, _M, _M, _T))
+@compiled_as(types.void(_A, _M, _M, _M, _A, _I, _A, _T, _A, types.int64, _T, _M, _M, _M, _M, _T))
 def sensitivities(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, knots: Vector, times: Vector, torques: Rows,
-    marks: Vector, states: Rows, X: Rows, next_X: Rows, hat: Rows, rates: Rows, series: Rows,
+    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, knots: Vector, owners: Owners, times: Vector,
+    torques: Rows, marks: Vector, first: int, states: Rows, X: Rows, next_X: Rows, hat: Rows, rates: Rows, series: Rows,
 ) -> None:  # fmt: skip
-    """Of a recorded start: d T_k(times[j])/d u_q into torques[j, k, q], dX(marks[j]) into states[j].
+    """Of a recorded start: d T_k(times[j])/d u_q into torques[j, k, q], X(marks[j]) into states[j].
 
-    `times` and `marks` rise and lie within the run. At an event the value is the one after it. The arrays
+    Knot k belongs to column `owners[k]`, which rise. Of X are given the rows from `first` on. `times` and `marks` rise and lie within the run. At an event the value is the one after it. The arrays
     behind `states` are scratch.
     """
     s = work.view(WORK)[0]
     count = s.n
     joints = count - 1
-    size = joints + count + 1
-    columns = knots.shape[0]
+    size = X.shape[0]
+    columns = X.shape[1]
+    motor = joints + count - first
+    knot = 0
     for i in range(size):
         for q in range(columns):
             X[i, q] = 0.0
@@ -222,27 +233,25 @@ def sensitivities(
         parts = int(rate * length / REACH) + 1
         h = length / parts
         n = min(orders(rate * h), ORDERS - 2)
-        transition(s, h, n, series)
+        transition(s, h, n, size, series)
         for part in range(parts):
             t = start + part * h
-            active = demand_hats(knots, t, h, hat)
+            knot = demand_hats(s, knots, owners, knot, t, h, hat)
+            active = owners[min(knot + 1, knots.shape[0] - 1)] + 1
             ends = row == rows - 1 and part == parts - 1
             until = end if part == parts - 1 else t + h
             while mark < marks.shape[0] and (marks[mark] < until or ends):
                 x = (marks[mark] - t) / h
-                carried(series, n, x, size, X, hat, active, next_X)
-                for i in range(size):
-                    for q in range(columns):
-                        states[mark, i, q] = next_X[i, q] if q < active else 0.0
-                if s.lag == 0.0:
+                carried(series, n, x, X, hat, active, first, states[mark])
+                if s.lag == 0.0 and 0 <= motor < states.shape[1]:
                     for q in range(active):
-                        states[mark, size - 1, q] = hat[0, q] + hat[1, q] * x
+                        states[mark, motor, q] = hat[0, q] + hat[1, q] * x
                 mark += 1
             while j < times.shape[0] and (times[j] < until or ends):
                 for k in range(joints):
                     carried_torque(s, k, series, n, (times[j] - t) / h, X, hat, active, torques, j)
                 j += 1
-            carried(series, n, 1.0, size, X, hat, active, next_X)
+            carried(series, n, 1.0, X, hat, active, 0, next_X)
             for i in range(size):
                 for q in range(active):
                     X[i, q] = next_X[i, q]

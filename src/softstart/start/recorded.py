@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.kernel import records as at
-from softstart.kernel import replay, start
+from softstart.kernel import replay, sensitivity, start
 from softstart.kernel.motor import N_MEASURED
 from softstart.start.rows import Rows
 
@@ -151,6 +151,32 @@ class Recorded:
         place = int(self.rows.machine.motor)
         phi = motor[:, :1] + before - before[:, place : place + 1]
         return {"phi": phi, "w": w, "twist": twist, "T": T, "u": motor[:, 1].copy()}
+
+    def sensitivities(
+        self, knots: ArrayLike, times: ArrayLike = (), marks: ArrayLike = (), owners: ArrayLike | None = None,
+        parts: slice = slice(None, -1),
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+        """Of the torques of shafts at rising instants, and of the state at rising `marks`, to a demand's torques.
+
+        The demand is linear between its knots; a last axis is of them, or of those who own them, which rise.
+        The `parts` of the state are twists, speeds, realised torque of the motor, and its angle.
+        """
+        when, begin = (np.ascontiguousarray(one, dtype=np.float64) for one in (times, marks))
+        given = np.ascontiguousarray(knots, dtype=np.float64)
+        own = np.arange(given.size) if owners is None else np.ascontiguousarray(owners, dtype=np.int64)
+        count, columns = self.rows.count, int(own[-1]) + 1
+        first, end, _ = parts.indices(2 * count + 1)
+        size = max(end, 2 * count)
+        torques, states = (
+            np.zeros((when.size, count - 1, columns)),
+            np.zeros((begin.size, end - first, columns)),
+        )
+        sensitivity.sensitivities(
+            *self._loaded(), np.ascontiguousarray(self.spans), given, own, when, torques, begin, first, states,
+            np.zeros((size, columns)), np.zeros((size, columns)), np.zeros((2, columns)), np.zeros((2, count)),
+            np.zeros((size + 1, size + 2, at.ORDERS)),
+        )  # fmt: skip
+        return torques, states
 
     def work(self) -> Vector:
         """Work in J of motor, exciting torques, loads, friction, shafts, gears, and change of elastic energy."""
