@@ -54,7 +54,7 @@ layers: $(VENV)/.installed-dev
 floors: $(FLOORS)/.installed
 	OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR=$(CURDIR)/$(FLOORS)/kernels $(FLOORS)/bin/softstart compare
 	OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR=$(CURDIR)/$(FLOORS)/kernels $(FLOORS)/bin/python -m pytest -q --few-kernels -W default \
-		tests/softstart/drive tests/softstart/plant/test_anchors.py tests/softstart/test_documents.py \
+		tests/softstart/drive tests/softstart/kernel/test_anchors.py tests/softstart/test_documents.py \
 		tests/softstart/test_profile.py tests/softstart/test_quantities.py tests/softstart/test_store.py \
 		tests/validation/test_gerasymiak_subbotin.py
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 SOURCES = {"src": "softstart", "controllers": "controllers", "studies": "studies"}
-ANCHORS = "tests/softstart/plant/test_anchors.py"
+ANCHORS = "tests/softstart/kernel/test_anchors.py"
 
 
 def git(*words: str) -> list[str]:

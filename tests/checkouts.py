@@ -1,14 +1,17 @@
-"""Compare two checkouts of softstart: every number must be equal to the bit.
+"""Compare two checkouts of softstart, number by number.
 
-    python tests/checkouts.py OLD NEW                   compare all parts
-    python tests/checkouts.py OLD NEW --only starts,optima
+    python tests/checkouts.py OLD NEW                   every number must be equal
+    python tests/checkouts.py OLD NEW --rtol 1e-9       where arithmetic changes
+    python tests/checkouts.py OLD NEW --only starts optima
     python tests/checkouts.py OLD NEW --speed           how long the new one takes, as a ratio
     python tests/checkouts.py --list                    what is compared
 
 Each part runs in a process of its own for each checkout, with that checkout's sources first on the path, and
 uses nothing but the names in `softstart.__all__` and the commands, so that it outlives any change of layout.
-Floats are compared as hexadecimal text, arrays by a checksum of their bytes, written tables (CSV, TOML)
-by their text. Nothing is stored. Computing times and versions are left out. Exit code 1 if anything differs.
+A difference is relative to the value, or to the largest of the array that it stands in, or to 1e-3 in SI
+units if that is more. Traces are taken at the same 101 instants of both runs; texts and written tables (CSV,
+TOML) are compared number by number too. Every larger difference is listed, the largest first, those of one
+array in one line. Nothing is stored. Computing times and versions are left out. Exit code 1 if any is listed.
 """
 
 from __future__ import annotations
@@ -16,77 +19,82 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import hashlib
 import io
 import json
+import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 Values = Iterator[tuple[str, Any]]
+Compared = tuple[str, Any, Any, float]
 ROOTS = ("src", "controllers", "studies")
 DRIVES = (
-    "crane-4amtkf",
-    "crane-4amtkf-light",
-    "crane-4amtkf-worn",
-    "crane-4amtkf-light-worn",
-    "nordin-servo-60kw",
-    "servo-axis-small",
-    "hoist-15kw",
-    "conveyor-11kw",
-    "long-travel-3kw",
-)
+    "crane-4amtkf", "crane-4amtkf-light", "crane-4amtkf-worn", "crane-4amtkf-light-worn", "nordin-servo-60kw",
+    "servo-axis-small", "hoist-15kw", "conveyor-11kw", "long-travel-3kw",
+)  # fmt: skip
 CHAINS = ("crane-4-mass", "tractor-like")
 CLUTCHES = ("paper-c", "tractor-pto")
 LAWS = ("linear", "quadratic-concave", "quadratic-convex", "exponential")
 # keys of results that say how long a computer took, or on what it ran
 UNCOMPARED = {"seconds", "elapsed", "computing_time", "duration_of_search", "time_taken", "python", "version"}
-TRACES = ("t", "phi1", "phi2", "w1", "w2", "u", "T")
-CHAIN_TRACES = ("t", "phi", "w", "twist", "T", "u")
+NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
+SMALL = 1e-3  # smaller values are compared as if they were so large
 
 
-def ready(names: Sequence[str] = ()) -> list[str]:
+def ready() -> list[str]:
     """The shipped controllers that need no parameter."""
     listed = json.loads(command("controllers", "--json")[1])["controllers"]
-    return [one["name"] for one in listed if one["name"] != "profile" and (not names or one["name"] in names)]
+    return [one["name"] for one in listed if one["name"] != "profile"]
+
+
+def instants(end: float) -> np.ndarray:
+    """Up to the end, which may differ in its last digits, and off the instants at which controllers act."""
+    return np.linspace(0.0, 0.99731 * float(f"{end:.6g}"), 101)
+
+
+def run_of(label: str, start: Callable[[], Any]) -> Values:
+    """Summary, events and traces of one start, or its refusal."""
+    run = outcome(start)
+    if isinstance(run, str):
+        yield label, run
+        return
+    yield label, run.summary()
+    yield f"{label} events", [[event.time, event.kind] for event in run.events]
+    yield f"{label} traces", run.at(instants(run.end_time))
 
 
 def starts() -> Values:
-    """Each shipped drive under each controller: one start with its traces, a batch, and the plain twin."""
+    """Each shipped drive under each controller: one start with its traces, and a batch of 45."""
     from softstart import Drive, simulate
-    from softstart.controller import make_controller
-    from softstart.drive import library
 
-    for name in sorted({*DRIVES} & {*library.names()}, key=DRIVES.index):  # an older checkout has fewer
+    for name in DRIVES:
         drive = Drive.load(name)
+        gaps, inertias = np.linspace(0.0, 4.0, 9) * drive.gap, np.geomspace(0.4, 2.5, 5) * drive.J2
+        others = [drive.replace(gap=float(g), load_inertia=float(J2)) for g in gaps for J2 in inertias]
         for controller in ready():
-            run = simulate(drive, controller)
-            yield f"{name} {controller}", run.summary()
-            for trace in TRACES:
-                yield f"{name} {controller} {trace}", getattr(run, trace)
-            yield f"{name} {controller} events", [(e.time, e.kind) for e in run.events]
-            gaps = np.linspace(0.0, 4.0, 9)[:, None] * float(drive.gap)
-            inertias = np.geomspace(0.4, 2.5, 5) * float(drive.J2)
-            batch = simulate(drive.replace(gap=gaps, load_inertia=inertias), controller, fitted_to=drive)
-            for key, values in batch.data_vars.items():
-                yield f"{name} {controller} batch {key}", values.values
+            label = f"{name} {controller}"
+            yield from run_of(label, lambda d=drive, k=controller: simulate(d, k))
+            for key, values in simulate(others, controller, fitted_to=drive).data_vars.items():
+                yield f"{label} batch {key}", values.values
     drive = Drive.load("crane-4amtkf").replace(torque_lag=0.004, damping=1.5, load_kind="reactive")
-    for controller in ready():
-        yield f"lag {controller}", simulate(drive, controller).summary()
-        made = make_controller(controller)
-        if hasattr(made, "as_plain"):
-            yield f"plain {controller}", simulate(drive, made.as_plain(drive)).summary()
+    others = [("lag", drive)]
     for law in ("no-pull", "dead-zone", "modelica"):
-        other = drive.replace(contact_law=law, encoder_lines=1024, torque_noise=0.2, computing_delay=5e-4)
+        changes = {"contact_law": law, "encoder_lines": 1024, "torque_noise": 0.2, "computing_delay": 5e-4}
+        with contextlib.suppress(ValueError):  # a law that one of the two does not have
+            others.append((law, drive.replace(**changes)))
+    for label, other in others:
         for controller in ready():
-            yield f"{law} {controller}", simulate(other, controller).summary()
+            yield from run_of(f"{label} {controller}", lambda d=other, k=controller: simulate(d, k))
 
 
 def optima() -> Values:
@@ -142,8 +150,10 @@ def robust() -> Values:
 
 def chains() -> Values:
     """Shipped chains: vibration, reduction, starts with traces, verification."""
-    from softstart import Chain, natural_vibration, reduce_chain, simulate, verify_on_chain
+    import softstart
+    from softstart import Chain, natural_vibration, reduce_chain, verify_on_chain
 
+    start: Any = getattr(softstart, "simulate_chain", softstart.simulate)  # one word for both, later
     for name in CHAINS:
         chain = Chain.load(name)
         yield f"{name} toml", chain.to_toml()
@@ -151,15 +161,9 @@ def chains() -> Values:
         for method in ("lever", "modal"):
             yield f"{name} {method}", outcome(lambda c=chain, m=method: reduce_chain(c, method=m).summary())
         for controller in ready():
-            run = outcome(lambda c=chain, k=controller: simulate(c, k))
-            if isinstance(run, str):
-                yield f"{name} {controller}", run
-                continue
-            yield f"{name} {controller}", run.summary()
-            for trace in CHAIN_TRACES:
-                yield f"{name} {controller} {trace}", getattr(run, trace)
+            yield from run_of(f"{name} {controller}", lambda c=chain, k=controller: start(c, k))
     crane = Chain.load("crane-4-mass")
-    drive = reduce_chain(crane).to_drive()
+    drive = reduce_chain(crane, method="modal").to_drive()
     for controller in ("direct", "ramp"):
         yield f"verification {controller}", verify_on_chain(crane, drive, controller).summary()
 
@@ -174,7 +178,7 @@ def machines() -> Values:
         for law in LAWS:
             run = engage(clutch.replace(law=law))
             yield f"{name} {law}", run.summary()
-            yield f"{name} {law} traces", run.at(run.t)
+            yield f"{name} {law} traces", run.at(instants(run.t[-1]))
     yield "optimal laws", optimize_engagement(Clutch.load("paper-c"), points=4).summary()
     engine = Engine.load("vaz-11113")
     yield "engine toml", engine.to_toml()
@@ -253,26 +257,20 @@ PARTS: dict[str, Callable[[], Values]] = {
 
 def speed() -> Values:
     """Least time in s of three runs of each: batches of starts, single starts, chains."""
-    from softstart import Chain, Drive, simulate, simulate
+    import softstart
+    from softstart import Chain, Drive, simulate
 
-    crane = Drive.load("crane-4amtkf")
-    chain = Chain.load("crane-4-mass")
-    damped = crane.replace(damping=1.5)
-
-    def batch(drive: Drive, starts: int) -> Drive:
-        return drive.replace(gap=np.linspace(0.1, 2.0, starts))
-
+    start: Any = getattr(softstart, "simulate_chain", simulate)
+    crane, chain = Drive.load("crane-4amtkf"), Chain.load("crane-4-mass")
+    damped = crane.replace(damping=1.5, torque_lag=0.002)
     work: dict[str, Callable[[], Any]] = {
-        "batch direct": lambda: simulate(batch(crane, 100_000), "direct"),
-        "batch direct, damped": lambda: simulate(batch(damped, 10_000), "direct"),
         "start direct": lambda: [simulate(crane, "direct") for _ in range(200)],
-        "start ramp with traces": lambda: [simulate(crane, "ramp").T for _ in range(20)],
-        "chain direct": lambda: [simulate(chain, "direct") for _ in range(3)],
-        "chain ramp": lambda: [simulate(chain, "ramp") for _ in range(3)],
+        "chain ramp": lambda: [start(chain, "ramp") for _ in range(3)],
     }
-    for name in ready():
-        if name != "direct":
-            work[f"batch {name}"] = lambda k=name: simulate(batch(crane, 1500), k)
+    for label, drive in (("batch", crane), ("batch damped", damped)):
+        drives = [drive.replace(gap=gap) for gap in np.linspace(0.1, 2.0, 500).tolist()]
+        for name in ready():
+            work[f"{label} {name}"] = lambda d=drives, k=name, f=drive: simulate(d, k, fitted_to=f)
     for label, run in work.items():
         run()  # compiled and loaded
         times = []
@@ -288,12 +286,10 @@ def race(old: Path, new: Path, rounds: int = 4) -> int:
     least: list[dict[str, float]] = [{}, {}]
     for turn in range(rounds):
         for which in (0, 1) if turn % 2 else (1, 0):
-            text = run_part((old, new)[which], "speed").communicate()[0]
-            for label, value in map(json.loads, text.splitlines()):
-                took = float.fromhex(value)
+            for label, took in results_of([(old, new)[which]], "speed")[0].items():
                 least[which][label] = min(took, least[which].get(label, took))
     for label, before in least[0].items():
-        print(f"{label:28} {before:9.4f} s {least[1][label]:9.4f} s  ratio {before / least[1][label]:.3f}")
+        print(f"{label:32} {before:9.4f} s {least[1][label]:9.4f} s  ratio {before / least[1][label]:.3f}")
     return 0
 
 
@@ -315,92 +311,97 @@ def command(*words: str) -> tuple[int, str]:
     return code, out.getvalue() if code in (0, 3) else err.getvalue()
 
 
-def frozen(value: Any) -> Any:
-    """`value` as JSON in which equal text means equal bits."""
+def plain(value: Any) -> Any:
+    """`value` as JSON: floats keep all their bits."""
     if isinstance(value, str):
         with contextlib.suppress(ValueError):
             if value.lstrip().startswith("{"):
-                return frozen(json.loads(value))
+                return plain(json.loads(value))
         return value
-    if isinstance(value, bool | int | None):
+    if isinstance(value, bool | int | float | None):
         return value
-    if isinstance(value, float):
-        return float(value).hex()
     if isinstance(value, np.generic):
-        return frozen(value.item())
+        return plain(value.item())
     if isinstance(value, np.ndarray):
-        if value.dtype == object or value.dtype.kind in "US":
-            return frozen(value.tolist())
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        about = float(np.nansum(value)).hex() if value.dtype.kind == "f" else ""
-        return f"{value.dtype} {value.shape} {digest} sum {about}"
+        return {"shape": list(value.shape), "": plain(value.ravel().tolist())}
     if isinstance(value, Mapping):
-        return {str(k): frozen(v) for k, v in value.items() if str(k) not in UNCOMPARED}
+        return {str(k): plain(v) for k, v in value.items() if str(k) not in UNCOMPARED}
     if isinstance(value, list | tuple):
-        return [frozen(one) for one in value]
+        return [plain(one) for one in value]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return frozen({f.name: getattr(value, f.name) for f in dataclasses.fields(value)})
+        return plain({f.name: getattr(value, f.name) for f in dataclasses.fields(value)})
     return str(value)
 
 
-def run_part(checkout: Path, part: str) -> subprocess.Popen[str]:
-    """Start one part on one checkout; its standard output holds one JSON line for each value."""
-    path = os.pathsep.join(str(checkout / root) for root in ROOTS)
-    environment = os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"}
-    words = [sys.executable, str(Path(__file__).resolve()), "--part", part]
-    return subprocess.Popen(words, env=environment, cwd="/", stdout=subprocess.PIPE, text=True)
+def results_of(checkouts: Sequence[Path], part: str) -> list[dict[str, Any]]:
+    """The results of one part on each of the checkouts, which run side by side."""
+
+    def results(checkout: Path) -> dict[str, Any]:
+        path = os.pathsep.join(str(checkout / root) for root in ROOTS)
+        environment = os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100"}
+        words = [sys.executable, str(Path(__file__).resolve()), "--part", part]
+        run = subprocess.run(words, env=environment, cwd="/", stdout=subprocess.PIPE, text=True, check=False)
+        found = dict(map(json.loads, run.stdout.splitlines()))
+        return found | ({"exit code": f"{run.returncode} on {checkout}"} if run.returncode else {})
+
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(results, checkouts))
 
 
-def differences(old: Any, new: Any, where: str = "") -> Iterator[str]:
-    """The places at which two frozen values differ."""
+def numeric(value: Any) -> bool:
+    """Whether `value` is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def compared(old: Any, new: Any, place: str = "", scale: float = SMALL) -> Iterator[Compared]:
+    """Each value: its place, the old one, the new one, and how large the difference is in relative terms.
+
+    >>> [one[3] for one in compared([0.0, 100.0], [0.5, 100.0])]
+    [0.005, 0.0]
+    """
     if isinstance(old, dict) and isinstance(new, dict):
         for key in {**old, **new}:
-            if key not in old or key not in new:
-                yield f"{where}.{key}: only in the {'old' if key in old else 'new'} checkout"
-            else:
-                yield from differences(old[key], new[key], f"{where}.{key}")
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for index, (one, other) in enumerate(zip(old, new, strict=True)):
-            yield from differences(one, other, f"{where}[{index}]")
-    elif old != new:
-        yield f"{where}: {_shown(old)} -> {_shown(new)}"
+            yield from compared(old.get(key, "(none)"), new.get(key, "(none)"), f"{place}.{key}")
+    elif isinstance(old, list) and isinstance(new, list):
+        if len(old) != len(new):
+            yield place, f"{len(old)} values", f"{len(new)} values", math.inf
+        else:
+            largest = max((abs(v) for v in (*old, *new) if numeric(v)), default=0.0)
+            for index, (one, other) in enumerate(zip(old, new, strict=True)):
+                yield from compared(one, other, f"{place}[{index}]", max(largest, SMALL))
+    elif numeric(old) and numeric(new):
+        yield place, old, new, abs(old - new) / max(scale, abs(old), abs(new))
+    elif isinstance(old, str) and isinstance(new, str) and NUMBER.split(old) == NUMBER.split(new):
+        for one, other in zip(NUMBER.findall(old), NUMBER.findall(new), strict=True):
+            yield from compared(float(one), float(other), place)
+    else:
+        same = old == new or repr(old) == repr(new)  # both are not a number
+        yield place, old, new, 0.0 if same else math.inf
 
 
-def _shown(value: Any) -> str:
-    text = str(value)
-    with contextlib.suppress(ValueError):
-        if isinstance(value, str) and "0x" in value and "sum" not in value:
-            return repr(float.fromhex(value))
-    return text if len(text) < 300 else text[:300] + " ..."
-
-
-def compare(old: Path, new: Path, parts: Sequence[str]) -> int:
-    """Run the parts on both checkouts, side by side, and print what differs; returns how many do."""
-    bad = total = 0
+def compare(old: Path, new: Path, parts: Sequence[str], rtol: float) -> int:
+    """Run the parts on both checkouts and print each difference above `rtol`; returns how many there are."""
+    listed: dict[str, tuple[float, str, int]] = {}
     for part in parts:
-        begun = time.monotonic()
-        runs = [run_part(checkout, part) for checkout in (old, new)]
-        texts = [run.communicate()[0] for run in runs]
-        for checkout, run in zip((old, new), runs, strict=True):
-            if run.returncode != 0:
-                print(f"{part}: failed on {checkout} with exit code {run.returncode}")
-                bad += 1
-        found = [dict(json.loads(line) for line in text.splitlines()) for text in texts]
-        differing = [
-            f"{part}: {label}{place}"
-            for label in {**found[0], **found[1]}
-            for place in differences(found[0].get(label), found[1].get(label))
-        ]
-        for line in differing[:40]:
-            print(line)
-        if len(differing) > 40:
-            print(f"{part}: and {len(differing) - 40} more")
-        bad += len(differing)
-        total += len(found[0])
+        begun, values, within, above = time.monotonic(), 0, 0.0, 0
+        before, after = results_of((old, new), part)
+        for place, one, other, size in compared(before, after, part):
+            values += 1
+            if size <= rtol:
+                within = max(within, size)
+                continue
+            above += 1
+            name = re.sub(r"\[\d+\]", "", place)
+            largest, line, count = listed.get(name, (-1.0, "", 0))
+            if size > largest:
+                largest, line = size, f"{place}: {str(one)[:200]} -> {str(other)[:200]}"
+            listed[name] = largest, line, count + 1
         took = time.monotonic() - begun
-        print(f"{part}: {len(found[0])} results, {len(differing)} differences, {took:.0f} s", flush=True)
-    print(f"{total} results compared, {bad or 'none'} different")
-    return bad
+        print(f"{part}: {len(before)} results, {values} values, {above} differ by more than", end=" ")
+        print(f"{rtol:g}, the others by {within:.1e} at most, {took:.0f} s", flush=True)
+    for size, line, count in sorted(listed.values(), reverse=True):
+        print(f"{size:9.1e}  {line}" + (f" (largest of {count})" if count > 1 else ""))
+    return len(listed)
 
 
 def main() -> int:
@@ -408,7 +409,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("old", nargs="?", type=Path)
     parser.add_argument("new", nargs="?", type=Path)
-    parser.add_argument("--only", default=",".join(PARTS), help="parts, with commas between")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts", metavar="PART")
+    parser.add_argument("--rtol", type=float, default=0.0, help="relative difference that is no difference")
     parser.add_argument("--speed", action="store_true", help="compare times instead of numbers")
     parser.add_argument("--list", action="store_true", help="what is compared")
     parser.add_argument("--part", help=argparse.SUPPRESS)
@@ -417,7 +419,7 @@ def main() -> int:
         out = sys.stdout
         with contextlib.redirect_stdout(sys.stderr):
             for label, value in (PARTS | {"speed": speed})[given.part]():
-                out.write(json.dumps([label, frozen(value)]) + "\n")
+                out.write(json.dumps([label, plain(value)]) + "\n")
         return 0
     if given.list:
         for name, part in PARTS.items():
@@ -425,12 +427,9 @@ def main() -> int:
         return 0
     if given.old is None or given.new is None:
         parser.error("give two checkouts: OLD NEW")
-    unknown = [part for part in given.only.split(",") if part not in PARTS]
-    if unknown:
-        parser.error(f"--only: no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
     if given.speed:
         return race(given.old.resolve(), given.new.resolve())
-    return int(compare(given.old.resolve(), given.new.resolve(), given.only.split(",")) > 0)
+    return int(compare(given.old.resolve(), given.new.resolve(), given.only, given.rtol) > 0)
 
 
 if __name__ == "__main__":

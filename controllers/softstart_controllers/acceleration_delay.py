@@ -12,7 +12,7 @@ from softstart import formulas
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart_controllers.reduced import (
     RAISE_AT,
     closing_speed,

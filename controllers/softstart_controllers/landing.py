@@ -32,7 +32,7 @@ import numpy as np
 from softstart.controller.compiled import Vector, compiled, record
 from softstart.drive import Drive
 from softstart.kernel.jit import compiled
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
 from softstart_controllers.sampled import mean_torque, number, patience, pulling_load, sample_period

@@ -11,7 +11,7 @@ import numpy as np
 from softstart.controller import CompiledController, Effort, parameter, stack
 from softstart.controller.compiled import Vector, size
 from softstart.drive import Drive
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart_controllers.pulse_coast_hold_step import RING, STATE, step
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,

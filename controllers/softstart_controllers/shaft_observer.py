@@ -13,7 +13,7 @@ from numba import njit
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart_controllers.design_store import kept
 from softstart_controllers.sampled import number
 

@@ -12,7 +12,7 @@ from softstart.controller import CompiledController, Effort, compiled_step, para
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.kernel.jit import compiled
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains

@@ -18,13 +18,9 @@ from softstart.formulas import DirectStarts, contact_stage, open_stage, two_stag
 CRANE = {"J1": 0.035, "J2": 0.175, "c": 368.465, "gap": 0.5, "Ms": 62.0, "Mc": 7.16}
 
 
-def four_decades(middle: float) -> st.SearchStrategy[float]:
-    return st.floats(-2.0, 2.0).map(lambda power: middle * 10.0**power)
-
-
-MIDDLES = {"J1": 0.1, "J2": 0.1, "c": 300.0, "gap": 0.3, "Ms": 50.0}
+MIDDLES = {"J1": 0.1, "J2": 0.1, "c": 300.0, "gap": 0.3, "Ms": 50.0}  # of four decades
 drives = st.fixed_dictionaries(
-    {name: four_decades(middle) for name, middle in MIDDLES.items()}
+    {name: st.floats(-2.0, 2.0).map(lambda power, m=m: m * 10.0**power) for name, m in MIDDLES.items()}
     | {"share": st.floats(0.0, 0.95), "r": st.floats(0.05, 1.0)}
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -58,6 +59,20 @@ def gauss(seed: float, number: float) -> float:
     b = _mixed(start + _2 * _INCREMENT)
     radius = math.sqrt(-2.0 * math.log((float(a >> _11) + 0.5) * _UNIT))
     return radius * math.cos(2.0 * math.pi * float(b >> _11) * _UNIT)
+
+
+COUNTS_PER_LINE = 4  # quadrature
+
+
+def encoder_count(lines: Any) -> Any:
+    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
+
+    >>> round(encoder_count(4096) * 1e6, 2)
+    383.5
+    """
+    lines = np.asarray(lines, dtype=np.float64)
+    count = np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * np.maximum(lines, 1.0)), 0.0)
+    return count if count.ndim else float(count)
 
 
 # the demand -----------------------------------------------------------------------------------------

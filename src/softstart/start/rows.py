@@ -14,26 +14,15 @@ from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.kernel import records as at
+from softstart.kernel.motor import encoder_count
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain, ChainArrays
 
 LAWS: Final = {"no-pull": at.NO_PULL, "dead-zone": at.DEAD_ZONE, "modelica": at.MODELICA}
-COUNTS_PER_LINE: Final = 4  # quadrature
 LONGEST: Final = 100_000  # elastic periods of one start
 MAX_EVENTS: Final = 1_000_000  # events and control instants of one start
 SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
-
-
-def encoder_count(lines: Any) -> Any:
-    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
-
-    >>> round(encoder_count(Drive.load("crane-4amtkf").encoder_lines) * 1e6, 2)
-    383.5
-    """
-    lines = np.asarray(lines, dtype=np.float64)
-    count = np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * np.maximum(lines, 1.0)), 0.0)
-    return count if count.ndim else float(count)
 
 
 @dataclass(frozen=True, eq=False)
