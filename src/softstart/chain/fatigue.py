@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from softstart.arrays import Matrix, Vector
+from softstart.arrays import Matrix
 from softstart.chain.model import Chain
-from softstart.start.run import Run
-from softstart.start.simulation import simulate
 from softstart.drive import SNCurve
 from softstart.errors import InputError
 from softstart.start.fatigue import DEFAULT_SLOPE, STILL, life_ratio, miner, rainflow_cycles, read_slope
 from softstart.start.metrics import REFERENCE
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 
 @dataclass(frozen=True, eq=False)

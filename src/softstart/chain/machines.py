@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.start.batch import prepared
 from softstart.chain.elements import START, TOP, Shaft
 from softstart.chain.model import Chain, load_machine
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
-from softstart.start.batch import Figures, array_starts, figures
+from softstart.start.batch import Figures, array_starts, figures, prepared
 
 Machine = Drive | Chain
 Values = dict[str, tuple[Parameter, Any]]  # by path

@@ -42,7 +42,6 @@ from softstart.input.files import ABSENT, read_text, refusal_of
 from softstart.input.parameters import Wording
 from softstart.quantities import RefusedError, nearest, show
 
-
 BRANCHES = (
     "A mass with more than two shafts, a branched train, is not covered: add a stiff branch (its inertia "
     "times the square of its speed ratio) to the mass that it leaves, or make one of equal branches, whose "

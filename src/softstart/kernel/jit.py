@@ -48,9 +48,7 @@ def drop_stale(sources: Iterable[Path], needed: Iterable[Path] = ()) -> None:
     files = set(sources)
     try:
         cached = [
-            one
-            for file in files
-            for one in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]")
+            one for file in files for one in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]")
         ]
         if not cached:
             return

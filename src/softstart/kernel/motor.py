@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from softstart.arrays import Vector
 from softstart.kernel.jit import compiled
 from softstart.kernel.records import (
     ASK, BAD_COMMAND, MEASURED, MOST_PENDING, QUEUE_FULL, Record, size,

@@ -282,9 +282,7 @@ class Answer:
     slope: float
 
 
-_WHOLE = (
-    "n at_motor at_load path path_end motor_shaft first stuck rubbing gears curve piece passed mode zeros"
-)  # numbers that are counted
+_WHOLE = "n at_motor at_load path path_end motor_shaft first stuck rubbing gears curve piece passed mode zeros"  # numbers that are counted
 
 
 def _parts() -> dict[str, Any]:
@@ -301,7 +299,9 @@ MACHINE, MASS, SHAFT, TONE = record(Machine), record(Mass), record(Shaft), recor
 CURVE = record(Curve, at=MOST_POINTS, torque=MOST_POINTS)
 NOTES, SHAFT_NOTES, EVENT = record(Notes), record(ShaftNotes), record(EventRow)
 MEASURED, ANSWER = record(Measured), record(Answer)
-WORK = record(Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts())
+WORK = record(
+    Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts()
+)
 N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
 
 # a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and

@@ -186,7 +186,9 @@ def stage_peaks(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into
 
 
 @compiled_as(types.float64(_A, _M, _M, _M, types.float64, types.float64))
-def load_settles(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, begin: float, floor: float) -> float:
+def load_settles(
+    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, begin: float, floor: float
+) -> float:
     """From when on, not before `begin`, the speed of the load is not below `floor`; NaN if it is at the end."""
     s = work.view(WORK)[0]
     settled, above = begin, True

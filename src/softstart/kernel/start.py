@@ -8,16 +8,16 @@ from typing import Any
 from numba import types
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.events import next_event, peak_within, swing, value
+from softstart.kernel.events import next_event, peak_within, value
 from softstart.kernel.jit import compiled, compiled_as
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
-    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, along_line, begin_torque, move_demand, next_in_queue,
+    NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue,
     note_excess, sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
     ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT_LIMIT, LOWER, MASS, MEASURED, NO_EVENT, NOT_FINITE,
-    NOT_LOCATED, N_MACHINE, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, ORDERS, PRESSED, SETTLE, SHAFT,
+    NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
     SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
     UNSOLVED, UPPER, WELDED, WORK, Record,
 )  # fmt: skip
@@ -180,9 +180,7 @@ def rate_of(s: Record, curves: Matrix) -> float:
 @compiled
 def stands(s: Record, spans: Matrix, events: Matrix) -> int:
     """Why the start does not go on from here: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
-    if spans.shape[0] > 0 and (
-        s.n_spans >= spans.shape[0] or s.n_events + 4 * s.n + 8 >= events.shape[0]
-    ):
+    if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + 4 * s.n + 8 >= events.shape[0]):
         return BUFFER_FULL
     stop = s.t_end
     if math.isnan(s.start_time) and stop == math.inf:
@@ -389,7 +387,9 @@ def run_all(  # type: ignore[no-untyped-def]
             state[j] = 0.0
         begin_one(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
         own = parameters[i if parameters.shape[0] > 1 else 0]
-        run_one(go_on, look, step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command)
+        run_one(
+            go_on, look, step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command
+        )
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):

@@ -77,7 +77,8 @@ class Notes:
     @property
     def peaks(self) -> Matrix:
         """Largest |T| of each shaft, N m."""
-        return np.abs(self.shafts["peak"])
+        peaks: Matrix = np.abs(self.shafts["peak"])
+        return peaks
 
     @property
     def finished(self) -> NDArray[np.bool_]:
@@ -273,9 +274,7 @@ class Batch:
         return self.read(np.array([0]), Notes(starts, shafts), 1.0, None)
 
 
-def prepared(
-    machines: Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS
-) -> Batch:
+def prepared(machines: Sequence[Any], time_limit: float | None = None, max_events: int = MAX_EVENTS) -> Batch:
     """Machines that go through one call of the kernel; InputError for machines that do not match."""
     each = [list(one.positions.values()) for one in machines]
     rows = [rows_of(one, time_limit, max_events) for several in each for one in several]
@@ -375,16 +374,23 @@ def simulate_many(
             for name in PARAMETERS
             if isinstance(values := getattr(machines, name), np.ndarray)
         }
-        return _dataset({name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, coordinates)
+        return _dataset(
+            {name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, coordinates
+        )
     listed = list(machines)
     nominal = fitted_to.design_drive if fitted_to is not None else [one.design_drive for one in listed]
     means = np.array([(base or one).mean_torque for one in listed], dtype=np.float64)
     batch = prepared(listed, time_limit, max_events)
     found = batch.figures(
-        np.arange(len(listed)), controller, nominal, means, until=until, workers=workers or os.cpu_count() or 1
+        np.arange(len(listed)),
+        controller,
+        nominal,
+        means,
+        until=until,
+        workers=workers or os.cpu_count() or 1,
     )
     names = listed[0].shaft_names
-    data = {
+    data: dict[str, Any] = {
         name: (("start",), *one) for name, one in found.items() if name.rstrip("0123456789")[-1] != "_"
     }
     if len(names) > 1:
@@ -392,7 +398,7 @@ def simulate_many(
             columns = [found[f"{one}_{k + 1}"] for k in range(len(names))]
             values = np.stack([column[0] for column in columns], axis=1)
             data[many] = (("start", "shaft"), values, columns[0][1], f"{found[one][2]}, of each shaft")
-    coordinates = {"drive": (("start",), [one.name for one in listed])}
+    coordinates: dict[str, Any] = {"drive": (("start",), [one.name for one in listed])}
     if len(names) > 1 and len({one.shaft_names for one in listed}) == 1:
         coordinates["shaft"] = (("shaft",), list(names))
     if all(isinstance(one, Drive) for one in listed):

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from softstart.arrays import Vector
 from softstart.controller.base import (
     CompiledController,
     Controller,
@@ -84,7 +85,9 @@ def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until
         size = controller.state_size
         memory, command = np.zeros(size), np.zeros(NEW_STATE + size)
         with watched(controller):
-            while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
+            while (
+                reason := recorder.run(type(controller).kernel, numbers, memory, command)
+            ) == at.BUFFER_FULL:
                 recorder.grow()
         return reason
     if controller is None:
@@ -108,7 +111,7 @@ def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until
 
 
 def plain_answer(
-    controller: PlainController, measured: at.Vector, state: tuple[float, ...]
+    controller: PlainController, measured: Vector, state: tuple[float, ...]
 ) -> tuple[float, float, tuple[float, ...], float]:
     """What a plain controller answers: torque, when to be asked again, its state, slope."""
     try:

@@ -11,9 +11,9 @@ import numpy as np
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive, SNCurve
-from softstart.errors import InputError, SimulationError
-from softstart.late import late
+from softstart.errors import InputError
 from softstart.kernel import records as at
+from softstart.late import late
 from softstart.quantities import to_si
 from softstart.start.metrics import REFERENCE
 from softstart.start.run import Run
@@ -335,7 +335,7 @@ def impacts(run: Run) -> Vector:
     # not above 0 where flanks that overlap still take hold again
     speed = side[meets] * (w[meets, 0] - w[meets, 1])
     held = run.recorded.states[meets, at.S_BRAKED] == 1.0
-    energy: Vector = (0.5 * np.where(held, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2)) * speed**2)
+    energy: Vector = 0.5 * np.where(held, drive.J2, drive.J1 * drive.J2 / (drive.J1 + drive.J2)) * speed**2
     return energy[speed > 0.0]
 
 

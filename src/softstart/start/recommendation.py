@@ -17,7 +17,7 @@ from typing import Any, Final
 from softstart.controller.base import Effort, effort_of, label_of
 from softstart.drive import Drive, Limit, Limits
 from softstart.start.fatigue import worst_damage
-from softstart.start.run import Run, Run
+from softstart.start.run import Run
 
 SLOW: Final = 2.0  # times the time of `direct`
 HARDER: Final = 1.001  # times the K_dyn of `direct`

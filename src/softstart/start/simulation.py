@@ -165,7 +165,9 @@ def simulate(
             raise InputError("drive: give one machine, a Drive with array fields, or a list, not empty.")
         if made is None:
             raise InputError("controller is missing: many starts need one.")
-        if workers is not None and (isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1):
+        if workers is not None and (
+            isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
+        ):
             raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
     if not isinstance(drive, Machine):
