@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from softstart.chain.elements import Mass, Motor, Shaft
 from softstart.chain.model import Chain, ChainArrays
+from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
 
 if TYPE_CHECKING:
     from softstart.chain.batch import simulate_chains
     from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
-    from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.run import ChainRun
     from softstart.chain.simulation import (
         TwoMassError,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         two_mass_error,
         verify_on_chain,
     )
-    from softstart.chain.vibration import Vibration, natural_vibration
 
 __all__ = [
     "Chain",
@@ -53,14 +52,10 @@ __all__ = [
 _HOME = {
     "ChainFatigue": "softstart.chain.fatigue",
     "ChainRun": "softstart.chain.run",
-    "Reduction": "softstart.chain.reduction",
     "ShaftLife": "softstart.chain.fatigue",
     "TwoMassError": "softstart.chain.simulation",
     "Verification": "softstart.chain.simulation",
-    "Vibration": "softstart.chain.vibration",
     "chain_fatigue": "softstart.chain.fatigue",
-    "natural_vibration": "softstart.chain.vibration",
-    "reduce_chain": "softstart.chain.reduction",
     "simulate_chain": "softstart.chain.simulation",
     "simulate_chains": "softstart.chain.batch",
     "two_mass_error": "softstart.chain.simulation",

@@ -17,13 +17,13 @@ import numpy as np
 
 from softstart import plant
 from softstart.arrays import Vector
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.elements import MOST_POINTS
 from softstart.chain.model import Chain, ChainArrays
-from softstart.chain.vibration import closed, elastic_frequencies
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
 from softstart.plant import layout
 from softstart.plant.vector import COUNTS_PER_LINE, LAWS
+from softstart.vibration import closed, elastic_frequencies
 
 Record = Any  # an element of a structured array, or such an array
 

@@ -12,10 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.kernel_records import numbers
 from softstart.chain.model import Chain
-from softstart.chain.reduction import reduce_chain
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.chain.run import ChainRecorder, ChainRun
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller, ready_controller_names
@@ -27,6 +26,7 @@ from softstart.start import metrics
 from softstart.start.engine import MAX_EVENTS, check_limits, ended, run_one
 from softstart.start.run import Run, worst_run
 from softstart.start.simulation import simulate
+from softstart.vibration import reduce_chain
 
 
 def simulate_chain(
@@ -139,7 +139,7 @@ def simulate_chain(
 def drive_of(chain: Chain) -> Drive:
     """The two-mass drive for which a controller is set up where none is named: the modal reduction."""
     try:
-        return reduce_chain(chain, 2, method="modal", force=True).to_drive().design_drive
+        return reduce_chain(chain, force=True).to_drive().design_drive
     except InputError as error:
         sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
         raise InputError(sentences) from None
@@ -255,9 +255,9 @@ def verify_on_chain(
     --------
     >>> from softstart.chain import Chain, reduce_chain
     >>> chain = Chain.load("crane-4-mass")
-    >>> found = verify_on_chain(chain, reduce_chain(chain, to=2).to_drive(), "s-curve")
+    >>> found = verify_on_chain(chain, reduce_chain(chain).to_drive(), "s-curve")
     >>> found.worst_place, round(found.drive.k_dyn, 3), round(found.chain_k_dyn, 3)
-    ('rotor - pinion', 1.879, 3.041)
+    ('rotor - pinion', 1.906, 3.053)
 
     References
     ----------

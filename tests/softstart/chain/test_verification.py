@@ -16,7 +16,7 @@ from softstart.chain import Chain, Mass, reduce_chain, simulate_chain, two_mass_
 from softstart.chain.simulation import drive_of, error_under, torques_to_try
 
 CHAIN = Chain.load("crane-4-mass")
-DRIVE = reduce_chain(CHAIN, to=2).to_drive()
+DRIVE = reduce_chain(CHAIN).to_drive()
 
 
 @pytest.mark.parametrize("controller", ["direct", "current-limit-feedback"])
