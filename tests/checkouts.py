@@ -158,8 +158,7 @@ def chains() -> Values:
         chain = Chain.load(name)
         yield f"{name} toml", chain.to_toml()
         yield f"{name} vibration", natural_vibration(chain).summary()
-        for method in ("lever", "modal"):
-            yield f"{name} {method}", outcome(lambda c=chain, m=method: reduce_chain(c, method=m).summary())
+        yield f"{name} reduced", outcome(lambda c=chain: reduce_chain(c).summary())
         for controller in ready():
             yield from run_of(f"{name} {controller}", lambda c=chain, k=controller: start(c, k))
     crane = Chain.load("crane-4-mass")
@@ -224,7 +223,6 @@ def commands() -> Values:
         ("linear", "--controller", "current-limit-feedback"),
         *(("reduce", name) for name in CHAINS),
         ("reduce", "--verify", "direct,shaped"),
-        ("reduce", "--method", "modal"),
         *(("clutch", name) for name in CLUTCHES),
         ("clutch", "--optimal", "--points", "3"),
         ("balance", "--speed", "4500rpm"),

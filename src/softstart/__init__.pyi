@@ -1,13 +1,13 @@
 """The public names of softstart, each with the module that defines it; `__init__.py` reads this list."""
 
 from softstart.balancing import Engine as Engine
-from softstart.balancing import PeriodicTorque as PeriodicTorque
 from softstart.balancing import balance as balance
 from softstart.chain import Chain as Chain
 from softstart.chain import natural_vibration as natural_vibration
 from softstart.chain import reduce_chain as reduce_chain
 from softstart.chain import two_mass_error as two_mass_error
 from softstart.chain import verify_on_chain as verify_on_chain
+from softstart.chain.periodic_torque import PeriodicTorque as PeriodicTorque
 from softstart.clutch import Clutch as Clutch
 from softstart.clutch import Engagement as Engagement
 from softstart.clutch import EngagementFront as EngagementFront

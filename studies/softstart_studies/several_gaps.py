@@ -76,7 +76,7 @@ class Findings:
 def find(extent: Extent, progress: Progress) -> Findings:
     """All of it."""
     machine = chain()
-    drive = reduce_chain(machine, to=2).to_drive()
+    drive = reduce_chain(machine).to_drive()
     rows: list[Row] = []
     before: dict[str, Any] = {}
     for t in extent.start_times:

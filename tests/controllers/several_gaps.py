@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from softstart import Controller, OptimumError, optimize
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
+from softstart import simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import make_controller
 
 CRANE = Chain.load("crane-4-mass")

@@ -17,7 +17,7 @@ from tests.controllers.several_gaps import (
     seen,
 )
 
-from softstart import Drive, InputError, compare, simulate, simulate
+from softstart import Drive, InputError, compare, simulate
 from softstart.controller import make_controller
 from softstart.drive import library
 

@@ -111,8 +111,7 @@ OPTIONS: dict[str, list[str]] = {
     ],
     "linear": ["--controller", "--param", "--set", "--json"],
     "reduce": [
-        "--to", "--up-to", "--method", "--factor", "--force", "--set", "--verify", "--no-starts",
-        "--param", "--json",
+        "--factor", "--force", "--set", "--verify", "--no-starts", "--param", "--json",
     ],
     "clutch": ["--law", "--set", "--until", "--optimal", "--points", "--nondecreasing", "--json"],
     "balance": ["--speed", "--set", "--json"],
@@ -376,6 +375,7 @@ def notations(rng: random.Random) -> Attack:
     axis = ["sweep", "--controller", "direct", "--json", "--axis"]
     start = ["simulate", CRANE, "--controller", "direct", "--json", "--set"]
     optimum = ["optimize", "--start-time", "1.4x", "--json", "--set"]
+    reduced = ["reduce", "--json", "--no-starts", "--factor"]
     kinds = [
         ([*start, f"shaft.gap={rng.choice(forms)}"], [*start, f"shaft.gap={text}"]),
         ([*start, f"shaft.gap={rng.choice(forms)}"], [*start, f"shaft.gap={text}"]),
@@ -383,7 +383,7 @@ def notations(rng: random.Random) -> Attack:
         ([*optimum, f"gap={rng.choice(forms)}"], [*optimum, f"gap={text}"]),
         (["clutch", "--json", "--until", comma], ["clutch", "--json", "--until", text]),
         (["balance", "--json", "--speed", f"{comma}krpm"], ["balance", "--json", "--speed", f"{text}krpm"]),
-        (["reduce", "--json", "--up-to", f"{comma}e2"], ["reduce", "--json", "--up-to", f"{text}e2"]),
+        ([*reduced, f"{comma}e1"], [*reduced, f"{text}e1"]),
     ]
     words, truth = rng.choice(kinds)
     return Attack("notations", words, truth=truth)

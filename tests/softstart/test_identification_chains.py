@@ -12,6 +12,7 @@ from softstart.start.simulation import simulate
 from softstart.identification.chains import chain_log, reduced_drive, reduction_note
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
+from softstart_studies.paper_r.lever import lever
 
 REVERSE = "two levels, then reverse"
 
@@ -62,8 +63,7 @@ def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None
     found = identify(logged(chain, drive), chain, searches=1)
     (note,) = [note for note in found.notes if "has 4 masses" in note]
     first, second = natural_vibration(chain).Omega[1:3] / (2.0 * np.pi)
-    assert f"Natural frequencies from {second:.4g} Hz on are left out" in note
-    assert f"the first, {first:.4g} Hz, is -0.58 % off" in note
+    assert f"first natural frequency, {first:.4g} Hz. Those from {second:.4g} Hz on are left out" in note
     moved = moved_by(note)
     assert set(moved) == {one.name for one in found.shared}
     assert float(moved["motor_inertia"]) == pytest.approx(-1.2, abs=0.3)  # the pinion flies with the load
@@ -71,7 +71,7 @@ def test_a_chain_is_found_through_its_reduction_and_the_error_is_named() -> None
         # what the reduction says, moved by the predicted error, is in twice the interval
         expected = float(getattr(drive, one.name)) * (1.0 + 0.01 * float(moved[one.name]))
         assert abs(one.value - expected) < one.upper - one.lower, one.name
-    assert found.drive.name.endswith("reduced to two masses (lever)")
+    assert found.drive.name.endswith("reduced to two masses")
 
 
 @pytest.mark.parametrize("second", [0.005, 0.02, 0.04])
@@ -90,9 +90,15 @@ def test_a_second_gap_at_a_light_mass_adds_to_the_first_and_does_no_harm_at_the_
 def test_a_second_gap_at_a_middle_mass_is_noticed_or_does_no_harm_at_the_motor(
     second: float, light: float
 ) -> None:
-    """Shafts behind a second gap that is not noticed have peaks up to 15 % larger."""
-    chain = stiff_behind_the_gap(others=second, light=light)
-    drive = reduced_drive(stiff_behind_the_gap(light=light))
+    """Shafts behind a second gap that is not noticed have peaks up to 15 % larger.
+
+    Plan and guess are the two masses of the lever rule. With those of the modal reduction 0.04 rad at 0.008
+    kg m2 are told as friction or cogging instead, without intervals.
+    """
+    chain, plain = stiff_behind_the_gap(others=second, light=light), stiff_behind_the_gap(light=light)
+    two = lever(plain.at_motor_shaft().J, plain.at_motor_shaft().c)
+    J1, J2, c = (*two.J.tolist(), *two.c.tolist())
+    drive = reduced_drive(plain).replace(motor_inertia=J1, load_inertia=J2, stiffness=c)
     found = identify(logged(chain, drive), drive, searches=1)
     named = any("something else moves this drive (a second gap" in note for note in found.notes)
     assert named == (second * light > 2e-4)
@@ -129,7 +135,7 @@ def test_where_two_masses_are_the_wrong_model_the_prediction_says_so() -> None:
     plan = made_up_log(drive, REVERSE, log_period=4e-3)
     note = reduction_note(chain, drive, plan, lambda one: identify(one, drive, searches=1).shared)
     moved = {name: float(text) for name, text in moved_by(note).items()}
-    assert -13.0 < moved["motor_inertia"] < -9.0
+    assert -7.0 < moved["motor_inertia"] < -4.0
     assert -40.0 < moved["gap"] < -20.0
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from softstart import Chain, Drive, compare, fatigue, optimize, pareto, simulate, simulate
+from softstart import Chain, Drive, compare, fatigue, optimize, pareto, simulate
 
 CRANE = Drive.load("crane-4amtkf")
 DAMPED = CRANE.replace(damping=1.0, name="<script>alert(1)</script> & co")

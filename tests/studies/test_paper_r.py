@@ -6,13 +6,17 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, natural_vibration, reduce_chain
 from softstart.start.simulation import simulate
 from softstart.study import Verdict, study_names
+from softstart.vibration import elastic_frequencies
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables
+from softstart_studies.paper_r.lever import error_bound, lever
 from softstart_studies.paper_r.motion import moved, released
 from softstart_studies.paper_r.pictures import map_figure
 from softstart_studies.paper_r.vibration_with_gaps import backbone, forced_response
@@ -132,6 +136,54 @@ def test_the_lever_rule_is_percents_low_at_a_tenth():
     assert np.all(found.lever < 0.0)
 
 
+# the lever rule ----------------------------------------------------------------------------------------
+
+
+@given(st.integers(0, 10**6), st.integers(2, 6))
+@settings(max_examples=80, deadline=None)
+def test_squared_periods_move_by_no_more_than_those_of_the_partial_systems(seed: int, to: int) -> None:
+    """The theorem behind the bound, for every frequency, far outside the condition too."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 10))
+    J, c = 10 ** rng.uniform(-2, 1, n), 10 ** rng.uniform(1, 5, n - 1)
+    found = lever(J, c, min(to, n - 1))
+    whole, after = elastic_frequencies(J, c), elastic_frequencies(found.J, found.c)
+    whole = whole[: after.size]
+    allowed = np.sum(1.0 / found.squares)
+    change = np.abs(1.0 / after**2 - 1.0 / whole**2)
+    assert np.all(change <= allowed * (1.0 + 1e-12) + 1e-12 / whole**2)
+    assert np.all(np.abs(after / whole - 1.0) <= error_bound(whole, found.squares) * (1.0 + 1e-9) + 1e-12)
+    assert found.J.sum() == pytest.approx(J.sum(), rel=1e-12)
+
+
+@given(*[st.floats(0.01, 10.0)] * 4, st.floats(10, 1e4), st.floats(10, 1e4))
+@settings(max_examples=50, deadline=None)
+def test_four_masses_to_two_are_the_formulas_of_the_paper(
+    I1: float, I2: float, I3: float, I4: float, c1: float, c3: float
+) -> None:
+    """[R]: 1/C = 1/c1 + 1/c3, I_I = I1 + (I2 + I3) C/c3, I_II = I4 + (I2 + I3) C/c1."""
+    found = lever(np.array([I1, I2 + I3, I4]), np.array([c1, c3]), ends=(2, 0))
+    if found.squares[0] != pytest.approx((c1 + c3) / (I2 + I3)):
+        return  # a pair swings higher than the inner mass: another way is better there
+    C = 1.0 / (1.0 / c1 + 1.0 / c3)
+    assert pytest.approx([I1 + (I2 + I3) * C / c3, I4 + (I2 + I3) * C / c1], rel=1e-12) == found.J
+    assert found.c == pytest.approx([C], rel=1e-12)
+
+
+def test_a_pair_goes_to_its_centre_of_mass() -> None:
+    """By hand: masses 1 and 3 over c = 4: centre 3/4 of the way, compliances 1/c grow by 3/16 and 1/16."""
+    found = lever(np.array([50.0, 1.0, 3.0, 50.0]), np.array([1.0, 400.0, 2.0]), 3)
+    assert found.J.tolist() == [50.0, 4.0, 50.0]
+    assert 1.0 / found.c == pytest.approx([1.0 + 0.75 / 400, 0.5 + 0.25 / 400], rel=1e-12)
+
+
+def test_motor_and_load_stay_apart() -> None:
+    """By hand, although their pair swings highest: a mass at an end takes its part of 1/c along."""
+    found = lever(np.array([1.0, 0.1, 0.1, 5.0]), np.array([10.0, 1e4, 10.0]), ends=(2, 1))
+    assert pytest.approx([1.1, 5.1]) == found.J
+    assert 1.0 / found.c == pytest.approx([1e-4 + 1.0 / 1.1 / 10.0 + 5.0 / 5.1 / 10.0])
+
+
 # the findings ------------------------------------------------------------------------------------------
 
 
@@ -144,7 +196,7 @@ def test_gaps_lower_the_frequency_and_more_so_at_small_amplitudes():
 
 def test_the_two_masses_of_the_chain_tell_its_backbone_roughly():
     """The exact formula with the reduced drive is within a tenth of the whole chain's motion."""
-    two = reduce_chain(free.tractor(), method="modal").to_drive()
+    two = reduce_chain(free.tractor()).to_drive()
     plain = free.free(free.scale_gaps(free.tractor(), 0.0))
     run = free.free(free.tractor())
     amplitude = plain.torque.max() / two.c

@@ -14,7 +14,6 @@ from softstart.balancing.design import Balance, Residual, balance
 from softstart.balancing.engine import Engine
 from softstart.balancing.gas import MeasuredCycle, SimpleCycle
 from softstart.balancing.parts import BalancerShaft, Counterweights, Cylinders, Layout, Masses, Operation
-from softstart.balancing.periodic_torque import PeriodicTorque
 
 __all__ = [
     "Balance",
@@ -26,7 +25,6 @@ __all__ = [
     "Masses",
     "MeasuredCycle",
     "Operation",
-    "PeriodicTorque",
     "Residual",
     "SimpleCycle",
     "balance",

@@ -32,8 +32,8 @@ from softstart.balancing.parts import (
     Masses,
     Operation,
 )
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.balancing.slider_crank import acceleration_harmonics, inertia_torque_harmonics
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.errors import InputError
 from softstart.input.documents import Table, document_text, made, read_document
 from softstart.input.files import Library

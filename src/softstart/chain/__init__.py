@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING
 
 from softstart.chain.elements import Mass, Motor, Shaft
 from softstart.chain.model import Chain, ChainArrays
+from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
 
 if TYPE_CHECKING:
     from softstart.chain.fatigue import ChainFatigue, ShaftLife, chain_fatigue
-    from softstart.chain.reduction import Reduction, reduce_chain
     from softstart.chain.two_masses import TwoMassError, Verification, two_mass_error, verify_on_chain
-    from softstart.chain.vibration import Vibration, natural_vibration
 
 __all__ = [
     "Chain",
@@ -41,14 +40,10 @@ __all__ = [
 # loaded when first used: they need compiled code
 _HOME = {
     "ChainFatigue": "softstart.chain.fatigue",
-    "Reduction": "softstart.chain.reduction",
     "ShaftLife": "softstart.chain.fatigue",
     "TwoMassError": "softstart.chain.two_masses",
     "Verification": "softstart.chain.two_masses",
-    "Vibration": "softstart.chain.vibration",
     "chain_fatigue": "softstart.chain.fatigue",
-    "natural_vibration": "softstart.chain.vibration",
-    "reduce_chain": "softstart.chain.reduction",
     "two_mass_error": "softstart.chain.two_masses",
     "verify_on_chain": "softstart.chain.two_masses",
 }

@@ -357,10 +357,10 @@ class Chain:
     @cached_property
     def design_drive(self) -> Drive:
         """The two masses that controllers are set up for: the modal reduction, whatever its error."""
-        from softstart.chain.reduction import reduce_chain
+        from softstart.vibration import reduce_chain
 
         try:
-            return reduce_chain(self, 2, method="modal", force=True).to_drive().design_drive
+            return reduce_chain(self, force=True).to_drive().design_drive
         except InputError as error:
             sentences = [*error.sentences, "Name the drive for which the controller is set up (fitted_to)."]
             raise InputError(sentences) from None
@@ -372,7 +372,7 @@ class Chain:
         >>> round(Chain.load("crane-4-mass").elastic_period, 4)
         0.0548
         """
-        from softstart.chain.vibration import closed, elastic_frequencies
+        from softstart.vibration import closed, elastic_frequencies
 
         arrays = self.at_motor_shaft()
         if arrays.rigid.all():

@@ -112,9 +112,9 @@ def verify_on_chain(
     --------
     >>> from softstart.chain import Chain, reduce_chain
     >>> chain = Chain.load("crane-4-mass")
-    >>> found = verify_on_chain(chain, reduce_chain(chain, to=2).to_drive(), "s-curve")
+    >>> found = verify_on_chain(chain, reduce_chain(chain).to_drive(), "s-curve")
     >>> found.worst_place, round(found.drive.k_dyn, 3), round(found.chain_k_dyn, 3)
-    ('rotor - pinion', 1.879, 3.041)
+    ('rotor - pinion', 1.906, 3.053)
 
     References
     ----------

@@ -14,10 +14,8 @@ from softstart.cli.commands import Command, typed
 from softstart.cli.completion import table_keys
 from softstart.cli.options import (
     changes_option,
-    choice,
     command_line,
     controller_option,
-    count,
     drive_argument,
     json_option,
     named_as_options,
@@ -27,8 +25,9 @@ from softstart.cli.options import (
     read_changes,
 )
 from softstart.cli.running import Attributed, make_controllers, working
-from softstart.errors import InputError, Mistakes
+from softstart.errors import InputError
 from softstart.late import late
+from softstart.vibration import Reduction, Vibration, natural_vibration, reduce_chain
 from softstart.views.drawing import save_figure
 from softstart.views.markdown import (
     markdown,
@@ -49,17 +48,13 @@ from softstart.views.terminal import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from softstart.chain import reduction, simulation
-    from softstart.chain.reduction import Reduction
+    from softstart.chain import two_masses as simulation
     from softstart.chain.two_masses import TwoMassError
-    from softstart.chain.vibration import Vibration
     from softstart.views import chain_schemes
     from softstart.views import chains as views
 else:  # no numba for a help, a wrong option or the Tab key; the kernel of starts only with --verify
-    reduction, simulation = late("softstart.chain.reduction"), late("softstart.chain.two_masses")
+    simulation = late("softstart.chain.two_masses")
     chain_schemes, views = late("softstart.views.chain_schemes"), late("softstart.views.chains")
-
-METHODS = ("lever", "modal")
 
 
 def _check_verify(given: Mapping[str, Any]) -> None:
@@ -76,30 +71,13 @@ def _check_verify(given: Mapping[str, Any]) -> None:
     default="crane-4-mass",
     names=LIBRARY.names,
 )
-@click.option("--to", metavar="N", type=count(2), help="Number of masses to reduce to. Default: 2, a drive.")
-@click.option(
-    "--up-to",
-    metavar="SPEED",
-    type=quantity("rad/s", "give a frequency above 0, as 70 (rad/s) or '11 turn/s'", above=0.0),
-    help="Keep all natural frequencies up to this one, for example 70 (rad/s), with as few masses as "
-    "possible.",
-)
-@click.option(
-    "--method",
-    metavar="|".join(METHODS),
-    type=choice(*METHODS),
-    default="lever",
-    help="lever: merge partial systems one by one, as in the literature; modal: two masses with the first "
-    "frequency and the node of the chain. Default: lever.",
-)
 @click.option(
     "--factor",
     metavar="NUMBER",
     type=quantity("1", "give a number of 1 or more, as 10", above=0.0),
-    help="Smallest ratio of the squared partial frequencies to that of the highest frequency to keep. "
-    "Default: 10.",
+    help="Smallest squared ratio of the frequencies that are left out to the first one. Default: 10.",
 )
-@click.option("--force", is_flag=True, help="Continue where a partial frequency is too low.")
+@click.option("--force", is_flag=True, help="Continue where a frequency that is left out is too low.")
 @changes_option(
     lambda: table_keys(TABLES),
     "Change a parameter of the chain, for example mass[2].inertia='0.003 kg*m^2' or shaft[1].gap=0.2.",
@@ -135,19 +113,17 @@ def reduce(
     CHAIN is a TOML file or the name of a shipped chain (crane-4-mass, tractor-like); by default the crane
     drive as a chain of four masses. Masses are in a row; lump the branches of a branched train first. Where
     the chain cannot be reduced as requested, its natural frequencies are shown nevertheless. The reduced
-    drive is an input of compare, optimize and tune. The error of the reduction in K_dyn is computed from
+    drive has the first frequency, the node and the inertia of the chain and is an input of compare, optimize
+    and tune. The error of the reduction in K_dyn is computed from
     starts of both under the controllers of --verify and 128 torque profiles.
     """
     asked = {name: value for name, value in asked.items() if value is not None}
     with output_folder(out) as folder:
         try:
             with working("reducing the chain ..."), named_as_options():
-                found = reduction.reduce_chain(chain, **asked)
-                beside = beside_it(found)
+                found = reduce_chain(chain, **asked)
             check(found, verify)
         except InputError as error:
-            from softstart.chain.vibration import natural_vibration
-
             refused = error.sentences
             vibration = natural_vibration(chain.freed)
             present(
@@ -163,11 +139,11 @@ def reduce(
                 off = error_of(found, verify, params)
         if folder is not None:
             with working("drawing the figures ..."):
-                _write(found, beside, off, folder, command_line())
+                _write(found, off, folder, command_line())
 
     present(
-        lambda: {**summary(found, beside), **views.verdict(off)},
-        lambda to: _show(to, found, beside, off),
+        lambda: {**summary(found), **views.verdict(off)},
+        lambda to: _show(to, found, off),
         as_json,
         out and f"{out}: report.md, the scheme, the figures, the tables and what it was reduced to",
     )
@@ -179,30 +155,21 @@ def _show_vibration(to: Console, vibration: Vibration) -> None:
     print_tables(to, [views.frequencies_table(vibration)])
 
 
-def _show(to: Console, found: Reduction, beside: Reduction | None, off: TwoMassError | None) -> None:
-    """The chain, its frequencies, the steps and what came out."""
+def _show(to: Console, found: Reduction, off: TwoMassError | None) -> None:
+    """The chain, its frequencies and what came out."""
     print_lines(to, views.chain_lines(found.chain))
-    print_tables(to, views.tables(found, beside, off))
+    print_tables(to, views.tables(found, off))
     if off is not None:
         sentence(to, views.enough(off), "bold")
     print_conclusion(to, [views.conclusion(found)], views.footnotes(found))
 
 
-def _write(
-    found: Reduction, beside: Reduction | None, off: TwoMassError | None, folder: Path, command: str
-) -> None:
-    """Scheme, figures, tables, the chain with all changes, what came out, and the report that ties them."""
-    vibration = found.whole_vibration
+def _write(found: Reduction, off: TwoMassError | None, folder: Path, command: str) -> None:
+    """Scheme, shapes, tables, the chain with all changes, what came out, and the report that ties them."""
     write_text(folder / "scheme.svg", chain_schemes.scheme_svg(found.chain))
-    write_text(folder / "reduced-scheme.svg", chain_schemes.scheme_svg(found.reduced))
-    pictures = {"shapes": vibration.plot()}
-    if any(step.ratio != float("inf") for step in found.steps):
-        pictures["reduction"] = found.plot()
-    for stem, figure in pictures.items():
-        save_figure(figure, folder, stem)
+    save_figure(found.vibration.plot(), folder, "shapes")
     write_text(folder / "chain.toml", found.chain.to_toml())
-    write_text(folder / "reduced.toml", found.reduced.to_toml())
-    results = "[chain.toml](chain.toml), [reduced.toml](reduced.toml)"
+    results = "[chain.toml](chain.toml)"
     if makes_drive(found):
         write_text(folder / "drive.toml", found.to_drive().to_toml())
         results += ", [drive.toml](drive.toml) for compare, optimize and tune"
@@ -214,19 +181,16 @@ def _write(
         "\n".join(f"- {markdown(line.strip())}" for line in views.chain_lines(found.chain)[1:]),
         markdown(views.conclusion(found)),
         "![scheme](scheme.svg)",
-        "![reduced scheme](reduced-scheme.svg)",
     ]
-    parts += table_sections(views.tables(found, beside, off))
+    parts += table_sections(views.tables(found, off))
     if off is not None:
         parts.append(markdown(views.enough(off)))
-    parts += [f"![{stem}]({stem}.svg)" for stem in pictures]
+    parts.append("![shapes](shapes.svg)")
     starts = ", [verified.csv](verified.csv)" if off is not None and off.verified else ""
     parts += [
         *map(markdown, views.footnotes(found)),
         f"What was reduced, and to what: {results}.",
-        "All numbers: [frequencies.csv](frequencies.csv), [shapes.csv](shapes.csv), "
-        "[holzer.csv](holzer.csv), [partial-systems.csv](partial-systems.csv), [steps.csv](steps.csv)"
-        f"{starts}.",
+        f"All numbers: [frequencies.csv](frequencies.csv), [shapes.csv](shapes.csv){starts}.",
     ]
     write_report(folder, parts, command, f"Source: {markdown(found.chain.source) or 'none given'}.")
 
@@ -241,51 +205,19 @@ def error_of(
 
 
 def check(found: Reduction, names: Sequence[str] | None) -> None:
-    """That there is a drive to design on, where controllers are to be verified."""
-    if names is None or makes_drive(found):
-        return
-    mistakes = Mistakes()
-    count = len(found.reduced.masses)
-    if count != 2:
-        with mistakes.noted():
-            raise InputError(
-                f"--verify: a start is designed on two masses, and {count} are left; leave out --to and "
-                "--up-to, or take --method modal."
-            )
-    with mistakes.noted():
-        if found.chain.motor is None or found.chain.target_speed is None:
-            raise InputError(
-                "--verify: a start needs the tables [motor] and [start] with a target_speed; add them."
-            )
-    mistakes.settle()
+    """That there is a drive to start, where controllers are to be verified."""
+    if names is not None and not makes_drive(found):
+        raise InputError(
+            "--verify: a start needs the tables [motor] and [start] with a target_speed; add them."
+        )
 
 
-def beside_it(found: Reduction) -> Reduction | None:
-    """The other method's two masses, to be shown beside; None where it has none."""
-    if len(found.reduced.masses) != 2:
-        return None
-    other = "modal" if found.method == "lever" else "lever"
-    try:
-        return reduction.reduce_chain(found.chain, 2, method=other, force=True)  # type: ignore[arg-type]
-    except InputError:
-        return None
-
-
-def summary(found: Reduction, beside: Reduction | None) -> dict[str, Any]:
+def summary(found: Reduction) -> dict[str, Any]:
     """All of it as plain data."""
-    data = found.summary()
-    data["vibration"] = found.whole_vibration.summary()
-    data["drive"] = drive_data(found)
-    data["beside"] = None if beside is None else {**beside.summary(), "drive": drive_data(beside)}
-    return data
-
-
-def drive_data(found: Reduction) -> dict[str, Any] | None:
-    """The parameters of the drive in SI, or None where there is none."""
-    return dict(found.to_drive().given()) if makes_drive(found) else None
+    drive = dict(found.to_drive().given()) if makes_drive(found) else None  # in SI
+    return {**found.summary(), "vibration": found.vibration.summary(), "drive": drive}
 
 
 def makes_drive(found: Reduction) -> bool:
-    """Whether a drive comes out: two masses, with a motor and a target speed."""
-    chain = found.reduced
-    return len(chain.masses) == 2 and chain.motor is not None and chain.target_speed is not None
+    """Whether a drive comes out: there are a motor and a target speed."""
+    return found.chain.motor is not None and found.chain.target_speed is not None

@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 
 from softstart.chain.model import Chain
-from softstart.chain.reduction import reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError, SimulationError
@@ -18,6 +17,7 @@ from softstart.identification.logs import TURN, Log
 from softstart.identification.result import Estimate
 from softstart.profile import TorqueProfile
 from softstart.start.simulation import simulate
+from softstart.vibration import reduce_chain
 
 DOMINANT: Final = 0.5  # of all gaps, at the motor shaft
 WIDE: Final = 1e3  # times the largest torque logged: no limit of the motor cuts it
@@ -38,7 +38,7 @@ def reduced_drive(chain: Chain) -> Drive:
             f"drive = {chain.name}: its widest gap is {100.0 * float(gaps.max()) / whole:.0f} % of all; "
             "a log of the motor is explained by two masses and one gap only where one gap is the larger part."
         )
-    return reduce_chain(chain, to=2, force=True).to_drive()
+    return reduce_chain(chain, force=True).to_drive()
 
 
 def chain_log(chain: Chain, log: Log, lines: float) -> Log:
@@ -85,16 +85,14 @@ def reduction_note(
     The second follows from a fit of two masses to the start of the whole chain, as it was given, under the
     torque of the log: what comes out beside what the reduction says.
     """
-    found = reduce_chain(chain, to=2, force=True)
-    first = found.frequencies[0]
-    rest = found.whole_vibration.Omega[2:] / TURN
+    found = reduce_chain(chain, force=True)
+    first, *rest = (found.vibration.Omega[1:] / TURN).tolist()
     period = float(np.median(np.diff(log.time)))
     may = "may show it" if rest[0] * period < 0.5 else "cannot show it"
     said = (
-        f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it. Natural "
-        f"frequencies from {rest[0]:.4g} Hz on are left out (a log with {period:.3g} s between samples "
-        f"{may}); the first, {first.whole / TURN:.4g} Hz, is "
-        f"{100.0 * first.error:+.2g} % off, by at most {100.0 * first.bound:.2g} %. "
+        f"{chain.name} has {len(chain.masses)} masses; what was found are the two that stand for it, with "
+        f"its first natural frequency, {first:.4g} Hz. Those from {rest[0]:.4g} Hz on are left out (a log "
+        f"with {period:.3g} s between samples {may}). "
     )
     try:
         each = fitted(chain_log(chain, log, float(drive.encoder_lines)))

@@ -10,7 +10,6 @@ from typing import Any
 
 from softstart.chain.fatigue import chain_fatigue
 from softstart.chain.model import Chain
-from softstart.chain.vibration import natural_vibration
 from softstart.controller import Controller
 from softstart.controller.base import label_of
 from softstart.controller.finding import ready_controller_names
@@ -34,6 +33,7 @@ from softstart.reporting.sheet import Sheet, make_sheet, sheet_drive, sheet_sect
 from softstart.start.comparison import REFERENCE, Comparison, compared
 from softstart.start.recommendation import Row
 from softstart.start.simulation import simulate
+from softstart.vibration import natural_vibration
 from softstart.views import chain_schemes, chains, starts
 from softstart.views import fatigue as lives
 from softstart.views.printed import digits, fixed, short, unit, units_of

@@ -19,7 +19,7 @@ from softstart.start.run import Run, worst_run
 if TYPE_CHECKING:
     import xarray
 
-    from softstart.balancing.periodic_torque import PeriodicTorque
+    from softstart.chain.periodic_torque import PeriodicTorque
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from softstart.chain.model import Chain, ChainArrays
-from softstart.chain.vibration import Vibration, natural_vibration
+from softstart.vibration import Vibration, natural_vibration
 
 _AXIS, _TALLEST, _THICK = 215.0, 150.0, 16.0  # px: height of the shaft axis, tallest disc, thickness of discs
 _SHORTEST, _SPRING, _GAP, _LEAST_GAP = 44.0, 420.0, 90.0, 3.0  # px: springs, and what all gaps share

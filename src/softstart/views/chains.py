@@ -16,10 +16,9 @@ from softstart.views.printed import units_of
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain
-    from softstart.chain.reduction import Reduction
-    from softstart.start.run import Run
     from softstart.chain.two_masses import TwoMassError, Verification
-    from softstart.chain.vibration import Vibration
+    from softstart.start.run import Run
+    from softstart.vibration import Reduction, Vibration
 
 MOST_MODES = 12
 EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
@@ -107,13 +106,13 @@ def event_table(run: Run, most: int) -> Table:
 
 def conclusion(found: Reduction) -> str:
     """What came out."""
-    whole, after = len(found.chain.masses), len(found.reduced.masses)
-    if not found.steps:
-        return f"The {whole} masses stay: nothing swings far enough above {found.wanted:.6g} rad/s."
-    worst = max(found.frequencies, key=lambda one: abs(one.error))
+    masses, kept = len(found.chain.masses), f"first natural frequency {found.whole.Omega:.6g} rad/s"
+    if masses == 2:
+        return f"The chain has two masses already: {kept}."
+    off = 100.0 * (found.reduced.participation / found.whole.participation - 1.0)
     said = (
-        f"{whole} masses became {after}; of the kept frequencies {worst.whole:.6g} rad/s changed most, by "
-        f"{100 * worst.error:+.3g} %."
+        f"{masses} masses became 2, with the {kept}, the node and the inertia of the chain; the "
+        f"participation of the motor is {off:+.2g} % off."
     )
     if found.forced:
         said += f" The condition fails: its least ratio is {found.least_ratio:.3g}, below {found.factor:g}."
@@ -194,17 +193,10 @@ def verdict(found: TwoMassError | None) -> dict[str, Any]:
 # tables ----------------------------------------------------------------------------------------------------
 
 
-def tables(found: Reduction, beside: Reduction | None, off: TwoMassError | None = None) -> list[Table]:
-    """Frequencies, steps, the two masses of both methods, and the starts on drive and chain."""
-    shown = [frequencies_table(found.whole_vibration)]
-    if found.steps:
-        shown.append(steps_table(found))
-    shown.append(kept_table(found))
-    if len(found.reduced.masses) == 2:
-        shown.append(two_masses_table(found, beside))
-    if off is not None and off.verified:
-        shown.append(verified_table(off.verified))
-    return shown
+def tables(found: Reduction, off: TwoMassError | None = None) -> list[Table]:
+    """Frequencies, the two masses beside the chain, and the starts on both."""
+    shown = [frequencies_table(found.vibration), two_masses_table(found)]
+    return shown if off is None or not off.verified else [*shown, verified_table(off.verified)]
 
 
 def frequencies_table(vibration: Vibration) -> Table:
@@ -223,63 +215,26 @@ def frequencies_table(vibration: Vibration) -> Table:
     return Table.of(title, cells, texts=[of_nodes])
 
 
-def steps_table(found: Reduction) -> Table:
-    """What was merged, at which frequency, and what it did to the kept frequencies."""
-    what = {"joint": "rigid joint", "mass": "shared", "pair": "joined", "modal": "first mode of"}
-    masses = [", ".join(step.masses) if step.kind != "modal" else "the chain" for step in found.steps]
-    worst = [max((abs(error) for error in step.errors), default=0.0) for step in found.steps]
-    bounds = [max(step.bounds, default=0.0) for step in found.steps]
-    cells = {
-        "step": [f"{what[step.kind]} {names}" for step, names in zip(found.steps, masses, strict=True)],
-        "partial\nrad/s": [number(step.Omega, 1) for step in found.steps],
-        "(partial/\nwanted)^2": [number(step.ratio, 1) for step in found.steps],
-        "masses\nleft": [str(step.masses_left) for step in found.steps],
-        "error\n%": [f"{100 * error:.2g}" for error in worst],
-        "at most\n%": [f"{100 * bound:.2g}" if math.isfinite(bound) else "-" for bound in bounds],
-    }
-    wanted = f"wanted up to {found.wanted:.6g} rad/s, condition {found.factor:g}"
-    return Table.of(f"Steps, method {found.method}: {wanted}", cells, texts=["step"])
-
-
-def kept_table(found: Reduction) -> Table:
-    """The kept frequencies before and after."""
-    kept = found.frequencies
-    cells = {
-        "mode": [f"{i}" for i in range(1, len(kept) + 1)],
-        "chain\nrad/s": [f"{f.whole:.6g}" for f in kept],
-        "reduced\nrad/s": [f"{f.reduced:.6g}" for f in kept],
-        "error\n%": [f"{100 * f.error:+.3g}" for f in kept],
-        "at most\n%": [f"{100 * f.bound:.3g}" for f in kept],
-    }
-    return Table.of("Kept frequencies", cells)
-
-
-def two_masses_table(found: Reduction, beside: Reduction | None) -> Table:
-    """The chain and the two masses of both methods."""
-    rows = {
+def two_masses_table(found: Reduction) -> Table:
+    """The chain beside the two masses, and how far these are off."""
+    names = {
         "first elastic frequency, rad/s": "Omega",
         "node: share of the twist before it": "node",
         "participation of the motor": "participation",
         "stiffness motor - load, N m/rad": "stiffness",
-        "J1, kg m2": "",
-        "J2, kg m2": "",
+        "whole inertia, kg m2": "inertia",
         "whole gap, rad": "gap",
     }
-    whole = found.figures[0]
+    chain, two = ([getattr(one, key) for key in names.values()] for one in (found.whole, found.reduced))
+    off = [100.0 * (b - a) / a if a else 0.0 for a, b in zip(chain, two, strict=True)]
     cells = {
-        "at the motor shaft": list(rows),
-        "chain": [short(getattr(whole, key)) if key else "-" for key in rows.values()],
+        "at the motor shaft": [*names, "J1, kg m2", "J2, kg m2"],
+        "chain": [*map(short, chain), "-", "-"],
+        "two masses": [*map(short, two), short(found.J1), short(found.J2)],
+        "off\n%": [*(f"{one:+.1f}" if abs(one) > 1e-6 else "0" for one in off), "-", "-"],
     }
-    for one in (found, beside) if beside is not None else (found,):
-        chain, figures = one.reduced, one.figures[1]
-        inertia = {
-            "J1, kg m2": chain.masses[chain.motor_index].inertia,
-            "J2, kg m2": chain.masses[chain.load_index].inertia,
-        }
-        cells[one.method] = [
-            short(getattr(figures, key) if key else inertia[name]) for name, key in rows.items()
-        ]
-    return Table.of("Two masses", cells, texts=["at the motor shaft"])
+    condition = f"condition: {number(found.least_ratio, 1)}, at least {found.factor:g}"
+    return Table.of(f"Two masses ({condition})", cells, texts=["at the motor shaft"])
 
 
 def verified_table(done: Sequence[Verification]) -> Table:
@@ -299,27 +254,12 @@ def verified_table(done: Sequence[Verification]) -> Table:
 
 def files(found: Reduction, off: TwoMassError | None) -> dict[str, tuple[Sequence[str], list[list[Any]]]]:
     """The tables of --out with all digits: headings and rows by file name."""
-    vibration = found.whole_vibration
-    names = [mass.name for mass in found.chain.masses]
+    vibration, names = found.vibration, [mass.name for mass in found.chain.masses]
     modes = range(vibration.Omega.size)
     frequencies = [[m, float(vibration.Omega[m]), float(vibration.frequency[m])] for m in modes]
-    holzer = [[m, *row] for m in modes[1:] for row in vibration.holzer(m)]
-    heading = ("mode", "mass", "inertia [kg*m^2]", "shape", "inertia torque [N*m]", "sum [N*m]")
-    systems = [[s.kind, " + ".join(s.masses), s.Omega] for s in vibration.partial_systems]
-    kept = range(1, len(found.frequencies) + 1)
-    columns = [f"{what} {i}" for i in kept for what in ("error", "bound")]
-    steps = []
-    for step in found.steps:
-        errors = [x for pair in zip(step.errors, step.bounds, strict=False) for x in pair]
-        filled = [*errors, *([None] * (len(columns) - len(errors)))]
-        steps.append([step.kind, " + ".join(step.masses), step.Omega, step.ratio, step.masses_left, *filled])
-    first = ("kind", "masses", "partial [rad/s]", "ratio", "masses left")
     made: dict[str, tuple[Sequence[str], list[list[Any]]]] = {
         "frequencies.csv": (("mode", "Omega [rad/s]", "frequency [Hz]"), frequencies),
         "shapes.csv": (("mode", *names), [[m, *vibration.shape[m].tolist()] for m in modes]),
-        "holzer.csv": ((*heading, "stiffness [N*m/rad]", "twist [rad]"), holzer),
-        "partial-systems.csv": (("kind", "masses", "Omega [rad/s]"), systems),
-        "steps.csv": ((*first, *columns), steps),
     }
     if off is not None and off.verified:
         rows = [{k: v for k, v in one.summary().items() if k != "chain"} for one in off.verified]
@@ -369,33 +309,6 @@ def _name_masses(axes: Any, place: np.ndarray[Any, Any], names: list[str]) -> No
     texts = [group[0] if len(group) == 1 else f"{group[0]} ... {group[-1]}" for group in labels]
     axes.set_xticks(ticks, texts, rotation=30, ha="right")
     axes.set_xlabel("place along the chain, by compliance (grey: shafts with a gap)")
-
-
-def reduction_figure(reduction: Reduction) -> Any:
-    """The partial frequency of each step over what it had to be above, and the errors with their bounds."""
-    steps = [step for step in reduction.steps if math.isfinite(step.ratio)]
-    with drawing():
-        figure, (above, below) = new_figure(2, size=(8.0, 5.6), sharex=True)
-        left = [step.masses_left for step in steps]
-        above.semilogy(left, [step.ratio for step in steps], "o-", color=COLOURS[0])
-        above.axhline(reduction.factor, color=COLOURS[1], ls="--", label=f"condition: {reduction.factor:g}")
-        above.set_ylabel("(partial / wanted frequency)$^2$")
-        above.legend()
-        for i in range(len(reduction.frequencies)):
-            colour = COLOURS[i % len(COLOURS)]
-            errors = [100 * abs(step.errors[i]) if i < len(step.errors) else math.nan for step in steps]
-            bounds = [100 * step.bounds[i] if i < len(step.bounds) else math.nan for step in steps]
-            below.semilogy(
-                left, np.maximum(errors, 1e-12), "o-", color=colour, label=f"frequency {i + 1}: error"
-            )
-            below.semilogy(left, np.maximum(bounds, 1e-12), ":", color=colour, label="its bound")
-        below.set_ylabel("error, %")
-        below.set_xlabel("masses left")
-        below.xaxis.get_major_locator().set_params(integer=True)
-        below.legend()
-        below.invert_xaxis()
-        above.set_title(f"{reduction.chain.name}: reduction, method {reduction.method}")
-    return figure
 
 
 def run_figure(run: Run) -> Any:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from softstart.study import Progress, Study, StudyResult
-from softstart_studies.paper_r import findings, four_to_two, free, locked, pictures, tables
+from softstart_studies.paper_r import findings, four_to_two, free, lever, locked, pictures, tables
 
 __all__ = ["PaperR"]
 
@@ -61,5 +61,11 @@ class PaperR(Study):
             pictures.node_figure(),
             pictures.locking_figure(),
         )
-        shown = (tables.recomputed_table(), four_to_two.map_table(), *of_free, *of_locked)
+        shown = (
+            tables.recomputed_table(),
+            four_to_two.map_table(),
+            lever.chains_table(),
+            *of_free,
+            *of_locked,
+        )
         return self.result(shown, claims, figures)

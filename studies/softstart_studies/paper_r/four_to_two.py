@@ -63,17 +63,16 @@ def _errors(share: float, stiffness: float) -> tuple[float, float, float, float,
     chain = four_masses(share, stiffness)
     J, c = chain.at_motor_shaft().J, chain.at_motor_shaft().c
     lever = paper_reduction(chain)
-    modal = reduce_chain(chain, method="modal", force=True)
+    modal = reduce_chain(chain, force=True)
     Omega = float(natural_vibration(chain).Omega[1])
     after = float(natural_vibration(lever).Omega[1])
-    whole, of_modal = modal.figures
     J1, J2 = (mass.inertia for mass in lever.masses)
     pieces = (c[0] / J[0] + c[0] / J[1], c[2] / J[2] + c[2] / J[3])
     inner = (c[0] + c[2]) / (J[1] + J[2])
     return (
         after / Omega - 1.0,
-        J2 / J1 / whole.participation - 1.0,
-        of_modal.participation / whole.participation - 1.0,
+        J2 / J1 / modal.whole.participation - 1.0,
+        modal.reduced.participation / modal.whole.participation - 1.0,
         float(min(pieces)) / Omega**2,
         float(inner) / Omega**2,
     )

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.chain import Chain, natural_vibration
+from softstart.chain import Chain
 from softstart.study import Table
+from softstart_studies.paper_r.last_bits import natural_vibration
 from softstart_studies.paper_r.motion import Motion, moved, released
 from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
 

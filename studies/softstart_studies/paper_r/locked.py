@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain import Chain, natural_vibration
+from softstart.chain import Chain
 from softstart.study import Table
 from softstart_studies.paper_r.free import SAMPLES, analysed, scale_gaps, tractor
+from softstart_studies.paper_r.last_bits import natural_vibration
 from softstart_studies.paper_r.motion import moved, released
 
 __all__ = ["Locked", "forced", "forced_table", "locked", "locked_table"]

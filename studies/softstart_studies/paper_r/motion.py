@@ -16,7 +16,8 @@ import numba
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain import Chain, natural_vibration
+from softstart.chain import Chain
+from softstart_studies.paper_r.last_bits import natural_vibration
 
 __all__ = ["Motion", "moved", "released"]
 

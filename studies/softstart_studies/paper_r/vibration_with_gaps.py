@@ -16,16 +16,16 @@ import numpy as np
 from scipy import optimize
 
 from softstart.arrays import Vector, plain_fields
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
-from softstart.chain.reduction import reduce_chain
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.start.simulation import simulate
-from softstart.chain.vibration import natural_vibration
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
 from softstart.quantities import Value
+from softstart.vibration import reduce_chain
 from softstart.views.drawing import COLOURS, drawing, new_figure
+from softstart_studies.paper_r.last_bits import natural_vibration
 
 
 def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Value:
@@ -106,10 +106,8 @@ def chain_backbone(chain: Chain, torque: Value, mode: int = 1, periods: int = 60
     found = [_main_line(chain, size * share, vibration.shape[mode], Omega, periods, mode) for size in torques]
     two = np.full(torques.size, math.nan)
     if mode == 1:
-        reduced = reduce_chain(chain, 2, method="modal", force=True).reduced
-        (a, b), (shaft,) = reduced.masses, reduced.shafts
-        amplitude = torques / shaft.stiffness
-        two = np.asarray(backbone(a.inertia, b.inertia, shaft.stiffness, shaft.gap, amplitude))
+        reduced = reduce_chain(chain, force=True)
+        two = np.asarray(backbone(reduced.J1, reduced.J2, reduced.c, reduced.gap, torques / reduced.c))
     return Backbone(chain, mode, Omega, torques, np.array(found), two)
 
 

@@ -10,8 +10,8 @@ from tests.oracle_torque import TorquePath
 from tests.softstart.chain.chain_oracle import ChainOracle, Given
 from tests.softstart.kernel.pieces import Pieces
 
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.drive import Drive

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from softstart import Drive, InputError, simulate
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
+from softstart import simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import make_controller
 
 DAMPED = {f"shaft[{k}].damping_ratio": 0.02 for k in (1, 2, 3)}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softstart import Chain, Drive, InputError, fatigue, simulate, simulate
+from softstart import Chain, Drive, InputError, fatigue, simulate
 from softstart.chain import chain_fatigue
 from softstart.chain.fatigue import reversals, shaft_turning_points
 from softstart.start.fatigue import rainflow_cycles, turning_points

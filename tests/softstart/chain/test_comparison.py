@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softstart import Command, Drive, InputError, PlainController, compare, simulate, simulate
+from softstart import Command, Drive, InputError, PlainController, compare, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.model import load_machine
 from softstart.cli import main

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import ANY_DRIVE, both, differences, random_chain, with_losses
 from tests.softstart.kernel.pieces import Pieces
 
-from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, simulate, verify_on_chain
+from softstart import simulate
+from softstart.chain import Chain, Mass, Motor, Shaft, reduce_chain, verify_on_chain
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 5))
@@ -122,7 +123,7 @@ def test_the_gear_stays_at_its_mass_when_the_chain_is_brought_to_one_shaft():
 
 def test_a_start_on_a_chain_with_losses_is_verified_with_them():
     whole = Chain.load("crane-4-mass", also={"shaft[2].efficiency": "0.9"})
-    found = reduce_chain(whole, to=2)
+    found = reduce_chain(whole)
     assert any("0.9) are left out of the drive" in note for note in found.notes)
     lossy = verify_on_chain(whole, found.to_drive(), "ramp")
     assert lossy.summary()["gear_losses"] == lossy.chain.energy.gears > 0.0

@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.softstart.chain.oracle_starts import both, differences, random_chain
 
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate, simulate
-from softstart.chain.reduction import reduce_chain
-from softstart.chain.vibration import natural_vibration
+from softstart import simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.errors import InputError
 from softstart.optimal.chains.problem import ChainProblem, momentum_bound
+from softstart.vibration import natural_vibration, reduce_chain
 from softstart.views.chain_schemes import scheme_svg
 from softstart_studies.paper_r.vibration_with_gaps import chain_backbone
 
@@ -186,7 +186,7 @@ def test_ground_is_drawn_and_the_rest_is_said():
     """The scheme draws it; what has no place for it, or for load curves, says so."""
     chain = Chain.from_toml(FILE)
     assert "nan" not in scheme_svg(chain)
-    notes = " ".join(reduce_chain(chain, 2, method="modal", force=True).notes)
+    notes = " ".join(reduce_chain(chain, force=True).notes)
     assert "stays at rest" in notes
     assert "load curves of mass 2" in notes
     with pytest.raises(InputError, match="leave ground out"):

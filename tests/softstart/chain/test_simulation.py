@@ -12,8 +12,8 @@ from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
 from softstart.balancing import Engine
-from softstart.balancing.periodic_torque import PeriodicTorque
 from softstart.chain import Chain, Mass, Motor, Shaft
+from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 from softstart.start import metrics

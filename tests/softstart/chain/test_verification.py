@@ -12,11 +12,12 @@ import pytest
 from tests.controllers.several_gaps import random_chains
 
 from softstart import Drive, InputError, SimulationError, simulate
-from softstart.chain import Chain, Mass, reduce_chain, simulate, two_mass_error, verify_on_chain
+from softstart import simulate
+from softstart.chain import Chain, Mass, reduce_chain, two_mass_error, verify_on_chain
 from softstart.chain.two_masses import drive_of, error_under, torques_to_try
 
 CHAIN = Chain.load("crane-4-mass")
-DRIVE = reduce_chain(CHAIN, to=2).to_drive()
+DRIVE = reduce_chain(CHAIN).to_drive()
 
 
 @pytest.mark.parametrize("controller", ["direct", "current-limit-feedback"])

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from softstart import Drive, TorqueProfile, compare, simulate, simulate
+from softstart import Drive, TorqueProfile, compare, simulate
 from softstart.cli import main
 from softstart.controller import Command, Controller, PlainController, make_controller
 from softstart.controller.base import CompiledController, Measured

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from softstart import __version__
-from softstart.chain import Chain, Mass, Motor, Shaft, simulate
+from softstart import simulate
+from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.start.batch import prepared
 from softstart.chain.kernel_records import elastic_period
 from softstart.start.run import Run

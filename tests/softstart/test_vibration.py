@@ -1,0 +1,252 @@
+"""Natural frequencies, shapes and nodes against independent computations; the two masses, and refusals."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal, getcontext
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from softstart import Drive, compare
+from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration, reduce_chain
+from softstart.errors import InputError
+from softstart.vibration import elastic_frequencies, shapes
+
+Vector = NDArray[np.float64]
+
+
+def stiffness_matrix(c: Vector) -> Vector:
+    K = np.zeros((c.size + 1, c.size + 1))
+    for k, stiffness in enumerate(c):
+        K[k : k + 2, k : k + 2] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return K
+
+
+def random_chain(rng: np.random.Generator, n: int, decades: float) -> tuple[Vector, Vector]:
+    return 10 ** rng.uniform(-decades, decades, n), 10 ** rng.uniform(-decades, decades, n - 1)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 20])
+def test_frequencies_are_those_of_a_dense_solver(n: int) -> None:
+    rng = np.random.default_rng(n)
+    for _ in range(20):
+        J, c = random_chain(rng, n, 0.7)
+        dense = np.sqrt(eigh(stiffness_matrix(c), np.diag(J), eigvals_only=True)[1:])
+        np.testing.assert_allclose(elastic_frequencies(J, c), dense, rtol=1e-10)
+
+
+def test_frequencies_of_equal_masses_and_springs() -> None:
+    """Closed form: 2 sqrt(c/J) sin(k pi/(2 n))."""
+    n = 200
+    found = elastic_frequencies(np.full(n, 0.25), np.full(n - 1, 9.0))
+    exact = [2.0 * 6.0 * math.sin(k * math.pi / (2 * n)) for k in range(1, n)]
+    np.testing.assert_allclose(found, exact, rtol=1e-14)
+
+
+def count_below(J: list[Decimal], c: list[Decimal], square: Decimal) -> int:
+    """How many natural frequencies, the rigid one among them, lie below: signs of the pivots of K - w^2 J."""
+    count, pivot = 0, Decimal(0)
+    for k in range(len(J)):
+        diagonal = (c[k - 1] if k else 0) + (c[k] if k < len(c) else 0) - square * J[k]
+        pivot = Decimal(diagonal) - (c[k - 1] * c[k - 1] / pivot if k else 0)
+        count += pivot < 0
+    return count
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_frequencies_keep_their_digits_over_many_decades(seed: int) -> None:
+    """80 digits: each frequency lies within 4e-15 of itself; a dense solver keeps none of the lowest."""
+    getcontext().prec = 80
+    rng = np.random.default_rng(seed)
+    J, c = random_chain(rng, 9, 5.0)
+    exact_J, exact_c = [Decimal(float(x)) for x in J], [Decimal(float(x)) for x in c]
+    for i, w in enumerate(elastic_frequencies(J, c)):
+        low, high = (Decimal(float(w)) * Decimal(1 + side) for side in (-4e-15, 4e-15))
+        assert count_below(exact_J, exact_c, low * low) <= i + 1 < count_below(exact_J, exact_c, high * high)
+
+
+@pytest.mark.parametrize("decades", [1.0, 6.0])
+def test_shapes_are_orthogonal_and_give_their_frequency_back(decades: float) -> None:
+    rng = np.random.default_rng(3)
+    for n in (2, 3, 8, 20, 40):
+        J, c = random_chain(rng, n, decades)
+        omega = elastic_frequencies(J, c)
+        x = shapes(J, c, omega)
+        assert np.abs(x).max(axis=1) == pytest.approx(np.ones(n - 1))
+        normal = x * np.sqrt(J) / np.sqrt((x * x) @ J)[:, None]
+        np.testing.assert_allclose(normal @ normal.T, np.eye(n - 1), atol=1e-12)
+        np.testing.assert_allclose(normal @ np.sqrt(J) / math.sqrt(J.sum()), 0.0, atol=1e-12)  # no momentum
+        rayleigh = np.sqrt((np.diff(x, axis=1) ** 2 @ c) / ((x * x) @ J))
+        np.testing.assert_allclose(rayleigh, omega, rtol=1e-12)
+
+
+def test_the_rigid_mode_is_exactly_zero_and_flat() -> None:
+    vibration = natural_vibration(Chain.load("tractor-like"))
+    assert vibration.Omega[0] == 0.0
+    assert np.all(vibration.shape[0] == 1.0)
+    assert np.all(vibration.torque[0] == 0.0)
+    assert vibration.nodes[0] == ()
+
+
+def test_torques_balance_every_mass() -> None:
+    """J Omega^2 x is what the shaft behind carries more than the one before; both equal c times the twist."""
+    vibration = natural_vibration(Chain.load("tractor-like"))
+    arrays = vibration.chain.at_motor_shaft()
+    for Omega, x, torque in zip(vibration.Omega, vibration.shape, vibration.torque, strict=True):
+        net = np.diff(np.concatenate([[0.0], torque, [0.0]]))
+        scale = np.abs(arrays.J * Omega**2 * x).max() + 1e-300
+        np.testing.assert_allclose(net / scale, arrays.J * Omega**2 * x / scale, atol=1e-12)
+        np.testing.assert_allclose(torque / scale, arrays.c * (x[:-1] - x[1:]) / scale, atol=1e-9)
+
+
+def test_mode_m_has_m_nodes_and_they_rest() -> None:
+    vibration = natural_vibration(Chain.load("tractor-like"))
+    for m, nodes in enumerate(vibration.nodes):
+        assert len(nodes) == m
+        for node in nodes:
+            x, y = vibration.shape[m, node.shaft : node.shaft + 2]
+            assert x + node.share * (y - x) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_node_at_a_mass() -> None:
+    chain = Chain([Mass(1), Mass(5), Mass(1)], [Shaft(2), Shaft(2)])
+    (node,) = natural_vibration(chain).nodes[1]
+    assert (node.shaft, node.share) in ((0, pytest.approx(1.0)), (1, pytest.approx(0.0)))
+
+
+def test_rigid_joints_move_as_one_mass() -> None:
+    rigid = Chain(
+        [Mass(1), Mass(2), Mass(3), Mass(4)],
+        [Shaft(5), Shaft(gap=0.1, restitution=0.5, ratio=2), Shaft("inf")],
+    )
+    one = Chain([Mass(1), Mass(2 + (3 + 4) / 4)], [Shaft(5)])
+    vibration = natural_vibration(rigid)
+    np.testing.assert_allclose(vibration.Omega, natural_vibration(one).Omega, rtol=1e-15)
+    assert vibration.shape[1, 1] == vibration.shape[1, 2] == vibration.shape[1, 3]
+    assert vibration.torque[1, 2] == pytest.approx(-(4 / 4) * vibration.Omega[1] ** 2 * vibration.shape[1, 3])
+    with pytest.raises(InputError, match="nothing vibrates"):
+        natural_vibration(Chain([Mass(1), Mass(1)], [Shaft("inf")]))
+
+
+# two masses --------------------------------------------------------------------------------------------
+
+
+def random_machine(rng: np.random.Generator) -> Chain:
+    n = int(rng.integers(3, 10))
+    J, c = 10 ** rng.uniform(-2, 1, n), 10 ** rng.uniform(1, 5, n - 1)
+    masses = [Mass(x, torque=float(rng.uniform(0, 5))) for x in J]
+    return Chain(
+        masses, [Shaft(x, gap=float(rng.uniform(0, 0.1))) for x in c], Motor(100.0), target_speed=10.0
+    )
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=60, deadline=None)
+def test_two_masses_have_frequency_node_inertia_gap_and_load_of_the_chain(seed: int) -> None:
+    """Frequency and node of the drive, as a chain, against a dense solver for the whole one."""
+    chain = random_machine(np.random.default_rng(seed))
+    drive = reduce_chain(chain, force=True).to_drive()
+    arrays = chain.at_motor_shaft()
+    squares, modes = eigh(stiffness_matrix(arrays.c), np.diag(arrays.J))
+    first, last = modes[[0, -1], 1]
+    assert drive.Omega == pytest.approx(math.sqrt(squares[1]), rel=1e-6)
+    two = natural_vibration(Chain.from_drive(drive)).shape[1]
+    assert two[1] / two[0] == pytest.approx(last / first, rel=1e-5)
+    assert pytest.approx(arrays.J.sum(), rel=1e-12) == drive.J1 + drive.J2
+    assert drive.gap == pytest.approx(arrays.gap.sum(), rel=1e-12)
+    assert drive.Mc == pytest.approx(arrays.Mc.sum(), rel=1e-12)
+
+
+def test_the_damping_of_the_mode_is_kept() -> None:
+    """Decay rate of the first elastic mode, from the eigenvalues of the damped systems."""
+    chain = Chain.load("tractor-like")
+    two = Chain.from_drive(reduce_chain(chain).to_drive())
+    assert _decay(two) == pytest.approx(_decay(chain), rel=2e-3)  # light damping: first order
+
+
+def _decay(chain: Chain) -> float:
+    arrays = chain.at_motor_shaft()
+    n = arrays.J.size
+    K, D = stiffness_matrix(arrays.c), stiffness_matrix(arrays.d)
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K / arrays.J[:, None], -D / arrays.J[:, None]]])
+    values = np.linalg.eigvals(A)
+    values = values[values.imag > 1.0]
+    return float(-values[np.argmin(values.imag)].real)
+
+
+def test_the_crane_chain_gives_about_the_crane_drive() -> None:
+    """The chain was drawn from it: inertias within 0.3 %, the first frequency 2 % higher."""
+    crane, chain = Drive.load("crane-4amtkf"), Chain.load("crane-4-mass")
+    drive = reduce_chain(chain).to_drive()
+    for name in ("J1", "J2", "gap", "Mc", "Ms", "maximum_torque", "target_speed"):
+        assert getattr(drive, name) == pytest.approx(getattr(crane, name), rel=3e-3), name
+    assert drive.c == pytest.approx(crane.c, rel=0.05)
+    assert drive.assumed == chain.assumed
+    best = compare(drive, ["direct", "reduced-first-stage"])
+    assert best.rows[0].run.k_dyn == pytest.approx(compare(crane, ["direct"]).rows[0].run.k_dyn, rel=0.02)
+
+
+def test_motor_behind_the_load() -> None:
+    """The same chain named from the other end is the same drive."""
+    there = Chain.load("crane-4-mass").brought_to("motor")
+    back = Chain(
+        there.masses[::-1],
+        there.shafts[::-1],
+        there.motor,
+        load_mass="crane",
+        target_speed=there.target_speed,
+    )
+    one, other = reduce_chain(there).to_drive(), reduce_chain(back).to_drive()
+    for name in ("J1", "J2", "c", "gap", "Mc"):
+        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-9)
+
+
+def test_refused_where_the_second_mode_is_too_near() -> None:
+    chain = Chain([Mass(1), Mass(1), Mass(1)], [Shaft(100), Shaft(100)])
+    with pytest.raises(InputError, match=r"the second mode .* 17\.3205 rad/s.* = 3 is below the 10.*--force"):
+        reduce_chain(chain, factor=10.0)
+    forced = reduce_chain(chain, force=True)
+    assert forced.forced
+    assert forced.least_ratio == pytest.approx(3.0, rel=1e-12)
+    assert not reduce_chain(chain, factor=2.0).forced
+
+
+def test_refused_where_a_piece_between_the_gaps_vibrates_too_low() -> None:
+    """[R]: w(1)^2 >> w^2 of the halves; here a light inner mass on a soft spring."""
+    chain = Chain([Mass(1), Mass(0.9), Mass(1e-3), Mass(1)], [Shaft(100), Shaft(1e4, gap=0.1), Shaft(1e4)])
+    with pytest.raises(InputError, match="with open gaps the piece mass 1 - mass 2 vibrates at"):
+        reduce_chain(chain)
+
+
+def test_refused_where_the_node_is_not_between_motor_and_load() -> None:
+    chain = Chain([Mass(1), Mass(1), Mass(100)], [Shaft(1000), Shaft(1)], Motor(1.0), load_mass="mass 2")
+    with pytest.raises(InputError, match="does not lie between the motor"):
+        reduce_chain(chain, force=True)
+    with pytest.raises(InputError, match="motor and load are the same mass"):
+        reduce_chain(Chain([Mass(1), Mass(1)], [Shaft(1)], Motor(1.0), load_mass="mass 1"))
+    with pytest.raises(InputError, match="1 or more"):
+        reduce_chain(chain, factor=0.5)
+
+
+def test_no_drive_without_motor_or_target() -> None:
+    parts = [Mass(1), Mass(1e-6), Mass(1)], [Shaft(1), Shaft(1)]
+    with pytest.raises(InputError, match="starting torque"):
+        reduce_chain(Chain(*parts)).to_drive()
+    with pytest.raises(InputError, match="target_speed"):
+        reduce_chain(Chain(*parts, Motor(5.0))).to_drive()
+
+
+def test_notes_say_what_is_left_out() -> None:
+    chain = Chain(
+        [Mass(1), Mass(1e-3, torque=1, kind="reactive", damping=0.1), Mass(1, torque=2)],
+        [Shaft(10), Shaft(10, efficiency=0.9)],
+    )
+    notes = " ".join(reduce_chain(chain).notes)
+    assert "both kinds" in notes
+    assert "damping to the ground" in notes
+    assert "0.9" in notes
