@@ -169,7 +169,7 @@ class LogModel:
         player, found = self.player({}), np.empty((len(values), 2))
         for row, plant in zip(found, self.plants(values), strict=True):
             motion = self._motion(plant, player)
-            angles = motion.states[:, S_PHI] - motion.of_shafts(0)[:, 0]
+            angles = motion.states[:, S_PHI]
             row[:] = np.max(np.abs(angles - angles[0])), motion.notes.gap_events
         return found
 

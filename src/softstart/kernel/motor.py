@@ -174,6 +174,8 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     The encoder counts edges from 0 on; the start lies `encoder_phase` of a count beyond the middle of two.
     """
     angle = s.phi
+    for k in range(s.path, s.path_end):
+        angle += s.theta[k] if s.at_motor < s.at_load else -s.theta[k]
     speed = s.w[s.at_motor]
     count = s.encoder
     if count > 0.0:

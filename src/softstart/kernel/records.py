@@ -223,7 +223,7 @@ class State:
     """The rest of the state of a start."""
 
     t_end: float
-    phi: float  # angle of the motor
+    phi: float  # angle of the load
     u: float  # its realised torque
     ref: float  # the demand after the slew limiter
     demand: float
@@ -247,7 +247,7 @@ class State:
     bodies: float  # 1 where masses move as one
     fastest: float  # upper bound of the machine's rates in the present modes, 1/s
     tone_rate: float  # of the exciting torques
-    torque_u: float  # Taylor coefficients of the motor torque and of its angle
+    torque_u: float  # Taylor coefficients of the motor torque and of the load's angle
     angle_u: float
     f: float  # scratch: an event function
 

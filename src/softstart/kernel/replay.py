@@ -61,7 +61,7 @@ def states_at(
     work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
 ) -> None:  # fmt: skip
-    """The states at times[j] within span index[j]: angle and torque of the motor, speeds, twists, torques."""
+    """The states at times[j] within span index[j]: angle of the load, torque of the motor, speeds, twists, torques."""
     s = work.view(WORK)[0]
     last = -1
     n = 0

@@ -266,7 +266,7 @@ def curve_torque(s: Record, i: int, curves: Matrix, o: int, share: float) -> flo
 def expand(s: Record, tones: Matrix, curves: Matrix, h: float, n: int) -> None:
     """All coefficients of the span of length h that begins with the present state and modes."""
     speed, twist, torque, held = s.speed, s.twist, s.torque, s.held
-    count, motor = s.n, s.at_motor
+    count, motor, load = s.n, s.at_motor, s.at_load
     forced, curved, bodies = tones.shape[0] > 0, curves.shape[0] > 0, s.bodies != 0.0
     expand_torque(s, h, n)
     if forced:
@@ -302,7 +302,7 @@ def expand(s: Record, tones: Matrix, curves: Matrix, h: float, n: int) -> None:
             speed[i, o + 1] = share * s.inverse[i] * total
         if bodies:
             join(s, o, share)
-        s.angle_u[o + 1] = share * speed[motor, o]
+        s.angle_u[o + 1] = share * speed[load, o]
     note_scale(s, forced)
 
 

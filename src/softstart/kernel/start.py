@@ -102,7 +102,7 @@ def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> Non
         s.offset[i] = 0.0
         s.incline[i] = 0.0
         find_piece(s, i, curves)
-    s.phi = s.angle[s.at_motor]
+    s.phi = 0.0
     s.u = s.ref = s.demand = s.initial_torque
     s.stage = 1.0
     s.changed = 1.0

@@ -147,7 +147,7 @@ class Recorded:
         index = self.index(when) if index is None else index
         replay.states_at(*self._loaded(), spans, index, when, motor, w, twist, T)
         before = np.concatenate([np.zeros((when.size, 1)), -np.cumsum(twist, axis=1)], axis=1)
-        place = int(self.rows.machine.motor)
+        place = int(self.rows.machine.load)
         phi = motor[:, :1] + before - before[:, place : place + 1]
         return {"phi": phi, "w": w, "twist": twist, "T": T, "u": motor[:, 1].copy()}
 
