@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from softstart import Controller, OptimumError, optimize
-from softstart import simulate
+from softstart import Controller, OptimumError, optimize, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import make_controller
 

@@ -10,7 +10,7 @@ import numpy as np
 from softstart import Drive, Run, simulate
 from softstart.controller import Command, CompiledController, Measured
 from softstart.controller.base import PlainTwin
-from softstart.plant import layout as at
+from softstart.kernel.records import S_REF, S_START
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -42,9 +42,10 @@ def random_drive(rng: np.random.Generator, **fixed: Any) -> Drive:
 
 
 def raised_at(run: Run) -> float:
-    """First instant at which the demand is the starting torque (seen in the torque without lag), s."""
-    full = run.segments[:, at.S_UA] >= 0.999 * float(run.drive.Ms)
-    return float(run.segments[full, at.S_START][0]) if full.any() else math.nan
+    """First instant at which the demand is the starting torque, s."""
+    spans = run.recorded.spans
+    full = spans[:, S_REF] >= 0.999 * float(run.drive.Ms)
+    return float(spans[full, S_START][0]) if full.any() else math.nan
 
 
 def traced(drive: Drive, controller: CompiledController) -> tuple[Run, np.ndarray[Any, Any]]:
@@ -62,3 +63,10 @@ def traced(drive: Drive, controller: CompiledController) -> tuple[Run, np.ndarra
     run = simulate(drive, Listening(twin.twin, twin.numbers))
     trace = np.array(rows)
     return run, trace[trace[:, 0] <= run.end_time]
+
+
+def index(states: Any, path: str) -> int:
+    """The place of a field, `free.inverse` of a record within it, in the row of a controller's state."""
+    name, _, rest = path.partition(".")
+    inner, offset = states.fields[name][:2]
+    return int(offset) // 8 + (index(inner, rest) if rest else 0)

@@ -10,7 +10,7 @@ import pytest
 from tests.controllers.starts import CRANE, raised_at, random_drive
 
 from softstart import Drive, formulas, simulate
-from softstart.plant.vector import encoder_count
+from softstart.start.rows import encoder_count
 from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
 
 AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
@@ -131,7 +131,7 @@ def test_window_keeps_the_rounding_error_below_a_third_of_the_drop() -> None:
         half, stride, threshold = window(drive, fitted.torque, fitted.drop, fitted.period)
         assert 2 <= half <= 30
         assert stride >= 1
-        assert 2.0 * encoder_count(drive) <= threshold / 3 * (1 + 1e-9)
+        assert 2.0 * encoder_count(drive.encoder_lines) <= threshold / 3 * (1 + 1e-9)
 
 
 def test_latency_of_a_batch_equals_that_of_its_drives() -> None:

@@ -13,7 +13,6 @@ from tests.controllers.starts import CRANE, random_drive
 from softstart import Drive, InputError, simulate
 from softstart.controller import CompiledController, controller_class, make_controller
 from softstart.drive import library
-from softstart.plant import layout as at
 from softstart.quantities import to_si
 
 ALL = (
@@ -75,10 +74,10 @@ def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> No
     assert isinstance(controller, CompiledController)
     compiled = simulate(drive, controller)
     plain = simulate(drive, controller.as_plain(drive))
-    noted = np.arange(compiled.final.size) != at.STATUS  # which only the compiled loop fills in
-    assert np.array_equal(compiled.final[noted], plain.final[noted], equal_nan=True)
-    assert np.array_equal(compiled.segments, plain.segments)
-    assert np.array_equal(compiled.event_rows, plain.event_rows)
+    one, two = compiled.recorded, plain.recorded
+    assert one.notes.tobytes() == two.notes.tobytes()
+    assert np.array_equal(one.states, two.states)
+    assert np.array_equal(one.events, two.events)
 
 
 @pytest.mark.parametrize("name", SAMPLED)
@@ -170,8 +169,8 @@ def test_a_load_that_pushes_is_started_too(name: str) -> None:
 @pytest.mark.parametrize("name", SAMPLED)
 def test_asks_at_whole_sample_periods_only(name: str) -> None:
     run = simulate(CRANE, make_controller(name, {"period": 0.0007}))
-    instants = run.segments[1:, 0]
-    asked = np.setdiff1d(instants, run.event_rows[:, 0])
+    instants = run.recorded.spans[1:, 0]
+    asked = np.setdiff1d(instants, run.recorded.events["time"])
     assert np.abs(asked / 0.0007 - np.rint(asked / 0.0007)).max() < 1e-9
 
 

@@ -11,10 +11,9 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from tests.controllers.starts import CRANE, random_drive, traced
+from tests.controllers.starts import CRANE, index, random_drive, traced
 
 from softstart import Drive, simulate
-from softstart.plant.layout import index
 from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback

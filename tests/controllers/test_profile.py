@@ -52,7 +52,7 @@ def test_steps_alone_or_with_lag_and_limiter_twin_and_batch_agree(
     plain = simulate(drive, controller.as_plain(drive), until=0.3)
     many = simulate(drive.replace(maximum_torque=[62.0, 70.0]), controller, until=0.3)
     assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
-    assert plain.segments.tobytes() == run.segments.tobytes()
+    assert plain.recorded.states.tobytes() == run.recorded.states.tobytes()
 
 
 def test_a_constant_profile_is_a_direct_start_to_the_bit() -> None:
@@ -60,7 +60,7 @@ def test_a_constant_profile_is_a_direct_start_to_the_bit() -> None:
         simulate(CRANE, Profile(profile=TorqueProfile([0.0], [40.0]))),
         simulate(CRANE, Direct(40.0)),
     )
-    assert run.segments.tobytes() == direct.segments.tobytes()
+    assert run.recorded.states.tobytes() == direct.recorded.states.tobytes()
 
 
 def test_knots_are_put_where_a_line_crosses_the_limits() -> None:
@@ -68,7 +68,7 @@ def test_knots_are_put_where_a_line_crosses_the_limits() -> None:
     drive = CRANE.replace(maximum_torque=70.0)
     run = simulate(drive, Profile(profile=steep), until=0.2)
     for instant in (0.015, 0.05):
-        assert np.abs(run.segments[:, 0] - instant).min() < 1e-16
+        assert np.abs(run.recorded.states[:, 0] - instant).min() < 1e-16
     assert run.at([0.0, 0.03, 0.06])["u"] == pytest.approx([0.0, 30.0, 70.0], rel=1e-13)
 
 

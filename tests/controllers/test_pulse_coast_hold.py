@@ -15,11 +15,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, way_lost
-from tests.controllers.starts import CRANE, random_drive, traced
+from tests.controllers.starts import CRANE, index, random_drive, traced
 
 from softstart import Drive, InputError, simulate
+from softstart.kernel.records import size
 from softstart.optimal.solving import optimize
-from softstart.plant.layout import index, size
 from softstart.start.batch import array_starts, figures
 from softstart.start.metrics import base_torque
 from softstart_controllers import pulse_coast_hold_step as stepping

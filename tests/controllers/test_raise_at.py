@@ -14,6 +14,7 @@ import pytest
 from softstart import Drive, InputError, formulas, simulate
 from softstart.arrays import Vector
 from softstart.controller import make_controller
+from softstart.kernel.records import S_REF, S_START
 from softstart_controllers.acceleration_delay import AccelerationDelay
 from softstart_controllers.reduced import delay_of
 from softstart_controllers.reduced_two_stage import ReducedTwoStage
@@ -60,7 +61,8 @@ def test_peak_is_the_default(name: str) -> None:
 
 def test_the_torque_is_raised_at_the_located_peak() -> None:
     run = simulate(CRANE, ReducedTwoStage(torque=15.5, raise_at="peak"))
-    raised = run.segments[run.segments[:, 9] == 62.0][0, 0]
+    spans = run.recorded.spans
+    raised = spans[spans[:, S_REF] == 62.0][0, S_START]
     assert float(run.at(raised)["v"]) == pytest.approx(0.0, abs=1e-9)  # T' = c v
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from tests.controllers.starts import CRANE
 
-from softstart.plant.vector import encoder_count
+from softstart.start.rows import encoder_count
 from softstart_controllers.sampled import mean_torque, patience
 
 torques = some.floats(-1000, 1000)
@@ -40,8 +40,8 @@ def test_mean_torque_lies_between_its_ends_and_the_demand(before: float, after: 
 
 
 def test_ideal_encoder_has_no_count() -> None:
-    assert encoder_count(CRANE.replace(encoder_lines=0)) == 0.0
-    assert encoder_count(CRANE.replace(encoder_lines=[0, 1])).tolist() == [0.0, math.pi / 2]
+    assert encoder_count(0) == 0.0
+    assert encoder_count([0, 1]).tolist() == [0.0, math.pi / 2]
 
 
 def test_patience_outlasts_every_start_of_the_crane() -> None:

@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.controllers.starts import CRANE, random_drive, traced
+from tests.controllers.starts import CRANE, index, random_drive, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.plant.layout import index
 from softstart.profile import TorqueProfile
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing, shaped

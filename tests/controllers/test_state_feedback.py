@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from tests.controllers.starts import CRANE, traced
+from tests.controllers.starts import CRANE, index, traced
 
 from softstart import Drive, InputError, simulate
 from softstart.drive import library
-from softstart.plant.layout import index
 from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
 from softstart_controllers import state_feedback as sf

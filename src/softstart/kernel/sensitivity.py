@@ -171,9 +171,9 @@ def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> N
             jump = s.d[k]
         elif before == CONTACT and after == OPEN and s.law[k] == DEAD_ZONE:
             jump = -s.d[k]
-        if jump == 0.0:
-            continue
         v = s.w[k] - s.w[k + 1]
+        if jump == 0.0 or v == 0.0:  # flanks that touch, and part or press as a mass breaks away
+            continue
         for i in range(k, k + 2):
             share = jump * (s.after[k] if i > k else -s.before[k]) * s.inverse[i]
             if span[S_MASSES + OF_MASS * i + 1] == 0.0:  # held before: the blow may break it away

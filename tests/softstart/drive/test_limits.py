@@ -52,7 +52,7 @@ def test_a_drive_without_limits_has_none():
 
 def test_limits_change_no_start():
     one, other = simulate("crane-4amtkf", "ramp"), simulate(with_limits(FILE), "ramp")
-    assert one.final.tobytes() == other.final.tobytes()
+    assert one.recorded.notes.tobytes() == other.recorded.notes.tobytes()
     with pytest.raises(InputError, match=r"limits.shaft_torque: .* changes no start"):
         sweep("crane-4amtkf", "direct", {"limits.shaft_torque": [90, 100]})
 
