@@ -10,15 +10,18 @@ from __future__ import annotations
 
 import math
 
-from softstart.arrays import Matrix, Vector
-from softstart.kernel.jit import compiled
-from softstart.kernel.records import (
-    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, CURVE, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
-    MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
-    SWITCH, TURNED, UNSOLVED, UPPER, Record,
-)  # fmt: skip
-from softstart.kernel.series import by_angle, grip
+from numba import types
 
+from softstart.arrays import Vector
+from softstart.kernel.jit import apart, compiled
+from softstart.kernel.records import (
+    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
+    MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
+    SWITCH, TURNED, UNSOLVED, UPPER, WORK_TYPE, Record,
+)  # fmt: skip
+from softstart.kernel.series import grip
+
+_I, _F = types.int64, types.float64
 NONE = -1.0
 LOST = -2.0  # the iteration did not end: reported as an error, never passed over
 EPS = 2.220446049250313e-16
@@ -62,9 +65,10 @@ def safe_step(y: float, dy: float, bend: float, third: float, room: float) -> fl
     return step
 
 
-@compiled
-def crossing(f: Vector, low: int, n: int, begin: float, end: float) -> float:
-    """First x in [begin, end] at which f/x^low falls through zero; it is positive, or rises, at `begin`."""
+@apart(types.float64(WORK_TYPE, _I, _I, _F, _F))
+def crossing(s: Record, low: int, n: int, begin: float, end: float) -> float:
+    """First x in [begin, end] at which s.f/x^low falls through zero; it is positive, or rises, at `begin`."""
+    f = s.f
     third = 0.0
     power = 1.0
     for i in range(3, n - low + 1):
@@ -101,15 +105,16 @@ def crossing(f: Vector, low: int, n: int, begin: float, end: float) -> float:
     return LOST
 
 
-@compiled
-def first_root(f: Vector, n: int, end: float, zeros: int, noise: float, faint: float) -> float:
-    """First x in [0, end] at which f falls below zero.
+@apart(types.float64(WORK_TYPE, _I, _F, _I, _F, _F))
+def first_root(s: Record, n: int, end: float, zeros: int, noise: float, faint: float) -> float:
+    """First x in [0, end] at which the event function f = s.f falls below zero.
 
     The first `zeros` coefficients are zero by the nature of what has just happened, unless f_0 clearly is
     not, where speeds have jumped. Of the others `noise` (of f_0) and `faint` (of the rest) say what may be
     rounding. Where f begins at zero it is divided by powers of x, and the first coefficient that counts says
     whether it falls at once.
     """
+    f = s.f
     low = zeros
     if f[0] > CLEARLY * noise:
         low = 0
@@ -138,7 +143,7 @@ def first_root(f: Vector, n: int, end: float, zeros: int, noise: float, faint: f
         power *= end
     if f[low] > rest * (1.0 + 1e-12):
         return NONE
-    return crossing(f, low, n, 0.0, end)
+    return crossing(s, low, n, 0.0, end)
 
 
 # events of shafts -----------------------------------------------------------------------------------
@@ -205,7 +210,7 @@ def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]
         side = 1.0 - 2.0 * which
         zeros = s.zeros[k] if s.side[k] == side else 0
         set_line(s.f, twist, n, half, -side)
-        x = first_root(s.f, n, end, zeros, ROUNDING * half, faint)
+        x = first_root(s, n, end, zeros, ROUNDING * half, faint)
         if x < NONE:
             return UNSOLVED, 0.0
         if x >= 0.0:
@@ -233,7 +238,7 @@ def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     if s.law[k] == MODELICA and s.d[k] > 0.0:
         doubled = s.mode[k] == DOUBLED
         set_damping_excess(s, k, n, -side if doubled else side)
-        x = first_root(s.f, n, end, 0 if rejoined else s.zeros[k], noise, 0.0)
+        x = first_root(s, n, end, 0 if rejoined else s.zeros[k], noise, 0.0)
         if x < NONE:
             return UNSOLVED, 0.0
         if x >= 0.0:
@@ -251,7 +256,7 @@ def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
             return NO_EVENT, end
         set_line(s.f, s.twist[k], n, -s.half[k], side)
         noise = ROUNDING * s.half[k]
-    x = first_root(s.f, n, end, zeros, noise, 0.0)
+    x = first_root(s, n, end, zeros, noise, 0.0)
     if x < NONE:
         return UNSOLVED, 0.0
     return (EXIT, x) if x >= 0.0 else (event, end)
@@ -265,14 +270,14 @@ def returning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
         s.f[o] = -side * (s.c[k] * s.twist[k, o] + s.d[k] * (s.speed[k, o] - s.speed[k + 1, o]))
     s.f[0] += s.c[k] * s.half[k]
     event = NO_EVENT
-    x = first_root(s.f, n, end, s.zeros[k], rounding_of_torque(s, k), 0.0)
+    x = first_root(s, n, end, s.zeros[k], rounding_of_torque(s, k), 0.0)
     if x < NONE:
         return UNSOLVED, 0.0
     if x >= 0.0:
         event = REJOIN
         end = x
     set_line(s.f, s.twist[k], n, -s.half[k], side)
-    x = first_root(s.f, n, end, 0, ROUNDING * s.half[k], 0.0)
+    x = first_root(s, n, end, 0, ROUNDING * s.half[k], 0.0)
     if x < NONE:
         return UNSOLVED, 0.0
     return (BACK, x) if x >= 0.0 else (event, end)
@@ -285,7 +290,7 @@ def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
         return NO_EVENT, end
     set_line(s.f, s.torque[k], n, 0.0, s.side[k])
     noise = 1e-14 * s.scale[s.first[k]]
-    x = first_root(s.f, n, end, 0, noise, noise)
+    x = first_root(s, n, end, 0, noise, noise)
     if x < NONE:
         return UNSOLVED, 0.0
     return (RELEASE, x) if x >= 0.0 else (NO_EVENT, end)
@@ -300,7 +305,7 @@ def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     set_line(s.f, s.torque[k], n, 0.0, s.sign[k])
     noise = s.c[k] * (abs(s.theta[k]) + s.half[k]) + s.d[k] * (abs(s.w[k]) + abs(s.w[k + 1]))
     noise += s.scale[s.first[k]]  # a twist near 0 has the rounding of those before it
-    x = first_root(s.f, n, end, s.zeros[k], ROUNDING * noise, 0.0)
+    x = first_root(s, n, end, s.zeros[k], ROUNDING * noise, 0.0)
     if x < NONE:
         return UNSOLVED, 0.0
     return (TURNED, x) if x >= 0.0 else (NO_EVENT, end)
@@ -318,7 +323,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
         if s.release_at < math.inf:  # released by time
             return event, end
         set_line(s.f, s.held[i], n, 0.0, -1.0)
-        x = first_root(s.f, n, end, 0, noise, noise)
+        x = first_root(s, n, end, 0, noise, noise)
         if x < NONE:
             return UNSOLVED, 0.0
         return (LET_GO, x) if x >= 0.0 else (event, end)
@@ -332,7 +337,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
             if s.gears[i] != 0:
                 for o in range(n + 1):
                     s.f[o] += grip(s, i, 1.0 - 2.0 * which, o)
-            x = first_root(s.f, n, end, 0, noise, noise)
+            x = first_root(s, n, end, 0, noise, noise)
             if x < NONE:
                 return UNSOLVED, 0.0
             if x >= 0.0:
@@ -346,31 +351,30 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
         return event, end
     set_line(s.f, s.speed[i], n, 0.0, s.direction[j])
     faint = 1e-14 * h * (s.scale[i] + s.hold[i]) / s.body_J[i]
-    x = first_root(s.f, n, end, 0, 0.0, faint)
+    x = first_root(s, n, end, 0, 0.0, faint)
     if x < NONE:
         return UNSOLVED, 0.0
     return (STOP, x) if x >= 0.0 else (event, end)
 
 
 @compiled
-def next_point(s: Record, i: int, curves: Matrix, h: float, n: int, end: float) -> tuple[int, float]:
+def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
-    curve = curves[s.curve[i]].view(CURVE)[0]
-    angular = by_angle(s, i, curves)
+    angular = s.by_angle[i] != 0.0
     course = s.turned[i] if angular else s.speed[i]
     faint = 1e-14 * h * influence(s, i) * (h if angular else 1.0)
     event = NO_EVENT
     for which in range(2):
         sign = 1.0 - 2.0 * which
         piece = s.piece[i] if which == 0 else s.piece[i] - 1
-        if piece < 0 or piece >= curve.points:
+        if piece < 0 or piece >= s.points[i]:
             continue
-        point = curve.at[piece]
+        point = s.at[i, piece]
         set_line(s.f, course, n, sign * point, -sign)
         zeros = 1 if s.passed[i] == -sign else 0
         if zeros == 0 and swing(s.f, n) < s.f[0]:
             continue
-        x = first_root(s.f, n, end, zeros, ROUNDING * abs(point), faint)
+        x = first_root(s, n, end, zeros, ROUNDING * abs(point), faint)
         if x < NONE:
             return UNSOLVED, 0.0
         if x >= 0.0:
@@ -399,38 +403,39 @@ def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int
     return event, end
 
 
-@compiled
-def next_event(s: Record, curves: Matrix, h: float, n: int) -> tuple[int, int, float]:
-    """The first event of the span, on which shaft or mass, and where on [0, 1]."""
-    first, where, end = NO_EVENT, 0, 1.0
+@apart(types.int64(WORK_TYPE, _F, _I))
+def next_event(s: Record, h: float, n: int) -> int:
+    """The first event of the span; `s.where` is its shaft or mass, `s.share` the share of the span."""
+    first = NO_EVENT
+    s.where, s.share = 0, 1.0
     for k in range(s.n - 1):
-        event, x = event_of_shaft(s, k, h, n, end)
+        event, x = event_of_shaft(s, k, h, n, s.share)
         if event != NO_EVENT:
-            first, where, end = event, k, x
+            first, s.where, s.share = event, k, x
         if event == UNSOLVED:
-            return first, where, end
+            return first
     for i in range(s.n):
         if s.first[i] == i and (s.rubbing[i] != 0 or s.braked != 0.0):
-            event, x = friction(s, i, h, n, end)
+            event, x = friction(s, i, h, n, s.share)
             if event != NO_EVENT:
-                first, where, end = event, i, x
+                first, s.where, s.share = event, i, x
             if event == UNSOLVED:
-                return first, where, end
-        if s.curve[i] >= 0:
-            event, x = next_point(s, i, curves, h, n, end)
+                return first
+        if s.points[i] > 0:
+            event, x = next_point(s, i, h, n, s.share)
             if event != NO_EVENT:
-                first, where, end = event, i, x
+                first, s.where, s.share = event, i, x
             if event == UNSOLVED:
-                return first, where, end
+                return first
     load = s.at_load
     if math.isnan(s.start_time) and swing(s.speed[load], n) >= s.target - s.w[load]:
         set_line(s.f, s.speed[load], n, s.target, -1.0)
-        x = first_root(s.f, n, end, 0, ROUNDING * s.target, 0.0)
+        x = first_root(s, n, s.share, 0, ROUNDING * s.target, 0.0)
         if x < NONE:
-            return UNSOLVED, load, 0.0
+            return UNSOLVED
         if x >= 0.0:
-            first, where, end = REACHED, load, x
-    return first, where, end
+            first, s.where, s.share = REACHED, load, x
+    return first
 
 
 # the largest torque ---------------------------------------------------------------------------------
@@ -448,37 +453,37 @@ def keep_peak(s: Record, k: int, torque: float, time: float) -> None:
         s.peak[k] = torque
 
 
-@compiled
-def peak_within(s: Record, k: int, n: int, end: float, h: float) -> bool:
-    """Note the largest |T| of shaft k up to `end` if it is above the largest so far; False if it is lost."""
+@apart(types.int64(WORK_TYPE, _I, _I, _F, _F))
+def peak_within(s: Record, k: int, n: int, end: float, h: float) -> int:
+    """Note the largest |T| of shaft k up to `end` if it is above the largest so far; 0 if it is lost."""
     f, torque = s.f, s.torque[k]
     if abs(torque[0]) + swing(torque, n) <= abs(s.peak[k]):
-        return True
+        return 1
     keep_peak(s, k, torque[0], s.time)
     keep_peak(s, k, value(torque, n, end), s.time + end * h)
     bend = 0.0
     for o in range(2, n + 1):
         bend += o * abs(torque[o])
     if end == 0.0 or bend * (1.0 + 1e-12) < abs(torque[1]):
-        return True  # it rises or falls all the way
+        return 1  # it rises or falls all the way
     for which in range(2):
         sign = 1.0 - 2.0 * which
         begin = 0.0
         while True:
             # where it rises above the largest so far
             set_line(f, torque, n, abs(s.peak[k]) * (1.0 + ROUNDING), -sign)
-            above = first_root(f, n, end, 0, 0.0, 0.0) if begin == 0.0 else crossing(f, 0, n, begin, end)
+            above = first_root(s, n, end, 0, 0.0, 0.0) if begin == 0.0 else crossing(s, 0, n, begin, end)
             if above < NONE:
-                return False
+                return 0
             if above < 0.0:
                 break
             # and the extreme behind it
             for o in range(n):
                 f[o] = sign * (o + 1.0) * torque[o + 1]
             f[n] = 0.0
-            top = crossing(f, 0, n - 1, above, end)
+            top = crossing(s, 0, n - 1, above, end)
             if top < NONE:
-                return False
+                return 0
             if top < 0.0:
                 break  # it rises to the end, which is noted
             highest = value(torque, n, top)
@@ -486,4 +491,4 @@ def peak_within(s: Record, k: int, n: int, end: float, h: float) -> bool:
                 break
             keep_peak(s, k, highest, s.time + top * h)
             begin = top
-    return True
+    return 1

@@ -6,13 +6,16 @@ count; take the option out and `softstart study benchmark-starts` shows what cou
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 import numba
+from numba import types
 
 _njit: Any = numba.njit
+_cfunc: Any = numba.cfunc
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
 
@@ -37,6 +40,24 @@ def compiled_as(signature: Any, cache: bool = True) -> Any:
         return made
 
     return compile_now
+
+
+def apart(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile by itself, once: the kernel calls it by its symbol, and its code is no part of its callers.
+
+    LLVM optimises what a function calls again within each caller, and each caller of that one: what is large
+    and called from several places costs less here. Arguments are records and numbers, the result is a number.
+    """
+
+    def declared(function: Callable[..., Any]) -> Any:
+        symbol = f"{function.__module__}.{function.__qualname__}"
+        code = _cfunc(signature, **OPTIONS)(function)
+        llvmlite.binding.add_symbol(symbol, code.address)
+        declaration: Any = types.ExternalFunction(symbol, signature)
+        declaration.code = code  # kept for as long as it can be called
+        return declaration
+
+    return declared
 
 
 def drop_stale(sources: Iterable[Path], needed: Iterable[Path] = ()) -> None:

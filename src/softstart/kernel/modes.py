@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
-from softstart.arrays import Matrix
 from softstart.kernel.events import GRAZE, REJOINED
-from softstart.kernel.jit import compiled
+from softstart.kernel.jit import apart, compiled
 from softstart.kernel.records import (
-    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EVENT, EXIT, IMPACT, JOINED,
-    LET_GO, LOWER, MODELICA, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE,
-    RELEASED, SETTLE, SETTLED, STARTS, STOP, STOPS, SWITCH, TARGET_REACHED, TURNED, UPPER, WELDED, Record,
+    BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EXIT, IMPACT, JOINED,
+    LET_GO, LOWER, MODELICA, MOST_NOTED, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE,
+    RELEASED, SETTLE, SETTLED, STARTS, STOP, STOPS, SWITCH, TARGET_REACHED, TURNED, UPPER, WELDED, WORK_TYPE, Record,
 )  # fmt: skip
-from softstart.kernel.series import by_angle, find_piece, set_piece
+from softstart.kernel.series import find_piece, set_piece
 
 # a rigid flank that is reached more slowly than this, against what presses it on within the span, is settled
 SLOW = 1e-10
@@ -25,28 +25,25 @@ COLLAPSE = 100
 
 
 @compiled
-def note(
-    s: Record, events: Matrix, time: float, kind: int, place: int, value: float, impulse: float = 0.0
-) -> None:
-    """One event; `events` may have no rows, then it is only counted."""
+def note(s: Record, time: float, kind: int, place: int, value: float, impulse: float) -> None:
+    """One event, to be recorded before the next span."""
     s.events += 1.0
-    if events.shape[0] > 0:
-        event = events[int(s.n_events)].view(EVENT)[0]
-        event.time = time
-        event.kind = kind
-        event.place = place
-        event.value = value
-        event.impulse = impulse
-        s.n_events += 1.0
+    if s.noted < MOST_NOTED:
+        s.note_time[s.noted] = time
+        s.note_kind[s.noted] = kind
+        s.note_place[s.noted] = place
+        s.note_value[s.noted] = value
+        s.note_impulse[s.noted] = impulse
+        s.noted += 1
 
 
 @compiled
-def turn_mass(s: Record, events: Matrix, i: int, direction: float) -> None:
+def turn_mass(s: Record, i: int, direction: float) -> None:
     """Friction holds mass i from now on (0), or lets it go in a direction."""
     if direction == 0.0:
-        note(s, events, s.time, STOPS, i, s.direction[i], 0.0)
+        note(s, s.time, STOPS, i, s.direction[i], 0.0)
     else:
-        note(s, events, s.time, STARTS, i, direction, 0.0)
+        note(s, s.time, STARTS, i, direction, 0.0)
     s.direction[i] = direction
 
 
@@ -119,9 +116,7 @@ def goes_with(s: Record, k: int, side: float, kind: int) -> bool:
 
 
 @compiled
-def strike(
-    s: Record, events: Matrix, curves: Matrix, k: int, restitution: float, kind: int, time: float
-) -> None:
+def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> None:
     """The rigid flanks of shaft k meet: new speeds by momentum and restitution, noted as an event `kind`.
 
     What is rigidly joined on either side goes with it, pressed flanks too where the impact presses them on;
@@ -150,7 +145,7 @@ def strike(
     reduced = min(J_a, J_b) if walled else J_a * J_b / (J_a + J_b)
     impulse = (1.0 + restitution) * reduced * v
     loss = 0.5 * (1.0 - restitution * restitution) * reduced * v * v
-    note(s, events, time, kind, k, loss, impulse)
+    note(s, time, kind, k, loss, impulse)
     s.impulse[k] = max(s.impulse[k], abs(impulse))
     if restitution == 0.0 and walled:
         w_a = w_b = 0.0
@@ -161,32 +156,32 @@ def strike(
         w_b += impulse / J_b
     for i in range(a, b + 1):
         s.w[i] = w_a if i <= k else w_b
-        if s.curve[i] >= 0 and not by_angle(s, i, curves):
-            find_piece(s, i, curves)
+        if s.points[i] > 0 and s.by_angle[i] == 0.0:
+            find_piece(s, i)
         direction = np.sign(s.w[i])
         if s.rubs[i] != 0.0 and direction != s.direction[i]:
             if s.direction[i] != 0.0:
-                turn_mass(s, events, i, 0.0)
+                turn_mass(s, i, 0.0)
             if direction != 0.0:
-                turn_mass(s, events, i, direction)
+                turn_mass(s, i, direction)
     for j in range(max(a - 1, 0), min(b + 1, s.n - 1)):
         s.zeros[j] = 0  # speeds have jumped: nothing is zero by its nature any more
     for edge in range(2):
         j = a - 1 if edge == 0 else b
         if 0 <= j < s.n - 1 and s.mode[j] == PRESSED:
             s.mode[j] = OPEN
-            note(s, events, s.time, OPENED, j, s.side[j], 0.0)
+            note(s, s.time, OPENED, j, s.side[j], 0.0)
 
 
 @compiled
-def settle(s: Record, events: Matrix, curves: Matrix, k: int, rest: float) -> None:
+def settle(s: Record, k: int, rest: float) -> None:
     """Rigid flanks lie on each other from now on; `rest` is how much longer the last impacts take."""
-    strike(s, events, curves, k, 0.0, SETTLED, s.time + rest)
+    strike(s, k, 0.0, SETTLED, s.time + rest)
     s.mode[k] = PRESSED
 
 
 @compiled
-def meet(s: Record, events: Matrix, curves: Matrix, k: int, side: float, press: float, h: float) -> None:
+def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
     """A flank is reached; `press` is the relative acceleration towards it."""
     v = side * (s.w[k] - s.w[k + 1])
     s.theta[k] = side * s.half[k]
@@ -200,21 +195,21 @@ def meet(s: Record, events: Matrix, curves: Matrix, k: int, side: float, press: 
             rest = 0.0
             if press > 0.0 and e < 1.0:
                 rest = 2.0 * max(e * v, -v) / (press * (1.0 - e))
-            settle(s, events, curves, k, rest)
+            settle(s, k, rest)
         else:
-            strike(s, events, curves, k, e, IMPACT, s.time)
+            strike(s, k, e, IMPACT, s.time)
     elif press < 0.0 and v * v <= -4.0 * press * GRAZE * s.half[k]:
         s.events += 1.0
         s.zeros[k] = 2
     else:
-        note(s, events, s.time, CLOSED, k, side, 0.0)
+        note(s, s.time, CLOSED, k, side, 0.0)
         engage(s, k, side)
 
 
 @compiled
-def part(s: Record, events: Matrix, k: int) -> None:
+def part(s: Record, k: int) -> None:
     """The flanks of shaft k cease to act."""
-    note(s, events, s.time, OPENED, k, s.side[k], 0.0)
+    note(s, s.time, OPENED, k, s.side[k], 0.0)
     if s.law[k] != DEAD_ZONE and s.d[k] > 0.0 and s.side[k] * s.theta[k] > s.half[k]:
         s.mode[k] = BEYOND
         s.zeros[k] = 1
@@ -224,24 +219,24 @@ def part(s: Record, events: Matrix, k: int) -> None:
 
 
 @compiled
-def turn(s: Record, events: Matrix, i: int, direction: float) -> None:
+def turn(s: Record, i: int, direction: float) -> None:
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
     for j in range(i, s.n):
         if s.first[j] != i:
             break
         if s.rubs[j] != 0.0:
-            turn_mass(s, events, j, direction)
+            turn_mass(s, j, direction)
         if direction == 0.0:
             s.w[j] = 0.0
 
 
 @compiled
-def release(s: Record, events: Matrix) -> None:
+def release(s: Record) -> None:
     """The brake lets the motor go; its friction may still hold it."""
     s.braked = 0.0
     s.release_time = s.time
     s.changed = 1.0
-    note(s, events, s.time, RELEASED, s.at_motor, s.u, 0.0)
+    note(s, s.time, RELEASED, s.at_motor, s.u, 0.0)
 
 
 @compiled
@@ -259,65 +254,19 @@ def note_stage(s: Record, bounced: bool) -> None:
 
 
 @compiled
-def handle(
-    s: Record, events: Matrix, curves: Matrix, event: int, k: int, press: float, rest: float, h: float
-) -> bool:
-    """Change of mode at an event on shaft or mass k; True if the path from motor to load closed or opened."""
-    was = path_closed(s, -1)
-    bounced = False
-    speed = 0.0
-    s.changed = 1.0
-    if event in (UPPER, LOWER):
-        side = 1.0 if event == UPPER else -1.0
-        speed = side * (s.w[k] - s.w[k + 1])
-        meet(s, events, curves, k, side, press, h)
-        bounced = s.rigid[k] != 0.0 and s.path <= k < s.path_end and s.mode[k] == OPEN and s.zeros[k] == 0
-    elif event == STOP:
-        turn(s, events, k, 0.0)
-    elif event in (BREAK_FORWARD, BREAK_BACK):
-        turn(s, events, k, 1.0 if event == BREAK_FORWARD else -1.0)
-    elif event == LET_GO:
-        release(s, events)
-    elif event in (POINT_ABOVE, POINT_BELOW):
-        s.events += 1.0
-        s.passed[k] = 1 if event == POINT_ABOVE else -1
-        set_piece(s, k, curves, s.piece[k] + s.passed[k])
-    elif event == REACHED:
-        s.start_time = s.time
-        s.changed = 0.0
-        note(s, events, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
-        if s.t_end == math.inf:
-            s.t_end = s.time + s.period
-    else:
-        if event == REJOIN:
-            speed = s.side[k] * (s.w[k] - s.w[k + 1])
-        change(s, events, curves, event, k, rest)
-    now = path_closed(s, -1)
-    bounced = bounced and not was and path_closed(s, k)  # closed, and opened at once
-    if now == was and not bounced:
-        return False
-    if math.isnan(s.first_contact) and (now or bounced):
-        s.first_contact = s.time
-        s.impact_speed = speed
-        s.contact_torque = s.u
-    note_stage(s, bounced)
-    return True
-
-
-@compiled
-def change(s: Record, events: Matrix, curves: Matrix, event: int, k: int, rest: float) -> None:
+def change(s: Record, event: int, k: int, rest: float) -> None:
     """Change of mode of shaft k, whose flanks are in contact or overlap."""
     if event == SETTLE:
         s.side[k] = math.copysign(1.0, s.theta[k])
-        settle(s, events, curves, k, rest)
+        settle(s, k, rest)
     elif event == REJOIN:
-        note(s, events, s.time, CLOSED, k, s.side[k], 0.0)
+        note(s, s.time, CLOSED, k, s.side[k], 0.0)
         engage(s, k, s.side[k])
         s.zeros[k] = REJOINED
     elif event == EXIT:
-        part(s, events, k)
+        part(s, k)
     elif event == RELEASE:
-        note(s, events, s.time, OPENED, k, s.side[k], 0.0)
+        note(s, s.time, OPENED, k, s.side[k], 0.0)
         s.mode[k] = OPEN
         s.zeros[k] = 2
     else:
@@ -331,3 +280,47 @@ def change(s: Record, events: Matrix, curves: Matrix, event: int, k: int, rest: 
             s.mode[k] = CONTACT if s.mode[k] == DOUBLED else DOUBLED
         elif event == TURNED:
             s.sign[k] = -s.sign[k]
+
+
+@apart(types.int64(WORK_TYPE, *[types.int64] * 2, *[types.float64] * 3))
+def handle(s: Record, event: int, k: int, press: float, rest: float, h: float) -> int:
+    """Change of mode at an event on shaft or mass k; 1 if the path from motor to load closed or opened."""
+    was = path_closed(s, -1)
+    bounced = False
+    speed = 0.0
+    s.changed = 1.0
+    if event in (UPPER, LOWER):
+        side = 1.0 if event == UPPER else -1.0
+        speed = side * (s.w[k] - s.w[k + 1])
+        meet(s, k, side, press, h)
+        bounced = s.rigid[k] != 0.0 and s.path <= k < s.path_end and s.mode[k] == OPEN and s.zeros[k] == 0
+    elif event == STOP:
+        turn(s, k, 0.0)
+    elif event in (BREAK_FORWARD, BREAK_BACK):
+        turn(s, k, 1.0 if event == BREAK_FORWARD else -1.0)
+    elif event == LET_GO:
+        release(s)
+    elif event in (POINT_ABOVE, POINT_BELOW):
+        s.events += 1.0
+        s.passed[k] = 1 if event == POINT_ABOVE else -1
+        set_piece(s, k, s.piece[k] + s.passed[k])
+    elif event == REACHED:
+        s.start_time = s.time
+        s.changed = 0.0
+        note(s, s.time, TARGET_REACHED, s.at_load, s.w[k], 0.0)
+        if s.t_end == math.inf:
+            s.t_end = s.time + s.period
+    else:
+        if event == REJOIN:
+            speed = s.side[k] * (s.w[k] - s.w[k + 1])
+        change(s, event, k, rest)
+    now = path_closed(s, -1)
+    bounced = bounced and not was and path_closed(s, k)  # closed, and opened at once
+    if now == was and not bounced:
+        return 0
+    if math.isnan(s.first_contact) and (now or bounced):
+        s.first_contact = s.time
+        s.impact_speed = speed
+        s.contact_torque = s.u
+    note_stage(s, bounced)
+    return 1

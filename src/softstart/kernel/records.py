@@ -10,11 +10,13 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numba import from_dtype
 
 MOST_MASSES: Final = 64
 ORDERS: Final = 36  # room for Taylor coefficients
 MOST_PENDING: Final = 16  # answers of a controller that may wait for their computing delay
 MOST_POINTS: Final = 16  # of a load curve
+MOST_NOTED: Final = 2 * MOST_MASSES + 16  # events at one instant
 
 Record = Any  # a record of one of these types, in compiled code
 
@@ -179,8 +181,11 @@ class OfMasses:
     rubbing: float  # how many of its masses rub
     gears: float  # how many of its gears have losses
     scale: float  # sum of the absolute torques: the scale of rounding
-    # load curves: which one the mass has, -1 none; its straight piece
-    curve: float
+    # its load curve over the speed or the angle: `points` and the torques there, and the straight piece
+    points: float  # 0 without a load curve
+    by_angle: float
+    at: float
+    torque_at: float
     piece: float  # how many of the points lie before
     offset: float  # the curve is offset + incline * (speed or angle) there
     incline: float
@@ -246,10 +251,20 @@ class State:
     changed: float  # 1 where what follows from the modes is to be computed again
     bodies: float  # 1 where masses move as one
     fastest: float  # upper bound of the machine's rates in the present modes, 1/s
-    tone_rate: float  # of the exciting torques
+    tones: float  # how many harmonics the exciting torques have
+    tone_rate: float  # and the fastest of them
+    curves: float  # how many masses have a load curve
     torque_u: float  # Taylor coefficients of the motor torque and of the load's angle
     angle_u: float
     f: float  # scratch: an event function
+    where: float  # of the event that ends the span: on which shaft or mass, and at which share of the span
+    share: float
+    noted: float  # events that are not yet recorded, how many and which
+    note_time: float
+    note_kind: float
+    note_place: float
+    note_value: float
+    note_impulse: float
 
 
 class EventRow:
@@ -282,16 +297,23 @@ class Answer:
     slope: float
 
 
-_WHOLE = "n at_motor at_load path path_end motor_shaft first stuck rubbing gears curve piece passed mode zeros"  # numbers that are counted
+_WHOLE = (  # numbers that are counted
+    "n at_motor at_load path path_end motor_shaft first stuck rubbing gears points piece passed mode zeros "
+    "where noted"
+)
 
 
 def _parts() -> dict[str, Any]:
     """The arrays in the work of a start."""
     shapes: dict[str, Any] = dict.fromkeys(("torque_u", "angle_u", "f"), ORDERS)
+    shapes |= dict.fromkeys(("at", "torque_at"), (MOST_MASSES, MOST_POINTS))
+    shapes |= dict.fromkeys(
+        ("note_time", "note_kind", "note_place", "note_value", "note_impulse"), MOST_NOTED
+    )
     shapes |= dict.fromkeys(("due_time", "due_demand", "due_slope"), MOST_PENDING)
     shapes |= dict.fromkeys(OfSpan.__annotations__, (MOST_MASSES, ORDERS))
     for part in (Mass, Shaft, OfMasses, OfShafts):
-        shapes |= dict.fromkeys(part.__annotations__, MOST_MASSES)
+        shapes = dict.fromkeys(part.__annotations__, MOST_MASSES) | shapes
     return shapes
 
 
@@ -302,6 +324,7 @@ MEASURED, ANSWER = record(Measured), record(Answer)
 WORK = record(
     Notes, Machine, Places, Mass, Shaft, OfMasses, OfShafts, OfSpan, State, whole=_WHOLE.split(), **_parts()
 )
+WORK_TYPE: Any = from_dtype(WORK)  # for compiled functions
 N_MACHINE, N_NOTES, N_WORK = size(MACHINE), size(NOTES), size(WORK)
 
 # a recorded span: these numbers, then w, direction, angle and piece of each mass, then theta, mode, side and

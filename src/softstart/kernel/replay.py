@@ -16,8 +16,8 @@ from softstart.kernel.records import (
     BEYOND, BUFFER_FULL, CONTACT, DOUBLED, ENDED, JOINED, NOT_LOCATED, OF_MASS, OF_SHAFT, OPEN, ORDERS,
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, WORK, Record,
 )  # fmt: skip
-from softstart.kernel.series import by_angle, expand, orders, set_piece
-from softstart.kernel.start import rate_of
+from softstart.kernel.series import orders, set_piece
+from softstart.kernel.start import expand_all, rate_of
 
 _A = types.Array(types.float64, 1, "C")
 _I = types.Array(types.int64, 1, "C")
@@ -25,7 +25,7 @@ _M = types.Array(types.float64, 2, "C")
 
 
 @compiled
-def restore(s: Record, tones: Matrix, curves: Matrix, spans: Matrix, row: int) -> int:
+def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
     """The state at the start of a recorded span, and its series; returns how many coefficients."""
     span = spans[row]
     s.time = span[S_START]
@@ -40,8 +40,8 @@ def restore(s: Record, tones: Matrix, curves: Matrix, spans: Matrix, row: int) -
         s.w[i] = span[at]
         s.direction[i] = span[at + 1]
         s.angle[i] = span[at + 2]
-        if s.curve[i] >= 0:
-            set_piece(s, i, curves, int(span[at + 3]))
+        if s.points[i] > 0:
+            set_piece(s, i, int(span[at + 3]))
     for k in range(s.n - 1):
         at = S_MASSES + OF_MASS * s.n + OF_SHAFT * k
         s.theta[k] = span[at]
@@ -51,14 +51,14 @@ def restore(s: Record, tones: Matrix, curves: Matrix, spans: Matrix, row: int) -
     s.changed = 1.0
     along_line(s)
     h = span[S_END] - span[S_START]
-    n = min(orders(rate_of(s, curves) * h), ORDERS - 2)
-    expand(s, tones, curves, h, n)
+    n = min(orders(rate_of(s) * h), ORDERS - 2)
+    expand_all(s, tones, h, n)
     return n
 
 
-@compiled_as(types.void(_A, _M, _M, _M, _I, _A, _M, _M, _M, _M))
+@compiled_as(types.void(_A, _M, _M, _I, _A, _M, _M, _M, _M))
 def states_at(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
+    work: Vector, tones: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
 ) -> None:  # fmt: skip
     """The states at times[j] within span index[j]: angle of the load, torque of the motor, speeds, twists, torques."""
@@ -68,7 +68,7 @@ def states_at(
     for j in range(times.shape[0]):
         if index[j] != last:
             last = index[j]
-            n = restore(s, tones, curves, spans, last)
+            n = restore(s, tones, spans, last)
         start, end = spans[last, S_START], spans[last, S_END]
         x = min(max((times[j] - start) / (end - start), 0.0), 1.0)
         motor[j, 0] = value(s.angle_u, n, x)
@@ -103,8 +103,8 @@ def spring_energy(s: Record) -> float:
     return total
 
 
-@compiled_as(types.void(_A, _M, _M, _M, _A))
-def work_of(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into: Vector) -> None:
+@compiled_as(types.void(_A, _M, _M, _A))
+def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
     """Work over all recorded spans but the last, by exact quadrature of their series, and what is stored.
 
     The last span has no length: it is the state at the end. Into motor, exciting torques, loads, friction and damping to the ground, shafts, gears, and change of the
@@ -113,13 +113,13 @@ def work_of(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into: Ve
     """
     s = work.view(WORK)[0]
     rows = spans.shape[0] - 1
-    restore(s, tones, curves, spans, rows)
+    restore(s, tones, spans, rows)
     stored = spring_energy(s)  # at the end
     f, g = s.f, s.held[0]
     after = stored
     elastic = stored
     for row in range(rows - 1, -1, -1):
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         h = spans[row, S_END] - spans[row, S_START]
         into[0] += h * product(s.torque_u, s.speed[s.at_motor], n)
         for i in range(s.n):
@@ -127,11 +127,11 @@ def work_of(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into: Ve
             turned = speed[0]
             for o in range(1, n + 1):
                 turned += speed[o] / (o + 1.0)
-            if tones.shape[0] > 0:
+            if s.tones != 0.0:
                 into[1] += h * product(s.outside[i], speed, n)
             into[2] += h * (s.direction[i] * s.Mc[i] + s.active[i]) * turned
-            if s.curve[i] >= 0:
-                course = s.turned[i] if by_angle(s, i, curves) else speed
+            if s.points[i] > 0:
+                course = s.turned[i] if s.by_angle[i] != 0.0 else speed
                 into[2] += h * (s.offset[i] * turned + s.incline[i] * product(course, speed, n))
             into[3] += h * s.direction[i] * s.friction[i] * turned
             if s.ground[i] != 0.0:
@@ -156,8 +156,8 @@ def work_of(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into: Ve
     into[6] = stored - elastic
 
 
-@compiled_as(types.int64(_A, _M, _M, _M, _M))
-def stage_peaks(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into: Matrix) -> int:
+@compiled_as(types.int64(_A, _M, _M, _M))
+def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int:
     """A row for each stage: its number, start, end, then largest torque and its instant for each shaft.
 
     Returns ENDED, or why it cannot be told. Stages that take no time have no row.
@@ -174,21 +174,19 @@ def stage_peaks(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, into
             for k in range(s.n - 1):
                 s.peak[k] = 0.0
                 s.peak_time[k] = spans[row, S_START]
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         h = spans[row, S_END] - spans[row, S_START]
         into[at, 2] = spans[row, S_END]
         for k in range(s.n - 1):
-            if s.mode[k] != OPEN and s.mode[k] != BEYOND and not peak_within(s, k, n, 1.0, h):
+            if s.mode[k] != OPEN and s.mode[k] != BEYOND and peak_within(s, k, n, 1.0, h) == 0:
                 return NOT_LOCATED
             into[at, 3 + 2 * k] = s.peak[k]
             into[at, 4 + 2 * k] = s.peak_time[k]
     return ENDED
 
 
-@compiled_as(types.float64(_A, _M, _M, _M, types.float64, types.float64))
-def load_settles(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, begin: float, floor: float
-) -> float:
+@compiled_as(types.float64(_A, _M, _M, types.float64, types.float64))
+def load_settles(work: Vector, tones: Matrix, spans: Matrix, begin: float, floor: float) -> float:
     """From when on, not before `begin`, the speed of the load is not below `floor`; NaN if it is at the end."""
     s = work.view(WORK)[0]
     settled, above = begin, True
@@ -196,12 +194,12 @@ def load_settles(
         start, end = spans[row, S_START], spans[row, S_END]
         if end <= begin:
             continue
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         x = max(0.0, (begin - start) / (end - start))
         speed = s.speed[s.at_load]
         while True:
             set_line(s.f, speed, n, -floor if above else floor, 1.0 if above else -1.0)
-            x = crossing(s.f, 0, n, x, 1.0)
+            x = crossing(s, 0, n, x, 1.0)
             if x < 0.0:
                 break
             above = not above
@@ -209,9 +207,9 @@ def load_settles(
     return settled if above else math.nan
 
 
-@compiled_as(types.float64(_A, _M, _M, _M, types.int64, types.float64, types.float64))
+@compiled_as(types.float64(_A, _M, _M, types.int64, types.float64, types.float64))
 def torque_settles(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, k: int, begin: float, limit: float
+    work: Vector, tones: Matrix, spans: Matrix, k: int, begin: float, limit: float
 ) -> float:  # fmt: skip
     """From when on the torque of shaft k stays within `limit` of its mean; NaN if it is not at the end.
 
@@ -227,7 +225,7 @@ def torque_settles(
         start, end = spans[row, S_START], spans[row, S_END]
         if end <= begin:
             continue
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         share = 0.0
         for i in range(k + 1):
             share += s.J[i] / J
@@ -236,7 +234,7 @@ def torque_settles(
             for i in range(s.n):
                 q = -s.ground[i] * s.speed[i, o] + (s.push[i] if o == 0 else 0.0)
                 q += s.torque_u[o] if i == s.at_motor else 0.0
-                q += s.outside[i, o] if tones.shape[0] > 0 else 0.0
+                q += s.outside[i, o] if s.tones != 0.0 else 0.0
                 every += q
                 before += q if i <= k else 0.0
             s.f[o] = s.torque[k, o] - (before - share * every)
@@ -249,14 +247,14 @@ def torque_settles(
         while True:
             if within:
                 set_line(s.f, away, n, limit, -1.0)
-                upper = crossing(s.f, 0, n, x, 1.0)
+                upper = crossing(s, 0, n, x, 1.0)
                 set_line(s.f, away, n, limit, 1.0)
-                lower = crossing(s.f, 0, n, x, 1.0)
+                lower = crossing(s, 0, n, x, 1.0)
                 sign = -1.0 if upper < 0.0 or 0.0 <= lower < upper else 1.0
                 x = lower if sign < 0.0 else upper
             else:
                 set_line(s.f, away, n, -limit, sign)
-                x = crossing(s.f, 0, n, x, 1.0)
+                x = crossing(s, 0, n, x, 1.0)
             if x < 0.0:
                 break
             within = not within
@@ -288,9 +286,9 @@ def turn(kept: Vector, points: Matrix, time: float, torque: float, still: float)
         kept[2], kept[3] = time, torque
 
 
-@compiled_as(types.int64(_A, _M, _M, _M, types.int64, types.float64, _A, _M))
+@compiled_as(types.int64(_A, _M, _M, types.int64, types.float64, _A, _M))
 def turning_points(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, k: int, still: float, kept: Vector,
+    work: Vector, tones: Matrix, spans: Matrix, k: int, still: float, kept: Vector,
     points: Matrix,
 ) -> int:  # fmt: skip
     """Times and values of the torque of shaft k at its first instant, at all its reversals, and at its last.
@@ -302,7 +300,7 @@ def turning_points(
     s = work.view(WORK)[0]
     f = s.f
     for row in range(spans.shape[0]):
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         start = spans[row, S_START]
         h = spans[row, S_END] - start
         T = s.torque[k]
@@ -316,7 +314,7 @@ def turning_points(
             for o in range(n):
                 f[o] = sign * (o + 1.0) * T[o + 1]
             begin = x
-            x = crossing(f, 0, n - 1, begin, 1.0)
+            x = crossing(s, 0, n - 1, begin, 1.0)
             if x < -1.0:
                 return -2
             if x < 0.0:

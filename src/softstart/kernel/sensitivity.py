@@ -32,7 +32,7 @@ from softstart.kernel.records import (
 )  # fmt: skip
 from softstart.kernel.replay import restore
 from softstart.kernel.series import REACH, orders
-from softstart.kernel.start import rate_of
+from softstart.kernel.start import expand_all, rate_of
 
 Rows = NDArray[np.float64]
 Owners = NDArray[np.int64]
@@ -191,9 +191,9 @@ def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> N
             X[joints + i, q] *= kept
 
 
-@compiled_as(types.void(_A, _M, _M, _M, _A, _I, _A, _T, _A, types.int64, _T, _M, _M, _M, _M, _T))
+@compiled_as(types.void(_A, _M, _M, _A, _I, _A, _T, _A, types.int64, _T, _M, _M, _M, _M, _T))
 def sensitivities(
-    work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, knots: Vector, owners: Owners, times: Vector,
+    work: Vector, tones: Matrix, spans: Matrix, knots: Vector, owners: Owners, times: Vector,
     torques: Rows, marks: Vector, first: int, states: Rows, X: Rows, next_X: Rows, hat: Rows, rates: Rows, series: Rows,
 ) -> None:  # fmt: skip
     """Of a recorded start: d T_k(times[j])/d u_q into torques[j, k, q], X(marks[j]) into states[j].
@@ -215,7 +215,7 @@ def sensitivities(
     mark = 0
     rows = spans.shape[0]
     for row in range(rows):
-        n = restore(s, tones, curves, spans, row)
+        n = restore(s, tones, spans, row)
         start, end = spans[row, S_START], spans[row, S_END]
         length = end - start
         for i in range(count):
@@ -227,7 +227,7 @@ def sensitivities(
             for o in range(1, n + 1):
                 rate += o * s.speed[i, o]
             rates[0, i] = rate / length
-        rate = rate_of(s, curves)
+        rate = rate_of(s)
         if s.lag > 0.0:
             rate = max(rate, 1.0 / s.lag)
         parts = int(rate * length / REACH) + 1

@@ -25,11 +25,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
 from softstart.arrays import Matrix
-from softstart.kernel.jit import compiled
+from softstart.kernel.jit import apart, compiled
 from softstart.kernel.motor import expand_torque
-from softstart.kernel.records import CONTACT, CURVE, DOUBLED, JOINED, ORDERS, PRESSED, TONE, WELDED, Record
+from softstart.kernel.records import (
+    CONTACT,
+    DOUBLED,
+    JOINED,
+    ORDERS,
+    PRESSED,
+    TONE,
+    WELDED,
+    WORK_TYPE,
+    Record,
+)
 
 REACH = 3.0
 TRUNCATION = 1e-18
@@ -40,81 +51,33 @@ LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
 
 
 @compiled
-def set_piece(s: Record, i: int, curves: Matrix, piece: int) -> None:
+def set_piece(s: Record, i: int, piece: int) -> None:
     """The straight piece of its load curve on which mass i is: `piece` of the points lie before it."""
-    curve = curves[s.curve[i]].view(CURVE)[0]
     s.piece[i] = piece
     s.incline[i] = 0.0
     s.changed = 1.0
-    last = int(curve.points)
+    last = s.points[i]
     if piece == 0:
-        s.offset[i] = curve.torque[0]
+        s.offset[i] = s.torque_at[i, 0]
     elif piece == last:
-        s.offset[i] = curve.torque[last - 1]
+        s.offset[i] = s.torque_at[i, last - 1]
     else:
-        rise = curve.torque[piece] - curve.torque[piece - 1]
-        s.incline[i] = rise / (curve.at[piece] - curve.at[piece - 1])
-        s.offset[i] = curve.torque[piece - 1] - s.incline[i] * curve.at[piece - 1]
+        rise = s.torque_at[i, piece] - s.torque_at[i, piece - 1]
+        s.incline[i] = rise / (s.at[i, piece] - s.at[i, piece - 1])
+        s.offset[i] = s.torque_at[i, piece - 1] - s.incline[i] * s.at[i, piece - 1]
 
 
 @compiled
-def find_piece(s: Record, i: int, curves: Matrix) -> None:
+def find_piece(s: Record, i: int) -> None:
     """The same by the present speed or angle, as at the start and where a blow has changed the speed."""
-    if s.curve[i] < 0:
+    if s.points[i] == 0:
         return
-    curve = curves[s.curve[i]].view(CURVE)[0]
-    where = s.angle[i] if curve.by_angle != 0.0 else s.w[i]
+    where = s.angle[i] if s.by_angle[i] != 0.0 else s.w[i]
     piece = 0
-    while piece < curve.points and curve.at[piece] <= where:
+    while piece < s.points[i] and s.at[i, piece] <= where:
         piece += 1
     s.passed[i] = 0
-    set_piece(s, i, curves, piece)
-
-
-@compiled
-def by_angle(s: Record, i: int, curves: Matrix) -> bool:
-    """Whether mass i has a load curve over its angle."""
-    return s.curve[i] >= 0 and curves[s.curve[i]].view(CURVE)[0].by_angle != 0.0
-
-
-@compiled
-def apply_modes(s: Record, curves: Matrix) -> None:
-    """What follows from the modes: bodies and what holds them, springs that act, gears, the fastest rate."""
-    first = 0
-    s.bodies = 0.0
-    for i in range(s.n):
-        if i == 0 or (s.mode[i - 1] != WELDED and s.mode[i - 1] != PRESSED):
-            first = i
-            s.body_J[i] = 0.0
-            s.hold[i] = 0.0
-            s.stuck[i] = 0
-            s.rubbing[i] = 0
-            s.gears[i] = 0
-        else:
-            s.bodies = 1.0
-        s.first[i] = first
-        s.body_J[first] += s.J[i]
-        s.push[i] = -s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
-        if s.curve[i] >= 0:
-            s.push[i] -= s.offset[i]
-        if s.rubs[i] != 0.0:
-            s.rubbing[first] += 1
-            s.hold[first] += s.Mc[i] + s.friction[i]
-            if s.direction[i] == 0.0:
-                s.stuck[first] = 1
-        if s.braked != 0.0 and i == s.at_motor:
-            s.stuck[first] = 1
-    for i in range(s.n):
-        first = s.first[i]
-        s.inverse[i] = 0.0 if s.stuck[first] != 0 else 1.0 / s.body_J[first]
-    for k in range(s.n - 1):
-        spring = s.mode[k] == CONTACT or s.mode[k] == JOINED
-        s.stiff[k] = s.c[k] if spring else (2.0 * s.c[k] if s.mode[k] == DOUBLED else 0.0)
-        s.damp[k] = s.d[k] if spring else 0.0
-        s.slack[k] = s.side[k] * s.half[k]
-        set_gear(s, k)
-    s.fastest = fastest_rate(s, curves)
-    s.changed = 0.0
+    set_piece(s, i, piece)
 
 
 @compiled
@@ -153,7 +116,7 @@ def grip(s: Record, i: int, direction: float, o: int) -> float:
 
 
 @compiled
-def fastest_rate(s: Record, curves: Matrix) -> float:
+def fastest_rate(s: Record) -> float:
     """An upper bound of the rates of the machine in its present modes, 1/s.
 
     Gershgorin's theorem on the matrix of the shafts, c_k (1/J_a + 1/J_b) with sqrt(c_k c_l)/J beside it, and
@@ -168,8 +131,8 @@ def fastest_rate(s: Record, curves: Matrix) -> float:
         j = i
         while j < s.n and s.first[j] == i:
             to_ground += s.ground[j]
-            if s.curve[j] >= 0:
-                if by_angle(s, j, curves):
+            if s.points[j] > 0:
+                if s.by_angle[j] != 0.0:
                     incline += abs(s.incline[j])
                 else:
                     to_ground += abs(s.incline[j])
@@ -192,6 +155,46 @@ def fastest_rate(s: Record, curves: Matrix) -> float:
     springs = max(springs, before_row) + held
     dampers = max(dampers, before_damping) + ground
     return 0.5 * (dampers + math.sqrt(dampers * dampers + 4.0 * springs))
+
+
+@apart(types.void(WORK_TYPE))
+def apply_modes(s: Record) -> None:
+    """What follows from the modes: bodies and what holds them, springs that act, gears, the fastest rate."""
+    first = 0
+    s.bodies = 0.0
+    for i in range(s.n):
+        if i == 0 or (s.mode[i - 1] != WELDED and s.mode[i - 1] != PRESSED):
+            first = i
+            s.body_J[i] = 0.0
+            s.hold[i] = 0.0
+            s.stuck[i] = 0
+            s.rubbing[i] = 0
+            s.gears[i] = 0
+        else:
+            s.bodies = 1.0
+        s.first[i] = first
+        s.body_J[first] += s.J[i]
+        s.push[i] = -s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
+        if s.points[i] > 0:
+            s.push[i] -= s.offset[i]
+        if s.rubs[i] != 0.0:
+            s.rubbing[first] += 1
+            s.hold[first] += s.Mc[i] + s.friction[i]
+            if s.direction[i] == 0.0:
+                s.stuck[first] = 1
+        if s.braked != 0.0 and i == s.at_motor:
+            s.stuck[first] = 1
+    for i in range(s.n):
+        first = s.first[i]
+        s.inverse[i] = 0.0 if s.stuck[first] != 0 else 1.0 / s.body_J[first]
+    for k in range(s.n - 1):
+        spring = s.mode[k] == CONTACT or s.mode[k] == JOINED
+        s.stiff[k] = s.c[k] if spring else (2.0 * s.c[k] if s.mode[k] == DOUBLED else 0.0)
+        s.damp[k] = s.d[k] if spring else 0.0
+        s.slack[k] = s.side[k] * s.half[k]
+        set_gear(s, k)
+    s.fastest = fastest_rate(s)
+    s.changed = 0.0
 
 
 def needed(reach: float) -> int:
@@ -252,58 +255,14 @@ def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
 
 
 @compiled
-def curve_torque(s: Record, i: int, curves: Matrix, o: int, share: float) -> float:
+def curve_torque(s: Record, i: int, o: int, share: float) -> float:
     """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
-    if by_angle(s, i, curves):
+    if s.by_angle[i] != 0.0:
         if o == 0:
             s.turned[i, 0] = s.angle[i]
         s.turned[i, o + 1] = share * s.speed[i, o]
         return s.incline[i] * s.turned[i, o]
     return s.incline[i] * s.speed[i, o]
-
-
-@compiled
-def expand(s: Record, tones: Matrix, curves: Matrix, h: float, n: int) -> None:
-    """All coefficients of the span of length h that begins with the present state and modes."""
-    speed, twist, torque, held = s.speed, s.twist, s.torque, s.held
-    count, motor, load = s.n, s.at_motor, s.at_load
-    forced, curved, bodies = tones.shape[0] > 0, curves.shape[0] > 0, s.bodies != 0.0
-    expand_torque(s, h, n)
-    if forced:
-        expand_tones(s, tones, h, n)
-    s.angle_u[0] = s.phi
-    for i in range(count):
-        speed[i, 0] = s.w[i]
-    for k in range(count - 1):
-        twist[k, 0] = s.theta[k]
-    for o in range(n + 1):
-        share = h / (o + 1.0)
-        passed_on = 0.0
-        for i in range(count):
-            w = speed[i, o]
-            total = passed_on - s.ground[i] * w
-            if i == motor:
-                total += s.torque_u[o]
-            if o == 0:
-                total += s.push[i]
-            if forced:
-                total += s.outside[i, o]
-            if curved and s.curve[i] >= 0:
-                total -= curve_torque(s, i, curves, o, share)
-            if i + 1 < count:
-                v = w - speed[i + 1, o]
-                z = twist[i, o] - s.slack[i] if o == 0 else twist[i, o]
-                T = s.stiff[i] * z + s.damp[i] * v
-                torque[i, o] = T
-                twist[i, o + 1] = share * v
-                total -= s.before[i] * T
-                passed_on = s.after[i] * T
-            held[i, o] = total
-            speed[i, o + 1] = share * s.inverse[i] * total
-        if bodies:
-            join(s, o, share)
-        s.angle_u[o + 1] = share * speed[load, o]
-    note_scale(s, forced)
 
 
 @compiled
@@ -338,7 +297,7 @@ def join(s: Record, o: int, share: float) -> None:
 
 
 @compiled
-def note_scale(s: Record, forced: bool) -> None:
+def note_scale(s: Record) -> None:
     """The sum of the absolute torques on each body, which is the scale of its rounding."""
     i = 0
     while i < s.n:
@@ -350,7 +309,7 @@ def note_scale(s: Record, forced: bool) -> None:
             scale += abs(s.push[j]) + abs(s.ground[j] * s.w[j])
             if j == s.at_motor:
                 scale += abs(s.torque_u[0])
-            if forced:
+            if s.tones != 0.0:
                 scale += abs(s.outside[j, 0])
             j += 1
             if j == s.n or s.first[j] != i:
@@ -359,3 +318,45 @@ def note_scale(s: Record, forced: bool) -> None:
             scale += s.before[j - 1] * abs(s.torque[j - 1, 0])
         s.scale[i] = scale
         i = j
+
+
+@apart(types.void(WORK_TYPE, types.float64, types.int64))
+def expand(s: Record, h: float, n: int) -> None:
+    """All coefficients of the span of length h that begins with the present state and modes."""
+    speed, twist, torque, held = s.speed, s.twist, s.torque, s.held
+    count, motor, load = s.n, s.at_motor, s.at_load
+    forced, curved, bodies = s.tones != 0.0, s.curves != 0.0, s.bodies != 0.0
+    expand_torque(s, h, n)
+    s.angle_u[0] = s.phi
+    for i in range(count):
+        speed[i, 0] = s.w[i]
+    for k in range(count - 1):
+        twist[k, 0] = s.theta[k]
+    for o in range(n + 1):
+        share = h / (o + 1.0)
+        passed_on = 0.0
+        for i in range(count):
+            w = speed[i, o]
+            total = passed_on - s.ground[i] * w
+            if i == motor:
+                total += s.torque_u[o]
+            if o == 0:
+                total += s.push[i]
+            if forced:
+                total += s.outside[i, o]
+            if curved and s.points[i] > 0:
+                total -= curve_torque(s, i, o, share)
+            if i + 1 < count:
+                v = w - speed[i + 1, o]
+                z = twist[i, o] - s.slack[i] if o == 0 else twist[i, o]
+                T = s.stiff[i] * z + s.damp[i] * v
+                torque[i, o] = T
+                twist[i, o + 1] = share * v
+                total -= s.before[i] * T
+                passed_on = s.after[i] * T
+            held[i, o] = total
+            speed[i, o + 1] = share * s.inverse[i] * total
+        if bodies:
+            join(s, o, share)
+        s.angle_u[o + 1] = share * speed[load, o]
+    note_scale(s)

@@ -16,12 +16,12 @@ from softstart.kernel.motor import (
     note_excess, sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
-    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT_LIMIT, LOWER, MASS, MEASURED, NO_EVENT, NOT_FINITE,
+    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT, EVENT_LIMIT, LOWER, MASS, MEASURED, MOST_NOTED, NO_EVENT, NOT_FINITE,
     NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
     SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
     UNSOLVED, UPPER, WELDED, WORK, Record,
 )  # fmt: skip
-from softstart.kernel.series import REACH, apply_modes, expand, find_piece, orders
+from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, find_piece, orders
 
 _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
@@ -53,7 +53,7 @@ def load_machine(
         s.friction[i] = mass.friction
         s.w0[i] = mass.w0
         s.rubs[i] = 1.0 if mass.Mc > 0.0 or mass.friction > 0.0 else 0.0
-        s.curve[i] = -1
+        s.points[i] = 0
     for k in range(s.n - 1):
         shaft = shafts[k].view(SHAFT)[0]
         s.c[k] = shaft.c
@@ -67,17 +67,25 @@ def load_machine(
         s.gear[k] = shaft.gear
         if shaft.eta != 1.0:
             s.rubs[k + int(shaft.gear)] = 1.0
+    s.curves = 0.0
     for row in range(curves.shape[0]):
-        mass_of_curve = int(curves[row].view(CURVE)[0].mass)
-        if mass_of_curve >= 0:
-            s.curve[mass_of_curve] = row
+        curve = curves[row].view(CURVE)[0]
+        if curve.mass >= 0.0:
+            i = int(curve.mass)
+            s.curves += 1.0
+            s.points[i] = int(curve.points)
+            s.by_angle[i] = curve.by_angle
+            for k in range(s.points[i]):
+                s.at[i, k] = curve.at[k]
+                s.torque_at[i, k] = curve.torque[k]
+    s.tones = tones.shape[0]
     s.tone_rate = 0.0
     for row in range(tones.shape[0]):
         s.tone_rate = max(s.tone_rate, tones[row].view(TONE)[0].omega)
 
 
 @compiled
-def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> None:
+def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
     s = work.view(WORK)[0]
     for j in range(N_NOTES):
@@ -93,6 +101,7 @@ def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> Non
     s.start_time = s.release_time = s.first_contact = s.impact_speed = math.nan
     s.contact_torque = s.stage_2_end = math.nan
     s.braked = 1.0 if s.release_at > 0.0 else 0.0
+    s.noted = 0
     begin_modes(s)
     for i in range(s.n):  # the load mass begins at the angle 0
         s.angle[i] = 0.0
@@ -101,7 +110,7 @@ def begin_start(work: Vector, curves: Matrix, until: float, on_gap: bool) -> Non
         s.passed[i] = 0
         s.offset[i] = 0.0
         s.incline[i] = 0.0
-        find_piece(s, i, curves)
+        find_piece(s, i)
     s.phi = 0.0
     s.u = s.ref = s.demand = s.initial_torque
     s.stage = 1.0
@@ -146,7 +155,7 @@ def move(s: Record, n: int, x: float, time: float) -> None:
     """The state after the share x of the span, `time` seconds later."""
     for i in range(s.n):
         s.w[i] = value(s.speed[i], n, x)
-        if s.curve[i] >= 0:
+        if s.points[i] > 0:
             s.passed[i] = 0
             s.angle[i] = value(s.turned[i], n, x)
     for k in range(s.n - 1):
@@ -169,10 +178,33 @@ def pressing(twist: Vector, n: int, x: float, h: float, side: float) -> float:
 
 
 @compiled
-def rate_of(s: Record, curves: Matrix) -> float:
+def note_events(s: Record, events: Matrix) -> None:
+    """Record what has been noted since the last span."""
+    if events.shape[0] > 0:
+        for j in range(s.noted):
+            event = events[int(s.n_events)].view(EVENT)[0]
+            event.time = s.note_time[j]
+            event.kind = s.note_kind[j]
+            event.place = s.note_place[j]
+            event.value = s.note_value[j]
+            event.impulse = s.note_impulse[j]
+            s.n_events += 1.0
+    s.noted = 0
+
+
+@compiled
+def expand_all(s: Record, tones: Matrix, h: float, n: int) -> None:
+    """All coefficients of the span, those of exciting torques first."""
+    if s.tones != 0.0:
+        expand_tones(s, tones, h, n)
+    expand(s, h, n)
+
+
+@compiled
+def rate_of(s: Record) -> float:
     """An upper bound of all rates of the span, 1/s."""
     if s.changed != 0.0:
-        apply_modes(s, curves)
+        apply_modes(s)
     rate = max(s.fastest, s.tone_rate)
     return rate if s.follows != 0.0 else max(rate, 1.0 / s.lag)
 
@@ -180,7 +212,7 @@ def rate_of(s: Record, curves: Matrix) -> float:
 @compiled
 def stands(s: Record, spans: Matrix, events: Matrix) -> int:
     """Why the start does not go on from here: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
-    if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + 4 * s.n + 8 >= events.shape[0]):
+    if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + MOST_NOTED >= events.shape[0]):
         return BUFFER_FULL
     stop = s.t_end
     if math.isnan(s.start_time) and stop == math.inf:
@@ -214,12 +246,12 @@ def horizon(s: Record) -> float:
     return until
 
 
-_ADVANCE = types.int64(_A, _M, _M, _M, _M)
+_ADVANCE = types.int64(_A, _M, _M, _M)
 _ADVANCES = types.FunctionType(_ADVANCE)
 
 
 @compiled_as(_ADVANCE)
-def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: Matrix) -> int:
+def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way.
 
     `spans` and `events` are filled row by row; with no rows nothing is recorded.
@@ -231,7 +263,8 @@ def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: 
             return reason
         begin_torque(s)
         if s.braked != 0.0 and s.time >= s.release_at:
-            release(s, events)
+            release(s)
+            note_events(s, events)
         until = horizon(s)
         h = until - s.time
         cut = s.slew_end < h
@@ -241,17 +274,18 @@ def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: 
         if s.period > 0.0 and h > s.period:
             cut = True
             h = s.period
-        rate = rate_of(s, curves)
+        rate = rate_of(s)
         if rate * h > REACH:
             cut = True
             h = REACH / rate
         n = orders(rate * h)
-        expand(s, tones, curves, h, n)
-        event, where, x = next_event(s, curves, h, n)
+        expand_all(s, tones, h, n)
+        event = next_event(s, h, n)
+        where, x = s.where, s.share
         if event == UNSOLVED:
             return NOT_LOCATED
         for k in range(s.n - 1):
-            if s.mode[k] != OPEN and s.mode[k] != BEYOND and not peak_within(s, k, n, x, h):
+            if s.mode[k] != OPEN and s.mode[k] != BEYOND and peak_within(s, k, n, x, h) == 0:
                 return NOT_LOCATED
         if x > 0.0:
             if spans.shape[0] > 0:
@@ -274,40 +308,41 @@ def advance(work: Vector, tones: Matrix, curves: Matrix, spans: Matrix, events: 
         elif event == SETTLE and s.restitution[where] < 1.0:
             ratio = -s.twist[where, 1] / s.twist[where, 2]
             rest = h * ratio / (1.0 - s.restitution[where])
-        if handle(s, events, curves, event, where, press, rest, h) and s.ask_on_gap != 0.0:
+        if handle(s, event, where, press, rest, h) != 0 and s.ask_on_gap != 0.0:
             s.ask_at = s.time
+        note_events(s, events)
         if s.events > s.event_cap:
             return EVENT_LIMIT
 
 
 @compiled
-def torque_now(s: Record, k: int, tones: Matrix, curves: Matrix) -> float:
+def torque_now(s: Record, k: int, tones: Matrix) -> float:
     """The torque of shaft k in the present state; of rigid joints as a span of no length has it."""
     mode = s.mode[k]
     if mode == OPEN or mode == BEYOND:
         return 0.0
     if s.changed != 0.0:
-        apply_modes(s, curves)
+        apply_modes(s)
     if mode == PRESSED or mode == WELDED:
         begin_torque(s)
-        expand(s, tones, curves, 0.0, 2)
+        expand_all(s, tones, 0.0, 2)
         return float(s.torque[k, 0])
     return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
 
-_MEASURE = types.void(_A, types.int64, _M, _M, _A)
+_MEASURE = types.void(_A, types.int64, _M, _A)
 _MEASURES = types.FunctionType(_MEASURE)
 
 
 @compiled_as(_MEASURE)
-def measure(work: Vector, sees: int, tones: Matrix, curves: Matrix, measured: Vector) -> None:
+def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
     """What the controller sees now."""
     s = work.view(WORK)[0]
     seen = measured.view(MEASURED)[0]
     sample(s, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
-        seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones, curves)
+        seen.shaft_torque = sign * torque_now(s, s.motor_shaft, tones)
 
 
 @compiled_as(types.int64(_A, types.float64, types.float64, types.float64))
@@ -332,23 +367,23 @@ def begin(
 ) -> None:  # fmt: skip
     """A start of this machine, at t = 0."""
     load_machine(work, machine, masses, shafts, curves, tones)
-    begin_start(work, curves, until, on_gap)
+    begin_start(work, until, on_gap)
 
 
-_RUN = types.int64(_ADVANCES, _MEASURES, _STEP, _A, types.int64, _A, _M, _M, _M, _M, _A, _A, _A)
+_RUN = types.int64(_ADVANCES, _MEASURES, _STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A)
 
 
 @compiled_as(_RUN)
 def run_on(  # type: ignore[no-untyped-def]
-    go_on, look, step, parameters, sees, work, tones, curves, spans, events, measured, state, command
+    go_on, look, step, parameters, sees, work, tones, spans, events, measured, state, command
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
     s = work.view(WORK)[0]
     told = command[:NEW_STATE].view(ANSWER)[0]
     while True:
-        reason = go_on(work, tones, curves, spans, events)
+        reason = go_on(work, tones, spans, events)
         if reason == ASK:
-            look(work, sees, tones, curves, measured)
+            look(work, sees, tones, measured)
             told.slope = 0.0
             step(parameters, measured, state, command)
             reason = take_answer(s, told.torque, told.ask_again, told.slope)
@@ -387,9 +422,7 @@ def run_all(  # type: ignore[no-untyped-def]
             state[j] = 0.0
         begin_one(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
         own = parameters[i if parameters.shape[0] > 1 else 0]
-        run_one(
-            go_on, look, step, own, sees, work, nothing, curves[i], nothing, nothing, measured, state, command
-        )
+        run_one(go_on, look, step, own, sees, work, nothing, nothing, nothing, measured, state, command)
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):

@@ -26,7 +26,6 @@ class Recorder:
         self.rows, self.sees = rows, sees
         self.work = np.zeros(at.N_WORK)
         self.measured = np.zeros(N_MEASURED)
-        self.curves = rows.curves[0]
         self.spans = np.zeros((room, at.span_size(rows.count)))
         self.events = np.zeros((room + 16 * rows.count if room else 0, at.size(at.EVENT)))
 
@@ -39,26 +38,26 @@ class Recorder:
         """The state at t = 0; without an end `until` is infinite."""
         given = self.rows
         start.begin(
-            self.work, given.machines[0], given.masses[0], given.shafts[0], self.curves, given.tones, until,
+            self.work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones, until,
             on_gap,
         )  # fmt: skip
 
     def advance(self) -> int:
         """To the next control instant, the end, or a full record; returns which."""
-        reason: int = start.advance(self.work, self.rows.tones, self.curves, self.spans, self.events)
+        reason: int = start.advance(self.work, self.rows.tones, self.spans, self.events)
         return reason
 
     def run(self, step: Any, numbers: Vector, state: Vector, command: Vector) -> int:
         """To the end, or a full record, under a compiled controller."""
         reason: int = start.run(
-            step, numbers, self.sees, self.work, self.rows.tones, self.curves, self.spans, self.events,
+            step, numbers, self.sees, self.work, self.rows.tones, self.spans, self.events,
             self.measured, state, command,
         )  # fmt: skip
         return reason
 
     def measure(self) -> None:
         """Fill `measured` with what the controller sees now."""
-        start.measure(self.work, self.sees, self.rows.tones, self.curves, self.measured)
+        start.measure(self.work, self.sees, self.rows.tones, self.measured)
 
     def answer(self, torque: float, ask_again: float, slope: float) -> int:
         """Take the controller's answer; returns ASK, or why it cannot be taken."""
@@ -124,13 +123,13 @@ class Recorded:
         end = at.S_MASSES + at.OF_MASS * self.rows.count
         return self.states[:, at.S_MASSES + what : end : at.OF_MASS]
 
-    def _loaded(self) -> tuple[Vector, Matrix, Matrix]:
-        """Work of the kernel with this machine, its tones and curves."""
+    def _loaded(self) -> tuple[Vector, Matrix]:
+        """Work of the kernel with this machine, and its tones."""
         work, given = np.zeros(at.N_WORK), self.rows
         start.load_machine(
             work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones
         )
-        return work, given.tones, given.curves[0]
+        return work, given.tones
 
     def index(self, times: Vector) -> NDArray[np.int64]:
         """The span in which each instant lies; at a joint, the one that begins there."""

@@ -9,11 +9,21 @@ from hypothesis import strategies as st
 from numpy.polynomial.polynomial import polyfromroots, polymul, polyval
 
 from softstart.kernel.events import NONE, first_root, value
+from softstart.kernel.jit import compiled
+from softstart.kernel.records import N_WORK, WORK
+
+
+@compiled
+def first_root_of(work, f, end, zeros, noise, faint):
+    s = work.view(WORK)[0]
+    for i in range(f.size):
+        s.f[i] = f[i]
+    return first_root(s, f.size - 1, end, zeros, noise, faint)
 
 
 def root(coefficients, end=1.0, zeros=0, noise=0.0, faint=0.0) -> float:
     f = np.ascontiguousarray(coefficients, dtype=np.float64)
-    return float(first_root(f, f.size - 1, end, zeros, noise, faint))
+    return float(first_root_of(np.zeros(N_WORK), f, end, zeros, noise, faint))
 
 
 @given(
