@@ -475,6 +475,11 @@ class Drive(ParameterSet):
         return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
 
     @property
+    def motor(self) -> Self:
+        """What has the data of the motor: the drive itself."""
+        return self
+
+    @property
     def shaft_names(self) -> tuple[str, ...]:
         """The shaft by the masses that it joins."""
         return ("motor - load",)
