@@ -55,6 +55,8 @@ def set_piece(s: Record, i: int, curves: Matrix, piece: int) -> None:
         rise = curve.torque[piece] - curve.torque[piece - 1]
         s.incline[i] = rise / (curve.at[piece] - curve.at[piece - 1])
         s.offset[i] = curve.torque[piece - 1] - s.incline[i] * curve.at[piece - 1]
+        if abs(s.offset[i]) <= 1e-15 * abs(curve.torque[piece - 1]):  # rounding: no torque breaks friction
+            s.offset[i] = 0.0
 
 
 @compiled

@@ -15,7 +15,6 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.start.run import Run
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
@@ -446,7 +445,7 @@ def sheet_section(
 
 def _motor_torque(run: AnyRun) -> Vector:
     """The motor torque over a start, N m."""
-    return run.u if isinstance(run, Run) else run.at(np.linspace(0.0, run.end_time, INSTANTS))["u"]
+    return run.u
 
 
 FUNCTIONS = {
