@@ -177,7 +177,7 @@ class Recorded:
         The `parts` of the state are twists, speeds, realised torque of the motor, and its angle.
         """
         when, begin = (np.ascontiguousarray(one, dtype=np.float64) for one in (times, marks))
-        given = np.ascontiguousarray(knots, dtype=np.float64)
+        given = np.array(knots, dtype=np.float64)  # a copy: the kernel takes no read-only numbers
         own = np.arange(given.size) if owners is None else np.ascontiguousarray(owners, dtype=np.int64)
         count, columns = self.rows.count, int(own[-1]) + 1
         first, end, _ = parts.indices(2 * count + 1)
