@@ -90,8 +90,8 @@ def states_at(
 @compiled_as(
     types.int64(
         types.FunctionType(RUN), ADVANCES, MEASURES, types.FunctionType(BEGIN), types.FunctionType(_STATES),
-        STEP, _M, types.int64, types.boolean, types.float64, *[_A, _M, _M, _M, _M], _A, _M, _M, _A, _I, _M, _T,
-        _M, _T, *[_A] * 3,
+        STEP, _M, types.int64, types.boolean, types.float64, _A, _M, _M, _M, _M, _A, _M, _M, _A, _I, _M,
+        _T, _M, _T, _A, _A, _A,
     )
 )  # fmt: skip
 def states_of_all(  # type: ignore[no-untyped-def]
