@@ -28,7 +28,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -336,7 +336,8 @@ class Loop:
         return scaled(system, self._scales(self.plant), np.zeros(0), outputs)
 
     def _plant(self, further: float) -> SampledPlant:
-        delay = float(self.drive.motor.computing_delay) + further
+        motor: Any = self.drive.motor
+        delay = float(motor.computing_delay) + further
         inputs = self.point.derivative.inputs
         return sampled(self._continuous, self.period, delay, inputs, self.differencing)
 

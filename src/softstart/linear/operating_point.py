@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,8 @@ def run_until_steady(start: SampledStart) -> SampledRun:
 
 def _stiff(start: SampledStart) -> float:
     """The time of a stiff start under the starting torque, s."""
-    drive, mass = start.drive, start.rows.masses.view(at.MASS)[0, :, 0]
+    drive: Any = start.drive
+    mass = start.rows.masses.view(at.MASS)[0, :, 0]
     target = float(drive.target_speed or 0.0)
     against = float((mass["Mc"] + mass["active"] + mass["friction"] + mass["ground"] * target).sum())
     Ms = drive.motor.starting_torque

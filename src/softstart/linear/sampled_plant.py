@@ -69,7 +69,7 @@ def single(machine: Machine) -> Any:
 def sizes_of(machine: Machine) -> Sizes:
     """The sizes of a machine with all gaps closed."""
     rows = rows_of(single(machine))
-    base, period = machine.mean_torque, float(rows.machine.period)
+    base, period = float(machine.mean_torque), float(rows.machine.period)
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
     c = rows.shafts.view(at.SHAFT)[0, :, 0]["c"]

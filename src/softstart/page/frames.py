@@ -507,7 +507,7 @@ def figure(session: Session, found: Strategy, units: Units) -> dict[str, Any]:
     run = found.run
     facts = judged(session, found) | {
         "status": found.status,
-        "base": number(session.machine.mean_torque),
+        "base": number(float(session.machine.mean_torque)),
     }
     if run is not None:
         facts |= {

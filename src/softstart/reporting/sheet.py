@@ -23,7 +23,7 @@ from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
 from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import array_starts, figures, joined_notes
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
@@ -382,7 +382,7 @@ def _starts(
         each = [
             {name: float(np.broadcast_to(v, count)[i]) for name, v in columns.items()} for i in range(count)
         ]
-        notes = np.concatenate(
+        notes = joined_notes(
             [array_starts(drive, replace(ready, **values), fitted_to=own) for values in each]
         )
     found = figures(notes, metrics.base_torque(drive))

@@ -139,7 +139,7 @@ def _of_drives(
 
 def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> Notes:
     maker = question.maker
-    fitted_to = question.fitted_to and question.fitted_to.design_drive
+    fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
     made = maker.make(parameters, controller)
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
     if not arrays or isinstance(made, CompiledController):
@@ -161,7 +161,7 @@ def _of_chains(
     chains = [_chain_of(question.drive, changes, index) for index in range(count)]
     starts = prepared(chains, question.time_limit)
     base = np.array([(question.base or question.fitted_to or chain).mean_torque for chain in chains])
-    nominal = question.fitted_to and question.fitted_to.design_drive
+    nominal = None if question.fitted_to is None else question.fitted_to.design_drive
     drives = [nominal or chain.design_drive for chain in chains]
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
     made = [
