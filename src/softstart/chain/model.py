@@ -271,6 +271,21 @@ class Chain:
         return tuple(speed / of_reference for speed in speeds)
 
     @property
+    def mass_names(self) -> tuple[str, ...]:
+        """The masses by their names."""
+        return tuple(mass.name for mass in self.masses)
+
+    @property
+    def own_gaps(self) -> tuple[float, ...]:
+        """The gap of each shaft at that shaft itself, rad, as it was given."""
+        return tuple(float(shaft.gap) for shaft in self.shafts)
+
+    @property
+    def gaps(self) -> Vector:
+        """The gap of each shaft, rad at the motor shaft."""
+        return self.at_motor_shaft().gap
+
+    @property
     def shaft_names(self) -> tuple[str, ...]:
         """Each shaft by the masses that it joins.
 

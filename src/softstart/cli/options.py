@@ -30,7 +30,7 @@ from softstart.plugins import CONTROLLERS, registered
 from softstart.quantities import RefusedError, to_si, whole_number
 
 if TYPE_CHECKING:
-    from softstart.chain import simulation
+    from softstart.chain import two_masses as simulation
     from softstart.identification import result
     from softstart.identification.result import Identification
     from softstart.views import chains as views

@@ -52,10 +52,9 @@ if TYPE_CHECKING:
     from softstart.identification.result import Identification
     from softstart.start import recommendation
     from softstart.start.comparison import Comparison
-    from softstart.views import chains, starts
     from softstart.views import fatigue as lives
+    from softstart.views import starts
 else:
-    chains = late("softstart.views.chains")
     starts, lives = late("softstart.views.starts"), late("softstart.views.fatigue")
     shaft_lives = late("softstart.chain.fatigue")
     recommendation = late("softstart.start.recommendation")
@@ -231,12 +230,12 @@ def simulate(
 
 
 def _start_data(run: Any, fitted_to: Drive | None) -> dict[str, Any]:
-    if isinstance(run.drive, Drive):
-        stages = [{**asdict(stage), "duration": stage.duration} for stage in run.stages]
-        more = {"stages": stages, "events": [asdict(event) for event in run.events]}
-    else:
-        more = {"events": [event._asdict() for event in run.events]}
-    return {**run.summary(), "fitted_to": fitted_to.name if fitted_to else None, **more}
+    return {
+        **run.summary(),
+        "fitted_to": fitted_to.name if fitted_to else None,
+        "stages": [{**asdict(stage), "duration": stage.duration} for stage in run.stages],
+        "events": [event._asdict() for event in run.events],
+    }
 
 
 def _show_start(to: Console, run: Any, fitted_to: Drive | None) -> None:
@@ -245,17 +244,12 @@ def _show_start(to: Console, run: Any, fitted_to: Drive | None) -> None:
     sentence(to, f"  under  {run.controller_name}{' (' + values + ')' if values else ''}")
     to.print()
     sentence(to, run.status.value, "bold")
-    if isinstance(run.drive, Drive):
-        print_figures(to, starts.figure_rows(run))
-        tables = [starts.stage_table(run, SHOWN), starts.event_table(run, SHOWN)]
-    else:
-        print_figures(to, chains.figure_rows(run))
-        tables = [chains.shaft_table(run), chains.event_table(run, SHOWN)]
-    for table in tables:
+    print_figures(to, starts.figure_rows(run))
+    for table in starts.start_tables(run, SHOWN):
         to.print()
         print_table(to, table)
-    if not isinstance(run.drive, Drive):
-        print_conclusion(to, [], run.chain.warnings)
+    if run.drive.warnings:
+        print_conclusion(to, [], run.drive.warnings)
 
 
 def _value(value: object) -> str:

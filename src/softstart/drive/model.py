@@ -475,9 +475,36 @@ class Drive(ParameterSet):
         return (push * self.J2 + self.J1 * self.Mc) / (self.J1 + self.J2)
 
     @property
+    def motor(self) -> Self:
+        """What has the data of the motor: the drive itself."""
+        return self
+
+    motor_index, load_index = 0, 1  # of the masses
+
+    @property
+    def mass_names(self) -> tuple[str, ...]:
+        """The two masses."""
+        return ("motor", "load")
+
+    @property
     def shaft_names(self) -> tuple[str, ...]:
         """The shaft by the masses that it joins."""
         return ("motor - load",)
+
+    @property
+    def gaps(self) -> Vector:
+        """The gap of the shaft, rad, as an array."""
+        return np.array([self.gap])
+
+    @property
+    def own_gaps(self) -> tuple[float, ...]:
+        """The gap of each shaft at that shaft itself, rad, as it was given."""
+        return (float(self.gap),)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what the machine leaves out that decides its shaft torques: none of a drive."""
+        return ()
 
     @property
     def shaft_means(self) -> Vector:

@@ -126,6 +126,7 @@ class Notes:
     status: float
     start_time: float
     time: float  # at the end that of the run
+    final_speed: float  # of the load at the end
     stage: float  # odd while a gap between motor and load is open, even while none is
     gap_events: float
     contacts: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -17,11 +18,14 @@ from softstart.kernel.records import (
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, WORK, Record,
 )  # fmt: skip
 from softstart.kernel.series import orders, set_piece
-from softstart.kernel.start import expand_all, rate_of
+from softstart.kernel.start import (
+    ADVANCES, BEGIN, MEASURES, RUN, STEP, advance, begin, expand_all, measure, rate_of, run_on,
+)  # fmt: skip
 
 _A = types.Array(types.float64, 1, "C")
 _I = types.Array(types.int64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
+_T = types.Array(types.float64, 3, "C")
 
 
 @compiled
@@ -56,7 +60,10 @@ def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
     return n
 
 
-@compiled_as(types.void(_A, _M, _M, _I, _A, _M, _M, _M, _M))
+_STATES = types.void(_A, _M, _M, _I, _A, _M, _M, _M, _M)
+
+
+@compiled_as(_STATES)
 def states_at(
     work: Vector, tones: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
@@ -78,6 +85,56 @@ def states_at(
         for k in range(s.n - 1):
             twist[j, k] = value(s.twist[k], n, x)
             T[j, k] = value(s.torque[k], n, x)
+
+
+@compiled_as(
+    types.int64(
+        types.FunctionType(RUN), ADVANCES, MEASURES, types.FunctionType(BEGIN), types.FunctionType(_STATES),
+        STEP, _M, types.int64, types.boolean, types.float64, _A, _M, _M, _M, _M, _A, _M, _M, _A, _I, _M,
+        _T, _M, _T, _A, _A, _A,
+    )
+)  # fmt: skip
+def states_of_all(  # type: ignore[no-untyped-def]
+    run_one, go_on, look, begin_one, look_at, step, parameters, sees, on_gap, until, machine, masses, shafts,
+    curves, tones, work, spans, events, times, index, motor, w, twist, T, measured, state, command,
+) -> int:  # fmt: skip
+    """Speeds and shaft torques of one machine at rising times, under each row of a controller's parameters.
+
+    Returns ENDED, or BUFFER_FULL: call again with larger buffers.
+    """
+    s = work.view(WORK)[0]
+    for r in range(parameters.shape[0]):
+        state[:] = 0.0
+        begin_one(work, machine, masses, shafts, curves, tones, until, on_gap)
+        reason = run_one(
+            go_on,
+            look,
+            step,
+            parameters[r],
+            sees,
+            work,
+            tones,
+            spans,
+            events,
+            measured,
+            state,
+            command,
+        )
+        if reason == BUFFER_FULL:
+            return BUFFER_FULL
+        row, last = 0, int(s.n_spans) - 1
+        for j in range(times.shape[0]):
+            while row < last and spans[row + 1, S_START] <= times[j]:
+                row += 1
+            index[j] = row
+        look_at(work, tones, spans, index, times, motor, w[r], twist, T[r])
+    return ENDED
+
+
+def states_of_each(*starts: Any) -> int:
+    """The arguments of `states_of_all` from the step on."""
+    reason: int = states_of_all(run_on, advance, measure, begin, states_at, *starts)
+    return reason
 
 
 @compiled

@@ -65,6 +65,8 @@ def set_piece(s: Record, i: int, piece: int) -> None:
         rise = s.torque_at[i, piece] - s.torque_at[i, piece - 1]
         s.incline[i] = rise / (s.at[i, piece] - s.at[i, piece - 1])
         s.offset[i] = s.torque_at[i, piece - 1] - s.incline[i] * s.at[i, piece - 1]
+        if abs(s.offset[i]) <= 1e-15 * abs(s.torque_at[i, piece - 1]):  # rounding: no torque breaks friction
+            s.offset[i] = 0.0
 
 
 @compiled

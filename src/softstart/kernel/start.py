@@ -26,7 +26,7 @@ from softstart.kernel.series import REACH, apply_modes, expand, expand_tones, fi
 _A = types.Array(types.float64, 1, "C")
 _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
-_STEP = types.FunctionType(STEP_SIGNATURE)
+STEP = types.FunctionType(STEP_SIGNATURE)
 FIRST_MACHINE = N_NOTES  # place of the machine's numbers in the work of a start
 
 
@@ -219,6 +219,7 @@ def stands(s: Record, spans: Matrix, events: Matrix) -> int:
         stop = s.time_limit
     if s.time >= stop:
         note_excess(s)
+        s.final_speed = s.w[s.at_load]
         if s.stage == 2.0:
             s.stage_2_end = s.time
         if s.stage <= 2.0:
@@ -247,7 +248,7 @@ def horizon(s: Record) -> float:
 
 
 _ADVANCE = types.int64(_A, _M, _M, _M)
-_ADVANCES = types.FunctionType(_ADVANCE)
+ADVANCES = types.FunctionType(_ADVANCE)
 
 
 @compiled_as(_ADVANCE)
@@ -331,7 +332,7 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
 
 
 _MEASURE = types.void(_A, types.int64, _M, _A)
-_MEASURES = types.FunctionType(_MEASURE)
+MEASURES = types.FunctionType(_MEASURE)
 
 
 @compiled_as(_MEASURE)
@@ -357,10 +358,10 @@ def note_state(work: Vector, row: Vector) -> None:
     note_span(work.view(WORK)[0], row, 0.0)
 
 
-_BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
+BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
 
 
-@compiled_as(_BEGIN)
+@compiled_as(BEGIN)
 def begin(
     work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix, until: float,
     on_gap: bool,
@@ -370,10 +371,10 @@ def begin(
     begin_start(work, until, on_gap)
 
 
-_RUN = types.int64(_ADVANCES, _MEASURES, _STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A)
+RUN = types.int64(ADVANCES, MEASURES, STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A)
 
 
-@compiled_as(_RUN)
+@compiled_as(RUN)
 def run_on(  # type: ignore[no-untyped-def]
     go_on, look, step, parameters, sees, work, tones, spans, events, measured, state, command
 ) -> int:
@@ -402,7 +403,7 @@ def run(*start: Any) -> int:
 
 @compiled_as(
     types.void(
-        types.FunctionType(_RUN), _ADVANCES, _MEASURES, types.FunctionType(_BEGIN), _STEP, _M, types.int64,
+        types.FunctionType(RUN), ADVANCES, MEASURES, types.FunctionType(BEGIN), STEP, _M, types.int64,
         types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A,
     )
 )  # fmt: skip

@@ -48,13 +48,14 @@ import numpy as np
 
 from softstart.arrays import Complex, Vector
 from softstart.drive import Drive
+from softstart.kernel import motor as exchange
+from softstart.kernel import records as at
 from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint
 from softstart.linear.sampled_plant import SampledPlant, motor_alone, sampled
 from softstart.linear.sampled_start import Part, Sample, SampledStart
 from softstart.linear.systems import System, at_points, zeros_of
-from softstart.plant import exchange, layout, record
-from softstart.start.engine import Recorder
+from softstart.start.recorded import FIRST_ROWS
 
 optimize = late("scipy.optimize")
 
@@ -319,15 +320,11 @@ def _after(
     first = _on_the_cycle(start, point, base, outside, cycle, factor)
     period = 2.0 * math.pi / cycle.frequency
     end = first.time + (SETTLING + MEASURED) * period
-    recorder = Recorder(start.p, start.sees)
+    recorder = start.begun(end, room=FIRST_ROWS)
     for _ in start.from_sample(first, end, recorder):
         pass
-    segments = recorder.rows()[0]
     times = np.linspace(end - MEASURED * period, end * (1.0 - 1e-12), MEASURED * POINTS)
-    index = (np.searchsorted(segments[:, layout.S_START], times, side="right") - 1).clip(0)
-    states = np.empty((times.size, record.N_OUT))
-    record.states_at(start.p, segments, index, times, np.zeros(layout.N_X), np.zeros(layout.N_M), states)
-    return _read(times, states[:, record.THETA_OUT])
+    return _read(times, recorder.finished().at(times)["twist"][:, 0])
 
 
 def _read(times: Vector, twist: Vector) -> tuple[float, float]:
@@ -364,22 +361,19 @@ def _on_the_cycle(
     J1, J2 = float(start.drive.J1), float(start.drive.J2)
     b1, b2 = outside.decays
     phi1, w2 = (u - torque) / (J1 * (s * (s + b1))), torque / (J2 * (s + b2))
-    motor_angle = base.x[layout.PHI2] + base.x[layout.THETA] + phi1.imag
+    plant = base.plant
+    (w1, load_speed), (theta, _) = plant["w"], plant["theta"]
     changes: dict[Part, float] = {
-        layout.THETA: twist - base.x[layout.THETA],
-        layout.PHI2: motor_angle - twist - base.x[layout.PHI2],
-        layout.V: (s * turn).imag - base.x[layout.V],
-        layout.W2: w2.imag,
-        layout.SIDE: -base.x[layout.SIDE],
-        layout.BEYOND: -base.x[layout.BEYOND],
-        layout.DOUBLED: -base.x[layout.DOUBLED],
-        layout.MASK: -base.x[layout.MASK],
-        layout.SAMPLE_ANGLE: (phi1 * np.exp(-s * outside.period)).imag,
+        ("theta", 0): twist - theta,
+        ("phi", 0): phi1.imag,
+        ("w", 0): load_speed - w1 + (w2 + s * turn).imag,
+        ("w", 1): w2.imag,
+        ("mode", 0): at.OPEN - plant["mode"][0],
+        ("stage", 0): 1.0 - plant["stage"] % 2.0,  # the gap is open: an odd stage
+        ("sample_angle", 0): (phi1 * np.exp(-s * outside.period)).imag,
     }
-    if base.x[layout.SIDE] != 0.0:
-        changes[layout.STAGE] = 1.0  # the gap is open: an odd stage
     if outside.lag > 0.0:
-        changes[layout.U] = u.imag
+        changes["u", 0] = u.imag
     return base.displaced(changes, _state(point, base, outside, cycle, torque, demand))
 
 

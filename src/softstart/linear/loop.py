@@ -28,13 +28,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart.arrays import Complex, Vector
 from softstart.chain.machines import Machine
-from softstart.chain.model import Chain
+from softstart.kernel.motor import M_MOTOR_TORQUE
 from softstart.late import late
 from softstart.linear.operating_point import OperatingPoint, closed
 from softstart.linear.sampled_plant import (
@@ -42,7 +42,6 @@ from softstart.linear.sampled_plant import (
     SampledPlant,
     Sizes,
     in_contact,
-    motor_of,
     motor_side,
     sampled,
     sizes_of,
@@ -60,7 +59,6 @@ from softstart.linear.systems import (
     unscaled,
     zeros_of,
 )
-from softstart.kernel.motor import M_MOTOR_TORQUE
 
 if TYPE_CHECKING:
     import control
@@ -255,9 +253,9 @@ def turned(delay: float, frequency: float, period: float, delayed: Callable[[flo
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A controller linearised at `point`, on a drive or chain that need not be that of the point.
+    """A controller linearised at `point`, on a machine that need not be that of the point.
 
-    `open` is the loop of the motor with what turns with it while all gaps of a chain are open.
+    `open` is the loop of the motor with what turns with it while all gaps are open.
     """
 
     drive: Machine
@@ -338,16 +336,15 @@ class Loop:
         return scaled(system, self._scales(self.plant), np.zeros(0), outputs)
 
     def _plant(self, further: float) -> SampledPlant:
-        delay = float(motor_of(self.drive).computing_delay) + further
+        motor: Any = self.drive.motor
+        delay = float(motor.computing_delay) + further
         inputs = self.point.derivative.inputs
         return sampled(self._continuous, self.period, delay, inputs, self.differencing)
 
     @cached_property
     def _continuous(self) -> Continuous:
-        if self.open:
-            assert isinstance(self.drive, Chain)
-            return motor_side(self.drive, self.point.sample.loads)
-        return in_contact(self.drive, self.point.sample.loads)
+        side = motor_side if self.open else in_contact
+        return side(self.drive, self.point.sample.plant["incline"])
 
     def _broken(self, plant: SampledPlant) -> System:
         A, B, C, _ = plant.system

@@ -19,16 +19,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
 from softstart.arrays import Matrix, Vector
-from softstart.chain.machines import Machine
-from softstart.chain.model import Chain
-from softstart.linear.sampled_plant import SampledPlant, in_contact, motor_of, sampled, sizes_of
+from softstart.kernel import motor as exchange
+from softstart.kernel import records as at
+from softstart.linear.sampled_plant import SampledPlant, in_contact, sampled, sizes_of
 from softstart.linear.sampled_start import Part, Sample, SampledStart, Step
 from softstart.linear.systems import System, moved, part, shown
-from softstart.kernel import motor as exchange
 
 LONGEST, STIFF = 60.0, 2.0  # elastic periods and stiff starts after which a start counts as never steady
 MOST_SAMPLES = 20_000
@@ -84,7 +84,7 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     samples: list[Sample] = []
     torques: list[float] = []  # of the samples in contact since it was last open
     steady = False
-    for sample in start.samples(LONGEST * period + STIFF * _stiff(start.drive)):
+    for sample in start.samples(LONGEST * period + STIFF * _stiff(start)):
         samples.append(sample)
         if sample.pressing:
             torques.append(start.shaft_torque(sample))
@@ -102,17 +102,14 @@ def run_until_steady(start: SampledStart) -> SampledRun:
     return _in_contact(tuple(samples), steady)
 
 
-def _stiff(machine: Machine) -> float:
+def _stiff(start: SampledStart) -> float:
     """The time of a stiff start under the starting torque, s."""
-    if isinstance(machine, Chain):
-        assert machine.motor is not None
-        arrays, Ms = machine.at_motor_shaft(), machine.motor.starting_torque
-        left = Ms - float((arrays.Mc / arrays.efficiency_from_motor).sum())
-        return float(arrays.moving_J.sum()) * float(machine.target_speed or 0.0) / max(left, 0.01 * Ms)
-    drive = machine
-    friction, b1, b2 = drive.frictions
-    net = max(drive.Ms - drive.Mc - (friction + (b1 + b2) * drive.target_speed), 0.01 * (drive.Ms - drive.Mc))
-    return float((drive.J1 + drive.J2) * drive.target_speed / net)
+    drive: Any = start.drive
+    mass = start.rows.masses.view(at.MASS)[0, :, 0]
+    target = float(drive.target_speed or 0.0)
+    against = float((mass["Mc"] + mass["active"] + mass["friction"] + mass["ground"] * target).sum())
+    Ms = drive.motor.starting_torque
+    return float(mass["J"][np.isfinite(mass["J"])].sum()) * target / max(Ms - against, 0.01 * Ms)
 
 
 def _in_contact(samples: tuple[Sample, ...], steady: bool) -> SampledRun:
@@ -144,7 +141,7 @@ def operating_points(start: SampledStart, run: SampledRun) -> list[OperatingPoin
 def _linearised_at(start: SampledStart, run: SampledRun, index: int) -> OperatingPoint:
     sample = run.samples[index]
     plant = sampled(
-        in_contact(start.drive, sample.loads), run.period, float(motor_of(start.drive).computing_delay),
+        in_contact(start.drive, sample.plant["incline"]), run.period, float(start.rows.machine.dead_time),
         seen(start.sees), start.differencing,
     )  # fmt: skip
     size = sizes_of(start.drive)

@@ -1,6 +1,6 @@
 """The drive or chain at the sample instants: exact, with held demand, torque lag and computing delay.
 
-In contact, while the flanks of all gaps press, the drive is linear (`softstart.drive.control_systems`). A
+In contact, while the flanks of all gaps press, the machine is linear (`softstart.drive.control_systems`). A
 demand made at t_k acts from t_k + computing_delay on, through the torque lag. Between those instants the
 motion is a matrix exponential, so the sampled system is exact:
 
@@ -19,15 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from softstart.arrays import Matrix
-from softstart.chain.elements import Motor
-from softstart.chain.kernel_records import elastic_period
+from softstart.arrays import Matrix, Vector
 from softstart.chain.machines import Machine
-from softstart.chain.model import Chain, ChainArrays
-from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart.linear.systems import System
 from softstart.kernel import motor as exchange
+from softstart.kernel import records as at
+from softstart.linear.systems import System
+from softstart.start.rows import Rows, rows_of
 
 TERMS = 18  # of the exponential's series: 2^-18/18! is below rounding
 
@@ -62,132 +60,118 @@ class Sizes:
         return self.Omega * self.windup
 
 
+def single(machine: Machine) -> Any:
+    """The machine at one of its positions: the loop in contact is the same from anywhere."""
+    positions = list(machine.positions.values())
+    return positions[len(positions) // 2]
+
+
 def sizes_of(machine: Machine) -> Sizes:
-    """The sizes of a drive or a chain with all gaps closed."""
-    base = machine.mean_torque
-    if not isinstance(machine, Chain):
-        return Sizes(base, base / float(machine.c), float(machine.Omega), float(machine.elastic_period))
-    windup, period = base * float((1.0 / machine.at_motor_shaft().c).sum()), elastic_period(machine)
+    """The sizes of a machine with all gaps closed."""
+    rows = rows_of(single(machine))
+    base, period = float(machine.mean_torque), float(rows.machine.period)
     if not period > 0.0:
         raise InputError(f"{machine.name}: all its shafts are rigid; a loop needs an elastic one.")
-    return Sizes(base, windup, 2.0 * np.pi / period, period)
+    c = rows.shafts.view(at.SHAFT)[0, :, 0]["c"]
+    return Sizes(base, base * float((1.0 / c[c > 0.0]).sum()), 2.0 * np.pi / period, period)
 
 
-def motor_of(machine: Machine) -> Drive | Motor:
-    """What has the motor's lag, delay and encoder."""
-    if not isinstance(machine, Chain):
-        return machine
-    assert machine.motor is not None
-    return machine.motor
+def in_contact(machine: Machine, inclines: Vector | None = None) -> Continuous:
+    """The machine while all flanks press: the angle of the motor, the twists of springs, speeds of bodies.
 
-
-def in_contact(machine: Machine, loads: Any = None) -> Continuous:
-    """Motor, shaft and load while the flank presses: states phi1, then z, w1, w2 of `Drive.to_control`.
-
-    Of a chain the angle of the motor, the twists of all springs and the speeds of all bodies: masses that are
-    joined rigidly are one. Its gears with losses pass power on from the motor to the load. `loads` are the
-    records of its masses at an instant: on that piece a load curve is a spring or a damper to the ground.
+    Masses that are joined rigidly are one body; gears with losses pass power on from the motor to the load.
+    `inclines` are those of the load curves of its masses at an instant: there a curve is a spring or a damper
+    to the ground.
     """
-    if isinstance(machine, Chain):
-        arrays = machine.at_motor_shaft()
-        return _chain_between(machine, arrays, range(arrays.J.size), loads)
-    drive = machine
-    own = drive.to_control()
-    A = np.zeros((4, 4))
-    A[0, 2] = 1.0
-    A[1:, 1:] = own.A
-    B = np.vstack([[[0.0]], own.B[:, :1]])
-    torque = np.hstack([[[0.0]], own.C[3:4]])
-    rows = {"phi1": _row(4, 0), "z": _row(4, 1), "w1": _row(4, 2), "w2": _row(4, 3), "T": torque}
-    return _with_lag(drive, A, B, rows, 2)
+    rows = rows_of(single(machine))
+    return _between(machine.name, rows, range(rows.count), inclines)
 
 
-def _chain_between(chain: Chain, arrays: ChainArrays, masses: range, loads: Any) -> Continuous:
-    """Neighbouring masses of a chain with all gaps closed, as if there were no others."""
+def motor_side(machine: Machine, inclines: Vector | None = None) -> Continuous:
+    """The masses that turn with the motor while all gaps are open; `inclines` as in `in_contact`."""
+    rows = rows_of(single(machine))
+    half = rows.shafts.view(at.SHAFT)[0, :, 0]["half"]
+    first = last = int(rows.machine.motor)
+    while first > 0 and half[first - 1] == 0.0:
+        first -= 1
+    while last < half.size and half[last] == 0.0:
+        last += 1
+    return _between(machine.name, rows, range(first, last + 1), inclines)
+
+
+def motor_alone(machine: Machine) -> Continuous:
+    """The motor without the shaft: states phi1, w1."""
+    rows = rows_of(single(machine))
+    motor = int(rows.machine.motor)
+    return _between(machine.name, rows, range(motor, motor + 1), None)
+
+
+def _between(name: str, given: Rows, masses: range, inclines: Vector | None) -> Continuous:
+    """Neighbouring masses with all gaps closed, as if there were no others."""
+    motor, load = int(given.machine.motor), int(given.machine.load)
+    mass, shaft = given.masses.view(at.MASS)[0, :, 0], given.shafts.view(at.SHAFT)[0, :, 0]
+    rigid = shaft["rigid"] != 0.0
     joints = range(masses.start, masses.stop - 1)
-    if any(arrays.rigid[k] for k in joints if k in (arrays.motor - 1, arrays.motor)):
+    if any(rigid[k] for k in joints if k in (motor - 1, motor)):
         raise InputError(
-            f"{chain.name}: a shaft beside the motor is rigid, and the loop is that of its spring; give it a "
+            f"{name}: a shaft beside the motor is rigid, and the loop is that of its spring; give it a "
             "stiffness, or make one mass of the two."
         )
     body = {masses.start: 0}  # of each mass
     for k in joints:
-        body[k + 1] = body[k] + (not arrays.rigid[k])
-    springs = [k for k in joints if not arrays.rigid[k]]
-    angles, speeds = 1 + len(springs), 1 + len(springs)
+        body[k + 1] = body[k] + (not rigid[k])
+    springs = [k for k in joints if not rigid[k]]
+    angles = speeds = 1 + len(springs)
     n = angles + speeds
     J = np.zeros(speeds)
     A, B = np.zeros((n, n)), np.zeros((n, 1))
     speed = {i: angles + body[i] for i in masses}
     for i in masses:
-        J[body[i]] += arrays.J[i]
+        J[body[i]] += mass["J"][i]
     for i in masses:
-        A[speed[i], speed[i]] -= arrays.d_ground[i] / J[body[i]]
-    A[0, speed[arrays.motor]] = 1.0
-    B[speed[arrays.motor], 0] = 1.0 / J[body[arrays.motor]]
-    rows = {"phi1": _row(n, 0), "w1": _row(n, speed[arrays.motor]), "z": np.zeros((1, n))}
-    rows["w2"] = _row(n, speed[arrays.load]) if arrays.load in masses else np.zeros((1, n))
+        A[speed[i], speed[i]] -= mass["ground"][i] / J[body[i]]
+    A[0, speed[motor]] = 1.0
+    B[speed[motor], 0] = 1.0 / J[body[motor]]
+    rows = {"phi1": _row(n, 0), "w1": _row(n, speed[motor]), "z": np.zeros((1, n))}
+    rows["w2"] = _row(n, speed[load]) if load in masses else np.zeros((1, n))
     rows["T"] = np.zeros((1, n))
-    beside = arrays.motor if arrays.load > arrays.motor or arrays.motor == 0 else arrays.motor - 1
     for place, k in enumerate(springs, start=1):
         torque = np.zeros((1, n))
-        torque[0, place] = arrays.c[k]
-        torque[0, speed[k]] += arrays.d[k]
-        torque[0, speed[k + 1]] -= arrays.d[k]
-        before, after = _shares(arrays, k)
+        torque[0, place] = shaft["c"][k]
+        torque[0, speed[k]] += shaft["d"][k]
+        torque[0, speed[k + 1]] -= shaft["d"][k]
+        before, after = _shares(shaft["eta"][k], bool(shaft["gear"][k]), motor <= k)
         A[place, speed[k]], A[place, speed[k + 1]] = 1.0, -1.0
         A[speed[k]] -= before * torque[0] / J[body[k]]
         A[speed[k + 1]] += after * torque[0] / J[body[k + 1]]
         rows[f"theta {k}"] = _row(n, place)
-        if k == beside:
-            sign = 1.0 if arrays.motor <= k else -1.0
+        if k == given.motor_shaft:
+            sign = 1.0 if motor <= k else -1.0
             rows["T"], rows["z"] = sign * torque, sign * rows[f"theta {k}"]
     rows |= {f"w {i}": _row(n, speed[i]) for i in masses}
-    for i in masses:
-        if loads is not None and loads["points"][i]:
-            twisted = [rows.get(f"theta {k}", 0.0) for k in range(*sorted((arrays.motor, i)))]
-            angle = rows["phi1"] - math.copysign(1.0, i - arrays.motor) * sum(twisted)
-            follows = angle if loads["by_angle"][i] else rows[f"w {i}"]
-            A[speed[i]] -= loads["slope"][i] / J[body[i]] * follows[0]
-    return _with_lag(chain, A, B, rows, angles)
+    for curve in given.curves[0].view(at.CURVE)[:, 0]:
+        i = int(curve.mass)
+        if inclines is not None and i in masses:
+            twisted = [rows.get(f"theta {k}", 0.0) for k in range(*sorted((motor, i)))]
+            angle = rows["phi1"] - math.copysign(1.0, i - motor) * sum(twisted)
+            follows = angle if curve.by_angle else rows[f"w {i}"]
+            A[speed[i]] -= inclines[i] / J[body[i]] * follows[0]
+    return _with_lag(float(given.machine.lag), A, B, rows, angles)
 
 
-def _shares(arrays: ChainArrays, k: int) -> tuple[float, float]:
+def _shares(eta: float, at_after: bool, driven: bool) -> tuple[float, float]:
     """The shares of a shaft's torque that act on the masses before and after: its gear takes the rest."""
-    eta, at_after = float(arrays.efficiency[k]), arrays.gear[k] > k
-    loss = eta if at_after == (arrays.motor <= k) else 1.0 / eta  # behind the spring, or before it
+    loss = eta if at_after == driven else 1.0 / eta  # behind the spring, or before it
     return (1.0, loss) if at_after else (loss, 1.0)
-
-
-def motor_side(chain: Chain, loads: Any = None) -> Continuous:
-    """The masses that turn with the motor while all gaps are open; `loads` as in `in_contact`."""
-    arrays = chain.at_motor_shaft()
-    first = last = arrays.motor
-    while first > 0 and arrays.gap[first - 1] == 0.0:
-        first -= 1
-    while last < arrays.gap.size and arrays.gap[last] == 0.0:
-        last += 1
-    return _chain_between(chain, arrays, range(first, last + 1), loads)
-
-
-def motor_alone(machine: Drive) -> Continuous:
-    """The motor without the shaft: states phi1, w1."""
-    J, viscous = float(machine.J1), float(machine.motor_viscous_friction)
-    A = np.array([[0.0, 1.0], [0.0, -(viscous / J)]])
-    B = np.array([[0.0], [1.0 / J]])
-    nothing = np.zeros((1, 2))
-    return _with_lag(machine, A, B, {"phi1": _row(2, 0), "w1": _row(2, 1), "w2": nothing, "T": nothing}, 1)
 
 
 def _row(n: int, index: int) -> Matrix:
     return np.eye(n)[index : index + 1]
 
 
-def _with_lag(machine: Machine, A: Matrix, B: Matrix, rows: dict[str, Matrix], angles: int) -> Continuous:
-    lag = float(motor_of(machine).torque_lag)
+def _with_lag(lag: float, A: Matrix, B: Matrix, rows: dict[str, Matrix], angles: int) -> Continuous:
     n = A.shape[0]
-    period = elastic_period(machine) if isinstance(machine, Chain) else float(machine.elastic_period)
-    if lag <= 1e-12 * period:  # the exact plant neglects such a lag, too
+    if lag == 0.0:
         return Continuous(A, B, rows, angles, n - angles)
     whole = np.block([[A, B], [np.zeros((1, n)), np.array([[-1.0 / lag]])]])
     rows = {name: np.hstack([row, [[0.0]]]) for name, row in rows.items()}

@@ -15,6 +15,7 @@ from softstart.controller.base import Controller, label_of
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.kernel import motor as exchange
 from softstart.late import late
 from softstart.linear.limit_cycles import Cycle, Outside, Verdict, check_cycle, cycles
 from softstart.linear.loop import Loop, Margins
@@ -25,10 +26,9 @@ from softstart.linear.operating_point import (
     operating_points,
     run_until_steady,
 )
-from softstart.linear.sampled_plant import sizes_of
+from softstart.linear.sampled_plant import single, sizes_of
 from softstart.linear.sampled_start import SampledStart
 from softstart.linear.systems import Mode
-from softstart.kernel import motor as exchange
 
 if TYPE_CHECKING:
     import control
@@ -325,9 +325,7 @@ def linear_view(
         drive = load_machine(drive)
     made = make_controller(controller, parameters)
     _check(drive, fitted_to, {"inertias": inertias, "stiffnesses": stiffnesses})
-    # the loop in contact is the same from anywhere
-    assumed = drive.design_drive if isinstance(drive, Drive) else next(iter(drive.positions.values()))
-    start = SampledStart.of(assumed, made, fitted_to or drive)
+    start = SampledStart.of(single(drive), made, fitted_to or drive)
     run = run_until_steady(start)
     name = label_of(start.controller)
     points = operating_points(start, run)
@@ -392,16 +390,15 @@ def _check(drive: object, fitted_to: object, factors: Mapping[str, Sequence[floa
     for name, one in (("drive", drive), ("fitted_to", fitted_to)):
         if one is None:
             continue
-        if isinstance(one, Chain):
-            if one.motor is None or one.target_speed is None:
-                wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
-        elif not isinstance(one, Drive):
+        if not isinstance(one, Drive | Chain):
             wrong.append(f"{name} = {one!r}: give a Drive; Drive.load reads one from a file or by name.")
-        elif one.shape != ():
+        elif isinstance(one, Drive) and one.shape != ():
             wrong.append(
                 f"{name}: {one.name} is a batch of shape {one.shape}, and a linear view is that of one "
                 "drive; take one of its elements()."
             )
+        elif one.motor is None or one.target_speed is None:
+            wrong.append(f"{name}: {one.name} has no motor or no target speed; add them to the chain.")
     for name, values in factors.items():
         wrong += [
             f"{name}: {value!r} is no factor; give numbers above 0."
@@ -458,7 +455,7 @@ def _cycles(
     rest = run.samples[run.last if not holds else -1]
     back = max(1, round(float(drive.elastic_period) / run.period))
     recent = run.samples[max(run.first, run.last - back) : run.last + 1]
-    w1, w2 = rest.x[layout.W2] + rest.x[layout.V], rest.x[layout.W2]
+    w1, w2 = rest.plant["w"]
     against = float(drive.Mc + drive.load_viscous_friction * w2)
     mean = against if holds else float(np.mean([start.shaft_torque(one) for one in recent]))
     takes = float(drive.motor_friction + drive.motor_viscous_friction * w1)

@@ -24,10 +24,10 @@ from softstart.arrays import Vector
 from softstart.controller import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.kernel import records as at
 from softstart.optimal.lp.motion import MARGIN
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate, LowerBound, OptimumError, heat_of
-from softstart.plant import layout as at
 from softstart.profile import TorqueProfile
 from softstart.start import metrics
 from softstart.start.run import Run
@@ -64,11 +64,11 @@ def demand_of(run: Run, until: float) -> TorqueProfile:
     >>> demand_of(run, 0.3).torque.tolist()
     [62.0, 62.0, 9.0]
     """
-    spans = run.segments[(run.segments[:, at.S_START] < until)]
-    spans = spans[spans[:, at.S_END] > spans[:, at.S_START]]
+    spans = run.recorded.spans
+    spans = spans[spans[:, at.S_START] < until]
     times = np.column_stack([spans[:, at.S_START], np.minimum(spans[:, at.S_END], until)])
     first = spans[:, at.S_REF]
-    levels = np.column_stack([first, first + spans[:, at.S_UB] * (times[:, 1] - times[:, 0])])
+    levels = np.column_stack([first, first + spans[:, at.S_SLOPE] * (times[:, 1] - times[:, 0])])
     return TorqueProfile(times.ravel(), levels.ravel()).simplified()
 
 
@@ -145,7 +145,7 @@ def _timed(problem: Problem, free: Drive) -> Hold:
     """The state at a release by time."""
     until = float(problem.drive.release_time)
     run = replay(problem.drive, TorqueProfile([0.0], [problem.lowest_torque]), until, problem.base)
-    state = {name: float(value) for name, value in run.at(until).items()}
+    state = {name: float(run.at(until)[name]) for name in ("theta", "w2")}
     if abs(state["w2"]) > ROUNDING * problem.target:  # else it hangs still
         speed = {"initial_motor_speed": 0.0, "initial_load_speed": state["w2"]}
         free = free.replace(start_position=state["theta"], **speed)
@@ -371,12 +371,13 @@ def _demand(problem: Problem, profile: TorqueProfile, name: str = "demand") -> I
 
 
 def _realised(problem: Problem, run: Run) -> Iterator[str]:
-    """u(s) = ua + ub s + ue exp(-s/lag) in each span: extreme at its ends or where its slope is 0."""
+    """In each span lag u' = ref + slope s - u: u is extreme at its ends or where u' = 0."""
     low, high = problem.lowest_torque, problem.highest_torque
     lag = float(problem.drive.torque_lag)
-    start, end = run.segments[:, at.S_START], run.segments[:, at.S_END]
-    ua, ub, ue = (run.segments[:, column] for column in (at.S_UA, at.S_UB, at.S_UE))
-    length = end - start
+    columns = (at.S_START, at.S_END, at.S_U, at.S_REF, at.S_SLOPE)
+    start, end, first, ref, ub = (run.recorded.spans[:, column] for column in columns)
+    length, ua = end - start, ref - lag * ub  # u(s) = ua + ub s + ue exp(-s/lag)
+    ue = first - ua
     turns = np.zeros_like(length)
     if lag > 0.0:
         bent = (ub != 0.0) & (ue / np.where(ub != 0.0, ub * lag, 1.0) > 0.0)
@@ -405,8 +406,8 @@ def _beyond(torques: Vector, low: float, high: float) -> Iterator[tuple[float, i
 def _torque_speed(problem: Problem, run: Run) -> Iterator[str]:
     worst, when, span = beyond_curve(problem, run)
     if worst > SHORT * problem.highest_torque:
-        state = run.states_in(np.array([span]), np.array([when]))
-        u, w1 = float(state["u"][0]), float(state["w1"][0])
+        state = run.recorded.at([when], np.array([span]))
+        u, w1 = float(state["u"][0]), float(state["w"][0, 0])
         yield (
             f"The motor torque is {u:.6g} N m at {when:.6g} s and {w1:.6g} rad/s, where the torque-speed "
             f"curve allows {u - worst:.6g} N m."
@@ -418,35 +419,26 @@ def beyond_curve(problem: Problem, run: Run) -> tuple[float, float, int]:
 
     Densely in each span, then the worst instant located; minus infinity without a curve.
     """
-    worst, when, span = -math.inf, 0.0, 0
     if not problem.torque_speed:
-        return worst, when, span
-    step = float(problem.drive.elastic_period) / CURVE_SAMPLES
-    for index, (start, end) in enumerate(run.segments[:, [at.S_START, at.S_END]].tolist()):
-        times = np.linspace(start, end, 2 + math.ceil((end - start) / step))
-        excess = _excess(problem, run, index, times)
-        i = int(np.argmax(excess))
-        if excess[i] > worst:
-            worst, when, span = float(excess[i]), float(times[i]), index
-    start, end = (float(run.segments[span, column]) for column in (at.S_START, at.S_END))
-    near = max(start, when - step), min(end, when + step)
-    if near[1] > near[0]:
-        found = minimize_scalar(
-            lambda t: -float(_excess(problem, run, span, np.array([t]))[0]),
-            bounds=near,
-            method="bounded",
-            options={"xatol": 1e-6 * step},
-        )
-        if -float(found.fun) > worst:
-            worst, when = -float(found.fun), float(found.x)
-    return worst, when, span
+        return -math.inf, 0.0, 0
+    recorded, step = run.recorded, float(problem.drive.elastic_period) / CURVE_SAMPLES
 
+    def excess(times: ArrayLike, spans: ArrayLike) -> Vector:
+        state = recorded.at(times, np.atleast_1d(spans))
+        found: Vector = state["u"] - torque_allowed(problem, state["w"][:, 0])
+        return found
 
-def _excess(problem: Problem, run: Run, index: int, times: Vector) -> Vector:
-    """Motor torque minus what the curve allows, N m."""
-    state = run.states_in(np.full(times.size, index), times)
-    excess: Vector = state["u"] - torque_allowed(problem, state["w1"])
-    return excess
+    ends = recorded.spans[:, [at.S_START, at.S_END]].tolist()
+    each = [np.linspace(start, end, 2 + math.ceil((end - start) / step)) for start, end in ends]
+    times, spans = np.concatenate(each), np.repeat(np.arange(len(each)), [one.size for one in each])
+    beyond = excess(times, spans)
+    i = int(np.argmax(beyond))
+    worst, when, span = float(beyond[i]), float(times[i]), int(spans[i])
+    near = max(ends[span][0], when - step), min(ends[span][1], when + step)
+    found = minimize_scalar(
+        lambda t: -float(excess([t], span)[0]), bounds=near, method="bounded", options={"xatol": 1e-6 * step}
+    )
+    return (-float(found.fun), float(found.x), span) if -float(found.fun) > worst else (worst, when, span)
 
 
 def _times(problem: Problem, run: Run, end_time: float, tolerance: float) -> Iterator[str]:
@@ -459,7 +451,8 @@ def _times(problem: Problem, run: Run, end_time: float, tolerance: float) -> Ite
 
 
 def _terminal(problem: Problem, run: Run, end_time: float, tolerance: float) -> Iterator[str]:
-    state = {name: float(value) for name, value in run.at(end_time).items()}
+    at_end = run.at(end_time)
+    state = {name: float(at_end[name]) for name in ("w1", "w2", "v", "T")}
     drive, target = problem.drive, problem.target
     if state["w2"] < target * (1.0 - SHORT):
         yield (

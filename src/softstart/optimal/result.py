@@ -11,6 +11,7 @@ import numpy as np
 
 from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
+from softstart.kernel import records as at
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
@@ -29,15 +30,12 @@ BINDING = 1e-3  # a limit is what forbids a quicker start if less than this shar
 def heat_of(run: Run, until: float) -> float:
     """I2t heat in s: the integral of (u/Ms)^2 of the realised torque from 0 to `until`, exact."""
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    total = 0.0
-    for index, row in enumerate(run.segments):
-        start, end = float(row[0]), min(float(row[1]), until)
-        if end <= start:
-            continue
-        times = start + 0.5 * (end - start) * (nodes + 1.0)
-        u = run.states_in(np.full(times.size, index), times)["u"]
-        total += 0.5 * (end - start) * float(weights @ (u * u))
-    return total / float(run.drive.Ms) ** 2
+    start, end = np.minimum(run.recorded.spans[:, [at.S_START, at.S_END]].T, until)
+    half = 0.5 * (end - start)
+    times = start[:, None] + half[:, None] * (nodes + 1.0)
+    index = np.repeat(np.arange(half.size), nodes.size)
+    u = run.recorded.at(times.ravel(), index)["u"].reshape(times.shape)
+    return float(half @ (u * u @ weights)) / float(run.drive.Ms) ** 2
 
 
 def demanded(shape: DemandShape, edges: Vector, levels: Matrix) -> TorqueProfile:

@@ -43,11 +43,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from softstart.arrays import Matrix, Vector
+from softstart.kernel.jit import compiled
 from softstart.optimal.lp.motion import MARGIN, Contact
 from softstart.optimal.lp.whole import ONE, STATES, W2, Kind, R, U, V, Z, phase_rates
 from softstart.optimal.lp.whole_search import phase_orders
 from softstart.optimal.problem import Problem
-from softstart.kernel.jit import compiled
 
 FINER = 3  # each grid has so many times the steps of the one before
 STEEP = 1e4  # N m of P for each N m by which the demand misses the one that holds a steady end
@@ -663,7 +663,7 @@ def _freely(X: Any, g: float, J1: float, lag: float, low: float, high: float) ->
     return total
 
 
-@inlined
+@compiled
 def _swept(x: float, a: float, b: float, e: float, lag: float) -> float:
     return a + b * x + (e * math.exp(-x / lag) if lag > 0.0 else 0.0)
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Machine, here, two_masses, values_of
-from softstart.start.run import Run
+from softstart.chain.machines import Machine, here, values_of
 from softstart.controller.base import Controller
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
 from softstart.drive.doubts import doubts
+from softstart.kernel import records as at
 from softstart.page import links
 from softstart.page.live import Frame
 from softstart.page.machines import (
@@ -40,7 +40,6 @@ from softstart.page.machines import (
 )
 from softstart.page.sentences import differences, sentence_of, written
 from softstart.page.session import Bench, Reference, Session, Strategy
-from softstart.plant import layout as at
 from softstart.quantities import Units
 from softstart.start.run import Run
 from softstart.views.printed import unit, units_of
@@ -53,19 +52,12 @@ TOO_LATE = 1.0  # s, of messages that waited; what is quick to compute overtakes
 SLICE = 0.006  # s, about what is computed before the loop looks for something newer
 SERVER = secrets.token_urlsafe(8)  # this process, to which a tab that is loaded anew comes back, or does not
 CHANNELS = ("T", "u", "w1", "w2", "theta")
-CONTACTS = {  # events in the gap of a chain's shaft: whether its flanks touch from then on
-    "gap closed": True,
-    "impacts over, flanks press": True,
-    "impact": False,
-    "gap opened": False,
-}
 MOST_STAGES = 400  # of one gap, shaded and lit up
 BUCKETS = 320  # about one for three pixels of the widest plot; each keeps the extrema of each channel
 WITHIN = 1600  # points in a window of the plots: one a pixel, nearly
 PER_PERIOD = 16  # points an elastic period before thinning: its crests are then within 2 % at worst
 COARSEST, FINEST = 500, 8000
 JUMPS = 120  # up to so many spans, both sides of each joint are kept: steps of the torque stay upright
-AnyRun = Run
 STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
 
 
@@ -402,8 +394,8 @@ class Screen:
 
 def _told(session: Session, found: Strategy) -> Drive:
     """The drive for which the strategy is set up."""
-    own = getattr(found.run, "told", None)
-    return two_masses(session.machine) if own is None else own
+    own = found.run.told if found.run is not None else None
+    return session.machine.design_drive if own is None else own
 
 
 def parameters_of(controller: Controller) -> list[Field[Any]]:
@@ -515,7 +507,7 @@ def figure(session: Session, found: Strategy, units: Units) -> dict[str, Any]:
     run = found.run
     facts = judged(session, found) | {
         "status": found.status,
-        "base": number(session.machine.mean_torque),
+        "base": number(float(session.machine.mean_torque)),
     }
     if run is not None:
         facts |= {
@@ -618,44 +610,44 @@ def drawn(
     return picture
 
 
-def parts_of(run: AnyRun) -> dict[str, Any]:
+def parts_of(run: Run) -> dict[str, Any]:
     """The bodies and the shafts between them, each with its channels; stages of each shaft, and of all gaps.
 
     A stage is a start and an end in s, and the flank that is touched: 0 while the gap is open.
     """
-    if isinstance(run, Run):
-        stages = [(s.start, s.end, s.side) for s in run.stages[:MOST_STAGES] if s.duration > 0.0]
-        shaft = {"name": "", "gap": float(run.drive.gap), "T": "T", "theta": "theta", "stages": stages}
-        bodies = [{"name": "J\N{SUBSCRIPT ONE}", "w": "w1"}, {"name": "J\N{SUBSCRIPT TWO}", "w": "w2"}]
-        return {"shafts": [shaft], "bodies": bodies, "motor": 0, "stages": stages, "gap": shaft["gap"]}
-    chain, numbered = run.chain, enumerate(run.chain.masses)
-    each = [chain_stages(run, k) for k in range(len(chain.shafts))]
-    gaps = chain.at_motor_shaft().gap
+    machine = run.drive
+    each = [stages_of(run, k) for k in range(len(machine.shaft_names))]
+    names, motor, load = machine.mass_names, machine.motor_index, machine.load_index
+    shafts = [
+        {"name": name, "gap": float(gap), "T": f"T[{k}]", "theta": f"theta[{k}]", "stages": stages}
+        for k, (name, gap, stages) in enumerate(zip(machine.shaft_names, machine.gaps, each, strict=True))
+    ]
+    bodies = [{"name": name, "w": f"w[{k}]"} for k, name in enumerate(names)]
+    stages = open_somewhere([stages for stages, gap in zip(each, machine.gaps, strict=True) if gap > 0.0])
+    if len(shafts) == 1:
+        shafts[0] |= {"name": "", "T": "T", "theta": "theta"}
+        bodies[motor] = {"name": "J\N{SUBSCRIPT ONE}", "w": "w1"}
+        bodies[load] = {"name": "J\N{SUBSCRIPT TWO}", "w": "w2"}
+        stages = each[0]
     return {
-        "shafts": [
-            {"name": name, "gap": float(gap), "T": f"T[{k}]", "theta": f"theta[{k}]", "stages": stages}
-            for k, (name, gap, stages) in enumerate(zip(chain.shaft_names, gaps, each, strict=True))
-        ],
-        "bodies": [{"name": mass.name, "w": f"w[{k}]"} for k, mass in numbered],
-        "motor": chain.motor_index,
-        "worst": chain.shaft_names[run.worst_shaft],
-        "stages": open_somewhere([stages for stages, gap in zip(each, gaps, strict=True) if gap > 0.0]),
-        "gap": float(gaps.sum()),
+        "shafts": shafts,
+        "bodies": bodies,
+        "motor": motor,
+        "worst": shafts[run.worst_shaft]["name"],
+        "stages": stages,
+        "gap": float(machine.gaps.sum()),
     }
 
 
-def chain_stages(run: Run, shaft: int) -> list[tuple[float, float, int]]:
-    """Contacts and free flights in the gap of one shaft of a chain, the first `MOST_STAGES` of them."""
-    events = [event for event in run.events if event.place == shaft and event.kind in CONTACTS][:MOST_STAGES]
-    times = np.array([0.0, *(event.time for event in events)])
-    twist = run.at(times)["twist"][:, shaft]
-    half = 0.5 * float(run.chain.at_motor_shaft().gap[shaft])
-    closed = [abs(float(twist[0])) >= half, *(CONTACTS[event.kind] for event in events)]
-    sides = [
-        (1 if angle > 0.0 or half == 0.0 else -1) if touch else 0
-        for angle, touch in zip(twist, closed, strict=True)
-    ]
-    return list(zip(times.tolist(), [*times[1:].tolist(), run.end_time], sides, strict=True))
+def stages_of(run: Run, shaft: int) -> list[tuple[float, float, int]]:
+    """Contacts and free flights in the gap of one shaft, the first `MOST_STAGES` of them."""
+    spans = run.recorded.spans
+    mode, side = run.recorded.of_shafts(1)[:-1, shaft], run.recorded.of_shafts(2)[:-1, shaft]
+    touched = np.where(np.isin(mode, (at.OPEN, at.BEYOND)), 0, np.where(side < 0.0, -1, 1))
+    first = np.flatnonzero(np.diff(touched, prepend=2))[:MOST_STAGES]
+    begins = spans[first, at.S_START]
+    ends = np.append(spans[first[1:], at.S_START], run.end_time)
+    return list(zip(begins.tolist(), ends.tolist(), touched[first].tolist(), strict=True))
 
 
 def open_somewhere(each: list[list[tuple[float, float, int]]]) -> list[tuple[float, float, int]]:
@@ -683,7 +675,7 @@ def open_somewhere(each: list[list[tuple[float, float, int]]]) -> list[tuple[flo
 
 
 def traces_of(
-    run: AnyRun, buckets: int = BUCKETS, window: tuple[float, float] | None = None
+    run: Run, buckets: int = BUCKETS, window: tuple[float, float] | None = None
 ) -> dict[str, Vector]:
     """Instants `t` of a run, s, and what is there: a few points a bucket, and every instant of `landmarks`.
 
@@ -714,28 +706,23 @@ def traces_of(
     return {"t": times, **states}
 
 
-def channels_at(run: AnyRun, times: Vector) -> dict[str, Vector]:
+def channels_at(run: Run, times: Vector) -> dict[str, Vector]:
     """What a run has at these instants, by the names of `traces_of`."""
     states = run.at(times)
-    if isinstance(run, Run):
+    if len(run.drive.shaft_names) == 1:
         return {name: states[name] for name in CHANNELS}
     parts = {"T": states["T"].T, "theta": states["twist"].T, "w": states["w"].T}
-    chain, worst = run.chain, run.worst_shaft
-    own = {"T": parts["T"][worst], "u": states["u"], "theta": parts["theta"][worst]}
-    own |= {"w1": parts["w"][chain.motor_index], "w2": parts["w"][chain.load_index]}
+    own = {"T": parts["T"][run.worst_shaft], "u": states["u"], "theta": parts["theta"][run.worst_shaft]}
+    own |= {"w1": states["w1"], "w2": states["w2"]}
     return own | {f"{name}[{k}]": row for name, rows in parts.items() for k, row in enumerate(rows)}
 
 
-def landmarks(run: AnyRun) -> Vector:
+def landmarks(run: Run) -> Vector:
     """Instants that are never thinned away: events and the instants just before, peaks of all stages, the
     peak of the run, the start time, the ends; and the joints of the motor torque while they are few.
     """
-    if isinstance(run, Run):
-        events, peaks = run.event_rows[:, at.E_TIME], run.stage_rows[:, at.G_PEAK_TIME]
-        joints = run.segments[:, at.S_START]
-    else:
-        events, peaks = run.recorded.events["time"], run.peak_times
-        joints = run.recorded.spans["start"]
+    events, joints = run.recorded.events["time"], run.recorded.spans[:, at.S_START]
+    peaks = [*run.peak_times, *(stage.peak_time for stage in run.stages)]
     if joints.size > JUMPS:
         joints = joints[:0]
     sudden = np.concatenate([events, joints])

@@ -26,7 +26,6 @@ from softstart.start.simulation import simulate
 from softstart.views.starts import outcome
 
 if TYPE_CHECKING:
-    from softstart.start.run import Run
     from softstart.controller.base import Controller
     from softstart.start.run import Run
 

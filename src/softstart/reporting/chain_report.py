@@ -311,7 +311,7 @@ def _starts(report: ChainReport, figures: Figures) -> Html:
             tag("p", f"Parameters: {values}.")
             if (values := _parameters(row.run.controller, units_of(report.drive)))
             else None,
-            printed(chains.shaft_table(row.run)),
+            printed(starts.shaft_table(row.run)),
         ]
         pictures.append(
             figures.shown(
@@ -413,8 +413,8 @@ def _life(report: ChainReport) -> Html:
 
 
 def _start_picture(row: Row, key: str, title: str) -> Html:
-    figure = chains.run_figure(row.run)
-    if len(row.run.chain.shafts) <= MOST_SHAFTS:
+    figure = starts.run_figure(row.run)
+    if len(row.run.drive.shafts) <= MOST_SHAFTS:
         figure.set_size_inches(8.0, 5.2)  # two on a page
     return inlined(figure, key, title)
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.start.run import Run
 from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.drive import Drive
@@ -24,7 +23,7 @@ from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
 from softstart.start import metrics
-from softstart.start.batch import array_starts, figures
+from softstart.start.batch import array_starts, figures, joined_notes
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
@@ -383,7 +382,7 @@ def _starts(
         each = [
             {name: float(np.broadcast_to(v, count)[i]) for name, v in columns.items()} for i in range(count)
         ]
-        notes = np.concatenate(
+        notes = joined_notes(
             [array_starts(drive, replace(ready, **values), fitted_to=own) for values in each]
         )
     found = figures(notes, metrics.base_torque(drive))
@@ -446,7 +445,7 @@ def sheet_section(
 
 def _motor_torque(run: AnyRun) -> Vector:
     """The motor torque over a start, N m."""
-    return run.u if isinstance(run, Run) else run.at(np.linspace(0.0, run.end_time, INSTANTS))["u"]
+    return run.u
 
 
 FUNCTIONS = {

@@ -277,4 +277,4 @@ def name_in_figure(name: str) -> str:
 
 
 def _peak(run: Run) -> float:
-    return max(run.stages, key=lambda one: abs(one.peak_torque)).peak_torque
+    return float(run.recorded.shafts["peak"][run.worst_shaft])

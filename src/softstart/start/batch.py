@@ -124,26 +124,35 @@ SetUp = list[tuple[Controller, Any]]
 def notes_of(rows: Rows, set_up: SetUp, until: float | None, workers: int = 1) -> Notes:
     """The kernel's notes of starts, each under its controller as it is set up, or all under one."""
     count = rows.machines.shape[0]
+    first = set_up[0][0]
+    if all(isinstance(ready, CompiledController) for ready, _ in set_up):
+        vectors = [np.asarray(ready.vector(own), dtype=np.float64) for ready, own in set_up]  # type: ignore[attr-defined]
+        numbers = np.concatenate([one.reshape(-1, one.shape[-1]) for one in vectors])
+        return notes_under(rows, first, numbers, until, workers)
+    notes = np.zeros((count, at.N_NOTES))
+    shafts = np.zeros((count, rows.count - 1), at.SHAFT_NOTES)
+    for i in range(count):
+        ready, own = set_up[i if len(set_up) > 1 else 0]
+        recorder = Recorder(rows.taken(slice(i, i + 1)), int(ready.sensors), room=0)
+        run_one(ready, own, recorder, until)
+        notes[i] = recorder.work[: at.N_NOTES]
+        for name in at.SHAFT_NOTES.names:
+            shafts[name][i] = recorder.state[name][: rows.count - 1]
+    return Notes(notes.view(at.NOTES)[:, 0], shafts)
+
+
+def notes_under(
+    rows: Rows, controller: Any, numbers: Matrix, until: float | None = None, workers: int = 1
+) -> Notes:
+    """The kernel's notes of starts under a compiled controller with these numbers: a row each, or one for all."""
+    count = rows.machines.shape[0]
     notes = np.zeros((count, at.N_NOTES))
     of_shafts = np.zeros((count, rows.count - 1, at.size(at.SHAFT_NOTES)))
-    made = Notes(notes.view(at.NOTES)[:, 0], of_shafts.view(at.SHAFT_NOTES)[..., 0])
+    step, sees, size = type(controller).kernel, int(controller.sensors), controller.state_size
     end = math.inf if until is None else float(until)
-    first = set_up[0][0]
-    if not all(isinstance(ready, CompiledController) for ready, _ in set_up):
-        for i in range(count):
-            ready, own = set_up[i if len(set_up) > 1 else 0]
-            recorder = Recorder(rows.taken(slice(i, i + 1)), int(ready.sensors), room=0)
-            run_one(ready, own, recorder, end)
-            notes[i] = recorder.work[: at.N_NOTES]
-            for name in at.SHAFT_NOTES.names:
-                made.shafts[name][i] = recorder.state[name][: rows.count - 1]
-        return made
-    vectors = [np.asarray(ready.vector(own), dtype=np.float64) for ready, own in set_up]  # type: ignore[attr-defined]
-    numbers = np.concatenate([one.reshape(-1, one.shape[-1]) for one in vectors])
-    step, sees, size = type(first).kernel, int(first.sensors), first.state_size  # type: ignore[attr-defined]
 
     def run(part: slice) -> None:
-        with watched(first):
+        with watched(controller):
             kernel.run_many(
                 step, np.ascontiguousarray(numbers[part]) if numbers.shape[0] > 1 else numbers, sees,
                 bool(sees & Sensor.STAGE), end, rows.machines[part], rows.masses[part], rows.shafts[part],
@@ -159,7 +168,7 @@ def notes_of(rows: Rows, set_up: SetUp, until: float | None, workers: int = 1) -
         with Pool(min(workers, len(parts)), threads=True) as pool:
             for _ in pool.results(run, iter(parts)):
                 pass
-    return made
+    return Notes(notes.view(at.NOTES)[:, 0], of_shafts.view(at.SHAFT_NOTES)[..., 0])
 
 
 def _parts(count: int) -> Iterator[slice]:

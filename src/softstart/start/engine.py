@@ -77,19 +77,12 @@ def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until
 
     `drive` is the one for which the (fitted) controller is set up.
     """
-    sees = 0 if controller is None else controller.sensors
-    recorder.begin(math.inf if until is None else float(until), bool(sees & Sensor.STAGE))
-    if isinstance(controller, CompiledController):  # the loop itself runs in the kernel
+    if isinstance(controller, CompiledController):
         # a copy: the kernel takes no read-only numbers
         numbers = np.array(controller.vector(drive), dtype=np.float64).ravel()
-        size = controller.state_size
-        memory, command = np.zeros(size), np.zeros(NEW_STATE + size)
-        with watched(controller):
-            while (
-                reason := recorder.run(type(controller).kernel, numbers, memory, command)
-            ) == at.BUFFER_FULL:
-                recorder.grow()
-        return reason
+        return run_compiled(controller, numbers, recorder, until)
+    sees = 0 if controller is None else controller.sensors
+    recorder.begin(math.inf if until is None else float(until), bool(sees & Sensor.STAGE))
     if controller is None:
         recorder.state.ask_at = math.inf
     elif not isinstance(controller, PlainController):
@@ -108,6 +101,19 @@ def run_one(controller: Controller | None, drive: Any, recorder: Recorder, until
         if reason not in (at.ASK, at.BUFFER_FULL):
             recorder.state.status = reason
             return reason
+
+
+def run_compiled(
+    controller: CompiledController, numbers: Vector, recorder: Recorder, until: float | None
+) -> int:
+    """The same under a compiled controller with these numbers: the loop itself runs in the kernel."""
+    recorder.begin(math.inf if until is None else float(until), bool(controller.sensors & Sensor.STAGE))
+    memory = np.zeros(controller.state_size)
+    command = np.zeros(NEW_STATE + controller.state_size)
+    with watched(controller):
+        while (reason := recorder.run(type(controller).kernel, numbers, memory, command)) == at.BUFFER_FULL:
+            recorder.grow()
+    return reason
 
 
 def plain_answer(

@@ -12,7 +12,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.kernel import records as at
 from softstart.kernel import replay, sensitivity, start
-from softstart.kernel.motor import N_MEASURED
+from softstart.kernel.motor import N_MEASURED, NEW_STATE
 from softstart.start.rows import Rows
 
 FIRST_ROWS = 256
@@ -54,6 +54,22 @@ class Recorder:
             self.measured, state, command,
         )  # fmt: skip
         return reason
+
+    def states_of_each(
+        self, step: Any, numbers: Matrix, size: int, until: float, on_gap: bool, times: Vector
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Shaft torques and speeds at rising times under each row of numbers of a compiled controller."""
+        given, many = self.rows, (numbers.shape[0], times.size)
+        w, T = np.empty((*many, given.count)), np.empty((*many, given.count - 1))
+        while replay.states_of_each(
+            step, numbers, self.sees, on_gap, until, given.machines[0], given.masses[0], given.shafts[0],
+            self.curves, given.tones, self.work, self.spans, self.events, times,
+            np.zeros(times.size, dtype=np.int64), np.empty((times.size, 2)), w,
+            np.empty((times.size, given.count - 1)), T, self.measured, np.zeros(size),
+            np.zeros(NEW_STATE + size),
+        ) == at.BUFFER_FULL:  # fmt: skip
+            self.grow()
+        return T, w
 
     def measure(self) -> None:
         """Fill `measured` with what the controller sees now."""
@@ -160,7 +176,7 @@ class Recorded:
         The `parts` of the state are twists, speeds, realised torque of the motor, and its angle.
         """
         when, begin = (np.ascontiguousarray(one, dtype=np.float64) for one in (times, marks))
-        given = np.ascontiguousarray(knots, dtype=np.float64)
+        given = np.array(knots, dtype=np.float64)  # a copy: the kernel takes no read-only numbers
         own = np.arange(given.size) if owners is None else np.ascontiguousarray(owners, dtype=np.int64)
         count, columns = self.rows.count, int(own[-1]) + 1
         first, end, _ = parts.indices(2 * count + 1)

@@ -12,15 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from softstart.start.batch import prepared
-from softstart.chain.machines import Machine, two_masses, with_values
+from softstart.chain.machines import Machine, with_values
 from softstart.chain.model import Chain
 from softstart.controller.base import CompiledController
 from softstart.drive import Drive, Limits
 from softstart.errors import InputError, Mistakes
-from softstart.plant import layout as at
-from softstart.start import metrics
-from softstart.start.batch import Figures, array_starts, figures, limits_of_each
+from softstart.kernel import records as at
+from softstart.start.batch import (
+    Figures,
+    Notes,
+    array_starts,
+    figures,
+    joined_notes,
+    limits_of_each,
+    prepared,
+)
 from softstart.start.status import Status
 from softstart.sweeping.grid import Axis, Column
 from softstart.sweeping.maker import Maker
@@ -42,8 +48,8 @@ def known_figures(machine: Machine | None = None) -> dict[str, tuple[str, str]]:
         shafts = tuple(one.replace(permissible_torque=1.0) for one in machine.shafts)
         found = prepared([replace(machine, shafts=shafts, position="mid-gap")]).named()
     else:
-        notes = np.zeros((1, at.N_X))
-        notes[:, at.RELEASE_TIME] = np.nan
+        notes = Notes(np.zeros(1, at.NOTES), np.zeros((1, 1), at.SHAFT_NOTES))
+        notes["release_time"][:] = np.nan
         found = figures(notes, 1.0, limits=Limits(shaft_torque=1.0))
     return {name: (unit, meaning) for name, (_, unit, meaning) in found.items()}
 
@@ -126,16 +132,14 @@ def _of_drives(
     change = question.drive.with_gap if "gap" in changes else question.drive.replace
     drive = change(**{**own, **changes})
     base = question.base if question.base is not None else drive
-    each = np.broadcast_to(
-        metrics.base_torque(base) if isinstance(base, Drive) else base.mean_torque, (count,)
-    )
+    each = np.broadcast_to(base.mean_torque, (count,))
     notes = _notes(question, drive, parameters, controller)
     return figures(notes, each, question.until, limits_of_each(drive))
 
 
-def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> at.Matrix:
+def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], controller: str) -> Notes:
     maker = question.maker
-    fitted_to = None if question.fitted_to is None else two_masses(question.fitted_to)
+    fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
     made = maker.make(parameters, controller)
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
     if not arrays or isinstance(made, CompiledController):
@@ -147,7 +151,7 @@ def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], cont
         own = {name: float(values[index]) for name, values in arrays.items()}
         made = maker.make({**parameters, **own}, controller)
         rows.append(array_starts(one, made, question.until, fitted_to, question.time_limit))
-    return np.concatenate(rows)
+    return joined_notes(rows)
 
 
 def _of_chains(
@@ -157,8 +161,8 @@ def _of_chains(
     chains = [_chain_of(question.drive, changes, index) for index in range(count)]
     starts = prepared(chains, question.time_limit)
     base = np.array([(question.base or question.fitted_to or chain).mean_torque for chain in chains])
-    nominal = None if question.fitted_to is None else two_masses(question.fitted_to)
-    drives = [nominal or two_masses(chain) for chain in chains]
+    nominal = None if question.fitted_to is None else question.fitted_to.design_drive
+    drives = [nominal or chain.design_drive for chain in chains]
     arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
     made = [
         question.maker.make({**parameters, **{n: float(v[i]) for n, v in arrays.items()}}, controller)
@@ -210,7 +214,7 @@ def first_start(question: Question, axes: tuple[Axis, ...]) -> bool:
         )
         compute(Task(0, question, first, tuple(slice(0, 1) for _ in axes)))
         ready, _ = question.maker.make({}, controller).set_up(
-            two_masses(question.fitted_to or question.drive)
+            (question.fitted_to or question.drive).design_drive
         )
         compiled = compiled and isinstance(ready, CompiledController)
     return compiled

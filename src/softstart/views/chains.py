@@ -1,28 +1,23 @@
-"""Chains in words, tables and figures: vibration, reduction, starts, and starts beside the reduced drive."""
+"""Chains in words, tables and figures: vibration, reduction, and starts beside the reduced drive."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softstart.views.drawing import COLOURS, DASHES, SHAFTS, drawing, entitle, new_figure
+from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart.views.drives import POSITIONS
-from softstart.views.numbers import Table, column_of, first_of, number, printable, short
-from softstart.views.printed import units_of
+from softstart.views.numbers import Table, column_of, number, printable, short
 
 if TYPE_CHECKING:
     from softstart.chain.model import Chain
     from softstart.chain.two_masses import TwoMassError, Verification
-    from softstart.start.run import Run
     from softstart.vibration import Reduction, Vibration
 
 MOST_MODES = 12
-EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
-OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
 ALIKE = 0.01  # share by which two K_dyn differ at least where one strategy counts as gentler
 
 
@@ -45,63 +40,6 @@ def chain_lines(chain: Chain) -> list[str]:
     if chain.assumed:
         lines.append(f"  assumed: {printable(chain.assumed)}")
     return lines
-
-
-def figure_rows(run: Run) -> list[list[str]]:
-    """The figures of a start, as words and numbers."""
-
-    def with_unit(value: float, unit: str) -> str:
-        return f"{short(value)} {unit}" if not math.isnan(value) else "-"
-
-    worst = run.chain.shaft_names[run.worst_shaft]
-    rows = [
-        ["K_dyn", f"{number(run.k_dyn, 6)} in {worst}"],
-        ["largest torque", f"{short(run.peak_torque)} N m at the motor shaft, at {short(run.peak_time)} s"],
-        ["start time", with_unit(run.start_time, "s")],
-        ["settled time", with_unit(run.settled_time, "s")],
-        ["contacts", str(run.contacts)],
-        ["end of the run", with_unit(run.end_time, "s")],
-    ]
-    for name, one in run.positions.items():
-        time = with_unit(one.start_time, "s")
-        rows.append([f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {time}"])
-    return rows
-
-
-def shaft_table(run: Run) -> Table:
-    """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
-    own = run.peak_torques / run.chain.at_motor_shaft().torque_ratio
-    cells = {
-        "shaft": list(run.chain.shaft_names),
-        "K": [number(k, 4) for k in run.k_dyns.tolist()],
-        "over its\nown mean": [number(k, 4) for k in run.shaft_factors.tolist()],
-        "torque at\nmotor shaft\nN m": column_of(run.peak_torques.tolist()),
-        "torque at\nown shaft\nN m": column_of(own.tolist()),
-        "at s": column_of(run.peak_times.tolist(), 5),
-    }
-    if run.chain.limits:
-        cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
-    return Table.of("Shafts", cells, ("shaft",))
-
-
-def event_rows(run: Run) -> list[list[object]]:
-    """The events, full numbers, each with the shaft or mass on which it happened."""
-    masses, shafts = [mass.name for mass in run.chain.masses], run.chain.shaft_names
-    return [
-        [one.time, one.kind, (shafts if one.kind in OF_SHAFTS else masses)[one.place], one.value, one.impulse]
-        for one in run.events
-    ]
-
-
-def event_table(run: Run, most: int) -> Table:
-    """The first events: time, what happened and where."""
-    rows = event_rows(run)
-    cells = {
-        "time s": column_of([float(str(row[0])) for row in rows[:most]], 6),
-        "event": [str(row[1]) for row in rows[:most]],
-        "at": [str(row[2]) for row in rows[:most]],
-    }
-    return Table.of(f"Events{first_of(len(rows), most)}", cells, ("event", "at"))
 
 
 def conclusion(found: Reduction) -> str:
@@ -309,37 +247,3 @@ def _name_masses(axes: Any, place: np.ndarray[Any, Any], names: list[str]) -> No
     texts = [group[0] if len(group) == 1 else f"{group[0]} ... {group[-1]}" for group in labels]
     axes.set_xticks(ticks, texts, rotation=30, ha="right")
     axes.set_xlabel("place along the chain, by compliance (grey: shafts with a gap)")
-
-
-def run_figure(run: Run) -> Any:
-    """Shaft torques with their located peaks, speeds of the masses, and where each twist is in its gap."""
-    masses = [mass.name for mass in run.chain.masses]
-    shafts = [f"{a} - {b}" for a, b in pairwise(masses)]
-    gap, units = run.chain.at_motor_shaft().gap, units_of(run.chain)
-    with drawing():
-        figure, (torque, speed, twist) = new_figure(3, size=(8.0, 7.5), sharex=True)
-        entitle(figure, f"{run.chain.name}, at the motor shaft")
-        torque.plot(run.t, run.u, color="black", lw=1.0, label="motor")
-        for k, name in enumerate(shafts):
-            style = {"color": SHAFTS[k % len(SHAFTS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
-            torque.plot(run.t, run.T[:, k], label=name, **style)
-            at = run.at(run.peak_times[k])["T"][k]
-            torque.plot(run.peak_times[k], at, "o", ms=4, color=style["color"])
-            if gap[k] > 0.0:
-                twist.plot(run.t, 2.0 * run.twist[:, k] / gap[k], label=name, **style)
-        for i, name in enumerate(masses):
-            colour, dash = COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]
-            speed.plot(run.t, units.shown(run.w[:, i], "rad/s"), color=colour, ls=dash, label=name)
-        for flank in (-1.0, 1.0):
-            twist.axhline(flank, color="black", lw=0.8)
-        torque.set_ylabel("torque, N m")
-        speed.set_ylabel(f"speed, {units.speed}")
-        twist.set_ylabel("twist over half the gap")
-        twist.set_xlabel("time, s")
-        few = len(masses) <= 8  # else their names would cover the curves
-        for axes in (torque, speed, twist):
-            if axes.get_legend_handles_labels()[0] and few:
-                axes.legend(fontsize=7.5, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-            elif axes.get_legend_handles_labels()[0]:
-                axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure

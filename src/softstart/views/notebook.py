@@ -7,19 +7,16 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from softstart.drive import Drive
 from softstart.start.comparison import Comparison
-from softstart.views import chains, fatigue, identification, optima, starts
+from softstart.views import fatigue, identification, optima, starts
 from softstart.views.drawing import drawing
 from softstart.views.numbers import Column, Table
 
 
 def of_run(run: Any) -> str:
     """A start of a drive or a chain: its figures beside its traces."""
-    rows = starts.figure_rows(run) if isinstance(run.drive, Drive) else chains.figure_rows(run)
-    return _cell(
-        f"{run.controller_name} on {run.drive.name}: {run.status.value}", [_figures(rows)], run.plot()
-    )
+    title = f"{run.controller_name} on {run.drive.name}: {run.status.value}"
+    return _cell(title, [_figures(starts.figure_rows(run))], run.plot())
 
 
 def of_comparison(comparison: Comparison) -> str:

@@ -17,7 +17,6 @@ from softstart.optimal.problem import REACTS, best_k_dyn, best_start
 from softstart.optimal.result import Kept, Optimum, RobustOptimum, SensorWorth
 from softstart.start.recommendation import Row, checked_limits
 from softstart.start.run import Run
-from softstart.views import chains
 from softstart.views.drawing import (
     COLOURS,
     DASHES,
@@ -42,6 +41,7 @@ from softstart.views.markdown import (
     write_rows,
 )
 from softstart.views.numbers import NOTHING, Table, column_of, number, short
+from softstart.views.starts import run_figure
 
 if TYPE_CHECKING:
     from matplotlib import ticker
@@ -99,7 +99,7 @@ def _of_shafts(best: Optimum) -> list[list[str]]:
     run: Any = best.run
     if isinstance(best.problem.drive, Drive):
         return []
-    names = run.chain.shaft_names
+    names = run.drive.shaft_names
     return [[f"K_dyn in {name}", number(one, 6)] for name, one in zip(names, run.k_dyns, strict=True)]
 
 
@@ -254,19 +254,18 @@ def optimum_figure(best: Optimum) -> Any:
 
 def _chain_figure(best: Optimum) -> Any:
     """The start of the chain, with peak and bound of its shaft torques and the end of the start."""
-    figure = chains.run_figure(best.run)  # type: ignore[arg-type]
-    torque, speed, twist = figure.axes
+    figure = run_figure(best.run)
+    torque = figure.axes[0]
     with drawing():
         for sign in (1.0, -1.0) if float(best.run.T.min()) < -0.5 * best.run.peak_torque else (1.0,):
             torque.axhline(sign * best.run.peak_torque, color=GREY, lw=0.9, ls=DASHES[1])
         if best.bound.kind != "none":
             least = best.bound.k_dyn * best.problem.base_torque
             torque.axhline(least, color=COLOURS[4], lw=1.4, ls=DASHES[3], label="bound of the peak")
-        speed.axhline(best.problem.target, color=GREY, lw=0.8, ls=":")
-        for axes in (torque, speed, twist):
+        for axes in figure.axes:
             axes.axvline(best.end_time, color=GREY, lw=0.8, ls=":")
         torque.legend(fontsize=7.5, ncols=2, loc="best")
-        torque.set_title(f"{best.run.drive.name}: K_dyn {best.k_dyn:.4f} in {best.end_time:.4f} s")
+        head(torque, f"K_dyn {best.k_dyn:.4f} in {best.end_time:.4f} s", "torque, N m")
     return figure
 
 

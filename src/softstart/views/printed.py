@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from softstart.chain.model import Chain
 from softstart.drive import Drive
@@ -74,10 +73,8 @@ def units_of(machine: Drive | Chain) -> Units:
     >>> units_of(Drive.load("hoist-15kw")), units_of(Drive.load("servo-axis-small")).angle
     (Units(angle='deg', speed='rpm', diameter=0.0), ...)
     """
-    of: Any = machine
-    gaps = [shaft.gap for shaft in of.shafts] if isinstance(machine, Chain) else [of.gap]
-    speeds = [] if of.target_speed is None else [of.target_speed]
-    return Units.read(machine.units, map(float, gaps), map(float, speeds))
+    speeds = [] if machine.target_speed is None else [float(machine.target_speed)]
+    return Units.read(machine.units, machine.own_gaps, speeds)
 
 
 def at_output(machine: Drive | Chain, value: float, unit: str = "N*m") -> str:

@@ -40,6 +40,7 @@ from softstart.views.markdown import (
     write_table,
 )
 from softstart.views.numbers import Table, column_of, first_of, number, short
+from softstart.views.printed import units_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +48,9 @@ if TYPE_CHECKING:
     from softstart.start.run import Run
 
 STAGE_COLUMNS = ("stage", "gap", "start s", "duration s", "peak torque N m", "at s")
-EVENT_COLUMNS = ("time s", "event", "value")
+EVENT_COLUMNS = ("time s", "event", "at", "value", "impulse N m s")
+OF_SHAFTS = {"gap closed", "gap opened", "impact", "impacts over, flanks press"}
+FEW = 8  # masses
 SAME_TORQUE = 1e-9  # of the torque limits: less beyond them is rounding
 SIDES = {0: "open", 1: "closed, driving flank", -1: "closed, other flank"}
 
@@ -72,8 +75,10 @@ def figure_rows(run: Run) -> list[list[str]]:
         return f"{short(value)} {unit}" if not math.isnan(value) else "-"
 
     first, second = run.stage_durations
+    names = run.drive.shaft_names
+    where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
-        ["K_dyn", number(run.k_dyn, 6)],
+        ["K_dyn", f"{number(run.k_dyn, 6)}{where}"],
         ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
         ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
         ["start time", with_unit(run.start_time, "s")],
@@ -86,7 +91,7 @@ def figure_rows(run: Run) -> list[list[str]]:
         ["contacts", str(run.contacts)],
         ["end of the run", with_unit(run.end_time, "s")],
         *([["torque cut off", clipped]] if (clipped := clipped_torque(run)) else []),
-        *([] if run.drive.brake == "none" else [["brake released", with_unit(run.release_time, "s")]]),
+        *([] if math.isnan(run.release_time) else [["brake released", with_unit(run.release_time, "s")]]),
         *(
             [f"from {name}", f"K_dyn {number(one.k_dyn, 6)}, start time {with_unit(one.start_time, 's')}"]
             for name, one in run.positions.items()
@@ -116,7 +121,7 @@ def clipped_torque(run: Any) -> str:
     each that answered with an infinite torque.
     """
     excess, time = run.clipped
-    motor: Any = run.drive.motor if isinstance(run.drive, Chain) else run.drive
+    motor = run.drive.motor
     low, high = float(motor.minimum_torque), float(motor.maximum_torque)
     infinite = math.isinf(excess)
     if not infinite and (run.controller.saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
@@ -140,52 +145,115 @@ def stage_rows(run: Run) -> list[list[object]]:
 
 
 def event_rows(run: Run) -> list[list[object]]:
-    """The events, full numbers."""
-    return [[event.time, event.kind, event.value] for event in run.events]
+    """The events, full numbers, each with the shaft or mass on which it happened."""
+    masses, shafts = run.drive.mass_names, run.drive.shaft_names
+    return [
+        [one.time, one.kind, (shafts if one.kind in OF_SHAFTS else masses)[one.place], one.value, one.impulse]
+        for one in run.events
+    ]
+
+
+def shaft_table(run: Run) -> Table:
+    """K_dyn, own factor and largest torque of each shaft, at the motor shaft and at its own, its limit."""
+    own = run.peak_torques / run.drive.at_motor_shaft().torque_ratio
+    cells = {
+        "shaft": list(run.drive.shaft_names),
+        "K": [number(k, 4) for k in run.k_dyns.tolist()],
+        "over its\nown mean": [number(k, 4) for k in run.shaft_factors.tolist()],
+        "torque at\nmotor shaft\nN m": column_of(run.peak_torques.tolist()),
+        "torque at\nown shaft\nN m": column_of(own.tolist()),
+        "at s": column_of(run.peak_times.tolist(), 5),
+    }
+    if run.drive.limits:
+        cells["of the\npermissible\n%"] = [number(100.0 * used, 1) for used in run.utilisation.tolist()]
+    return Table.of("Shafts", cells, ("shaft",))
+
+
+def start_tables(run: Run, most: int) -> list[Table]:
+    """Each shaft where there are several, and the first stages and events."""
+    several = [shaft_table(run)] if len(run.drive.shaft_names) > 1 else []
+    return [*several, stage_table(run, most), event_table(run, most)]
 
 
 def run_figure(run: Run) -> Any:
-    """Torques, speeds and twist over time; grey where the gap is open."""
+    """Torques, speeds and twists over time; of a single shaft grey where its gap is open."""
+    single = len(run.drive.shaft_names) == 1
     with drawing():
-        figure, (torque, speed, twist) = new_figure(3, 1, (8.0, 7.5), sharex=True)
-        for axes in (torque, speed, twist):
+        figure, panels = new_figure(3, 1, (8.0, 7.5), sharex=True)
+        for axes in panels if single else ():
             shade_open_gap(axes, run)
-        _torques(torque, run)
-        _speeds(speed, run)
-        half = 0.5 * float(run.drive.gap)
-        twist.plot(run.t, run.theta, color=COLOURS[2])
-        for flank in (half, -half):
-            twist.axhline(flank, color="#444444", lw=0.8, ls="--")
-        head(twist, "twist phi1 - phi2, flanks dashed", "rad", "time, s     (grey: gap open)")
-        twist.set_xlim(0.0, run.end_time)
+        for axes, draw in zip(panels, (_torques, _speeds, _twists), strict=True):
+            draw(axes, run)
+            if not axes.get_legend_handles_labels()[0]:
+                continue
+            if single:
+                legend_above(axes, 3)
+            else:
+                columns = 1 + len(run.drive.mass_names) // FEW
+                axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns)
+        panels[-1].set_xlabel(f"time, s{'     (grey: gap open)' if single else ''}")
+        panels[-1].set_xlim(0.0, run.end_time)
         entitle(figure, f"{run.drive.name}: {run.controller_name}")
     return figure
 
 
+def _shafts(run: Run) -> list[tuple[str, dict[str, Any]]]:
+    """Name and line of each shaft."""
+    names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque T",)
+    return [
+        (name, {"color": SHAFTS[k % len(SHAFTS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]})
+        for k, name in enumerate(names)
+    ]
+
+
 def _torques(axes: Axes, run: Run) -> None:
     axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
-    axes.plot(run.t, run.T, color=COLOURS[0], label="shaft torque T")
+    peaks = run.recorded.shafts["peak"]
+    for (name, line), torque, time, peak in zip(
+        _shafts(run), run.T.reshape(run.t.size, -1).T, run.peak_times, peaks, strict=True
+    ):
+        axes.plot(run.t, torque, label=name, **line)
+        axes.plot([time], [peak], "o", ms=4, color=line["color"])
     if run.k_dyn > 0.0:
         axes.axhline(run.peak_torque / run.k_dyn, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
-        axes.plot([run.peak_time], [_signed_peak(run)], "o", ms=4, color=COLOURS[0])
     head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
-    legend_above(axes, 3)
 
 
 def _speeds(axes: Axes, run: Run) -> None:
-    axes.plot(run.t, run.w1, color=COLOURS[1], ls=DASHES[1], label="motor w1")
-    axes.plot(run.t, run.w2, color=COLOURS[0], label="load w2")
-    axes.axhline(float(run.drive.target_speed), color=GREY, lw=0.8, ls=":", label="target")
+    machine, units = run.drive, units_of(run.drive)
+    if len(machine.mass_names) == 2:
+        axes.plot(run.t, units.shown(run.w1, "rad/s"), color=COLOURS[1], ls=DASHES[1], label="motor w1")
+        axes.plot(run.t, units.shown(run.w2, "rad/s"), color=COLOURS[0], label="load w2")
+    else:
+        for i, name in enumerate(machine.mass_names):
+            colour, dash = COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]
+            axes.plot(run.t, units.shown(run.w[:, i], "rad/s"), color=colour, ls=dash, label=name)
+    if machine.target_speed is not None:
+        target = float(units.shown(machine.target_speed, "rad/s"))
+        axes.axhline(target, color=GREY, lw=0.8, ls=":", label="target")
     reached = run.start_time == run.start_time
     if reached:
         axes.axvline(run.start_time, color=GREY, lw=0.8, ls=":")
-    head(axes, f"start time {run.start_time:.4f} s" if reached else run.status.value, "speed, rad/s")
-    legend_above(axes, 3)
+    title = f"start time {run.start_time:.4f} s" if reached else run.status.value
+    head(axes, title, f"speed, {units.of('rad/s')}")
 
 
-def _signed_peak(run: Run) -> float:
-    stage = max(run.stages, key=lambda one: abs(one.peak_torque))
-    return stage.peak_torque
+def _twists(axes: Axes, run: Run) -> None:
+    """The twist of a single shaft in rad, of several each in its gap."""
+    gaps, twists = run.drive.gaps, run.twist.T
+    if len(gaps) == 1:
+        units = units_of(run.drive)
+        axes.plot(run.t, units.shown(twists[0], "rad"), color=COLOURS[2])
+        flanks, unit = float(units.shown(0.5 * gaps[0], "rad")), units.of("rad")
+        title = "twist phi1 - phi2, flanks dashed"
+    else:
+        for (name, line), gap, twist in zip(_shafts(run), gaps, twists, strict=True):
+            if gap > 0.0:
+                axes.plot(run.t, 2.0 * twist / gap, label=name, **line)
+        flanks, title, unit = 1.0, "twist over half the gap, flanks dashed", "1"
+    for flank in (flanks, -flanks):
+        axes.axhline(flank, color="#444444", lw=0.8, ls="--")
+    head(axes, title, unit)
 
 
 def stage_table(run: Run, most: int) -> Table:
@@ -204,32 +272,30 @@ def stage_table(run: Run, most: int) -> Table:
 
 
 def event_table(run: Run, most: int) -> Table:
-    """The first events: time and what happened."""
-    events = run.events[:most]
-    cells = {"time s": column_of([one.time for one in events], 6), "event": [one.kind for one in events]}
-    return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event",))
+    """The first events: time, what happened, and of several shafts where."""
+    rows: list[Any] = event_rows(run)[:most]
+    cells = {"time s": column_of([row[0] for row in rows], 6), "event": [row[1] for row in rows]}
+    if len(run.drive.shaft_names) > 1:
+        cells["at"] = [row[2] for row in rows]
+    return Table.of(f"Events{first_of(len(run.events), most)}", cells, ("event", "at"))
 
 
 def write_start(run: Run, folder: Path, command: str, fitted_to: Drive | None) -> None:
     """Everything about one start; `fitted_to` is the drive for which the controller is set up, if another."""
     stem = file_stem(run.controller_name)
     _write_run(run, folder, stem)
-    records = "Events: [events.csv](events.csv)."
-    if isinstance(run, Run):
-        write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
-        write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
-        records = f"Stages: [stages.csv](stages.csv). {records}"
-    else:
-        write_table(folder / "events.csv", chains.EVENT_COLUMNS, chains.event_rows(run))
+    write_table(folder / "stages.csv", STAGE_COLUMNS, stage_rows(run))
+    write_table(folder / "events.csv", EVENT_COLUMNS, event_rows(run))
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     write_rows(folder / "figures.csv", [summary])
     parts = [
         f"# {markdown(run.drive.name)}: start under {markdown(stem)}",
         run.status.value,
-        figure_table(figure_rows(run) if isinstance(run, Run) else chains.figure_rows(run)),
-        *([] if isinstance(run, Run) else [markdown_table(chains.shaft_table(run)), *run.chain.warnings]),
+        figure_table(figure_rows(run)),
+        *([markdown_table(shaft_table(run))] if len(run.drive.shaft_names) > 1 else []),
+        *run.drive.warnings,
         _strategy(run, stem),
-        records,
+        "Stages: [stages.csv](stages.csv). Events: [events.csv](events.csv).",
     ]
     write_drive_report(folder, parts, run.drive, command, fitted_to)
 
@@ -372,7 +438,7 @@ def remarks(comparison: Comparison) -> list[str]:
     """What the figures of these starts leave out, and which starts did not end as they should."""
     rows = comparison.rows
     return [
-        *(comparison.drive.warnings if isinstance(comparison.drive, Chain) else ()),
+        *comparison.drive.warnings,
         *([INTERVALS_NOTE] if rows[0].intervals else []),
         *row_remarks(rows),
     ]

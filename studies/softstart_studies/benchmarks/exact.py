@@ -10,10 +10,10 @@ from softstart import simulate
 from softstart.arrays import Vector
 from softstart.controller import CompiledController, Sensor
 from softstart.drive import Drive
-from softstart.plant import exchange
-from softstart.plant import layout as at
-from softstart.plant import start as kernel
-from softstart.plant.vector import plant_vector
+from softstart.kernel import records as at
+from softstart.kernel import start as kernel
+from softstart.kernel.motor import N_MEASURED, NEW_STATE
+from softstart.start.rows import rows_of
 from softstart.start.run import Run
 from softstart_studies.benchmarks.problem import Problem, controller_of, crane
 
@@ -26,22 +26,21 @@ class Kernel:
 
     def ready(self, gaps: Vector) -> tuple[Any, ...]:
         """All arguments of the kernel; those after the results are its scratch."""
-        drive = crane(gaps)
+        drive, count = crane(gaps), len(gaps)
         controller = cast(CompiledController, controller_of(self.problem.strategy, drive))
         own = np.ascontiguousarray(controller.vector(drive), dtype=np.float64)
-        size = controller.state_size
+        size, rows = controller.state_size, rows_of(drive)
         return (
-            type(controller).kernel, plant_vector(drive), own, int(controller.sensors),
-            bool(controller.sensors & Sensor.STAGE), np.array([np.inf]), np.empty((len(gaps), at.N_X)),
-            np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED), np.zeros(size),
-            np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P), np.zeros(own.shape[1]), np.zeros((0, 0)),
+            type(controller).kernel, own, int(controller.sensors), bool(controller.sensors & Sensor.STAGE),
+            np.inf, rows.machines, rows.masses, rows.shafts, rows.curves, np.zeros((count, at.N_NOTES)),
+            np.zeros((count, 1, at.size(at.SHAFT_NOTES))), np.zeros(at.N_WORK), np.zeros(N_MEASURED),
+            np.zeros(size), np.zeros(NEW_STATE + size),
         )  # fmt: skip
 
     def solve(self, work: tuple[Any, ...]) -> Vector:
         """Peak torques, N m."""
         kernel.run_many(*work)
-        results = work[6]
-        peaks: Vector = np.abs(results[:, at.PEAK])
+        peaks: Vector = np.abs(work[10].view(at.SHAFT_NOTES)[:, 0, 0]["peak"])
         return peaks
 
 

@@ -144,7 +144,7 @@ def test_a_load_curve_is_a_damper_or_a_spring_to_the_ground(seed, curve):
     start = SampledStart.of(loaded(seed, **curve), SpeedPI(0.1, 0.5, 10.0), CRANE)
     point = operating_points(start, run_until_steady(start))[0]
     assert point.mismatch < 1e-7
-    assert point.sample.loads["slope"].any()
+    assert point.sample.plant["incline"].any()
 
 
 def test_a_straight_curve_has_the_loop_of_a_damped_mass():

@@ -10,9 +10,13 @@ from tests.softstart.linear.speed_loops import CRANE, FREE, Filtered, SpeedPI, l
 
 from softstart import Command, Drive, InputError, PlainController, Sensor, SimulationError, linear_view
 from softstart.linear.operating_point import Smoothness, derivative, run_until_steady
-from softstart.linear.sampled_start import Sample, SampledStart
+from softstart.linear.sampled_start import Layout, Sample, SampledStart
 from softstart.linear.systems import at_points
-from softstart.plant import layout as at
+
+
+def motor_by(angle):
+    """The motor turned by an angle, the load not."""
+    return {("phi", 0): angle, ("theta", 0): angle}
 
 
 def test_the_law_of_a_linear_controller_is_found():
@@ -60,14 +64,14 @@ def test_small_motions_decay_on_the_exact_plant_as_the_modes_say(drive, controll
     view = loop_of(drive, controller)
     assert view.point.mismatch < 1e-6
     start, sample, h = SampledStart.of(drive, view.controller), view.point.sample, view.period
-    twist = 1e-4 * sample.x[at.THETA]
+    twist = 1e-4 * sample.plant["theta"][0]
     count = 12
 
     def torques(moves):
         rows = start.from_sample(sample.displaced(moves), sample.time + (count - 0.5) * h)
         return np.array([start.shaft_torque(one) for one in rows])
 
-    response = (torques({at.THETA: twist}) - torques({at.THETA: -twist})) / (2.0 * twist)
+    response = (torques(motor_by(twist)) - torques(motor_by(-twist))) / (2.0 * twist)
     assert response.size == count
     # the modes with their delays span all responses: the exact one must lie among them
     from softstart.linear.operating_point import closed
@@ -93,10 +97,10 @@ def test_the_least_damped_mode_is_what_rings_on():
     view = loop_of(drive, SpeedPI(0.05))
     mode = view.elastic_mode
     start, sample, h = SampledStart.of(drive, view.controller), view.point.sample, view.period
-    twist, count = 1e-4 * sample.x[at.THETA], 400
+    twist, count = 1e-4 * sample.plant["theta"][0], 400
     ends = []
     for side in (twist, -twist):
-        rows = start.from_sample(sample.displaced({at.THETA: side}), sample.time + (count - 0.5) * h)
+        rows = start.from_sample(sample.displaced(motor_by(side)), sample.time + (count - 0.5) * h)
         ends.append(np.array([start.shaft_torque(one) for one in rows]))
     ring = (ends[0] - ends[1]) / (2.0 * twist)
     assert ring.size == count
@@ -237,11 +241,11 @@ def test_bad_input():
 
 
 def sample(state, measured=()):
-    x = np.zeros(at.N_X)
+    layout = Layout.of(2)
     full = np.full(7, np.nan)
     full[0] = 0.0
     full[1 : 1 + len(measured)] = measured
-    return Sample(x, np.zeros(at.N_M), full, np.array(state, dtype=float), 0.0, 0.001, 0.0)
+    return Sample(np.zeros(layout.index.size), layout, full, np.array(state, dtype=float), 0.0, 0.001, 0.0)
 
 
 def test_what_is_not_smooth_is_named():
@@ -281,7 +285,7 @@ def test_the_start_is_the_one_of_simulate():
     plain = simulate(drive, "ramp", 0.09)
     at_samples = [one for one in run.samples if one.time < 0.09]
     times = np.array([one.time for one in at_samples])
-    assert plain.at(times)["theta"] == pytest.approx([one.x[at.THETA] for one in at_samples], abs=1e-12)
+    assert plain.at(times)["theta"] == pytest.approx([one.plant["theta"][0] for one in at_samples], abs=1e-12)
 
 
 def test_a_drive_file_by_name_and_the_figure(tmp_path):

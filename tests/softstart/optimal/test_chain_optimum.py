@@ -139,9 +139,10 @@ def test_no_random_torque_beats_the_momentum_bound():
             played = player.play(TorqueProfile(time, torque), 1.5)
         except SimulationError:
             continue
-        if math.isnan(played.start_time):
+        start_time = float(played.recorded.notes["start_time"])
+        if math.isnan(start_time):
             continue
-        problem = ChainProblem(chain, played.start_time)
+        problem = ChainProblem(chain, start_time)
         ratio = played.peak / problem.base_torque / momentum_bound(problem).k_dyn
         nearest = min(nearest, ratio)
         pulls = played.recorded.events

@@ -46,8 +46,8 @@ def slope(player, profile, direction, until, instants):
         ends = []
         for sign in (1.0, -1.0):
             moved = TorqueProfile(profile.time, profile.torque + sign * step * direction)
-            _, w, _, T = player.play(moved, until).states(instants)
-            ends.append(np.hstack([T, w]))
+            states = player.play(moved, until).recorded.at(instants)
+            ends.append(np.hstack([states["T"], states["w"]]))
         found.append((ends[0] - ends[1]) / (2.0 * step))
     return (4.0 * found[1] - found[0]) / 3.0, np.abs(found[1] - found[0])
 

@@ -29,14 +29,14 @@ import casadi as ca
 import numpy as np
 
 from softstart.arrays import Vector
-from softstart.chain.kernel_records import CONTACT, JOINED, OPEN
-from softstart.start.run import Run
 from softstart.errors import InputError
+from softstart.kernel.records import CONTACT, JOINED, OPEN, S_END, S_START
 from softstart.optimal.chains.problem import ChainProblem, carried_loads
 from softstart.optimal.collocation.search import QUIET, CasadiProblem
 from softstart.optimal.collocation.transcription import Slot
 from softstart.optimal.result import NotConverged
 from softstart.profile import TorqueProfile
+from softstart.start.run import Run
 
 DEGREE = 5
 STRIDE = 2.0  # rad of the fastest vibration in contact, or times the lag, that an element may span
@@ -72,8 +72,10 @@ class Phase:
 def phases_of(problem: ChainProblem, run: Run) -> list[Phase]:
     """The phases of a start that reaches to one elastic period after the start time, which ends one too."""
     assert problem.start_time is not None
-    spans, shafts, masses = (getattr(run.recorded, name) for name in ("spans", "span_shafts", "span_masses"))
-    rubs = problem.drive.at_motor_shaft().reactive
+    recorded = run.recorded
+    ends, modes = recorded.spans[:, [S_START, S_END]], recorded.of_shafts(1)[:-1]
+    sides = np.where(modes == CONTACT, recorded.of_shafts(2)[:-1], 2.0 * (modes == JOINED)).astype(int)
+    moving = np.where(problem.drive.at_motor_shaft().reactive, recorded.of_masses(1)[:-1], 1.0)
     found: list[Phase] = []
     if run.end_time < (problem.start_time + run.elastic_period) * (1.0 - LEAST):
         raise InputError(
@@ -82,17 +84,10 @@ def phases_of(problem: ChainProblem, run: Run) -> list[Phase]:
     parts = ((0.0, problem.start_time), (problem.start_time, problem.start_time + run.elastic_period))
     for begin, end in parts:
         own: list[Phase] = []
-        for span, shaft, mass in zip(spans, shafts, masses, strict=True):
-            a, b = max(span["start"], begin), min(span["end"], end)
+        for (a, b), side, mode, move in zip(ends.clip(begin, end), sides, modes, moving, strict=True):
             if b - a <= LEAST * end:
                 continue
-            sides = np.where(shaft["mode"] == CONTACT, shaft["side"], 2.0 * (shaft["mode"] == JOINED))
-            one = Phase(
-                a, b,
-                tuple(sides.astype(int).tolist()),
-                tuple((shaft["mode"] == OPEN).tolist()),
-                tuple(np.where(rubs, mass["direction"], 1.0).tolist()),
-            )  # fmt: skip
+            one = Phase(a, b, tuple(side.tolist()), tuple((mode == OPEN).tolist()), tuple(move.tolist()))
             if own and _alike(own[-1], one):
                 both = tuple(p and q for p, q in zip(own[-1].kept_open, one.kept_open, strict=True))
                 own[-1] = replace(own[-1], end=b, kept_open=both)

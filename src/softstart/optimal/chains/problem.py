@@ -44,13 +44,13 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.start.run import Run
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.optimal.problem import TERMINALS, Problem, Terminal
 from softstart.optimal.result import LowerBound, Optimum, OptimumError
 from softstart.profile import TorqueProfile
+from softstart.start.run import Run
 
 _collocation = late("softstart.optimal.chains.collocation")
 _solving = late("softstart.optimal.chains.solving")

@@ -28,7 +28,6 @@ from softstart.errors import SimulationError
 from softstart.optimal.chains.problem import ChainProblem, carried_loads, terminal_miss
 from softstart.optimal.chains.starts import Answer, Played, Player
 from softstart.optimal.lp.rows import Limits, Sparse
-from softstart.plant import layout
 from softstart.profile import TorqueProfile
 
 KNOTS_PER_PERIOD = 14
@@ -67,8 +66,8 @@ class Search:
         assert problem.start_time is not None
         self.problem, self.player = problem, player
         self.end = problem.start_time
-        p = player.given.p.view(layout.PLANT)[0]
-        self.period = float(p.period)
+        machine = player.rows.machine
+        self.period = float(machine.period)
         self.until = self.end + self.period
         count = math.ceil(KNOTS_PER_PERIOD * finer * self.until / self.period)
         self.knots = np.linspace(0.0, self.until, max(count, 2) + 1)
@@ -76,8 +75,8 @@ class Search:
         stiff = arrays.c * (1.0 / arrays.J[:-1] + 1.0 / arrays.J[1:])
         self.step = min(2.0 * math.pi / math.sqrt(float(stiff.max())) / INSTANTS, float(self.knots[1]))
         self.low, self.high = problem.lowest_torque, problem.highest_torque
-        self.rate = float(p.rate)
-        self.initial = float(player.given.masses["motor_torque0"].sum())
+        self.rate = float(machine.rate)
+        self.initial = float(machine.initial_torque)
         self.load = problem.drive.load_index
         self.penalty = PENALTY
 
@@ -114,8 +113,8 @@ class Search:
             played = self.player.play(self.profile(torques), self.until)
         except SimulationError:
             return None
-        _, w, _, T = played.states([self.end])
-        miss = terminal_miss(self.problem, w[0], T[0])
+        state = played.recorded.at([self.end])
+        miss = terminal_miss(self.problem, state["w"][0], state["T"][0])
         merit = played.peak + self.penalty * self.problem.base_torque * float(miss.sum())
         return Found(torques, played, miss, merit)
 
@@ -220,7 +219,8 @@ class Search:
     def terminal_rows(self, played: Played, answer: Answer) -> tuple[Matrix, Vector]:
         """Rows of what must rise by how much at t_f, in shares of the target and of the mean torque."""
         target = self.problem.target
-        _, w, _, T = played.states([self.end])
+        state = played.recorded.at([self.end])
+        w, T = state["w"], state["T"]
         if self.problem.terminal == "reached":
             return answer.speeds[0, [self.load]] / target, 1.0 - w[0, [self.load]] / target
         rows, missing = answer.speeds[0] / target, 1.0 - w[0] / target
@@ -251,7 +251,7 @@ class _Model:
     def of(cls, search: Search, found: Found) -> _Model:
         """The model at a start."""
         times = found.played.instants(search.step)
-        T = found.played.states(times)[3]
+        T = found.played.recorded.at(times)["T"]
         seen = np.flatnonzero(np.abs(T).max(axis=1) > LOW * found.played.peak)
         answer = found.played.answer(times[seen], [search.end])
         T = T[seen]

@@ -12,8 +12,6 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.model import Chain
-from softstart.start.run import Run
-from softstart.start.simulation import simulate
 from softstart.controller import make_controller, ready_controller_names
 from softstart.errors import InputError, SimulationError
 from softstart.late import late
@@ -38,6 +36,8 @@ from softstart.optimal.result import (
 )
 from softstart.optimal.shortest import start_time_of_direct
 from softstart.profile import TorqueProfile
+from softstart.start.run import Run
+from softstart.start.simulation import simulate
 
 collocation = late("softstart.optimal.chains.collocation")
 global_search = late("softstart.optimal.chains.global_search")

@@ -10,24 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.controller import make_controller
 from softstart.controller.base import CompiledController, Sensor
 from softstart.drive import Drive
-from softstart.plant import exchange, record
-from softstart.plant import layout as at
-from softstart.plant import start as kernel
-from softstart.kernel.motor import N_MEASURED, STEP_SIGNATURE
-from softstart.kernel.jit import compiled_as
-from softstart.plant.vector import plant_vector
+from softstart.kernel.records import ENDED
 from softstart.profile import TorqueProfile
-from softstart.start.engine import Recorder
+from softstart.start.batch import notes_under
+from softstart.start.engine import run_compiled
+from softstart.start.recorded import Recorded, Recorder
+from softstart.start.rows import rows_of
 
 Indices = NDArray[np.int64]
 
@@ -195,80 +192,6 @@ def _joined(
     return a, c, min(max(mean, min(low, high)), max(low, high))  # rounding must not lead beyond a limit
 
 
-_A = types.Array(types.float64, 1, "C")
-_I = types.Array(types.int64, 1, "C")
-_M = types.Array(types.float64, 2, "C")
-_STEP = types.FunctionType(STEP_SIGNATURE)
-_AT_SIGNATURE = types.void(_A, _M, _I, _A, _A, _A, _M)
-_STARTS, _AT = types.FunctionType(kernel.STARTS_SIGNATURE), types.FunctionType(_AT_SIGNATURE)
-
-# what `positions` holds
-SPANS, SPAN_START, FULL, FIRST_OUT, SECOND_OUT = range(5)
-
-
-@compiled_as(
-    types.boolean(
-        _STARTS, _AT, _STEP, _A, _M, _A, types.int64, _A, _I, *[_A] * 6, _M, _M, _M, _M, _A, _A, _M, _M, _M,
-        _I,
-    )
-)  # fmt: skip
-def _all_moved(  # type: ignore[no-untyped-def]
-    starts, states_at, step, p, rows, begun, sees, times, index, no_times, x, m, measured, state, command,
-    ended, segments, events, stages, scratch_x, scratch_m, out, first, second, positions,
-):  # fmt: skip
-    for r in range(rows.shape[0]):
-        for j in range(x.shape[0]):
-            x[j] = begun[j]
-        for j in range(m.shape[0]):
-            m[j] = 0.0
-        for j in range(state.shape[0]):
-            state[j] = 0.0
-        reason = starts(
-            step, ended, ended, sees, False, no_times, ended, x, m, measured, state, command, p, rows[r],
-            segments, events, stages,
-        )  # fmt: skip
-        if reason == positions[FULL]:
-            return False
-        count = int(x[positions[SPANS]])
-        for i in range(times.shape[0]):
-            low, high = 0, count
-            while high - low > 1:
-                middle = (low + high) // 2
-                if segments[middle, positions[SPAN_START]] <= times[i]:
-                    low = middle
-                else:
-                    high = middle
-            index[i] = low
-        states_at(p, segments, index, times, scratch_x, scratch_m, out)
-        for i in range(times.shape[0]):
-            first[r, i] = out[i, positions[FIRST_OUT]]
-            second[r, i] = out[i, positions[SECOND_OUT]]
-    return True
-
-
-def all_moved(
-    step: Any, p: at.Vector, rows: at.Matrix, begun: at.Vector, sees: int, state_size: int, command_size: int,
-    times: at.Vector, records: int,
-) -> tuple[at.Matrix, at.Matrix]:  # fmt: skip
-    """Shaft torque and load speed at `times` of one start under each row of controller parameters.
-
-    `begun` is the kernel's state at t = 0, `records` about how many spans one start has.
-    """
-    out = np.empty((times.size, record.N_OUT))
-    T, w2 = np.empty((rows.shape[0], times.size)), np.empty((rows.shape[0], times.size))
-    positions = np.array([at.N_SEGMENTS, at.S_START, at.BUFFER_FULL, record.T_OUT, record.W2_OUT])
-    while True:
-        recorders = (np.zeros((records, n)) for n in (at.N_SEGMENT, at.N_EVENT, at.N_STAGE))
-        if _all_moved(
-            kernel.starts, record.states_at, step, p, rows, begun, sees, times,
-            np.zeros(times.size, dtype=np.int64), kernel.NO_TIMES, np.zeros(at.N_X), np.zeros(at.N_M),
-            np.zeros(N_MEASURED), np.zeros(state_size), np.zeros(command_size), np.zeros((1, at.N_X)),
-            *recorders, np.zeros(at.N_X), np.zeros(at.N_M), out, T, w2, positions,
-        ):  # fmt: skip
-            return T, w2
-        records *= 2
-
-
 AIM = 1e-9  # the load's target is raised by so much, so that no rounding lets it miss
 PER_PERIOD = 40  # samples of the shaft torque in one elastic period
 STEP = 1e-5  # of a level, relative to the torque range, for the differences
@@ -307,32 +230,23 @@ class Evaluator:
     def __init__(self, drives: Sequence[Drive], start_time: float) -> None:
         self.drives = tuple(drives)
         self.start_time = start_time
-        self.p = [
-            plant_vector(drive, time_limit=start_time + float(drive.elastic_period)) for drive in drives
-        ]
-        for p in self.p:
-            p[:, at.TARGET] *= 1.0 + AIM
+        self.rows = [rows_of(drive, start_time + float(drive.elastic_period)) for drive in drives]
+        for rows in self.rows:
+            rows.machine.target *= 1.0 + AIM
         self.horizon = start_time + max(float(drive.elastic_period) for drive in drives)
 
     def figures(self, parameters: ProfileParameters, unknowns: Matrix) -> Figures:
         """Figures of many staircases of one staircase, a row of unknowns each."""
         numbers = parameters.vectors(unknowns)
-        size = parameters.controller.state_size
-        sees = parameters.controller.sensors
-        out = np.empty((3, numbers.shape[0], len(self.p)))
-        results = np.empty((numbers.shape[0], at.N_X))
-        for i, p in enumerate(self.p):
-            kernel.run_many(
-                type(parameters.controller).kernel, p, numbers, int(sees), bool(sees & Sensor.STAGE),
-                np.array([math.inf]), results, np.zeros(at.N_X), np.zeros(at.N_M),
-                np.zeros(exchange.N_MEASURED), np.zeros(size), np.zeros(exchange.NEW_STATE + size),
-                np.zeros(at.N_P), np.zeros(numbers.shape[1]), np.zeros((0, 0)),
-            )  # fmt: skip
-            good = results[:, at.STATUS] == at.ENDED
-            out[0, :, i] = np.where(good, np.abs(results[:, at.PEAK]), math.inf)
-            out[1, :, i] = np.where(good, results[:, at.START_TIME], math.nan)
-            out[2, :, i] = np.where(good, results[:, at.W2], -math.inf)
-        return Figures(out[0], out[1], out[2])
+        found = np.empty((3, numbers.shape[0], len(self.rows)))
+        for i, rows in enumerate(self.rows):
+            alike = rows.taken(np.zeros(numbers.shape[0], dtype=np.int64))
+            notes = notes_under(alike, parameters.controller, numbers)
+            good = notes["status"] == ENDED
+            found[0, :, i] = np.where(good, notes.peaks[:, 0], math.inf)
+            found[1, :, i] = np.where(good, notes["start_time"], math.nan)
+            found[2, :, i] = np.where(good, notes["final_speed"], -math.inf)
+        return Figures(*found)
 
     def trajectory(
         self,
@@ -344,41 +258,46 @@ class Evaluator:
         high: float,
     ) -> Trajectory:
         """Scenario i under the staircase, with differences for all levels and the edges marked free."""
-        recorder = _Recorder(parameters, self.p[i])
+        controller = parameters.controller
+        recorder = Recorder(self.rows[i], int(controller.sensors))
         unknowns = staircase.unknowns
         numbers = parameters.vectors(unknowns)[0]
-        x = recorder.run(numbers, math.inf)
-        peak, end, ts = abs(float(x[at.PEAK])), float(x[at.TIME]), float(x[at.START_TIME])
-        first = end if math.isnan(x[at.FIRST_CONTACT]) else float(x[at.FIRST_CONTACT])
-        times = self._instants(recorder, i, first, end)
-        checked = np.append(times, end if math.isnan(ts) else ts)
-        states = recorder.at(checked)
+        run_compiled(controller, numbers, recorder, None)
+        run, notes = recorder.finished(), recorder.state
+        peak, end, ts = abs(float(notes.peak[0])), float(notes.time), float(notes.start_time)
+        first = end if math.isnan(notes.first_contact) else float(notes.first_contact)
+        times = self._instants(run, first, end)
+        reached = end if math.isnan(ts) else ts
+        place = int(np.searchsorted(times, reached))
+        checked = np.insert(times, place, reached)
+        watched = np.delete(np.arange(checked.size), place)
+        states = run.at(checked)
+        T, w2 = states["T"][watched, 0], float(states["w"][place, 1])
         which, steps = self._steps(staircase, free_edges, low, high, first, end)
+        step, size = type(controller).kernel, controller.state_size
+        on_gap = bool(controller.sensors & Sensor.STAGE)
         rows = numbers + steps[:, None] * parameters.slopes[which]
-        T, w2 = recorder.moved(rows, end, checked)
+        moved, w = recorder.states_of_each(step, rows, size, end, on_gap, checked)
         dT, dlate = np.zeros((times.size, unknowns.size)), np.zeros(unknowns.size)
-        dT[:, which] = ((T[:, :-1] - states[:-1, record.T_OUT]) / steps[:, None]).T
-        gain = self._gain(i, float(states[-1, record.T_OUT]))
-        dlate[which] = (states[-1, record.W2_OUT] - w2[:, -1]) / steps / gain
-        late = ts - self.start_time
-        if math.isnan(ts):
-            late = self._behind(i, float(states[-1, record.W2_OUT]))
-        return Trajectory(peak, times, states[:-1, record.T_OUT].copy(), dT, late, dlate)
+        dT[:, which] = ((moved[:, watched, 0] - T) / steps[:, None]).T
+        dlate[which] = (w2 - w[:, place, 1]) / steps / self._gain(i, float(states["T"][place, 0]))
+        late = self._behind(i, w2) if math.isnan(ts) else ts - self.start_time
+        return Trajectory(peak, times, T, dT, late, dlate)
 
     def _gain(self, i: int, T: float) -> float:
         """Acceleration of the load under T, rad/s2, at least a part of the mean one that is needed."""
-        p = self.p[i][0]
-        return max(float((T - p[at.MC]) * p[at.INV_J2]), 0.05 * self._needed(i))
+        drive = self.drives[i]
+        return max(float((T - drive.Mc) / drive.J2), 0.05 * self._needed(i))
 
     def _needed(self, i: int) -> float:
-        p = self.p[i][0]
-        return float(p[at.TARGET] - p[at.W2_0]) / self.start_time
+        missing = self.rows[i].machine.target - self.drives[i].initial_load_speed
+        return float(missing) / self.start_time
 
     def _behind(self, i: int, w2: float) -> float:
         """How late a load comes that has only w2 when its run is stopped, s."""
-        p = self.p[i][0]
-        missing = max(float(p[at.TARGET]) - w2, 0.0) / self._needed(i)
-        return float(p[at.TIME_LIMIT]) - self.start_time + missing
+        machine = self.rows[i].machine
+        missing = max(float(machine.target) - w2, 0.0) / self._needed(i)
+        return float(machine.time_limit) - self.start_time + missing
 
     def lateness(self, figures: Figures) -> Matrix:
         """By how much each start misses the time asked for, s; below 0 where it is early."""
@@ -388,14 +307,15 @@ class Evaluator:
         late: Matrix = np.where(np.isnan(figures.start_time), behind, figures.start_time - self.start_time)
         return late
 
-    def _instants(self, recorder: _Recorder, i: int, first: float, end: float) -> Vector:
+    @staticmethod
+    def _instants(run: Recorded, first: float, end: float) -> Vector:
         """Instants at which the torque is watched: the onset, an even grid of the contact, and the peaks."""
         if end - first <= 2.0 * ONSET:
             return np.array([end])
-        period = float(self.p[i][0, at.PERIOD])
+        period = float(run.rows.machine.period)
         count = max(math.ceil((end - first) / period * PER_PERIOD), 2)
         grid = np.append(first + ONSET, np.linspace(first, end, count + 1)[1:])
-        T = np.abs(recorder.at(grid)[:, record.T_OUT])
+        T = np.abs(run.at(grid)["T"][:, 0])
         j = np.flatnonzero((T[2:-1] >= T[1:-2]) & (T[2:-1] > T[3:])) + 2
         width = grid[-1] - grid[-2]
         bend = 2.0 * T[j] - T[j - 1] - T[j + 1]
@@ -415,46 +335,3 @@ class Evaluator:
         steps = STEP * (high - low) * np.where(upper, -1.0, 1.0)
         which = np.concatenate([early, n + free_edges]).astype(np.int64)
         return which, np.concatenate([steps, np.full(free_edges.size, EDGE_STEP)])
-
-
-class _Recorder:
-    """One scenario, recorded again and again into the same buffers."""
-
-    def __init__(self, parameters: ProfileParameters, p: Matrix) -> None:
-        self.controller = parameters.controller
-        self.p = p[0].copy()
-        self.records = Recorder(self.p, int(parameters.controller.sensors))
-        self.state = np.zeros(self.controller.state_size)
-        self.command = np.zeros(exchange.NEW_STATE + self.controller.state_size)
-        self.scratch = np.zeros(at.N_X), np.zeros(at.N_M)
-
-    def run(self, numbers: Vector, until: float) -> Vector:
-        """The state at the end; the spans stay on the recorder."""
-        records = self.records
-        records.m[:] = 0.0
-        self.state[:] = 0.0
-        records.begin(until)
-        records.x[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
-        while True:
-            reason = records.run(type(self.controller).kernel, numbers, self.state, self.command)
-            if reason != at.BUFFER_FULL:
-                return records.x
-            records.grow()
-
-    def moved(self, rows: Matrix, until: float, times: Vector) -> tuple[Matrix, Matrix]:
-        """Shaft torque and load speed at `times` for each row of parameters, run to `until`."""
-        begun = np.zeros(at.N_X)
-        kernel.begin(self.p, begun, until, self.records.events)
-        begun[at.ASK_ON_GAP] = 1.0 if self.controller.sensors & Sensor.STAGE else 0.0
-        return all_moved(
-            type(self.controller).kernel, self.p, np.ascontiguousarray(rows), begun, self.records.sees,
-            self.state.size, self.command.size, times, self.records.segments.shape[0],
-        )  # fmt: skip
-
-    def at(self, times: Vector) -> Matrix:
-        """States at the instants, columns as in plant/record.py."""
-        spans = self.records.segments[: int(self.records.x[at.N_SEGMENTS])]
-        index = np.searchsorted(spans[:, at.S_START], times, side="right") - 1
-        out = np.empty((times.size, record.N_OUT))
-        record.states_at(self.p, spans, index.clip(0), times, *self.scratch, out)
-        return out

@@ -12,16 +12,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from softstart import __version__
-from softstart import simulate
+from softstart import __version__, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.start.batch import prepared
-from softstart.chain.kernel_records import elastic_period
-from softstart.start.run import Run
-from softstart.chain.two_masses import drive_of, simulate
 from softstart.controller import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
+from softstart.start.batch import prepared
+from softstart.start.run import Run
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
 from softstart_studies.benchmarks.chains.lsoda import Problem, lsoda_start
 from softstart_studies.benchmarks.contenders import condition_table
@@ -78,7 +75,7 @@ class Case:
         """For LSODA."""
         motor = self.chain.motor
         assert motor is not None
-        return Problem(self.chain, motor.starting_torque, elastic_period(self.chain), self.ramp)
+        return Problem(self.chain, motor.starting_torque, self.chain.elastic_period, self.ramp)
 
     def ours(self) -> Run:
         """By softstart, with everything that a run notes."""
