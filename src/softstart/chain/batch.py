@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from softstart.chain.kernel_records import SHAFT, Numbers, numbers
 from softstart.chain.model import Chain
 from softstart.chain.run import ChainRecorder, mean_torque_of
 from softstart.chain.simulation import check_end, drive_of
-from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
+from softstart.controller.base import Controller, Sensor, SetUp, rows_of
 from softstart.controller.finding import make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -120,10 +120,10 @@ def simulate_chains(
     for i, chain in enumerate(listed):
         check_end(chain, made, until, batch.p[batch.begins[i]])
     nominal = fitted_to if fitted_to is None or isinstance(fitted_to, Drive) else drive_of(fitted_to)
-    told = [drive_of(one) for one in listed] if nominal is None else nominal
+    set_ups = [made.set_up(one) for one in (map(drive_of, listed) if nominal is None else [nominal])]
     count = workers or os.cpu_count() or 1
     means = np.array([mean_torque_of(base or fitted_to or chain) for chain in listed])
-    found = batch.figures(np.arange(len(listed)), made, told, means, until=until, workers=count)
+    found = batch.figures(np.arange(len(listed)), set_ups, means, until=until, workers=count)
     data: dict[str, Any] = {
         name: ("start", values, {"units": unit, "long_name": meaning})
         for name, (values, unit, meaning) in found.items()
@@ -181,8 +181,7 @@ class ChainBatch:
     def figures(
         self,
         which: Rows,
-        controller: Controller | Sequence[Controller],
-        fitted: Drive | Sequence[Drive],
+        set_ups: Iterable[SetUp],
         base: Any,
         time_limit: float | None = None,
         *,
@@ -191,14 +190,13 @@ class ChainBatch:
     ) -> Figures:
         """Figures by name of the starts of chains `which`, of several positions the worst.
 
-        The controller is set up for one drive, for a batch with an element for each place in `which`, or for
-        each of several drives by itself; each place may have its own. `base` is M12avg in N m, one or one a
-        start.
+        The set-ups of the controller serve all places in `which`, one each, or as many in a row. `base` is
+        M12avg in N m, one or one a start.
         """
         spans = [np.arange(self.begins[i], self.begins[i + 1]) for i in which.tolist()]
         owners = np.repeat(np.arange(which.size), [span.size for span in spans])
         rows = np.concatenate(spans)
-        results, ends = self._notes(rows, owners, controller, fitted, time_limit, until, workers)
+        results, ends = self._notes(rows, owners, set_ups, time_limit, until, workers)
         return self._read(which, spans, owners, results, ends, base, until)
 
     def named(self) -> Figures:
@@ -260,8 +258,7 @@ class ChainBatch:
         self,
         rows: Rows,
         owners: Rows,
-        controller: Controller | Sequence[Controller],
-        fitted: Drive | Sequence[Drive],
+        set_ups: Iterable[SetUp],
         time_limit: float | None,
         until: float | None,
         workers: int,
@@ -273,20 +270,19 @@ class ChainBatch:
         results, ends = np.empty((rows.size, layout.N_X)), np.zeros((rows.size, self.first.count - 1), SHAFT)
         end = math.inf if until is None else until
         masses, shafts = self.masses[rows], self.shafts[rows]
-        set_up = _set_up(controller, fitted)
-        compiled = _compiled(set_up)
-        if compiled is None:
-            if isinstance(fitted, Drive) and fitted.shape != ():
-                set_up = _set_up(controller, list(fitted.elements()))
-            for row, owner in enumerate(owners.tolist()):
-                ready, own = set_up[owner if len(set_up) > 1 else 0]
+        prepared = rows_of(set_ups)
+        count = len(prepared) if isinstance(prepared, list) else len(prepared[1])
+        turns = owners * count // (int(owners[-1]) + 1)
+        if isinstance(prepared, list):
+            for row, turn in enumerate(turns.tolist()):
+                ready, own = prepared[turn]
                 one = replace(self.first, p=p[row], masses=masses[row], shafts=shafts[row])
                 recorder = ChainRecorder(one, int(ready.sensors), rows=0)
                 recorder.x[layout.STATUS] = run_one(ready, own, recorder, end)
                 results[row], ends[row] = recorder.x, recorder.start.shafts
             return results, ends
-        made, vectors = compiled
-        numbers_of = vectors[owners] if len(vectors) > 1 else vectors
+        made, vectors = prepared
+        numbers_of = vectors[turns] if len(vectors) > 1 else vectors
         step, sees = type(made).kernel, int(made.sensors)
 
         def run(part: slice) -> None:
@@ -308,28 +304,3 @@ class ChainBatch:
                 for _ in pool.results(run, iter(parts)):
                     pass
         return results, ends
-
-
-SetUp = list[tuple[Controller, Drive]]
-
-
-def _set_up(controller: Controller | Sequence[Controller], fitted: Drive | Sequence[Drive]) -> SetUp:
-    """Controllers as they are set up, each with the drive of its numbers: one for all starts, or one each."""
-    made = [controller] if isinstance(controller, Controller) else controller
-    drives = [fitted] if isinstance(fitted, Drive) else fitted
-    if isinstance(fitted, Drive) and fitted.shape != () and isinstance(made[0], PlainController):
-        return [(made[0], fitted)]  # a plain controller is set up start by start
-    return [made[i % len(made)].set_up(drives[i % len(drives)]) for i in range(max(len(made), len(drives)))]
-
-
-def _compiled(set_up: SetUp) -> tuple[CompiledController, layout.Matrix] | None:
-    """A compiled controller and its numbers, a row for all starts or one each; None for a plain one."""
-    rows = []
-    for ready, own in set_up:
-        if not isinstance(ready, CompiledController):
-            return None
-        vector = np.asarray(ready.vector(own), dtype=np.float64)
-        rows.append(vector.reshape(-1, vector.shape[-1]))
-    ready = set_up[0][0]
-    assert isinstance(ready, CompiledController)
-    return ready, np.ascontiguousarray(np.concatenate(rows))

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softstart import formulas
-from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
+from softstart.controller.base import CompiledController, Controller, Sensor, SetUp, rows_of
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
 from softstart.late import late
@@ -77,7 +76,7 @@ def simulate_many(
 
 def array_starts(
     drive: Drive,
-    controller: Controller,
+    controller: Controller | Iterable[SetUp],
     until: float | None = None,
     fitted_to: Drive | None = None,
     time_limit: float | None = None,
@@ -86,7 +85,8 @@ def array_starts(
     """The kernel's notes of all starts of a batch: one row a start, last index of the drive fastest.
 
     The columns are those of `x` in `softstart.plant.layout`; `figures` turns them into labelled figures. The
-    controller's parameters may be arrays of the drive's shape. Unlike `simulate`, nothing is checked.
+    controller is set up for each start, or once for a single `fitted_to`; set-ups that are given serve all
+    starts, one each, or as many in a row. Unlike `simulate`, nothing is checked.
 
     >>> from softstart.controller import make_controller
     >>> crane = Drive.load("crane-4amtkf")
@@ -94,24 +94,12 @@ def array_starts(
     >>> notes[:, at.PEAK].round(2).tolist()
     [164.81, 257.18]
     """
-    if len(drive.positions) > 1:
-        told = fitted_to or drive.design_drive
-        return worst_of(
-            [array_starts(one, controller, until, told, time_limit, max_events)
-             for one in drive.positions.values()]
-        )  # fmt: skip
-    p = plant_vector(drive, time_limit, max_events)
-    if not isinstance(controller, PlainController):
-        ready, own = controller.set_up(fitted_to or drive)
-        if isinstance(ready, CompiledController):
-            return _starts(ready, own, p, until)
-    single = fitted_to is None or fitted_to.shape == ()
-    nominal = repeat(fitted_to) if single else fitted_to.elements()  # type: ignore[union-attr]
-    rows = []
-    for i, (one, other) in enumerate(zip(drive.elements(), nominal, strict=False)):
-        ready, own = controller.set_up(other or one)
-        rows.append(_starts(ready, own, p[i : i + 1], until))
-    return np.concatenate(rows)
+    whole = fitted_to or drive.design_drive
+    ready = rows_of(controller.set_ups(whole) if isinstance(controller, Controller) else controller)
+    notes = [
+        _starts(ready, plant_vector(one, time_limit, max_events), until) for one in drive.positions.values()
+    ]
+    return worst_of(notes) if len(notes) > 1 else notes[0]
 
 
 def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
@@ -139,30 +127,32 @@ def worst_of(notes: Sequence[at.Matrix]) -> at.Matrix:
     return worst
 
 
-def _starts(controller: Controller, own: Drive, p: at.Matrix, until: float | None) -> at.Matrix:
+def _starts(
+    ready: tuple[CompiledController, at.Matrix] | list[SetUp], p: at.Matrix, until: float | None
+) -> at.Matrix:
     """The kernel's notes, one row a start."""
     end = math.inf if until is None else float(until)
     results = np.empty((p.shape[0], at.N_X))
-    if isinstance(controller, CompiledController):
-        numbers = np.asarray(controller.vector(own), dtype=np.float64)
-        if not any(numbers.strides[:-1]):  # one row, broadcast: it serves all starts
-            numbers = numbers[(0,) * (numbers.ndim - 1)]
-        numbers = np.array(numbers.reshape(-1, numbers.shape[-1]), order="C")
-        size = controller.state_size
-        for part in _parts(p.shape[0]):
-            with watched(controller):
-                kernel.run_many(
-                    type(controller).kernel, p[part], numbers[part] if numbers.shape[0] > 1 else numbers,
-                    int(controller.sensors), bool(controller.sensors & Sensor.STAGE), np.array([end]),
-                    results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED),
-                    np.zeros(size), np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P),
-                    np.zeros(numbers.shape[1]), np.zeros((0, 0)),
-                )  # fmt: skip
+    if isinstance(ready, list):
+        for i, (row, one) in enumerate(zip(results, p, strict=True)):
+            controller, own = ready[i * len(ready) // len(results)]
+            recorder = Recorder(one, int(controller.sensors), recording=False)
+            recorder.x[at.STATUS] = run_one(controller, own, recorder, end)
+            row[:] = recorder.x
         return results
-    for row, one in zip(results, p, strict=True):
-        recorder = Recorder(one, int(controller.sensors), recording=False)
-        recorder.x[at.STATUS] = run_one(controller, own, recorder, end)
-        row[:] = recorder.x
+    made, numbers = ready
+    if len(numbers) > 1:
+        numbers = np.repeat(numbers, len(results) // len(numbers), axis=0)
+    size = made.state_size
+    for part in _parts(p.shape[0]):
+        with watched(made):
+            kernel.run_many(
+                type(made).kernel, p[part], numbers[part] if len(numbers) > 1 else numbers,
+                int(made.sensors), bool(made.sensors & Sensor.STAGE), np.array([end]),
+                results[part], np.zeros(at.N_X), np.zeros(at.N_M), np.zeros(exchange.N_MEASURED),
+                np.zeros(size), np.zeros(exchange.NEW_STATE + size), np.zeros(at.N_P),
+                np.zeros(numbers.shape[1]), np.zeros((0, 0)),
+            )  # fmt: skip
     return results
 
 

@@ -16,7 +16,6 @@ from softstart import __version__
 from softstart.chain.machines import (
     Knob,
     Machine,
-    batch_of,
     here,
     knob,
     knobs,
@@ -118,12 +117,9 @@ class Question:
         assert found is not None
         return float(found.value)
 
-    def fitted(self) -> Drive:
-        """The drives for which controllers are set up in the cells, as one batch."""
-        if isinstance(self.drive, Chain):
-            return batch_of([two_masses(self.drive_of(cell)) for cell in range(len(self.cells))])
-        gaps, inertias = (np.array(axis) for axis in zip(*self.cells, strict=True))
-        return self.drive.with_gap(gaps, load_inertia=inertias)
+    def fitted(self) -> list[Drive]:
+        """The drives for which controllers are set up in the cells."""
+        return [two_masses(self.drive_of(cell)) for cell in range(len(self.cells))]
 
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""

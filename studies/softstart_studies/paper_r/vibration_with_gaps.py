@@ -47,7 +47,7 @@ def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Va
     amplitudes: Vector = np.asarray(amplitude, np.float64)
     if not np.all(amplitudes > 0.0):
         raise InputError("amplitude: the largest twist of the spring must be above 0.")
-    Omega = elastic_frequency(J1, J2, c)
+    Omega: Vector = elastic_frequency(J1, J2, c)
     return Omega / (1.0 + gap / (math.pi * amplitudes))
 
 

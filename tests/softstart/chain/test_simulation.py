@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import solve_ivp
+from tests import twin
 from tests.softstart.plant.pieces import Pieces
 
 from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
@@ -93,7 +94,7 @@ def test_plain_and_compiled_controllers_agree_to_the_bit():
 
     made = make_controller("ramp", None)
     compiled = simulate_chain(chain, made, 0.15, fitted_to=CRANE)
-    plain = simulate_chain(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
+    plain = simulate_chain(chain, twin.plain(made, CRANE), 0.15, fitted_to=CRANE)
     for name in ("spans", "span_masses", "span_shafts", "events"):
         assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
 

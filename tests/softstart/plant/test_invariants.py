@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.plant.pieces import Pieces, TwoSteps
 from tests.softstart.plant.test_against_oracle import case, in_other_units, run_of
+from tests.twin import plain
 
 from softstart import Drive, TorqueProfile, controller, simulate
 from softstart.plant.layout import S_SIDE, S_THETA
@@ -135,7 +136,7 @@ def test_a_plain_controller_equals_its_compiled_twin(strategy: Any) -> None:
     compiled = controller.make_controller(strategy)
     assert isinstance(compiled, controller.CompiledController)
     fast = simulate(drive.replace(gap=gaps), compiled, fitted_to=drive)
-    slow = simulate(drive.replace(gap=gaps), compiled.as_plain(drive))
+    slow = simulate(drive.replace(gap=gaps), plain(compiled, drive))
     np.testing.assert_array_equal(fast.k_dyn, slow.k_dyn)
     np.testing.assert_array_equal(fast.start_time, slow.start_time)
     np.testing.assert_array_equal(fast.gap_events, slow.gap_events)
