@@ -54,12 +54,14 @@ def controllers() -> None:
 
 def plain() -> None:
     """A controller that is called from Python."""
+    from tests import twin as twins
+
     from softstart import Drive, simulate
     from softstart.controller import CompiledController, make_controller
 
     crane, direct = Drive.load("crane-4amtkf"), make_controller("direct")
     assert isinstance(direct, CompiledController)
-    twin = direct.as_plain(crane)
+    twin = twins.plain(direct, crane)
     assert simulate(crane, twin).k_dyn == simulate(crane, "direct").k_dyn
     simulate(crane.replace(gap=[0.5, 2.0]), twin)
 

@@ -6,26 +6,24 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from softstart import formulas
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
-from softstart.kernel.motor import encoder_count
 from softstart_controllers.reduced import (
     RAISE_AT,
     closing_speed,
     delay_of,
+    mean_under,
     raise_parameter,
     reduced_torque,
+    swing_duration,
 )  # fmt: skip
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
     check,
+    encoder_count,
     mean_torque,
-    number,
     patience,
     sample_period,
 )
@@ -198,10 +196,10 @@ class AccelerationDelay(CompiledController):
         period = sample_period(drive) if self.period is None else self.period
         drop = _drop(drive, torque) if self.drop is None else self.drop
         return {
-            "torque": number(torque),
+            "torque": torque,
             "full_torque": drive.Ms,
             "delay": delay_of(drive, torque, self.raise_at or RAISE_AT),
-            "drop": number(drop),
+            "drop": drop,
             "latency": detection_latency(drive, torque, drop, period),
             "patience": patience(drive),
             "period": period,
@@ -211,30 +209,31 @@ class AccelerationDelay(CompiledController):
     def vector(self, drive: Drive) -> Vector:
         """(torque, full torque, period, J1, kept samples in W, stride, threshold, wait, patience)."""
         half, stride, threshold = window(drive, self.torque, self.drop, self.period)
-        wait = np.maximum(np.asarray(self.delay) - np.asarray(self.latency), 0.0)
+        delay: Any = self.delay
+        wait = max(delay - self.latency, 0.0)
         return stack(
-            drive, self.torque, self.full_torque, self.period, drive.J1, half, stride, threshold, wait,
+            self.torque, self.full_torque, self.period, drive.J1, half, stride, threshold, wait,
             self.patience,
         )  # fmt: skip
 
 
-def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[Any, Any, Any]:
+def window(drive: Drive, torque: Any, drop: Any, period: Any) -> tuple[int, int, float]:
     """Kept samples in half a window, stride between them in periods, threshold of the difference in rad.
 
     >>> crane = Drive.load("crane-4amtkf")
     >>> half, stride, threshold = window(crane, 15.386, 0.3, 0.001)
-    >>> int(half), int(stride), round(float(threshold) / encoder_count(crane), 1)
+    >>> half, stride, round(threshold / encoder_count(crane), 1)
     (5, 1, 8.6)
     """
-    rounding = 2.0 * np.asarray(encoder_count(drive.encoder_lines))
-    a = np.asarray(drop) * torque / drive.J1
-    samples = np.maximum(np.ceil(np.sqrt(rounding / (ROUNDING_SHARE * a)) / period), SHORTEST_WINDOW)
-    stride = np.ceil(samples / LONGEST_WINDOW)
-    half = np.ceil(samples / stride)
+    rounding = 2.0 * encoder_count(drive)
+    a = drop * torque / drive.J1
+    samples = max(math.ceil(math.sqrt(rounding / (ROUNDING_SHARE * a)) / period), SHORTEST_WINDOW)
+    stride = math.ceil(samples / LONGEST_WINDOW)
+    half = math.ceil(samples / stride)
     return half, stride, a * (half * stride * period) ** 2
 
 
-def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
+def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> float:
     """Time in s from contact until the window is at its threshold, at most the length of stage 2.
 
     The angle lost to the shaft is l(s) = int int T/J1 with T of [G](11), so with x = Omega s
@@ -249,25 +248,29 @@ def detection_latency(drive: Drive, torque: Any, drop: Any, period: Any) -> Any:
     """
     half, stride, threshold = window(drive, torque, drop, period)
     dw12, Omega = closing_speed(drive, torque), drive.Omega
-    mean = formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc)
+    mean = mean_under(drive, torque)
 
-    def lost(s: Any) -> Any:
-        s = np.maximum(s, 0.0)
+    impact, unit = drive.c * dw12 / Omega, drive.J1 * Omega**2
+
+    def lost(s: float) -> float:
+        if s <= 0.0:
+            return 0.0
         angle = Omega * s
-        swing = mean * (0.5 * angle**2 - 2.0 * np.sin(0.5 * angle) ** 2)
-        return (swing + drive.c * dw12 / Omega * (angle - np.sin(angle))) / (drive.J1 * Omega**2)
+        half_sine = math.sin(0.5 * angle)
+        swing = mean * (0.5 * angle * angle - 2.0 * half_sine * half_sine)
+        return (swing + impact * (angle - math.sin(angle))) / unit
 
-    low = np.zeros(np.broadcast_shapes(np.shape(threshold), drive.shape))
-    high = low + formulas.contact_stage(torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12).duration
-    back = half * stride * np.asarray(period)
+    low, high = 0.0, swing_duration(drive, torque, dw12)
+    back = half * stride * period
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        seen = lost(middle) - 2.0 * lost(middle - back) + lost(middle - 2.0 * back) > threshold
-        low, high = np.where(seen, low, middle), np.where(seen, middle, high)
-    return number(high + 0.5 * stride * np.asarray(period))
+        if lost(middle) - 2.0 * lost(middle - back) + lost(middle - 2.0 * back) > threshold:
+            high = middle
+        else:
+            low = middle
+    return high + 0.5 * stride * period
 
 
-def _drop(drive: Drive, torque: Any) -> Any:
+def _drop(drive: Drive, torque: Any) -> float:
     """Half of M12avg/M1 in contact, within 0.05 and 0.3."""
-    mean = np.asarray(formulas.mean_shaft_torque(torque, drive.J1, drive.J2, drive.Mc))
-    return np.clip(0.5 * mean / torque, SMALLEST_DROP, DROP)
+    return min(max(0.5 * mean_under(drive, torque) / torque, SMALLEST_DROP), DROP)

@@ -1,4 +1,4 @@
-"""LQR and Kalman gains for the closed drive, by python-control, in numbers without units.
+"""LQR and Kalman gains for the closed drive, in numbers without units.
 
 Time is counted in 1/Omega, angles in any unit. With mu = J2/(J1 + J2), the damping ratio zeta, the twist z
 and its rate v, the part y of the mean twist that the motor torque makes, its demand r and the part m that the
@@ -8,28 +8,24 @@ load makes, the closed drive is, but for known terms,
 
 so that all drives with the same few groups share one design. Each group is rounded to the grid below, where a
 step changes a gain by a few per cent; between the weights of the grid the gains are interpolated. So a tuning
-of thousands of weights needs two hundred designs; all are kept on disk.
+of thousands of weights needs two hundred designs; a process makes each once.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+import math
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.errors import InputError
 from softstart.late import late
-from softstart_controllers.design_store import kept_all
 
 if TYPE_CHECKING:
-    import control
     from scipy import linalg
 else:
-    control = late("control")
     linalg = late("scipy.linalg")
 
 Array = NDArray[np.float64]
@@ -42,114 +38,92 @@ NOISE_PER_DECADE = 4
 SHORTEST_LAG = 1e-3  # in 1/Omega: below it there is none
 LOAD_NOISE = 0.1  # spectral density of m' over that of v'
 
-_known: dict[str, dict[tuple[int, ...], list[float]]] = {"lqr": {}, "kalman": {}}
 
+def feedback_gains(
+    step: float, ratio: float, lag: float, torque_weight: float, rate_weight: float
+) -> list[float]:
+    """Gains on z, v and y.
 
-def feedback_gains(step: Any, ratio: Any, lag: Any, torque_weight: Any, rate_weight: Any) -> Array:
-    """Gains on z, v and y, last axis; broadcast over the arguments.
+    They minimise the sum of torque_weight z^2 + rate_weight v^2 + r^2 over the samples, `step` apart; without
+    lag the gain on y is 0.
 
-    Minimises the sum of torque_weight z^2 + rate_weight v^2 + r^2 over the samples (`control.dlqr`), `step`
-    apart; without lag the gain on y is 0.
-
-    >>> feedback_gains(0.1, 0.0, 0.0, 1.0, 1.0).round(1).tolist()
+    >>> [round(gain, 1) for gain in feedback_gains(0.1, 0.0, 0.0, 1.0, 1.0)]
     [0.3, 1.3, 0.0]
     """
-    lagging = np.asarray(lag) >= SHORTEST_LAG
-    groups = (
-        _decades(step, PER_DECADE),
-        np.rint(np.asarray(ratio) * RATIO_STEPS),
-        np.where(lagging, _decades(np.maximum(lag, SHORTEST_LAG), PER_DECADE), NO_LAG),
+    lags = _steps(lag, PER_DECADE) if lag >= SHORTEST_LAG else None
+    group = _steps(step, PER_DECADE), round(ratio * RATIO_STEPS), lags
+    weights = [WEIGHTS_PER_DECADE * math.log10(weight) for weight in (torque_weight, rate_weight)]
+    i, j = (math.floor(weight) for weight in weights)
+    across, along = weights[0] - i, weights[1] - j
+    corners = (
+        ((1.0 - across) * (1.0 - along), _feedback(*group, i, j)),
+        ((1.0 - across) * along, _feedback(*group, i, j + 1)),
+        (across * (1.0 - along), _feedback(*group, i + 1, j)),
+        (across * along, _feedback(*group, i + 1, j + 1)),
     )
-    weights = [WEIGHTS_PER_DECADE * np.log10(weight) for weight in (torque_weight, rate_weight)]
-    below = [np.floor(weight) for weight in weights]
-    gains: Any = 0.0
-    for i, j in itertools.product((0, 1), (0, 1)):
-        corner = _designs("lqr", (*groups, below[0] + i, below[1] + j), _feedback)
-        part = [np.abs(1 - k - (weight - low)) for k, weight, low in zip((i, j), weights, below, strict=True)]
-        gains = gains + np.asarray(part[0] * part[1])[..., None] * corner
-    return np.asarray(gains)
+    return [sum(share * gains[k] for share, gains in corners) for k in range(3)]
 
 
-def observer_gains(step: Any, ratio: Any, share: Any, noise: Any) -> Array:
-    """Gains on phi1, w1, z, v and m after the measurement of phi1, last axis.
+def observer_gains(step: float, ratio: float, share: float, noise: float) -> list[float]:
+    """Gains on phi1, w1, z, v and m after the measurement of phi1.
 
-    `noise` is the variance of one angle over the spectral density of v', in samples `step` apart, for
-    `control.dlqe`; m wanders with a tenth of that density.
+    `noise` is the variance of one angle over the spectral density of v', in samples `step` apart; m wanders
+    with a tenth of that density.
     """
-    groups = (
-        _decades(step, PER_DECADE),
-        np.rint(np.asarray(ratio) * RATIO_STEPS),
-        np.clip(np.rint(np.asarray(share) * SHARE_STEPS), 1, SHARE_STEPS - 1),
-        _decades(noise, NOISE_PER_DECADE),
+    shares = min(max(round(share * SHARE_STEPS), 1), SHARE_STEPS - 1)
+    return _observer(
+        _steps(step, PER_DECADE), round(ratio * RATIO_STEPS), shares, _steps(noise, NOISE_PER_DECADE)
     )
-    return _designs("kalman", groups, _observer)
 
 
-NO_LAG = 1000  # in place of the steps of a lag
+def _steps(value: float, per_decade: int) -> int:
+    return round(per_decade * math.log10(value))
 
 
-def _decades(value: Any, per_decade: int) -> Array:
-    return np.rint(per_decade * np.log10(value))
+@cache
+def _feedback(step: int, ratio: int, lag: int | None, torque_weight: int, rate_weight: int) -> list[float]:
+    rate = 0.0 if lag is None else 10.0 ** (-lag / PER_DECADE)
+    A = np.array([[0.0, 1.0, 0.0], [-1.0, -2.0 * ratio / RATIO_STEPS, 1.0], [0.0, 0.0, -rate]])
+    Q = np.diag(
+        [10.0 ** (torque_weight / WEIGHTS_PER_DECADE), 10.0 ** (rate_weight / WEIGHTS_PER_DECADE), 0.0]
+    )
+    B = np.array([[0.0], [0.0], [rate]])
+    h = 10.0 ** (step / PER_DECADE)
+    if lag is None:  # y is the demand itself
+        whole = linalg.expm(h * A)
+        return [*_regulator(whole[:2, :2], whole[:2, 2:], Q[:2, :2], 1.0), 0.0]
+    whole = linalg.expm(h * np.block([[A, B], [np.zeros((1, 4))]]))
+    return _regulator(whole[:3, :3], whole[:3, 3:], Q, 1.0)
 
 
-def _designs(kind: str, groups: tuple[Array, ...], make: Callable[[tuple[int, ...]], list[float]]) -> Array:
-    """One design for each distinct row of the groups, from memory, from disk or made."""
-    table = np.stack(np.broadcast_arrays(*groups), axis=-1).astype(np.int64)
-    kinds, where = np.unique(table.reshape(-1, table.shape[-1]), axis=0, return_inverse=True)
-    rows = [tuple(row) for row in kinds.tolist()]
-    known = _known[kind]
-    missing = [row for row in rows if row not in known]
-    if missing:
-        names = {f"{kind} {' '.join(map(str, row))}": row for row in missing}
-        found = kept_all(list(names), Path(__file__), lambda name: make(names[name]))
-        known.update({names[name]: gains for name, gains in found.items()})
-    gains = np.array([known[row] for row in rows])
-    return gains[where.ravel()].reshape(*table.shape[:-1], gains.shape[1])
-
-
-def _feedback(group: tuple[int, ...]) -> list[float]:
-    step = 10.0 ** (group[0] / PER_DECADE)
-    torque_weight, rate_weight = (10.0 ** (group[i] / WEIGHTS_PER_DECADE) for i in (3, 4))
-    ratio = group[1] / RATIO_STEPS
-    lagging = group[2] != NO_LAG
-    A = np.array([[0.0, 1.0, 0.0], [-1.0, -2.0 * ratio, 1.0], [0.0, 0.0, 0.0]])
-    B = np.zeros((3, 1))
-    Q = np.diag([torque_weight, rate_weight, 0.0])
-    if lagging:
-        rate = 10.0 ** (-group[2] / PER_DECADE)
-        A[2, 2], B[2, 0] = -rate, rate
-        whole = linalg.expm(step * np.block([[A, B], [np.zeros((1, 4))]]))
-        K = _solved(control.dlqr, whole[:3, :3], whole[:3, 3:], Q, np.eye(1))
-        return [float(k) for k in K[0]]
-    whole = linalg.expm(step * A)
-    K = _solved(control.dlqr, whole[:2, :2], whole[:2, 2:], Q[:2, :2], np.eye(1))
-    return [float(K[0, 0]), float(K[0, 1]), 0.0]
-
-
-def _observer(group: tuple[int, ...]) -> list[float]:
-    step, noise = 10.0 ** (group[0] / PER_DECADE), 10.0 ** (group[3] / NOISE_PER_DECADE)
-    ratio, share = group[1] / RATIO_STEPS, group[2] / SHARE_STEPS
+@cache
+def _observer(step: int, ratio: int, share: int, noise: int) -> list[float]:
+    h, damping, mu = 10.0 ** (step / PER_DECADE), 2.0 * ratio / RATIO_STEPS, share / SHARE_STEPS
     A = np.zeros((5, 5))
     A[0, 1] = A[2, 3] = A[3, 4] = 1.0
-    A[1, 2:4] = -share, -2.0 * ratio * share
-    A[3, 2:4] = -1.0, -2.0 * ratio
+    A[1, 2:4] = -mu, -damping * mu
+    A[3, 2:4] = -1.0, -damping
     density = np.diag([0.0, 0.0, 0.0, 1.0, LOAD_NOISE])
     # Van Loan: the noise of one sample
-    whole = linalg.expm(step * np.block([[-A, density], [np.zeros((5, 5)), A.T]]))
+    whole = linalg.expm(h * np.block([[-A, density], [np.zeros((5, 5)), A.T]]))
     Ad = whole[5:, 5:].T
     Q = Ad @ whole[:5, 5:]
-    C = np.eye(1, 5)
-    L = _solved(control.dlqe, Ad, np.eye(5), C, 0.5 * (Q + Q.T), np.array([[noise]]))
-    return [float(k) for k in np.linalg.solve(Ad, L)[:, 0]]
+    L = _regulator(Ad.T, np.eye(5, 1), 0.5 * (Q + Q.T), 10.0 ** (noise / NOISE_PER_DECADE))
+    gains: list[float] = np.linalg.solve(Ad, np.array(L)).tolist()
+    return gains
 
 
-def _solved(design: Callable[..., Any], *matrices: Array) -> Array:
-    """The gains by python-control."""
+def _regulator(A: Array, B: Array, Q: Array, R: float) -> list[float]:
+    """K = (R + B' X B)^-1 B' X A of the stationary Riccati equation X = A' X (A - B K) + Q.
+
+    Of the transposed system it is the predictor of the stationary Kalman filter.
+    """
     try:
-        gains, _, _ = design(*matrices)
+        X = linalg.solve_discrete_are(A, B, Q, np.array([[R]]))
     except np.linalg.LinAlgError:
         raise InputError(
             "state-feedback: no gains can be designed for these weights, uncertainty and sample period; give "
             "values nearer to the defaults."
         ) from None
-    return np.asarray(gains)
+    gains: list[float] = ((B.T @ X @ A) / (R + B.T @ X @ B))[0].tolist()
+    return gains

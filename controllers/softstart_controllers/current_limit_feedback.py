@@ -6,22 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
-from softstart_controllers.landing import horizon, over_dead_time, pole
-from softstart_controllers.reduced import reduced_torque
+from softstart_controllers.landing import horizon, over_dead_time, pole, shaft_torque_under
+from softstart_controllers.reduced import load_drift, reduced_torque
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
     check,
     mean_torque,
-    number,
     patience,
-    pulling_load,
     sample_period,
 )
 from softstart_controllers.shaft_observer import Observer, observer, predict
@@ -165,7 +161,7 @@ class CurrentLimitFeedback(CompiledController):
 
         T'' = (c/J1)(u - T) - (c/J2)(T - Mc) - (d Omega^2/c) T'
 
-    and are corrected by the encoder with Kalman gains from `control.dlqe` (`shaft_observer`), designed for an
+    and are corrected by the encoder with stationary Kalman gains (`shaft_observer`), designed for an
     unknown part `uncertainty` Omega^2 Ms of T'' and for the rounding of the encoder. The gap counts as closed
     from T > `threshold` on, and as open again from T < 0.3 `threshold`. The threshold is 0.1 M12avg_base, or
     half of what the shaft carries under the low limit where that is less. A coarse encoder makes the observer
@@ -267,72 +263,60 @@ class CurrentLimitFeedback(CompiledController):
         period = sample_period(drive) if self.period is None else self.period
         low = reduced_torque(drive) if self.low_torque is None else self.low_torque
         base = base_torque(drive)
-        threshold = np.minimum(THRESHOLD * base, LOW_SHARE * _shaft_torque_under(drive, low))
-        if self.uncertainty is None:
+        threshold = min(THRESHOLD * base, LOW_SHARE * shaft_torque_under(drive, low))
+        uncertainty = self.uncertainty
+        if uncertainty is None:
             uncertainty = _uncertainty(drive, period, threshold if self.threshold is None else self.threshold)
-        else:
-            uncertainty = self.uncertainty
         eyes = observer(drive, period, uncertainty)
         return {
-            "low_torque": number(low),
-            "approach_speed": number(drive.Omega * base / drive.c),
+            "low_torque": low,
+            "approach_speed": drive.Omega * base / drive.c,
             "full_torque": drive.Ms,
-            "rise": number(drive.elastic_period),
-            "damping_ratio": number(_damping_ratio(drive, eyes, period)),
-            "threshold": number(np.maximum(threshold, CERTAINTY * np.asarray(eyes.torque_deviation))),
-            "uncertainty": number(uncertainty),
+            "rise": drive.elastic_period,
+            "damping_ratio": _damping_ratio(drive, eyes, period),
+            "threshold": max(threshold, CERTAINTY * eyes.torque_deviation),
+            "uncertainty": uncertainty,
             "patience": patience(drive),
             "period": period,
         }
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        eyes = observer(drive, self.period, self.uncertainty)
-        period, ratio, rise = (np.asarray(v, float) for v in (self.period, self.damping_ratio, self.rise))
-        threshold = np.asarray(self.threshold, float)
-        opening = np.where(ratio > 0.0, OPEN_AGAIN * threshold, -math.inf)
-        rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
+        p: Any = self  # fitted: every parameter is a number
+        period, ratio, Omega = p.period, p.damping_ratio, drive.Omega
         return stack(
-            drive, period, drive.J1, self.low_torque, self.full_torque,
-            2.0 * ratio * drive.J1 * drive.Omega / drive.c, threshold, opening,
-            period / np.maximum(rise, period),
-            self.approach_speed, horizon(drive, period), drive.initial_load_speed,
-            rolling * drive.Mc / drive.J2, self.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
-            drive.d * drive.Omega**2 / drive.c, drive.Mc, eyes.angle_gain, eyes.speed_gain, eyes.torque_gain,
-            eyes.rate_gain, drive.torque_lag, drive.computing_delay, *pole(drive, drive.c),
+            period, drive.J1, p.low_torque, p.full_torque, 2.0 * ratio * drive.J1 * Omega / drive.c,
+            p.threshold, OPEN_AGAIN * p.threshold if ratio > 0.0 else -math.inf, period / max(p.rise, period),
+            p.approach_speed, horizon(drive, period), drive.initial_load_speed,
+            load_drift(drive), p.patience, drive.c, drive.c / drive.J1, drive.c / drive.J2,
+            drive.d * Omega**2 / drive.c, drive.Mc, *observer(drive, period, p.uncertainty).gains,
+            drive.torque_lag, drive.computing_delay, *pole(drive, drive.c),
         )  # fmt: skip
 
 
-def _damping_ratio(drive: Drive, eyes: Observer, period: Any) -> Any:
+def _damping_ratio(drive: Drive, eyes: Observer, period: float) -> float:
     """0.7 less that of the shaft, and at most what the delays of torque and observer allow."""
     unforeseen = drive.J1 / (drive.J1 + drive.J2)
     foreseen = eyes.rate_lag + drive.computing_delay
-    slewing = SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
-    delay = drive.torque_lag + slewing + 0.5 * np.asarray(period) + unforeseen * foreseen
+    slewing = SLEWED_SHARE * drive.Ms / drive.torque_rate
+    delay = drive.torque_lag + slewing + 0.5 * period + unforeseen * foreseen
     m = (0.5 * math.pi - PHASE_LEFT) / (drive.Omega * delay)
-    own = 0.5 * drive.d * drive.Omega / drive.c
-    following = np.clip(2.0 - drive.Omega * foreseen, 0.0, 1.0)
-    return following * np.clip(DAMPING_RATIO - own, 0.0, np.maximum(0.5 * (m - 1.0 / m), 0.0))
+    lacking = DAMPING_RATIO - 0.5 * drive.d * drive.Omega / drive.c
+    following = min(max(2.0 - drive.Omega * foreseen, 0.0), 1.0)
+    return following * min(max(lacking, 0.0), max(0.5 * (m - 1.0 / m), 0.0))
 
 
-def _shaft_torque_under(drive: Drive, low: Any) -> Any:
-    """Mean shaft torque in contact under the low limit; a load that pushes is not counted."""
-    return (np.asarray(low) * drive.J2 + drive.J1 * pulling_load(drive)) / (drive.J1 + drive.J2)
-
-
-def _uncertainty(drive: Drive, period: Any, threshold: Any) -> Any:
+def _uncertainty(drive: Drive, period: float, threshold: float) -> float:
     """0.05, or less, so that the encoder's rounding neither feigns contacts nor shakes the motor torque.
 
     With a fast sampler the observer's bandwidth goes with S^(1/8), the deviation of T with S^(5/16) and that
     of T' with S^(7/16), where S is proportional to the square of the uncertainty.
     """
     kd = 2.0 * DAMPING_RATIO * drive.J1 * drive.Omega / drive.c
-    uncertainty = np.full(drive.shape, UNCERTAINTY)
+    uncertainty = UNCERTAINTY
     for _ in range(REFINEMENTS):
         eyes = observer(drive, period, uncertainty)
-        excess = np.maximum(
-            (CERTAINTY * np.asarray(eyes.torque_deviation) / threshold) ** (8 / 5),
-            (kd * eyes.rate_deviation / (RIPPLE * np.asarray(drive.Ms))) ** (8 / 7),
-        )
-        uncertainty = uncertainty / np.maximum(excess, 1.0)
+        feigned = (CERTAINTY * eyes.torque_deviation / threshold) ** (8 / 5)
+        shaken = (kd * eyes.rate_deviation / (RIPPLE * drive.Ms)) ** (8 / 7)
+        uncertainty /= max(feigned, shaken, 1.0)
     return uncertainty

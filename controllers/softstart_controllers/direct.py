@@ -53,4 +53,4 @@ class Direct(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(torque,)."""
-        return stack(drive, self.torque)
+        return stack(self.torque)

@@ -27,15 +27,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from softstart.controller.compiled import Vector, compiled, record
 from softstart.drive import Drive
 from softstart.kernel.jit import compiled
-from softstart.kernel.motor import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
-from softstart_controllers.sampled import mean_torque, number, patience, pulling_load, sample_period
+from softstart_controllers.reduced import load_drift
+from softstart_controllers.sampled import encoder_count, mean_torque, patience, pulling_load, sample_period
 from softstart_controllers.shaping import swing
 
 THRESHOLD = 0.1  # of M12avg_base
@@ -273,44 +271,44 @@ def contact_seen(
     return s, v
 
 
-def shaft_torque_under(drive: Drive, torque: Any) -> Any:
+def shaft_torque_under(drive: Drive, torque: Any) -> float:
     """Mean shaft torque in contact under a motor torque; a load that pushes is not counted.
 
-    >>> round(float(shaft_torque_under(Drive.load("crane-4amtkf"), 62)), 2)
+    >>> round(shaft_torque_under(Drive.load("crane-4amtkf"), 62), 2)
     52.86
     """
-    return (np.asarray(torque) * drive.J2 + drive.J1 * pulling_load(drive)) / (drive.J1 + drive.J2)
+    under: float = (torque * drive.J2 + drive.J1 * pulling_load(drive)) / (drive.J1 + drive.J2)
+    return under
 
 
-def contact_threshold(drive: Drive, low: Any, approach_speed: Any, period: Any) -> Any:
+def contact_threshold(drive: Drive, low: Any, approach_speed: Any, period: Any) -> float:
     """0.1 M12avg_base, at most half of what the shaft carries under the low torque, in N m.
 
     Nor more than half of what the speed control applies to a motor that the shaft holds at rest, which is J1
     approach_speed/(horizon + W): the speed that it knows is as old as the window W = sqrt(6 q J1/threshold).
     """
-    rounding = np.sqrt(6.0 * np.asarray(encoder_count(drive.encoder_lines)) * drive.J1)
-    ahead = horizon(drive, period)
-    speed = np.asarray(approach_speed) * drive.J1
-    root = 2.0 * LOW_SHARE * speed / (rounding + np.sqrt(rounding**2 + 4.0 * LOW_SHARE * ahead * speed))
-    return np.minimum(
-        np.minimum(THRESHOLD * base_torque(drive), LOW_SHARE * shaft_torque_under(drive, low)), root**2
-    )
+    rounding = math.sqrt(6.0 * encoder_count(drive) * drive.J1)
+    speed = approach_speed * drive.J1
+    ahead = math.sqrt(rounding**2 + 4.0 * LOW_SHARE * horizon(drive, period) * speed)
+    root = 2.0 * LOW_SHARE * speed / (rounding + ahead)
+    return min(THRESHOLD * base_torque(drive), LOW_SHARE * shaft_torque_under(drive, low), root**2)
 
 
-def horizon(drive: Drive, period: Any) -> Any:
+def horizon(drive: Drive, period: Any) -> float:
     """Time in s in which the speed control takes the motor to its speed."""
-    return 2.0 * (np.asarray(period) + drive.torque_lag + drive.computing_delay)
+    ahead: float = 2.0 * (period + drive.torque_lag + drive.computing_delay)
+    return ahead
 
 
-def pole(drive: Drive, stiffness: Any, stuck: bool = False) -> tuple[Any, Any]:
+def pole(drive: Drive, stiffness: float, stuck: bool = False) -> tuple[float, float]:
     """Pole of the closed drive as (sigma, omega) in 1/s and rad/s; the load stuck or moving.
 
     The damping ratio d Omega/(2 c) is taken as 0.95 at most: what is damped more does not swing anyway.
     """
     inverse = 1.0 / drive.J1 + (0.0 if stuck else 1.0 / drive.J2)
-    Omega = np.sqrt(stiffness * inverse)
-    ratio = np.minimum(0.5 * drive.d * Omega / stiffness, LARGEST_DAMPING)
-    return -ratio * Omega, Omega * np.sqrt(1.0 - ratio**2)
+    Omega = math.sqrt(stiffness * inverse)
+    ratio = min(0.5 * drive.d * Omega / stiffness, LARGEST_DAMPING)
+    return -ratio * Omega, Omega * math.sqrt(1.0 - ratio**2)
 
 
 # unit, meaning and default of the parameters that every landing has
@@ -332,34 +330,33 @@ def landing_defaults(controller: Any, drive: Drive, impact: float) -> dict[str, 
         value = getattr(controller, name)
         return default if value is None else value
 
-    held = np.maximum(drive.Mc, 0.0)
+    held = pulling_load(drive)
     low = given("low_torque", held + LOW_TORQUE_SHARE * (drive.Ms - held))
     period = given("period", sample_period(drive))
     carried = impact * shaft_torque_under(drive, given("full_torque", drive.Ms))
     speed = given("approach_speed", drive.Omega * carried / drive.c)
     return {
-        "low_torque": number(low),
-        "approach_speed": number(speed),
+        "low_torque": low,
+        "approach_speed": speed,
         "full_torque": drive.Ms,
-        "threshold": number(contact_threshold(drive, low, speed, period)),
+        "threshold": contact_threshold(drive, low, speed, period),
         "patience": patience(drive),
         "period": period,
     }
 
 
-def landing_numbers(controller: Any, drive: Drive, stiffness: Any) -> tuple[Any, ...]:
-    """The numbers of `Parameters`, each a number or an array."""
+def landing_numbers(controller: Any, drive: Drive, stiffness: float) -> tuple[float, ...]:
+    """The numbers of `Parameters`."""
     period, threshold = controller.period, controller.threshold
     half, stride, trigger = window(drive, threshold, 1.0, period)
-    rests = float(drive.load_kind == "reactive") * (np.asarray(drive.Mc) > 0.0)
-    rolling = np.where(rests == 0.0, 1.0, np.sign(drive.initial_load_speed))
+    rests = float(drive.load_kind == "reactive" and drive.Mc > 0.0)
     sigma, omega = pole(drive, stiffness)
     stuck_sigma, stuck_omega = pole(drive, stiffness, stuck=True)
     return (
         period, drive.J1, controller.low_torque, controller.approach_speed,
         horizon(drive, period), drive.initial_load_speed,
-        rolling * drive.Mc / drive.J2, half, stride, trigger, controller.patience, drive.Mc,
-        drive.Mc / drive.J2, rests * (np.asarray(drive.initial_load_speed) == 0.0), rests, stiffness,
+        load_drift(drive), half, stride, trigger, controller.patience, drive.Mc,
+        drive.Mc / drive.J2, rests * (drive.initial_load_speed == 0.0), rests, stiffness,
         -2.0 * sigma * stiffness / (sigma**2 + omega**2), drive.J2 / (drive.J1 + drive.J2),
         sigma, omega, stuck_sigma, stuck_omega,
     )  # fmt: skip

@@ -6,18 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Effort, parameter, stack
 from softstart.controller.compiled import Vector, size
 from softstart.drive import Drive
-from softstart.kernel.motor import encoder_count
 from softstart_controllers.pulse_coast_hold_step import RING, STATE, step
 from softstart_controllers.sampled import (
     PATIENCE_DEFAULT,
     PERIOD_DEFAULT,
     check,
-    number,
+    encoder_count,
     patience,
     sample_period,
 )
@@ -139,7 +136,7 @@ class PulseCoastHold(CompiledController):
         """From motor, stiffness and kind of load; J2 enters period and patience, the gap nothing."""
         share = SHARE_ACTIVE if drive.load_kind == "active" else SHARE_REACTIVE
         return {
-            "coast_speed": number(share * drive.Ms / np.sqrt(drive.c * drive.J1)),
+            "coast_speed": share * drive.Ms / math.sqrt(drive.c * drive.J1),
             "hold_share": HOLD_SHARE,
             "damping_ratio": DAMPING_RATIO,
             "stiffening": STIFFENING,
@@ -152,37 +149,33 @@ class PulseCoastHold(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        a = 1.0 / np.asarray(drive.J1)
-        h = np.asarray(self.period, float)
-        ratio = 1.0 / np.asarray(self.inertia_ratio, float)
-        windup = drive.Ms / drive.c
-        count = np.asarray(encoder_count(drive.encoder_lines))
-        noise = np.asarray(drive.torque_noise)
-        free = a * h * np.hypot(TORQUE_DEVIATION * drive.Ms, noise)
-        slew = drive.Ms / np.asarray(drive.torque_rate)
-        late = np.asarray(drive.torque_lag + drive.computing_delay)
+        h: Any = self.period
+        inertia_ratio: Any = self.inertia_ratio
+        a, ratio, rate = 1.0 / drive.J1, 1.0 / inertia_ratio, drive.torque_rate
+        windup, count, noise = drive.Ms / drive.c, encoder_count(drive), drive.torque_noise
+        free = a * h * math.hypot(TORQUE_DEVIATION * drive.Ms, noise)
+        slew, late = drive.Ms / rate, drive.torque_lag + drive.computing_delay
         slewing = 0.5 * slew > late
-        delay = late + np.where(slewing, 0.0, 0.5 * slew)
-        Omega1 = np.sqrt(drive.c * a)
-        friction = (np.asarray(drive.Mc) > 0.0) & (drive.load_kind == "reactive")
+        delay = late if slewing else late + 0.5 * slew
+        Omega1 = math.sqrt(drive.c * a)
+        friction = drive.Mc > 0.0 and drive.load_kind == "reactive"
         rounding = count**2 / 12.0 + (FLOOR * windup) ** 2
         return stack(
-            drive, h, drive.Ms, drive.Mc, friction, drive.initial_load_speed, drive.c, drive.d, a,
+            h, drive.Ms, drive.Mc, friction, drive.initial_load_speed, drive.c, drive.d, a,
             (J1_DEVIATION * a) ** 2, ratio * a,
             (RATIO_DEVIATION * ratio * a) ** 2, LEAST_RATIO * a, MOST_RATIO * a, self.coast_speed,
             self.hold_share, delay, _samples(drive, self.coast_speed, rounding, self.certainty, delay, h),
-            rounding, self.certainty, free**2, np.hypot(SHAFT_DEVIATION * drive.Ms, noise), self.uncertainty,
-            LOAD_DEVIATION * drive.Ms, self.damping_ratio, self.stiffening,
-            h * np.sqrt(drive.c * a) / (2.0 * math.pi * RISE_PERIODS), self.patience,
-            (count > COARSE * windup) | ((0.5 * slew + late) * Omega1 > SLOW),
-            np.where(slewing, 0.5 / np.asarray(drive.torque_rate), 0.0),
-            np.where(np.isfinite(drive.torque_rate), drive.torque_rate, 0.0),
+            rounding, self.certainty, free**2, math.hypot(SHAFT_DEVIATION * drive.Ms, noise),
+            self.uncertainty, LOAD_DEVIATION * drive.Ms, self.damping_ratio, self.stiffening,
+            h * Omega1 / (2.0 * math.pi * RISE_PERIODS), self.patience,
+            count > COARSE * windup or (0.5 * slew + late) * Omega1 > SLOW, 0.5 / rate if slewing else 0.0,
+            rate if math.isfinite(rate) else 0.0,
         )  # fmt: skip
 
 
-def _samples(drive: Drive, v: Any, rounding: Any, certainty: Any, delay: Any, period: Any) -> Any:
+def _samples(drive: Drive, v: Any, rounding: float, certainty: Any, delay: float, period: float) -> int:
     """How many samples the filter of the free motor stays behind."""
-    far = 2.0 * np.asarray(certainty) * np.sqrt(rounding)
-    coasting = np.cbrt(6.0 * far * drive.J1 / (drive.c * np.asarray(v)))
+    far = 2.0 * certainty * math.sqrt(rounding)
+    coasting = math.cbrt(6.0 * far * drive.J1 / (drive.c * v))
     pulsing = (24.0 * far * drive.J1**2 / (drive.c * drive.Ms)) ** 0.25 + delay
-    return np.clip(np.ceil(np.maximum(coasting, pulsing) / period) + 4.0, 6.0, RING)
+    return min(max(math.ceil(max(coasting, pulsing) / period) + 4, 6), RING)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
-from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
+from softstart_controllers.sampled import PERIOD_DEFAULT, check, pulling_load, sample_period
 
 
 class Parameters:
@@ -89,11 +89,11 @@ class Ramp(CompiledController):
         """From load torque, starting torque and elastic period."""
         return {
             "initial": pulling_load(drive),
-            "time": number(2.0 * drive.elastic_period),
+            "time": 2.0 * drive.elastic_period,
             "full_torque": drive.Ms,
             "period": sample_period(drive),
         }
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        return stack(drive, self.initial, self.full_torque, self.time, self.period)
+        return stack(self.initial, self.full_torque, self.time, self.period)

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
-
-import numpy as np
 
 from softstart import formulas
 from softstart.controller import parameter
 from softstart.drive import Drive
-from softstart_controllers.sampled import number
+from softstart_controllers.sampled import pulling_load
 
 SHARE = 0.15
 INSTANTS = ("peak", "end")  # of stage 2, at which the torque is raised
 RAISE_AT = "peak"
 
 
-def reduced_torque(drive: Drive) -> Any:
+def reduced_torque(drive: Drive) -> float:
     """Load torque plus 15 % of the accelerating torque Ms - Mc: enough to move on, near 0.25 Ms in [G].
 
     >>> round(reduced_torque(Drive.load("crane-4amtkf")), 3)
     15.386
     """
-    held = np.maximum(drive.Mc, 0.0)
-    torque = held + SHARE * (drive.Ms - held)
-    return torque if np.ndim(torque) else float(torque)
+    held = pulling_load(drive)
+    return held + SHARE * (drive.Ms - held)
 
 
 def raise_parameter() -> Any:
@@ -38,7 +36,7 @@ def raise_parameter() -> Any:
     )
 
 
-def delay_of(drive: Drive, torque: Any, raise_at: str) -> Any:
+def delay_of(drive: Drive, torque: Any, raise_at: str) -> float:
     """Time in s from contact until the torque is raised.
 
     >>> [round(delay_of(Drive.load("crane-4amtkf"), 15.5, one), 4) for one in INSTANTS]
@@ -47,20 +45,30 @@ def delay_of(drive: Drive, torque: Any, raise_at: str) -> Any:
     return (0.5 if raise_at == "peak" else 1.0) * stage_2_duration(drive, torque)
 
 
-def closing_speed(drive: Drive, torque: Any) -> Any:
+def closing_speed(drive: Drive, torque: Any) -> float:
     """Speed in rad/s at which the driving flanks first meet, [G](10), from any start position and speeds.
 
     >>> round(closing_speed(Drive.load("crane-4amtkf"), 62), 3)
     30.103
     """
-    rolling = np.where(drive.load_kind == "active", 1.0, np.sign(drive.initial_load_speed))
-    a = np.asarray(torque) / drive.J1 + rolling * drive.Mc / drive.J2
-    way = np.maximum(0.5 * np.asarray(drive.gap) - drive.design_drive.theta0, 0.0)
-    v = np.asarray(drive.initial_motor_speed) - drive.initial_load_speed
-    return number(np.sqrt(np.maximum(v * v + 2.0 * a * way, 0.0)))
+    a = torque / drive.J1 + load_drift(drive)
+    way = max(0.5 * drive.gap - drive.design_drive.theta0, 0.0)
+    v = drive.initial_motor_speed - drive.initial_load_speed
+    return math.sqrt(max(v * v + 2.0 * a * way, 0.0))
 
 
-def stage_2_duration(drive: Drive, torque: Any) -> Any:
+def load_drift(drive: Drive) -> float:
+    """By how much the load slows down while the gap is open for the first time, rad/s^2.
+
+    >>> round(load_drift(Drive.load("crane-4amtkf")), 2)
+    40.91
+    """
+    w2 = drive.initial_load_speed
+    rolling = 1.0 if drive.load_kind == "active" or w2 > 0.0 else -1.0 if w2 < 0.0 else 0.0
+    return rolling * drive.Mc / drive.J2
+
+
+def stage_2_duration(drive: Drive, torque: Any) -> float:
     """Length of stage 2 in s under the reduced torque: [G](15), for a stuck reactive load the exact one.
 
     Where friction keeps the gap of a reactive load closed for good, [G](15) is taken all the same.
@@ -69,10 +77,20 @@ def stage_2_duration(drive: Drive, torque: Any) -> Any:
     0.0328
     """
     dw12 = closing_speed(drive, torque)
-    contact = (torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12)
-    duration = np.asarray(formulas.contact_stage(*contact).duration)
-    if drive.load_kind == "reactive":
-        stuck = formulas.contact_stage(*contact, "reactive").duration
-        resting = np.asarray(drive.initial_load_speed) == 0.0
-        duration = np.where(resting & np.isfinite(stuck), stuck, duration)
-    return number(duration)
+    if drive.load_kind == "reactive" and drive.initial_load_speed == 0.0:
+        contact = (torque, drive.J1, drive.J2, drive.Mc, drive.c, dw12, "reactive")
+        stuck = float(formulas.contact_stage(*contact).duration)
+        if math.isfinite(stuck):
+            return stuck
+    return swing_duration(drive, torque, dw12)
+
+
+def swing_duration(drive: Drive, torque: Any, dw12: float) -> float:
+    """Length of stage 2 in s for flanks that meet at dw12 in rad/s, active load: [G](15)."""
+    return 2.0 * math.atan2(drive.c * dw12 / drive.Omega, -mean_under(drive, torque)) / drive.Omega
+
+
+def mean_under(drive: Drive, torque: Any) -> float:
+    """M12avg in N m, the mean shaft torque under a motor torque, [G](12)."""
+    mean: float = (torque * drive.J2 + drive.J1 * drive.Mc) / (drive.J1 + drive.J2)
+    return mean

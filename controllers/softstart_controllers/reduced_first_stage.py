@@ -66,4 +66,4 @@ class ReducedFirstStage(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(torque, full torque)."""
-        return stack(drive, self.torque, self.full_torque)
+        return stack(self.torque, self.full_torque)

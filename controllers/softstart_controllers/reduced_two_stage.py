@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
 from softstart.drive import Drive
@@ -109,5 +107,5 @@ class ReducedTwoStage(CompiledController):
         """(torque, full torque, longest time from contact on)."""
         longest: Any = self.patience
         if self.raise_at == "peak":
-            longest = np.minimum(delay_of(drive, self.torque, "peak"), np.asarray(self.patience))
-        return stack(drive, self.torque, self.full_torque, longest)
+            longest = min(delay_of(drive, self.torque, "peak"), longest)
+        return stack(self.torque, self.full_torque, longest)

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, record
 from softstart.drive import Drive
 from softstart.errors import InputError
-from softstart_controllers.sampled import PERIOD_DEFAULT, check, number, pulling_load, sample_period
+from softstart_controllers.sampled import PERIOD_DEFAULT, check, pulling_load, sample_period
 
 
 class Parameters:
@@ -104,9 +102,9 @@ class SCurve(CompiledController):
 
     def __post_init__(self) -> None:
         check(self, above_zero=("period",), not_negative=("time", "rounding"))
-        if self.rounding is not None and np.any(np.asarray(self.rounding) > 1.0):
+        if isinstance(self.rounding, float | int) and self.rounding > 1.0:
             raise InputError(
-                f"rounding = {float(np.max(self.rounding)):g}: the parameter of the controller s-curve is a "
+                f"rounding = {self.rounding:g}: the parameter of the controller s-curve is a "
                 "share of the time, 0 to 1."
             )
 
@@ -114,7 +112,7 @@ class SCurve(CompiledController):
         """From load torque, starting torque and elastic period."""
         return {
             "initial": pulling_load(drive),
-            "time": number(2.0 * drive.elastic_period),
+            "time": 2.0 * drive.elastic_period,
             "rounding": 1.0,
             "full_torque": drive.Ms,
             "period": sample_period(drive),
@@ -122,4 +120,4 @@ class SCurve(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        return stack(drive, self.initial, self.full_torque, self.time, self.rounding, self.period)
+        return stack(self.initial, self.full_torque, self.time, self.rounding, self.period)

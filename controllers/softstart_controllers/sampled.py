@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container
 from dataclasses import fields
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -13,6 +12,7 @@ from numba import njit
 from softstart.controller import Controller
 from softstart.drive import Drive
 from softstart.errors import InputError
+from softstart.kernel.motor import COUNTS_PER_LINE
 from softstart.quantities import show
 
 LONGEST_PERIOD = 1e-3  # s
@@ -26,34 +26,34 @@ PATIENCE_DEFAULT = (
 )
 
 
-def number(value: Any) -> Any:
-    """A float for a single drive, the array for a batch.
-
-    >>> number(np.float64(2)), number(np.array([1.0, 2.0]))
-    (2.0, array([1., 2.]))
-    """
-    return value if np.ndim(value) else float(value)
-
-
-def sample_period(drive: Drive) -> Any:
+def sample_period(drive: Drive) -> float:
     """Sample period in s: 1 ms (1 kHz), or 1/32 of the elastic period where that is shorter.
 
     >>> sample_period(Drive.load("crane-4amtkf"))
     0.001
     """
-    return number(np.minimum(LONGEST_PERIOD, drive.elastic_period / SAMPLES_PER_ELASTIC_PERIOD))
+    return min(LONGEST_PERIOD, drive.elastic_period / SAMPLES_PER_ELASTIC_PERIOD)
 
 
-def pulling_load(drive: Drive) -> Any:
+def encoder_count(drive: Drive) -> float:
+    """Angle of one encoder count in rad: 2 pi/(4 lines); 0 for an ideal encoder.
+
+    >>> round(encoder_count(Drive.load("crane-4amtkf")) * 1e6, 2)
+    383.5
+    """
+    return 2.0 * math.pi / (COUNTS_PER_LINE * drive.encoder_lines) if drive.encoder_lines > 0.0 else 0.0
+
+
+def pulling_load(drive: Drive) -> float:
     """Load torque as far as it brakes, max(0, Mc), in N m.
 
     >>> pulling_load(Drive.load("crane-4amtkf"))
     7.16
     """
-    return number(np.maximum(drive.Mc, 0.0))
+    return max(drive.Mc, 0.0)
 
 
-def patience(drive: Drive) -> Any:
+def patience(drive: Drive) -> float:
     """How long in s a controller waits for a contact it cannot see, before it goes on without.
 
     (J1 + J2)(target - w2(0))/(0.15 (Ms - max(0, Mc))) + 50 elastic periods: far beyond any sound start, so
@@ -64,7 +64,7 @@ def patience(drive: Drive) -> Any:
     """
     push = SHARE_OF_PATIENCE * (drive.Ms - pulling_load(drive))
     without_gap = (drive.J1 + drive.J2) * (drive.target_speed - drive.initial_load_speed) / push
-    return number(without_gap + PERIODS_OF_PATIENCE * drive.elastic_period)
+    return without_gap + PERIODS_OF_PATIENCE * drive.elastic_period
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -87,30 +87,30 @@ def mean_torque(before: float, after: float, demand: float) -> float:
     return demand - (b - a) / math.log(b / a)
 
 
-def check(controller: Controller, above_zero: Iterable[str] = (), not_negative: Iterable[str] = ()) -> None:
+def check(controller: Controller, above_zero: Container[str] = (), not_negative: Container[str] = ()) -> None:
     """Refuse impossible parameters, all in one `InputError`; None stands for "derive it from the drive".
 
-    Parameters named in neither list only have to be finite; one with choices has to be one of these.
+    Parameters named in neither list only have to be finite; one with choices has to be one of these. Arrays
+    are checked element by element, when the controller is set up for each.
     """
-    above, from_zero = set(above_zero), set(not_negative)
     wrong = []
     for field in fields(controller):
-        value, choices = getattr(controller, field.name), field.metadata.get("choices", ())
-        if choices and value is not None and value not in choices:
-            wrong.append(f"{field.name} = {show(value)}: write {' or '.join(map(show, choices))}.")
-    for name, value in controller.parameters.items():
-        if value is None or isinstance(value, str):
+        name, value = field.name, getattr(controller, field.name)
+        if value is None or isinstance(value, np.ndarray):
             continue
-        values = np.asarray(value, dtype=np.float64)
-        good, rule = np.isfinite(values), "finite"
-        if name in above:
-            good, rule = good & (values > 0.0), "above 0"
-        elif name in from_zero:
-            good, rule = good & (values >= 0.0), "0 or more"
-        if not good.all():
-            shown = float(values[~good].flat[0]) if values.ndim else float(values)
+        if isinstance(value, str):
+            choices = field.metadata.get("choices", ())
+            if choices and value not in choices:
+                wrong.append(f"{name} = {show(value)}: write {' or '.join(map(show, choices))}.")
+            continue
+        good, rule = math.isfinite(value), "finite"
+        if name in above_zero:
+            good, rule = good and value > 0.0, "above 0"
+        elif name in not_negative:
+            good, rule = good and value >= 0.0, "0 or more"
+        if not good:
             wrong.append(
-                f"{name} = {shown:g}: the parameter of the controller {controller.name} must be {rule}."
+                f"{name} = {value:g}: the parameter of the controller {controller.name} must be {rule}."
             )
     if wrong:
         raise InputError(wrong)

@@ -1,37 +1,34 @@
-"""Shaft torque from motor angle and motor torque alone: an observer whose gains python-control designs."""
+"""Shaft torque from motor angle and motor torque alone: a stationary Kalman filter in closed form.
+
+Under a constant T'' one sample, h long, makes of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), but for the torque,
+A x + G h^4 T''/J1 with
+
+    A = 1  1 -1/2 -1/6       G = -1/24       and phi1 is measured, in units of the encoder's deviation.
+           1   -1 -1/2           -1/6
+                1    1            1/2
+                     1            1
+
+In these scales the filter is the same for every drive with the same variance q of h^4 T''/J1. With
+w = (z - 1)(1/z - 1) its spectral factorisation, 1 + q H(z) H(1/z) with H = C (z - A)^-1 G, has the zeros
+
+    w^4 + q (4 - w)(12 - w)^2/576 = 0
+
+and those inside the unit circle are the poles of the filter.
+"""
 
 from __future__ import annotations
 
+import cmath
 import math
 from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from softstart.drive import Drive
-from softstart.errors import InputError
-from softstart.late import late
-from softstart.kernel.motor import encoder_count
-from softstart_controllers.design_store import kept
-from softstart_controllers.sampled import number
+from softstart_controllers.sampled import encoder_count
 
-if TYPE_CHECKING:
-    import control
-else:
-    control = late("control")
-
-# One sample of x = (phi1, h w1, h^2 T/J1, h^3 T'/J1), without the known torque; h is the sample period.
-# In these scales the matrices are the same for every drive.
-TRANSITION = (
-    (1.0, 1.0, -1 / 2, -1 / 6),
-    (0.0, 1.0, -1.0, -1 / 2),
-    (0.0, 0.0, 1.0, 1.0),
-    (0.0, 0.0, 0.0, 1.0),
-)
-DISTURBANCE = ((-1 / 24,), (-1 / 6,), (1 / 2,), (1.0,))  # a constant T'' over the sample, in h^4 T''/J1
-OUTPUT = ((1.0, 0.0, 0.0, 0.0),)
 SMALLEST_INDEX = -18.0  # decades
 FASTEST = (
     6.0  # bandwidth of the observer in elastic frequencies; faster it would only learn the torque's ripple
@@ -52,47 +49,48 @@ class Design(NamedTuple):
 
 
 class Observer(NamedTuple):
-    """Gains for `observe`, and what the design promises: SI units, floats or arrays of the drive's shape."""
+    """Gains for `observe`, and what the design promises, in SI units."""
 
-    angle_gain: Any  # 1
-    speed_gain: Any  # 1/s
-    torque_gain: Any  # N m/rad
-    rate_gain: Any  # N m/(rad s)
-    torque_deviation: Any  # N m, standard deviation of the error of T
-    rate_deviation: Any  # N m/s, of T'
-    rate_lag: Any  # s, lag of T' behind a T' that changes unforeseen
+    gains: tuple[float, float, float, float]  # of phi1, 1; w1, 1/s; T, N m/rad; T', N m/(rad s)
+    torque_deviation: float  # N m, standard deviation of the error of T
+    rate_deviation: float  # N m/s, of T'
+    rate_lag: float  # s, lag of T' behind a T' that changes unforeseen
 
 
 @cache
 def design(steps: int) -> Design:
-    """The stationary Kalman filter for the index steps*DECADES, by `control.dlqe`.
+    """The stationary Kalman filter for the index steps*DECADES, the decimal logarithm of q.
 
-    The index is the decimal logarithm of (variance of h^4 T''/J1) / (variance of the encoder's rounding).
-    `control.dlqe` gives the gain L = A K of the predictor; `observe` corrects with K after the sample.
+    The gains K correct x after the sample; A K places the poles. Row by row the covariance after the sample
+    follows from K and from P = A (P - s K K') A' + q G G' with s = 1/(1 - K[0]), the variance of what is new
+    in a measurement; so does the error that stays under a T'' of 1 that never ends, the lag of T'.
+
+    >>> [round(number, 4) for number in design(-150)]
+    [0.2605, 0.0392, -0.0035, -0.0002, 0.011, 0.0008, 22.1507]
     """
-    return Design._make(kept(str(steps), Path(__file__), lambda: _designed(steps)))
+    q = 10.0 ** (steps * DECADES)
+    r = q**0.25
+    poles = []
+    for w in r * np.roots([576.0, -(r**3), 28.0 * r**2, -240.0 * r, 576.0]):
+        # z - 1 and 1/z - 1, whose product is w
+        root = cmath.sqrt(w * w - 4.0 * w)
+        larger = -0.5 * (w + root if abs(w + root) > abs(w - root) else w - root)
+        poles.append(larger if abs(1.0 + larger) < 1.0 else w / larger)
+    _, a3, a2, a1, a0 = np.poly(poles).real.tolist()
+    L3, L2 = -a0, a0 - a1
+    K3, K2 = L3, L2 - L3
+    K1 = a2 + 0.5 * L2 + L3 / 6.0 + K2 + 0.5 * K3
+    K0 = a3 - K1 + 0.5 * K2 + K3 / 6.0
+    s = 1.0 / (1.0 - K0)
+    P33 = s * K2 * K3 - q / 2.0
+    P23 = -s * K1 * K3 - q / 6.0 - P33 / 2.0
+    P13 = s * K0 * K3 + q / 24.0 + P23 / 2.0 + P33 / 6.0
+    P22 = -s * K1 * K2 - q / 12.0 + P13 - 1.5 * P23 - 0.5 * P33
+    return Design(K0, K1, K2, K3, math.sqrt(P22), math.sqrt(P33), K2 / K3 - 0.5)
 
 
-def _designed(steps: int) -> list[float]:
-    A, G, C = (np.array(matrix) for matrix in (TRANSITION, DISTURBANCE, OUTPUT))
-    try:
-        L, P, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * DECADES)]]), np.array([[1.0]]))
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "period: no observer can be designed for so long a sample period against the elastic period of "
-            "the drive; give a shorter one."
-        ) from None
-    K = np.linalg.solve(A, np.asarray(L))
-    keep = np.eye(4) - K @ C
-    after = keep @ np.asarray(P)
-    # the error settles to this under a T'' of 1 that never ends: how far behind T' stays
-    behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)
-    numbers = [*K[:, 0], math.sqrt(after[2, 2]), math.sqrt(after[3, 3]), behind[3, 0]]
-    return [float(value) for value in numbers]
-
-
-def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
-    """The observer of a drive, or of a batch.
+def observer(drive: Drive, period: float, uncertainty: float) -> Observer:
+    """The observer of a drive.
 
     The model is J1 w1' = u - T with T'' = model + noise: `uncertainty` Omega^2 Ms is the part of T'' that
     the model misses, changing at random within 1/Omega, so of spectral density
@@ -101,29 +99,21 @@ def observer(drive: Drive, period: Any, uncertainty: Any) -> Observer:
     keeps it at 6 Omega. Nothing about the gap enters.
 
     >>> crane = observer(Drive.load("crane-4amtkf"), 0.001, 0.05)
-    >>> round(crane.angle_gain, 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
+    >>> round(crane.gains[0], 2), round(crane.rate_lag, 4), 0.5 < crane.torque_deviation < 1.5
     (0.66, 0.0059, True)
     """
-    h = np.asarray(period, dtype=np.float64)
-    deviation = np.asarray(encoder_count(drive.encoder_lines)) / math.sqrt(12.0)
-    noise = np.asarray(uncertainty) * drive.Omega**2 * drive.Ms / np.sqrt(drive.Omega * h) * h**4 / drive.J1
+    h, Omega, unit = period, drive.Omega, drive.J1 / period**2
+    deviation = encoder_count(drive) / math.sqrt(12.0)
+    noise = uncertainty * Omega**2 * drive.Ms / math.sqrt(Omega * h) * h**4 / drive.J1
     slowest = 10.0 ** (0.5 * SMALLEST_INDEX)
-    fastest = np.maximum((FASTEST * drive.Omega * h) ** 4, slowest)
-    index = 2.0 * np.log10(noise / np.clip(deviation, noise / fastest, noise / slowest))
-    steps = np.rint(index / DECADES).astype(np.int64)
-    steps = np.broadcast_to(steps, drive.shape)
-    kinds, where = np.unique(steps, return_inverse=True)
-    table = np.array([design(int(kind)) for kind in kinds])
-    values = Design(*(table[where.reshape(steps.shape), i] for i in range(table.shape[1])))
-    unit = drive.J1 / h**2
+    fastest = max((FASTEST * Omega * h) ** 4, slowest)
+    index = 2.0 * math.log10(noise / min(max(deviation, noise / fastest), noise / slowest))
+    of = design(round(index / DECADES))
     return Observer(
-        number(values.angle),
-        number(values.speed / h),
-        number(values.torque * unit),
-        number(values.rate * unit / h),
-        number(values.torque_deviation * unit * deviation),
-        number(values.rate_deviation * unit / h * deviation),
-        number(values.rate_lag * h),
+        (of.angle, of.speed / h, of.torque * unit, of.rate * unit / h),
+        of.torque_deviation * unit * deviation,
+        of.rate_deviation * unit / h * deviation,
+        of.rate_lag * h,
     )
 
 

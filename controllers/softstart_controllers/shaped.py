@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
@@ -287,9 +285,10 @@ class Shaped(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
+        frequency: Any = self.frequency
         inertia = drive.J1 * drive.J2 / (drive.J1 + drive.J2)
-        numbers = landing.landing_numbers(self, drive, inertia * np.asarray(self.frequency) ** 2)
+        numbers = landing.landing_numbers(self, drive, inertia * frequency**2)
         return stack(
-            drive, *numbers, SHAPERS[self.shaper or "zv"], self.full_torque, drive.torque_lag,
+            *numbers, SHAPERS[self.shaper or "zv"], self.full_torque, drive.torque_lag,
             drive.computing_delay,
         )  # fmt: skip

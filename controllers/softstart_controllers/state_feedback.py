@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
 from softstart.drive import Drive
 from softstart.kernel.jit import compiled
-from softstart.kernel.motor import encoder_count
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing
 from softstart_controllers.contact_designs import feedback_gains, observer_gains
@@ -26,7 +23,14 @@ from softstart_controllers.landing import (
     sticks,
     watch,
 )  # fmt: skip
-from softstart_controllers.sampled import PATIENCE_DEFAULT, PERIOD_DEFAULT, check, mean_torque, number
+from softstart_controllers.sampled import (
+    PATIENCE_DEFAULT,
+    PERIOD_DEFAULT,
+    check,
+    encoder_count,
+    mean_torque,
+    pulling_load,
+)
 from softstart_controllers.shaping import swing
 
 IMPACT = 0.7  # c dw12/Omega, of the shaft torque under the full torque
@@ -204,22 +208,21 @@ def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -
     now.demand = demand
 
 
-def hanging(drive: Drive) -> tuple[Any, Any, Any]:
+def hanging(drive: Drive) -> tuple[float, float, float]:
     """Twist in rad beyond the gap at which a load hangs at first, or 0, and its brake.
 
     That is the torque in N m that releases the motor by torque proving, or the instant in s at which it is
     released.
 
-    >>> [round(float(x), 4) for x in hanging(Drive.load("hoist-15kw"))]
+    >>> [round(x, 4) for x in hanging(Drive.load("hoist-15kw"))]
     [0.0375, 120.0, 0.0]
     """
-    where = drive.start_position
-    if not isinstance(where, str) or where != "hanging":
+    if drive.start_position != "hanging":
         return 0.0, 0.0, 0.0
-    T = np.maximum(np.asarray(drive.Mc), 0.0)
-    if drive.brake == "none":
-        return T / drive.c, 0.0, 0.0
-    return (T / drive.c, T, 0.0) if isinstance(drive.release, str) else (T / drive.c, 0.0, drive.release)
+    T = pulling_load(drive)
+    if drive.brake != "none" and isinstance(drive.release, str):
+        return T / drive.c, T, 0.0
+    return T / drive.c, 0.0, drive.release_time
 
 
 @dataclass(frozen=True)
@@ -233,7 +236,7 @@ class StateFeedback(CompiledController):
 
     *Estimate.* From contact on the closed drive is followed under the torque realised and corrected by the
     encoder: phi1, w1, the twist z, its rate, and the load torque, a constant that wanders. The gains are
-    those of the stationary Kalman filter (`control.dlqe`) for an unknown part `uncertainty` Omega^2
+    those of the stationary Kalman filter for an unknown part `uncertainty` Omega^2
     M12avg_base of T'' (white, of that size over 1/Omega) and for the rounding of the encoder. The estimate of
     the load takes up what is wrong in the model, so the shaft torque settles at its reference: integral
     action. While a reactive load is at rest the twist is the motor's own way.
@@ -244,7 +247,7 @@ class StateFeedback(CompiledController):
 
         M = T_ref + 2 zeta T_ref'/Omega - f1 (T - T_ref) - f2 (T' - T_ref')/Omega - f3 (M_y - T_ref)
 
-    u is limited to 0 and full_torque. f1 to f3 minimise (`control.dlqr`) the sum over the samples of
+    u is limited to 0 and full_torque. f1 to f3 minimise the sum over the samples of
 
         torque_weight (T - T_ref)^2 + rate_weight ((T' - T_ref')/Omega)^2 + (M - T_ref)^2
 
@@ -255,7 +258,7 @@ class StateFeedback(CompiledController):
     is no contact to be seen: the feedback acts from the first sample on, from that twist, and waits with the
     reference until the brake has let the motor go. Else the start position is nowhere among its numbers.
 
-    *Limits.* Designs are made for groups without units on a grid (`contact_designs`) and kept on disk, so
+    *Limits.* Designs are made for groups without units on a grid (`contact_designs`), so
     neighbouring weights may give the same start. Where the estimate pulls by half the threshold, the gap
     counts as open again and is closed anew. At `patience` the feedback is dropped for the full torque.
 
@@ -331,7 +334,7 @@ class StateFeedback(CompiledController):
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """From the nominal drive; neither gap nor start position enter."""
         return {
-            "rise": number(RISE * drive.elastic_period),
+            "rise": RISE * drive.elastic_period,
             "torque_weight": TORQUE_WEIGHT,
             "rate_weight": RATE_WEIGHT,
             "uncertainty": UNCERTAINTY,
@@ -340,22 +343,18 @@ class StateFeedback(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        numbers = landing.landing_numbers(self, drive, drive.c)
-        period = np.asarray(self.period)
-        step = drive.Omega * period
-        ratio = np.minimum(0.5 * drive.d * drive.Omega / drive.c, landing.LARGEST_DAMPING)
-        share = drive.J2 / (drive.J1 + drive.J2)
-        lag = drive.torque_lag + SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
-        back = feedback_gains(step, ratio, drive.Omega * lag, self.torque_weight, self.rate_weight)
-        unit = base_torque(drive) / drive.c
-        density = np.asarray(self.uncertainty) ** 2
-        noise = np.asarray(encoder_count(drive.encoder_lines)) ** 2 / 12.0 / unit**2 / density
-        noise = np.clip(noise, share**2 / step / FASTEST**8, share**2 / step / SLOWEST**8)
-        kalman = observer_gains(step, ratio, share, noise)
+        p: Any = self  # fitted: every parameter is a number
+        Omega, share = drive.Omega, drive.J2 / (drive.J1 + drive.J2)
+        step = Omega * p.period
+        ratio = min(0.5 * drive.d * Omega / drive.c, landing.LARGEST_DAMPING)
+        lag = drive.torque_lag + SLEWED_SHARE * drive.Ms / drive.torque_rate
+        noise = encoder_count(drive) ** 2 / 12.0 / (base_torque(drive) / drive.c) ** 2 / p.uncertainty**2
+        noise = min(max(noise, share**2 / step / FASTEST**8), share**2 / step / SLOWEST**8)
+        angle, speed, twist, rate, load = observer_gains(step, ratio, share, noise)
         return stack(
-            drive, *numbers, self.full_torque, np.maximum(np.asarray(self.rise, float), period),
-            drive.torque_lag, drive.computing_delay, 1.0 / drive.J2, *np.moveaxis(back, -1, 0),
-            kalman[..., 0], kalman[..., 1] * drive.Omega, kalman[..., 2], kalman[..., 3] * drive.Omega,
-            kalman[..., 4] * drive.c * (drive.J1 + drive.J2) / drive.J1, -OPENS * np.asarray(self.threshold),
-            *hanging(drive),
+            *landing.landing_numbers(self, drive, drive.c), p.full_torque, max(p.rise, p.period),
+            drive.torque_lag, drive.computing_delay, 1.0 / drive.J2,
+            *feedback_gains(step, ratio, Omega * lag, p.torque_weight, p.rate_weight),
+            angle, speed * Omega, twist, rate * Omega, load * drive.c * (drive.J1 + drive.J2) / drive.J1,
+            -OPENS * p.threshold, *hanging(drive),
         )  # fmt: skip

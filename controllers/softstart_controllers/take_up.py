@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
-
-import numpy as np
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
 from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
@@ -15,7 +14,6 @@ from softstart_controllers.sampled import (
     PERIOD_DEFAULT,
     check,
     mean_torque,
-    number,
     patience,
     pulling_load,
     sample_period,
@@ -307,31 +305,33 @@ class TakeUp(CompiledController):
     def defaults(self, drive: Drive) -> dict[str, Any]:
         """From motor, load torque and the elastic period; neither gap nor start position enter."""
         period = sample_period(drive) if self.period is None else self.period
-        impedance = np.sqrt(drive.c * drive.J1)
+        Omega, elastic_period = drive.Omega, drive.elastic_period
+        impedance = math.sqrt(drive.c * drive.J1)
         speed = SPEED_SHARE * drive.Ms / impedance if self.take_up_speed is None else self.take_up_speed
         eyes = observer(drive, period, UNCERTAINTY if self.uncertainty is None else self.uncertainty)
-        delay = drive.torque_lag + drive.computing_delay + np.asarray(period)
-        delay = delay + SLEWED_SHARE * np.asarray(drive.Ms) / drive.torque_rate
+        delay = (
+            drive.torque_lag + drive.computing_delay + period + SLEWED_SHARE * drive.Ms / drive.torque_rate
+        )
         most = drive.J1 / delay  # a loop gain of one at 1 rad of phase lag
-        gain = np.minimum(SPEED_LOOP_SHARE * impedance, most) if self.speed_gain is None else self.speed_gain
-        share = CERTAINTY * np.asarray(eyes.torque_deviation) * eyes.rate_lag / (drive.J1 * np.asarray(speed))
-        share = np.maximum(CONTACT_SHARE, share) if self.contact_share is None else self.contact_share
-        held = HELD * np.asarray(share) * drive.J1 / np.asarray(gain)
-        left = np.clip((NONE_LEFT - drive.Omega * delay) / (NONE_LEFT - ALL_LEFT), 0.0, 1.0)
-        late = most / (2.0 * drive.J1 * drive.Omega)  # the damping ratio that is a loop gain of one at 1 rad
-        damping = np.minimum(DAMPING_RATIO * (LATE_SHARE + (1.0 - LATE_SHARE) * left), late)
-        damping = damping * np.clip((NO_DAMPING - drive.Omega * delay) / (NO_DAMPING - FADING), 0.0, 1.0)
+        gain = min(SPEED_LOOP_SHARE * impedance, most) if self.speed_gain is None else self.speed_gain
+        share = CERTAINTY * eyes.torque_deviation * eyes.rate_lag / (drive.J1 * speed)
+        share = max(CONTACT_SHARE, share) if self.contact_share is None else self.contact_share
+        held = HELD * share * drive.J1 / gain
+        left = min(max((NONE_LEFT - Omega * delay) / (NONE_LEFT - ALL_LEFT), 0.0), 1.0)
+        late = most / (2.0 * drive.J1 * Omega)  # the damping ratio that is a loop gain of one at 1 rad
+        damping = min(DAMPING_RATIO * (LATE_SHARE + (1.0 - LATE_SHARE) * left), late)
+        damping *= min(max((NO_DAMPING - Omega * delay) / (NO_DAMPING - FADING), 0.0), 1.0)
         return {
-            "take_up_speed": number(speed),
+            "take_up_speed": speed,
             "slowing": SLOWING,
-            "speed_gain": number(gain),
-            "contact_share": number(share),
-            "contact_time": number(np.maximum(CONTACT_TIME * drive.elastic_period, held)),
+            "speed_gain": gain,
+            "contact_share": share,
+            "contact_time": max(CONTACT_TIME * elastic_period, held),
             "full_torque": drive.Ms,
-            "rise": number((LATE_RISE + (RISE - LATE_RISE) * left) * drive.elastic_period),
-            "damping_ratio": number(damping),
-            "rate_damping_ratio": number(RATE_DAMPING_RATIO * left),
-            "corner": number(CORNER * drive.Omega),
+            "rise": (LATE_RISE + (RISE - LATE_RISE) * left) * elastic_period,
+            "damping_ratio": damping,
+            "rate_damping_ratio": RATE_DAMPING_RATIO * left,
+            "corner": CORNER * Omega,
             "uncertainty": UNCERTAINTY,
             "patience": patience(drive),
             "period": period,
@@ -339,21 +339,17 @@ class TakeUp(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """The numbers of `Parameters`."""
-        period = np.asarray(self.period, float)
-        first = observer(drive, period, self.uncertainty)
-        later = observer(drive, period, CALM * np.asarray(self.uncertainty))
-        speed, share = np.asarray(self.take_up_speed, float), np.asarray(self.contact_share, float)
-        added, by_rate = np.asarray(self.damping_ratio, float), np.asarray(self.rate_damping_ratio, float)
+        p: Any = self  # fitted: every parameter is a number
+        period, speed = p.period, p.take_up_speed
+        first = observer(drive, period, p.uncertainty)
+        later = observer(drive, period, CALM * p.uncertainty)
         unit = 2.0 * drive.J1 * drive.Omega
         falling = pulling_load(drive) / drive.J2 if drive.load_kind == "active" else 0.0
         return stack(
-            drive, period, drive.J1, drive.c, drive.Mc, 1.0 / drive.J2, drive.initial_load_speed,
+            period, drive.J1, drive.c, drive.Mc, 1.0 / drive.J2, drive.initial_load_speed,
             speed, SLOWEST * speed,
-            np.asarray(self.slowing) * falling, self.speed_gain,
-            share * drive.J1 * speed,
-            np.exp(-period / np.asarray(self.contact_time)), self.full_torque, drive.Ms,
-            period / np.maximum(np.asarray(self.rise, float), period), unit * added,
-            unit * by_rate / drive.c, self.corner, self.patience,
-            first.angle_gain, first.speed_gain, first.torque_gain, first.rate_gain,
-            later.angle_gain, later.speed_gain, later.torque_gain, later.rate_gain,
+            p.slowing * falling, p.speed_gain, p.contact_share * drive.J1 * speed,
+            math.exp(-period / p.contact_time), p.full_torque, drive.Ms,
+            period / max(p.rise, period), unit * p.damping_ratio,
+            unit * p.rate_damping_ratio / drive.c, p.corner, p.patience, *first.gains, *later.gains,
         )  # fmt: skip

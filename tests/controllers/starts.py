@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
+from tests.twin import PlainTwin, plain
 
 from softstart import Drive, Run, simulate
 from softstart.controller import Command, CompiledController, Measured
-from softstart.controller.base import PlainTwin
 from softstart.kernel.records import S_REF, S_START
 
 CRANE = Drive.load("crane-4amtkf")
@@ -58,8 +58,7 @@ def traced(drive: Drive, controller: CompiledController) -> tuple[Run, np.ndarra
             rows.append((measured.time, *answer.state))
             return answer
 
-    twin = controller.as_plain(drive)
-    assert isinstance(twin, PlainTwin)
+    twin = plain(controller, drive)
     run = simulate(drive, Listening(twin.twin, twin.numbers))
     trace = np.array(rows)
     return run, trace[trace[:, 0] <= run.end_time]

@@ -10,8 +10,8 @@ import pytest
 from tests.controllers.starts import CRANE, raised_at, random_drive
 
 from softstart import Drive, formulas, simulate
-from softstart.start.rows import encoder_count
-from softstart_controllers.acceleration_delay import AccelerationDelay, detection_latency, window
+from softstart.kernel.motor import encoder_count
+from softstart_controllers.acceleration_delay import AccelerationDelay, window
 
 AT_ONCE = AccelerationDelay(delay=0.0, latency=0.0)
 
@@ -132,10 +132,3 @@ def test_window_keeps_the_rounding_error_below_a_third_of_the_drop() -> None:
         assert 2 <= half <= 30
         assert stride >= 1
         assert 2.0 * encoder_count(drive.encoder_lines) <= threshold / 3 * (1 + 1e-9)
-
-
-def test_latency_of_a_batch_equals_that_of_its_drives() -> None:
-    batch = CRANE.replace(gap=[0.1, 0.5, 2.0], encoder_lines=[0, 1024, 4096])
-    together = detection_latency(batch, 15.0, 0.3, 0.001)
-    alone = [detection_latency(one, 15.0, 0.3, 0.001) for one in batch.elements()]
-    assert together.tolist() == alone

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import twin
 from tests.controllers.starts import CRANE, random_drive
 
 from softstart import Drive, InputError, simulate
@@ -73,7 +74,7 @@ def test_twin_in_plain_python_gives_the_same_bits(name: str, drive: Drive) -> No
     controller = make_controller(name)
     assert isinstance(controller, CompiledController)
     compiled = simulate(drive, controller)
-    plain = simulate(drive, controller.as_plain(drive))
+    plain = simulate(drive, twin.plain(controller, drive))
     one, two = compiled.recorded, plain.recorded
     assert one.notes.tobytes() == two.notes.tobytes()
     assert np.array_equal(one.states, two.states)

@@ -17,7 +17,7 @@ from softstart import Drive, simulate
 from softstart.start.metrics import base_torque
 from softstart_controllers import current_limit_feedback as clf
 from softstart_controllers.current_limit_feedback import CurrentLimitFeedback
-from softstart_controllers.shaft_observer import DISTURBANCE, OUTPUT, TRANSITION, design, predict
+from softstart_controllers.shaft_observer import design, predict
 
 CRANES = list(itertools.product((0.5, 2.0), (0.07, 0.175), (0.0, 0.002), ("active", "reactive")))
 
@@ -38,17 +38,11 @@ def test_gap_and_start_position_enter_nowhere() -> None:
 # observer ------------------------------------------------------------------------------------------------
 
 
-def test_the_design_matrices_are_those_of_the_prediction() -> None:
-    """Scaled states (phi1, h w1, h^2 T/J1, h^3 T'/J1) with h = J1 = 1."""
-    for row, unit in zip(np.array(TRANSITION).T, np.eye(4), strict=True):
-        assert predict(*unit, 0.0, 0.0, 1.0, 1.0) == pytest.approx(tuple(row))
-    assert predict(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0) == pytest.approx(tuple(np.ravel(DISTURBANCE)))
-
-
 @pytest.mark.parametrize("steps", [-360, -200, -60, 0, 60])
 def test_gains_are_the_stationary_kalman_filter(steps: int) -> None:
-    """The same gains by iterating the Riccati equation; the observer is stable."""
-    A, G, C = np.array(TRANSITION), np.array(DISTURBANCE), np.array(OUTPUT)
+    """The same by iterating the Riccati equation of `predict` with h = J1 = 1; the observer is stable."""
+    A = np.array([predict(*unit, 0.0, 0.0, 1.0, 1.0) for unit in np.eye(4)]).T
+    G, C = np.array([predict(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0)]).T, np.eye(1, 4)
     gains = design(steps)
     K = np.array(gains[:4])[:, None]
     Q = 10.0 ** (steps * 0.05) * G @ G.T
@@ -60,7 +54,11 @@ def test_gains_are_the_stationary_kalman_filter(steps: int) -> None:
             step_gain = P @ C.T / (C @ P @ C.T + 1.0)
             P = (np.eye(4) - step_gain @ C) @ P
         assert np.allclose(K, step_gain, rtol=1e-6, atol=1e-9)
-        assert gains.torque_deviation == pytest.approx(np.sqrt(P[2, 2]), rel=1e-6)
+        deviations = gains.torque_deviation, gains.rate_deviation
+        assert deviations == pytest.approx(np.sqrt([P[2, 2], P[3, 3]]), rel=1e-6)
+        keep = np.eye(4) - K @ C
+        behind = np.linalg.solve(np.eye(4) - keep @ A, keep @ G)  # under a T'' of 1 that never ends
+        assert gains.rate_lag == pytest.approx(behind[3, 0], rel=1e-9)
     else:
         L, _, _ = control.dlqe(A, G, C, np.array([[10.0 ** (steps * 0.05)]]), np.eye(1))
         assert np.allclose(A @ K, L, rtol=1e-9)

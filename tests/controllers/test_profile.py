@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from tests import twin
 
 from softstart import Drive, InputError, TorqueProfile, compare, simulate
 from softstart.controller import CompiledController, Sensor, make_controller, ready_controller_names
@@ -49,7 +50,7 @@ def test_steps_alone_or_with_lag_and_limiter_twin_and_batch_agree(
     drive = CRANE.replace(torque_lag=0.003, torque_rate=2000.0, maximum_torque=70.0, damping=0.1)
     controller = Profile(profile=profile, period=period)
     run = simulate(drive, controller, until=0.3)
-    plain = simulate(drive, controller.as_plain(drive), until=0.3)
+    plain = simulate(drive, twin.plain(controller, drive), until=0.3)
     many = simulate(drive.replace(maximum_torque=[62.0, 70.0]), controller, until=0.3)
     assert plain.peak_torque == run.peak_torque == float(many.peak_torque[1])
     assert plain.recorded.states.tobytes() == run.recorded.states.tobytes()

@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.pulse_reference import FreeMotor, Shaft, torque_moments, way_lost
 from tests.controllers.starts import CRANE, index, random_drive, traced
+from tests.twin import plain
 
 from softstart import Drive, InputError, simulate
 from softstart.kernel.records import size
@@ -205,8 +206,8 @@ def test_the_pulse_tells_motor_inertia_and_delay() -> None:
     nominal = told("reactive", torque_lag=0.001)
     controller = PulseCoastHold().fitted(nominal)
     numbers = tuple(controller.vector(nominal))
-    twin = controller.as_plain(nominal)
-    assert twin.numbers == numbers  # type: ignore[attr-defined]
+    twin = plain(controller, nominal)
+    assert twin.numbers == numbers
     _, trace = traced_as(drive, nominal)
     coasting = state(trace, "phase") == stepping.COAST
     assert state(trace, "free.inverse")[coasting][-1] * 1.05 * J1 == pytest.approx(1.0, abs=0.006)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from tests.controllers.starts import CRANE
 
-from softstart.start.rows import encoder_count
+from softstart.kernel.motor import encoder_count
 from softstart_controllers.sampled import mean_torque, patience
 
 torques = some.floats(-1000, 1000)

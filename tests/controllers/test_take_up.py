@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import twin
 from tests.controllers.several_gaps import (
     CRANE,
     NOMINAL,
@@ -75,7 +76,7 @@ def test_batch_has_the_bits_of_single_starts():
 def test_plain_twin_on_a_chain_gives_the_same_bits():
     controller = make_controller("take-up")
     compiled = simulate(NOMINAL, controller, fitted_to=NOMINAL)
-    plain = simulate(NOMINAL, controller.as_plain(FIT), fitted_to=NOMINAL)
+    plain = simulate(NOMINAL, twin.plain(controller, FIT), fitted_to=NOMINAL)
     assert plain.k_dyns.tolist() == compiled.k_dyns.tolist()
     assert plain.start_time == compiled.start_time
 

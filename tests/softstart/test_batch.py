@@ -8,10 +8,10 @@ from types import FrameType
 
 import numpy as np
 import pytest
+from softstart.plant.layout import GAP_EVENTS
 
 from softstart import Drive, InputError, SimulationError, compare, simulate
 from softstart.controller import make_controller
-from softstart.plant.layout import GAP_EVENTS
 from softstart.start.batch import array_starts
 
 CRANE = Drive.load("crane-4amtkf")

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from softstart.plant import layout
 from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
 
@@ -14,7 +15,6 @@ from softstart.chain import reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.doubts import doubts
-from softstart.plant import layout
 from softstart.start.batch import array_starts
 from softstart.views import starts
 

@@ -108,7 +108,7 @@ def test_a_single_cell():
     one = GainSchedule(
         "one", make_controller("ramp"), (0.5,), (0.1,), (("time", "linear", np.array([[0.2]])),)
     )
-    assert one.gains_at([0.1, 0.5, 3.0], 0.2)["time"].tolist() == [0.2, 0.2, 0.2]
+    assert [one.gains_at(gap, 0.2)["time"] for gap in (0.1, 0.5, 3.0)] == [0.2, 0.2, 0.2]
 
 
 # where they are played ------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+from tests import twin
 
 from softstart import simulate
 from softstart.study import Verdict, find_study
@@ -197,7 +198,7 @@ def test_switching_at_an_instant_raises_the_torque_then():
 def test_compiled_ways_of_switching_equal_their_plain_twins(controller):
     worn = crane(5, 1.2)
     compiled, plain = (
-        simulate(worn, one, fitted_to=CRANE) for one in (controller, controller.as_plain(CRANE))
+        simulate(worn, one, fitted_to=CRANE) for one in (controller, twin.plain(controller, CRANE))
     )
     assert compiled.k_dyn == plain.k_dyn
     assert compiled.start_time == plain.start_time

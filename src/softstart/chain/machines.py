@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from softstart.arrays import Vector
 from softstart.chain.elements import START, TOP, Shaft
 from softstart.chain.model import Chain, load_machine
-from softstart.controller.base import Controller
+from softstart.controller.base import SetUp
 from softstart.drive import PARAMETERS, Drive
 from softstart.errors import InputError
 from softstart.input.parameters import Parameter
@@ -45,11 +45,6 @@ def one_machine(given: Machine | str | os.PathLike[str]) -> Machine:
     if isinstance(machine, Chain) or (isinstance(machine, Drive) and machine.shape == ()):
         return machine
     raise InputError("drive: give one Drive or Chain, the path of its file, or the name of a shipped one.")
-
-
-def two_masses(machine: Machine) -> Drive:
-    """The drive for which controllers are set up; of a chain its modal reduction to two masses."""
-    return machine.design_drive if isinstance(machine, Chain) else machine.design_drive
 
 
 def here(machine: Machine) -> tuple[float, float]:
@@ -242,17 +237,16 @@ SHARED: Mapping[str, tuple[Callable[[Chain], Any], Callable[[Chain, Any], Any]]]
 
 
 class Starts(Protocol):
-    """Machines that are started again and again, under one controller or a controller for each start.
+    """Machines that are started again and again.
 
-    `fitted` is the drive for which the controller is set up: one, or a batch with an element for each start,
-    as the controller's parameters may have. The figures are those of `simulate`, to the bit.
+    The set-ups of the controller serve all starts, one each, or as many in a row. The figures are those of
+    `simulate`, to the bit.
     """
 
     def figures(
         self,
         which: Which,
-        controller: Controller,
-        fitted: Drive,
+        set_ups: Iterable[SetUp],
         base: Any,
         time_limit: float | None = None,
     ) -> Figures:
@@ -269,13 +263,12 @@ class StartsOfDrives:
     def figures(
         self,
         which: Which,
-        controller: Controller,
-        fitted: Drive,
+        set_ups: Iterable[SetUp],
         base: Any,
         time_limit: float | None = None,
     ) -> Figures:
         drives: Any = with_values(self.drive, {name: values[which] for name, values in self.fields.items()})
-        notes = array_starts(drives, controller, None, fitted, time_limit)
+        notes = array_starts(drives, set_ups, time_limit=time_limit)
         return figures(notes, base, limits=self.drive.limits)
 
 
@@ -285,7 +278,7 @@ def starts_of(machine: Machine, fields: Mapping[str, Vector]) -> Starts:
     >>> crane = Chain.load("crane-4-mass")
     >>> starts = starts_of(crane, {"gap": np.array([0.5, 2.0])})
     >>> from softstart.controller import make_controller
-    >>> found = starts.figures(np.array([1, 0]), make_controller("direct"), two_masses(crane), 1.0)
+    >>> found = starts.figures(np.array([1, 0]), [make_controller("direct").set_up(crane.design_drive)], 1.0)
     >>> found["peak_torque"][0].round(1).tolist()
     [583.2, 332.9]
     """
@@ -296,26 +289,3 @@ def starts_of(machine: Machine, fields: Mapping[str, Vector]) -> Starts:
     rows = zip(*(fields[name].tolist() for name in names), strict=True)
     chains: list[Any] = [with_values(machine, dict(zip(names, row, strict=True))) for row in rows]
     return prepared(chains)
-
-
-def batch_of(drives: Sequence[Drive]) -> Drive:
-    """Drives as one with array fields, where they differ.
-
-    >>> crane = Drive.load("crane-4amtkf")
-    >>> batch_of([crane, crane.replace(gap=1.0)]).gap
-    array([0.5, 1. ])
-    """
-    first = drives[0]
-    apart: dict[str, Any] = {"gap": np.array([float(one.gap) for one in drives])}  # a batch even of equals
-    for name, parameter in PARAMETERS.items():
-        values = [vars(one)[name] for one in drives]
-        numbers = parameter.unit and all(isinstance(value, float) for value in values)
-        if numbers and any(value != values[0] for value in values):
-            apart[name] = np.array(values)
-    return first.replace(**apart)
-
-
-def taken(drives: Drive, which: Which) -> Drive:
-    """The elements of a one-dimensional batch of drives in these places."""
-    arrays = {name: value for name, value in vars(drives).items() if name in PARAMETERS}
-    return drives.replace(**{name: v[which] for name, v in arrays.items() if isinstance(v, np.ndarray)})

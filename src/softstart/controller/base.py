@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum, IntFlag
+from itertools import repeat
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
-from softstart.arrays import Vector
+from softstart.arrays import Matrix, Vector
 from softstart.drive import Drive
-from softstart.kernel.motor import NEW_STATE, SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
+from softstart.kernel.motor import SEES_LOAD_SPEED, SEES_SHAFT_TORQUE, SEES_STAGE
 
 Kind = Literal["quantity", "text", "object"]
 
@@ -254,10 +255,41 @@ class Controller:
         drive = drive.design_drive
         return self.fitted(drive), drive
 
+    def set_ups(self, drives: Drive | Sequence[Drive]) -> Iterator[SetUp]:
+        """`set_up` for each element of a batch of drives, last index fastest; parameters may be such arrays.
+
+        The only place where a controller meets arrays.
+
+        >>> from softstart.controller import make_controller
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> batch = make_controller("ramp", {"initial": [1.0, 2.0]}).set_ups(crane)
+        >>> [(ready.parameters["initial"], own == crane) for ready, own in batch]
+        [(1.0, True), (2.0, True)]
+        """
+        arrays = {
+            f.name: value
+            for f in fields(self)
+            if isinstance(value := getattr(self, f.name), np.ndarray)
+            and f.metadata.get("kind", "quantity") == "quantity"
+        }
+        each = drives.elements() if isinstance(drives, Drive) else iter(drives)
+        if not arrays:
+            yield from map(self.set_up, each)
+            return
+        shape = drives.shape if isinstance(drives, Drive) else (len(drives),)
+        if isinstance(drives, Drive) and shape == ():
+            shape, each = np.broadcast_shapes(*(values.shape for values in arrays.values())), repeat(drives)
+        columns = (np.broadcast_to(values, shape).ravel().tolist() for values in arrays.values())
+        for row, drive in zip(zip(*columns, strict=True), each, strict=False):
+            yield replace(self, **dict(zip(arrays, row, strict=True))).set_up(drive)
+
     @property
     def parameters(self) -> dict[str, Any]:
         """Parameter names and values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+SetUp = tuple[Controller, Drive]  # a controller with every parameter a number, the drive of its numbers
 
 
 @dataclass(frozen=True)
@@ -348,51 +380,26 @@ class CompiledController(Controller, ABC):
 
         Returns
         -------
-        Shape drive.shape + (n,), in SI units.
+        Shape (n,), in SI units.
         """
 
-    def as_plain(self, drive: Drive) -> PlainController:
-        """Its twin in plain Python, step by step the same numbers."""
-        fitted = self.fitted(drive)
-        return PlainTwin(fitted, tuple(np.asarray(fitted.vector(drive), dtype=np.float64).ravel()))
+
+def numbers_of(set_ups: Iterable[SetUp]) -> tuple[CompiledController, Matrix] | list[SetUp]:
+    """A compiled controller with its numbers, a row for each set-up; those in plain Python as they are."""
+    plain, rows, compiled = list[SetUp](), list[Vector](), None
+    for ready, own in set_ups:
+        if isinstance(ready, CompiledController):
+            compiled = ready
+            rows.append(ready.vector(own))
+        else:
+            plain.append((ready, own))
+    return plain if compiled is None else (compiled, np.array(rows, dtype=np.float64))
 
 
-@dataclass(frozen=True)
-class PlainTwin(PlainController):
-    """A compiled controller run in plain Python."""
+def stack(*values: Any) -> Vector:
+    """Numbers as the vector that a compiled controller gives its kernel.
 
-    twin: CompiledController
-    numbers: tuple[float, ...]
-
-    @property
-    def sensors(self) -> Sensor:  # type: ignore[override]
-        """Those of the compiled controller."""
-        return self.twin.sensors
-
-    @property
-    def saturates(self) -> bool:  # type: ignore[override]
-        """As the compiled controller."""
-        return self.twin.saturates
-
-    @property
-    def effort(self) -> Effort | None:  # type: ignore[override]
-        """That of the compiled controller."""
-        return self.twin.effort
-
-    def step(self, measured: Measured, state: tuple[float, ...]) -> Command:
-        """The compiled controller's own lines, not compiled."""
-        size = self.twin.state_size
-        command = np.zeros(NEW_STATE + size)
-        before = np.array(state) if state else np.zeros(size)
-        kernel = type(self.twin).kernel
-        lines = getattr(kernel, "py_func", kernel)
-        lines(np.array(self.numbers), np.array(measured), before, command)
-        torque, ask_again, slope, *after = command.tolist()
-        return Command(torque, ask_again, tuple(after), slope)
-
-
-def stack(drive: Drive, *values: Any) -> Vector:
-    """Numbers and arrays of the drive's shape, stacked to shape drive.shape + (n,)."""
-    if drive.shape == () and all(isinstance(v, float | int) for v in values):
-        return np.array(values, dtype=np.float64)
-    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), drive.shape) for v in values], axis=-1)
+    >>> stack(62.0, True).tolist()
+    [62.0, 1.0]
+    """
+    return np.array(values, dtype=np.float64)

@@ -9,7 +9,8 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.controller.base import Controller, Effort, PlainController, Sensor, label_of
+from softstart.controller.base import Controller, Effort, Sensor, SetUp, label_of
 from softstart.controller.finding import GAIN_FILES, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -110,6 +111,10 @@ class RobustGains(Tuned):
         ready, own = self.controller.set_up(self.nominal)
         return self._called(ready), own
 
+    def set_ups(self, drives: Drive | Sequence[Drive]) -> Iterator[SetUp]:
+        """One for all drives."""
+        yield self.set_up(self.nominal)
+
     @property
     def parameters(self) -> dict[str, Any]:
         """Those of the controller as it is set up."""
@@ -137,26 +142,19 @@ class GainSchedule(Tuned):
     load_inertias: tuple[float, ...]
     gains: tuple[tuple[str, Scale, Vector], ...]
 
-    def gains_at(self, gap: Any, load_inertia: Any) -> dict[str, Any]:
-        """The gains for a gap in rad and a load inertia in kg m2, numbers or arrays."""
-        row, across = _place(self.gaps, gap)
-        column, along = _place(self.load_inertias, load_inertia)
-        below, right = (
-            np.minimum(row + 1, len(self.gaps) - 1),
-            np.minimum(column + 1, len(self.load_inertias) - 1),
-        )
+    def gains_at(self, gap: float, load_inertia: float) -> dict[str, float]:
+        """The gains for a gap in rad and a load inertia in kg m2."""
+        row, below, across = _place(self.gaps, gap)
+        column, right, along = _place(self.load_inertias, load_inertia)
         found = {}
         for name, scale, values in self.gains:
             near = _mixed(values[row, column], values[row, right], along, scale)
             far = _mixed(values[below, column], values[below, right], along, scale)
-            value = _mixed(near, far, across, scale)
-            found[name] = value if np.ndim(value) else float(value)
+            found[name] = float(_mixed(near, far, across, scale))
         return found
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller with the gains for the drive's gap and load inertia, set up for the drive."""
-        if isinstance(self.controller, PlainController) and drive.shape != ():
-            return self, drive  # a plain controller is set up start by start
         gains = self.gains_at(drive.gap, drive.load_inertia)
         ready, own = replace(self.controller, **gains).set_up(drive)
         return self._called(ready), own
@@ -168,23 +166,24 @@ class GainSchedule(Tuned):
         return grid | {name: values.tolist() for name, _, values in self.gains}
 
 
-def _place(nodes: tuple[float, ...], value: Any) -> tuple[Any, Any]:
-    """Index of the node below, and the way to the next one as a share of the step; clamped to the grid."""
-    axis = np.array(nodes)
-    inside = np.clip(np.asarray(value, dtype=np.float64), axis[0], axis[-1])
-    if len(nodes) == 1:
-        return np.zeros(inside.shape, dtype=np.int64), np.zeros(inside.shape)
-    below = np.clip(np.searchsorted(axis, inside, side="right") - 1, 0, len(nodes) - 2)
-    return below, (inside - axis[below]) / (axis[below + 1] - axis[below])
+def _place(nodes: tuple[float, ...], value: float) -> tuple[int, int, float]:
+    """The nodes beside a value, and the way to the second as a share of the step; clamped to the grid."""
+    inside = min(max(value, nodes[0]), nodes[-1])
+    below = min(bisect_right(nodes, inside) - 1, max(len(nodes) - 2, 0))
+    above = min(below + 1, len(nodes) - 1)
+    step = nodes[above] - nodes[below]
+    return below, above, (inside - nodes[below]) / step if step > 0.0 else 0.0
 
 
-def _mixed(first: Any, second: Any, share: Any, scale: Scale) -> Any:
+def _mixed(first: float, second: float, share: float, scale: Scale) -> float:
     """Between two values; at share 0 and 1 the values themselves, to the bit."""
+    if share == 0.0 or first == second:
+        return first
+    if share == 1.0:
+        return second
     if scale == "logarithmic":
-        between = np.exp((1.0 - share) * np.log(first) + share * np.log(second))
-    else:
-        between = (1.0 - share) * first + share * second
-    return np.where((share == 0.0) | (first == second), first, np.where(share == 1.0, second, between))
+        return math.exp((1.0 - share) * math.log(first) + share * math.log(second))
+    return (1.0 - share) * first + share * second
 
 
 def named(controller: Controller, label: str) -> str:

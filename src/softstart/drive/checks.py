@@ -18,7 +18,7 @@ FRICTIONS: Final = ("motor_friction", "motor_viscous_friction", "load_viscous_fr
 Values = Mapping[str, Any]
 
 
-def elastic_frequency(J1: Value, J2: Value, c: Value) -> Value:
+def elastic_frequency(J1: Any, J2: Any, c: Any) -> Any:
     """`Omega = sqrt(c (J1 + J2)/(J1 J2))` in rad/s, [G](8), written so that small inertias do not underflow.
 
     >>> round(elastic_frequency(0.035, 0.175, 368.465), 6)

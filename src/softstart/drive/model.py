@@ -17,17 +17,17 @@ from softstart.errors import InputError
 from softstart.input.documents import document_text, parsed
 from softstart.input.files import Library
 from softstart.input.parameter_set import (
-    MaybeNumbers,
+    MaybeNumber,
     MaybeSeries,
-    Numbers,
-    NumbersOrWord,
+    Number,
+    NumberOrWord,
     ParameterSet,
     parameter,
     read_settings,
 )  # fmt: skip
 from softstart.input.parameters import Parameter, Wording
 from softstart.late import late
-from softstart.quantities import Value, show
+from softstart.quantities import show
 
 if TYPE_CHECKING:
     import control
@@ -103,101 +103,101 @@ class Drive(ParameterSet):
     units: str = parameter(
         "units", "", "units in which page and report show angles and speeds", '"deg, rpm"', default=""
     )
-    motor_inertia: Numbers = parameter(
+    motor_inertia: Number = parameter(
         "motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"', "above 0", symbol="J1"
     )
-    starting_torque: Numbers = parameter(
+    starting_torque: Number = parameter(
         "motor.starting_torque", "N*m", "starting torque of the motor", '"62 N*m"', "above 0", symbol="Ms"
     )
-    maximum_torque: Numbers = parameter(
+    maximum_torque: Number = parameter(
         "motor.maximum_torque", "N*m", "largest torque of the motor", '"64 N*m"', "above 0",
         default=None, follows="starting_torque",
     )  # fmt: skip
-    minimum_torque: Numbers = parameter(
+    minimum_torque: Number = parameter(
         "motor.minimum_torque", "N*m", "smallest (braking) torque of the motor", '"-20 N*m"', "0 or less",
         default=0.0,
     )  # fmt: skip
-    motor_friction: Numbers = parameter(
+    motor_friction: Number = parameter(
         "motor.friction", "N*m", "Coulomb friction of the motor", '"1.2 N*m"', "0 or more", default=0.0,
     )  # fmt: skip
-    motor_viscous_friction: Numbers = parameter(
+    motor_viscous_friction: Number = parameter(
         "motor.viscous_friction", "N*m*s/rad", "viscous friction of the motor", '"0.01 N*m*s/rad"',
         "0 or more", default=0.0, symbol="b1",
     )  # fmt: skip
-    rated_power: MaybeNumbers = parameter(
+    rated_power: MaybeNumber = parameter(
         "motor.rated_power", "W", "rated power of the motor", '"2.2 kW"', "above 0", default=None
     )
-    rated_speed: MaybeNumbers = parameter(
+    rated_speed: MaybeNumber = parameter(
         "motor.rated_speed", "rad/s", "rated speed of the motor", '"880 rpm"', "above 0", default=None
     )
-    rated_torque: MaybeNumbers = parameter(
+    rated_torque: MaybeNumber = parameter(
         "motor.rated_torque", "N*m", "rated torque of the motor", '"23.9 N*m"', "above 0", default=None
     )
-    torque_lag: Numbers = parameter(
+    torque_lag: Number = parameter(
         "motor.torque_lag", "s", "time constant of the torque behind its demand", '"2 ms"', "0 or more",
         default=0.0,
     )  # fmt: skip
-    torque_rate: Numbers = parameter(
+    torque_rate: Number = parameter(
         "motor.torque_rate", "N*m/s", "largest rate of the torque demand", '"500 N*m/s"', "above 0",
         default=math.inf, infinite=True,
     )  # fmt: skip
-    encoder_lines: Numbers = parameter(
+    encoder_lines: Number = parameter(
         "motor.encoder_lines", "1", "number of encoder lines (four counts each; 0 for an ideal encoder)",
         "4096", "a whole number, 0 or more", default=4096.0,
     )  # fmt: skip
-    encoder_phase: Numbers = parameter(
+    encoder_phase: Number = parameter(
         "motor.encoder_phase", "1",
         "where between two edges of the encoder the start lies, as a share of a count",
         "0.5", "from 0 to 1", default=0.0,
     )  # fmt: skip
-    torque_noise: Numbers = parameter(
+    torque_noise: Number = parameter(
         "motor.torque_noise", "N*m",
         "standard deviation of the noise on the measured motor torque, in each sample",
         '"0.2 N*m"', "0 or more", default=0.0,
     )  # fmt: skip
-    noise_seed: Numbers = parameter(
+    noise_seed: Number = parameter(
         "motor.noise_seed", "1", "number of the noise: the same number gives the same noise",
         "1", "a whole number, 0 or more", default=0.0,
     )  # fmt: skip
-    computing_delay: Numbers = parameter(
+    computing_delay: Number = parameter(
         "motor.computing_delay", "s",
         "dead time between what a controller measures and the torque demand that follows from it",
         '"1 ms"', "0 or more", default=0.0,
     )  # fmt: skip
-    gear_ratio: MaybeNumbers = parameter(
+    gear_ratio: MaybeNumber = parameter(
         "gear.ratio", "1", "turns of the motor for one of the output", "31.5", "above 0", default=None
     )
-    stiffness: Numbers = parameter(
+    stiffness: Number = parameter(
         "shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"', "above 0", symbol="c"
     )
-    damping: Numbers = parameter(
+    damping: Number = parameter(
         "shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"', "0 or more",
         default=0.0, symbol="d",
     )  # fmt: skip
-    gap: Numbers = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap")
+    gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap")
     contact_law: ContactLaw = parameter(
         "shaft.contact_law", "", "law of the shaft torque in contact", '"no-pull"',
         default="no-pull", choices=get_args(ContactLaw),
     )  # fmt: skip
-    load_inertia: Numbers = parameter(
+    load_inertia: Number = parameter(
         "load.inertia", "kg*m^2", "inertia of the load at the motor shaft", '"0.175 kg*m^2"', "above 0",
         symbol="J2",
     )  # fmt: skip
-    load_torque: Numbers = parameter(
+    load_torque: Number = parameter(
         "load.torque", "N*m", "torque of the load at the motor shaft", '"7.16 N*m"', symbol="Mc"
     )
     load_kind: LoadKind = parameter(
         "load.kind", "", "kind of the load torque", '"active"', default="active", choices=get_args(LoadKind)
     )
-    load_viscous_friction: Numbers = parameter(
+    load_viscous_friction: Number = parameter(
         "load.viscous_friction", "N*m*s/rad", "viscous friction of the load at the motor shaft",
         '"0.02 N*m*s/rad"', "0 or more", default=0.0, symbol="b2",
     )  # fmt: skip
-    target_speed: Numbers = parameter(
+    target_speed: Number = parameter(
         "start.target_speed", "rad/s", "speed that the load is to reach", '"880 rpm"', "above 0",
         default=None, follows="rated_speed",
     )  # fmt: skip
-    start_position: NumbersOrWord = parameter(
+    start_position: NumberOrWord = parameter(
         "start.position", "rad", "position in the gap at the start, or twist phi1 - phi2", '"-0.25 rad"',
         default="mid-gap", choices=get_args(Position), symbol="theta", formerly="shaft.start_position",
     )  # fmt: skip
@@ -205,39 +205,39 @@ class Drive(ParameterSet):
         "start.brake", "", "brake that holds the motor until its release", '"motor"',
         default="none", choices=get_args(Brake),
     )  # fmt: skip
-    release: NumbersOrWord = parameter(
+    release: NumberOrWord = parameter(
         "start.release", "s", "release of the brake, by torque proving or at a time", '"0.1 s"', "0 or more",
         default="torque", choices=("torque",),
     )  # fmt: skip
-    initial_speed: NumbersOrWord = parameter(
+    initial_speed: NumberOrWord = parameter(
         "start.initial_speed", "rad/s", "speed of motor and load at the start, or minus the target speed",
         '"-20 rad/s"', default=0.0, choices=("reversal",),
     )  # fmt: skip
-    initial_load_speed: Numbers = parameter(
+    initial_load_speed: Number = parameter(
         "start.initial_load_speed", "rad/s", "speed of the load at the start", '"0 rad/s"',
         default=0.0, follows="initial_speed",
     )  # fmt: skip
-    initial_motor_speed: Numbers = parameter(
+    initial_motor_speed: Number = parameter(
         "start.initial_motor_speed", "rad/s", "speed of the motor at the start", '"0 rad/s"',
         default=0.0, follows="initial_speed",
     )  # fmt: skip
 
-    permissible_torque: MaybeNumbers = parameter(
+    permissible_torque: MaybeNumber = parameter(
         "limits.shaft_torque", "N*m", "permissible peak of the shaft torque", '"130 N*m"', "above 0",
         default=None,
     )  # fmt: skip
-    permissible_start_time: MaybeNumbers = parameter(
+    permissible_start_time: MaybeNumber = parameter(
         "limits.start_time", "s", "longest permissible start time", '"1.5 s"', "above 0", default=None
     )
-    starts_per_hour: MaybeNumbers = parameter(
+    starts_per_hour: MaybeNumber = parameter(
         "limits.starts_per_hour", "1", "number of starts in an hour of operation", "60", "above 0",
         default=None,
     )  # fmt: skip
-    required_life: MaybeNumbers = parameter(
+    required_life: MaybeNumber = parameter(
         "limits.life", "s", "time of operation that the shaft line must last", '"20000 h"', "above 0",
         default=None,
     )  # fmt: skip
-    fatigue_slope: MaybeNumbers = parameter(
+    fatigue_slope: MaybeNumber = parameter(
         "limits.fatigue.slope", "1", "slope m of the S-N curve", "6.6", "above 0", default=None
     )
     fatigue_torque: MaybeSeries = parameter(
@@ -382,44 +382,44 @@ class Drive(ParameterSet):
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 
     @property
-    def J1(self) -> Value:
+    def J1(self) -> float:
         """Inertia of the motor, kg m2."""
         return self.motor_inertia
 
     @property
-    def J2(self) -> Value:
+    def J2(self) -> float:
         """Inertia of the load, kg m2."""
         return self.load_inertia
 
     @property
-    def c(self) -> Value:
+    def c(self) -> float:
         """Stiffness of the shaft, N m/rad."""
         return self.stiffness
 
     @property
-    def d(self) -> Value:
+    def d(self) -> float:
         """Damping of the shaft, N m s/rad."""
         return self.damping
 
     @property
-    def Mc(self) -> Value:
+    def Mc(self) -> float:
         """Torque of the load, N m."""
         return self.load_torque
 
     @property
-    def Ms(self) -> Value:
+    def Ms(self) -> float:
         """Starting torque of the motor, N m."""
         return self.starting_torque
 
     @property
-    def rated(self) -> Value | None:
+    def rated(self) -> float | None:
         """Rated torque, or rated power over rated speed, N m; None where neither is given."""
         if self.rated_torque is not None or self.rated_power is None or self.rated_speed is None:
             return self.rated_torque
         return self.rated_power / self.rated_speed
 
     @property
-    def frictions(self) -> tuple[Value, Value, Value]:
+    def frictions(self) -> tuple[float, float, float]:
         """Coulomb and viscous friction of the motor, and viscous friction of the load: N m, N m s/rad twice.
 
         >>> Drive.load("crane-4amtkf").replace(motor_friction="1.5 N*m").frictions
@@ -439,12 +439,13 @@ class Drive(ParameterSet):
                 yield f"{name} = {show(value)} {self.PARAMETERS[name].unit}: {reason}; set it to 0."
 
     @property
-    def Omega(self) -> Value:
+    def Omega(self) -> float:
         """Elastic frequency in contact, undamped: `sqrt(c (J1 + J2)/(J1 J2))`, rad/s, [G](8)."""
-        return elastic_frequency(self.J1, self.J2, self.c)
+        Omega: float = elastic_frequency(self.J1, self.J2, self.c)
+        return Omega
 
     @property
-    def elastic_period(self) -> Value:
+    def elastic_period(self) -> float:
         """`2 pi/Omega`, s."""
         return 2.0 * math.pi / self.Omega
 
@@ -539,7 +540,7 @@ class Drive(ParameterSet):
     # ---- where the start begins --------------------------------------------------------------------------
 
     @property
-    def theta0(self) -> Value:
+    def theta0(self) -> float:
         """Twist phi1 - phi2 at the start, rad: that of `start_position` in this gap.
 
         A load that hangs has wound up the shaft by Mc/c beyond the flank that it rests on. Raises
@@ -588,7 +589,7 @@ class Drive(ParameterSet):
         return self._at("mid-gap") if isinstance(where, str) and where == "unknown" else self
 
     @property
-    def release_time(self) -> Value:
+    def release_time(self) -> float:
         """When the brake of the motor is released, s: infinite for torque proving, 0 without a brake."""
         if self.brake == "none":
             return 0.0

@@ -28,11 +28,11 @@ from softstart.input.parameters import (
     read_values,
     sentences_of,
 )
-from softstart.quantities import Value, nearest, show
+from softstart.quantities import nearest, show
 
 __all__ = [
-    "MaybeNumber", "MaybeNumbers", "MaybeSeries", "Number", "Numbers", "NumbersOrWord", "ParameterSet",
-    "Series", "like", "meant_by", "parameter",
+    "MaybeNumber", "MaybeSeries", "Number", "NumberOrWord", "ParameterSet", "Series", "like",
+    "meant_by", "parameter",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -46,14 +46,11 @@ if TYPE_CHECKING:
 
     Number = Given[float]
     MaybeNumber = Given[float | None]
-    Numbers = Given[Value]
-    MaybeNumbers = Given[Value | None]
-    NumbersOrWord = Given[Value | str]
+    NumberOrWord = Given[float | str]
     Series = Given[tuple[float, ...]]
     MaybeSeries = Given[tuple[float, ...] | None]
 else:
-    Number, MaybeNumber, Numbers, MaybeNumbers = float, float | None, Value, Value | None
-    NumbersOrWord = Value | str
+    Number, MaybeNumber, NumberOrWord = float, float | None, float | str
     Series, MaybeSeries = tuple[float, ...], tuple[float, ...] | None
 
 

@@ -32,7 +32,7 @@ from softstart.kernel.records import (
 )  # fmt: skip
 from softstart.kernel.replay import restore
 from softstart.kernel.series import REACH, orders
-from softstart.kernel.start import expand_all, rate_of
+from softstart.kernel.start import rate_of
 
 Rows = NDArray[np.float64]
 Owners = NDArray[np.int64]

@@ -12,7 +12,7 @@ import numpy as np
 
 from softstart.arrays import Vector
 from softstart.chain.elements import Shaft
-from softstart.chain.machines import Machine, here, moved, two_masses, values_of
+from softstart.chain.machines import Machine, here, moved, values_of
 from softstart.chain.model import Chain, is_chain_text
 from softstart.controller.base import Controller
 from softstart.drive import PARAMETERS, Drive
@@ -335,7 +335,7 @@ def scales_of(controller: Controller, origin: Machine) -> Mapping[str, Scale]:
     Scale(low=0.0, high=1.0, logarithmic=False)
     """
     found = {}
-    default = controller.defaults(two_masses(origin))
+    default = controller.defaults(origin.design_drive)
     names = tunable(controller)
     for one in ranges_of(controller, names) if names else ():
         low, high = (rounded(float(end)) for end in one.ends(default.get(one.name, 1.0)))

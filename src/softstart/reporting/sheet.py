@@ -23,7 +23,7 @@ from softstart.reporting.markup import Html, Part, html, joined, table, tag
 from softstart.reporting.resolution import RATED, Resolution, nearest_step, rated_torque
 from softstart.reporting.strategies import ORDINARY, OUTPUT, kind_of
 from softstart.start import metrics
-from softstart.start.batch import array_starts, figures, joined_notes
+from softstart.start.batch import array_starts, figures
 from softstart.start.comparison import compared
 from softstart.start.recommendation import CASES, Row, checked_limits
 from softstart.start.run import Run
@@ -364,35 +364,16 @@ def _starts(
     sides: Sequence[tuple[int, ...]],
 ) -> tuple[Any, Any]:
     """K_dyn and start times of the drive or chain with the values off by these half steps."""
+    each = [{one.name: one.off(side) for one, side in zip(varied, row, strict=True)} for row in sides]
     if not isinstance(drive, Drive):
-        each = [{one.name: one.off(side) for one, side in zip(varied, row, strict=True)} for row in sides]
         runs = [_start(drive, replace(ready, **values), own) for values in each]
         times = np.array([run.start_time for run in runs])
         return np.where(np.isnan(times), np.nan, [run.k_dyn for run in runs]), times
-    columns = {
-        one.name: np.array([one.off(row[k]) for row in sides])
-        if any(row[k] for row in sides)
-        else one.rounded
-        for k, one in enumerate(varied)
-    }
-    count = len(sides)
-    if isinstance(ready, CompiledController):
-        notes = array_starts(_many(drive, count), replace(ready, **columns), fitted_to=_many(own, count))
-    else:
-        each = [
-            {name: float(np.broadcast_to(v, count)[i]) for name, v in columns.items()} for i in range(count)
-        ]
-        notes = joined_notes(
-            [array_starts(drive, replace(ready, **values), fitted_to=own) for values in each]
-        )
+    set_ups = [(replace(ready, **values), own) for values in each]
+    notes = array_starts(drive.replace(gap=np.full(len(sides), float(drive.gap))), set_ups)
     found = figures(notes, metrics.base_torque(drive))
     time = np.asarray(found["start_time"][0], dtype=np.float64)
     return np.where(np.isnan(time), np.nan, found["k_dyn"][0]), time
-
-
-def _many(drive: Drive, count: int) -> Drive:
-    """The same drive so many times."""
-    return drive.replace(gap=np.full(count, float(drive.gap)))
 
 
 def computes_with(ready: Controller, own: Drive) -> list[str] | None:

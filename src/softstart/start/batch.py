@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from softstart import formulas
 from softstart.arrays import Matrix, Vector
-from softstart.controller.base import CompiledController, Controller, PlainController, Sensor
+from softstart.controller.base import CompiledController, Controller, Sensor, SetUp, numbers_of
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
 from softstart.errors import InputError
 from softstart.kernel import records as at
@@ -118,23 +117,23 @@ def worst_of(notes: Sequence[Notes]) -> Notes:
     return worst
 
 
-SetUp = list[tuple[Controller, Any]]
+Ready = tuple[CompiledController, Matrix] | list[SetUp]
 
 
-def notes_of(rows: Rows, set_up: SetUp, until: float | None, workers: int = 1) -> Notes:
-    """The kernel's notes of starts, each under its controller as it is set up, or all under one."""
+def notes_of(rows: Rows, ready: Ready, until: float | None, workers: int = 1) -> Notes:
+    """The kernel's notes of starts; what `numbers_of` makes of set-ups serves all, one each, or as many in a row."""
     count = rows.machines.shape[0]
-    first = set_up[0][0]
-    if all(isinstance(ready, CompiledController) for ready, _ in set_up):
-        vectors = [np.asarray(ready.vector(own), dtype=np.float64) for ready, own in set_up]  # type: ignore[attr-defined]
-        numbers = np.concatenate([one.reshape(-1, one.shape[-1]) for one in vectors])
-        return notes_under(rows, first, numbers, until, workers)
+    if isinstance(ready, tuple):
+        made, numbers = ready
+        if len(numbers) > 1:
+            numbers = np.repeat(numbers, count // len(numbers), axis=0)
+        return notes_under(rows, made, numbers, until, workers)
     notes = np.zeros((count, at.N_NOTES))
     shafts = np.zeros((count, rows.count - 1), at.SHAFT_NOTES)
     for i in range(count):
-        ready, own = set_up[i if len(set_up) > 1 else 0]
-        recorder = Recorder(rows.taken(slice(i, i + 1)), int(ready.sensors), room=0)
-        run_one(ready, own, recorder, until)
+        controller, own = ready[i * len(ready) // count]
+        recorder = Recorder(rows.taken(slice(i, i + 1)), int(controller.sensors), room=0)
+        run_one(controller, own, recorder, until)
         notes[i] = recorder.work[: at.N_NOTES]
         for name in at.SHAFT_NOTES.names:
             shafts[name][i] = recorder.state[name][: rows.count - 1]
@@ -184,7 +183,7 @@ def _parts(count: int) -> Iterator[slice]:
 
 def array_starts(
     drive: Drive,
-    controller: Controller,
+    controller: Controller | Iterable[SetUp],
     until: float | None = None,
     fitted_to: Drive | None = None,
     time_limit: float | None = None,
@@ -192,24 +191,14 @@ def array_starts(
 ) -> Notes:
     """The kernel's notes of all starts of a Drive with array fields, last index of the drive fastest.
 
-    `figures` turns them into labelled figures. The controller's parameters may be arrays of the drive's
-    shape. Unlike `simulate`, nothing is checked.
+    `figures` turns them into labelled figures. The controller is set up for each start, or once for a single
+    `fitted_to`; set-ups that are given serve all starts, one each, or as many in a row. Unlike `simulate`,
+    nothing is checked.
     """
-    if len(drive.positions) > 1:
-        told = fitted_to or drive.design_drive
-        return worst_of(
-            [array_starts(one, controller, until, told, time_limit, max_events)
-             for one in drive.positions.values()]
-        )  # fmt: skip
-    rows = rows_of(drive, time_limit, max_events)
-    if not isinstance(controller, PlainController):
-        ready, own = controller.set_up(fitted_to or drive)
-        if isinstance(ready, CompiledController):
-            return notes_of(rows, [(ready, own)], until)
-    single = fitted_to is None or fitted_to.shape == ()
-    nominal = repeat(fitted_to) if single else fitted_to.elements()  # type: ignore[union-attr]
-    each = [controller.set_up(other or one) for one, other in zip(drive.elements(), nominal, strict=False)]
-    return notes_of(rows, each, until)
+    whole = fitted_to or drive.design_drive
+    ready = numbers_of(controller.set_ups(whole) if isinstance(controller, Controller) else controller)
+    notes = [notes_of(rows_of(one, time_limit, max_events), ready, until) for one in drive.positions.values()]
+    return worst_of(notes) if len(notes) > 1 else notes[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,8 +216,7 @@ class Batch:
     def figures(
         self,
         which: Which,
-        controller: Controller | Sequence[Controller],
-        fitted: Any,
+        set_ups: Iterable[SetUp],
         base: Any,
         time_limit: float | None = None,
         *,
@@ -237,25 +225,18 @@ class Batch:
     ) -> Figures:
         """Figures by name of the starts of machines `which[i]` in place i, of several positions the worst.
 
-        The controller is set up for one drive, for a Drive with an element for each place in `which`, or for
-        each of several drives by itself; each place may have its own. `base` is M12avg in N m, one or one a
-        start.
+        The set-ups of the controller serve all places in `which`, one each, or as many in a row. `base` is
+        M12avg in N m, one or one a start.
         """
         sizes = np.diff(self.begins)[which]
         if len(set(sizes.tolist())) > 1:
             raise InputError("start_position: give all machines of one call a known position, or none.")
-        made = [controller] if isinstance(controller, Controller) else list(controller)
-        drives = [fitted] if isinstance(fitted, Drive) else list(fitted)
-        if len(drives) == 1 and drives[0].shape != () and isinstance(made[0], PlainController):
-            drives = list(drives[0].elements())
-        count = max(len(made), len(drives))
-        set_up = [made[i % len(made)].set_up(drives[i % len(drives)]) for i in range(count)]
-        every = [
-            notes_of(self.rows.taken(self.begins[which] + k).limited(time_limit), set_up, until, workers)
+        ready = numbers_of(set_ups)
+        notes = [
+            notes_of(self.rows.taken(self.begins[which] + k).limited(time_limit), ready, until, workers)
             for k in range(int(sizes[0]))
         ]
-        notes = every[0] if len(every) == 1 else worst_of(every)
-        return self.read(which, notes, base, until)
+        return self.read(which, worst_of(notes) if len(notes) > 1 else notes[0], base, until)
 
     def read(self, which: Which, notes: Notes, base: Any, until: float | None) -> Figures:
         """The figures in the kernel's notes."""
@@ -387,13 +368,12 @@ def simulate_many(
             {name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, coordinates
         )
     listed = list(machines)
-    nominal = fitted_to.design_drive if fitted_to is not None else [one.design_drive for one in listed]
+    nominal = [one.design_drive for one in ([fitted_to] if fitted_to is not None else listed)]
     means = np.array([(base or one).mean_torque for one in listed], dtype=np.float64)
     batch = prepared(listed, time_limit, max_events)
     found = batch.figures(
         np.arange(len(listed)),
-        controller,
-        nominal,
+        map(controller.set_up, nominal),
         means,
         until=until,
         workers=workers or os.cpu_count() or 1,

@@ -20,7 +20,7 @@ from softstart.late import late
 from softstart.start import metrics
 from softstart.start.recommendation import CASES, Case, Recommendation, Row, checked_limits, recommend
 from softstart.start.run import Run
-from softstart.start.simulation import Machine, simulate
+from softstart.start.simulation import Machine, is_machine, simulate
 
 notebook = late("softstart.views.notebook")
 
@@ -205,7 +205,7 @@ def compare(
     if isinstance(drive, Uncertain):
         drawn = drive.draws()
         drive = drive.drive
-    if not isinstance(drive, Machine):
+    if not is_machine(drive):
         raise InputError(
             f"drive = {drive!r}: give a Drive or a Chain, the path of its file, or the name of a shipped one."
         )

@@ -35,7 +35,7 @@ def base_torque(drive: Drive) -> Any:
     >>> round(base_torque(crane), 2), round(base_torque(crane.replace(motor_friction=6.0)), 2)
     (52.86, 47.86)
     """
-    return formulas.mean_shaft_torque(drive.Ms - drive.motor_friction, drive.J1, drive.J2, drive.Mc)
+    return ((drive.Ms - drive.motor_friction) * drive.J2 + drive.J1 * drive.Mc) / (drive.J1 + drive.J2)
 
 
 def k_dyn(peak_torque: Any, drive: Drive) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
-from typing import TYPE_CHECKING, Any, Protocol, overload, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from softstart.chain.periodic_torque import PeriodicTorque
 
 
-@runtime_checkable
 class Machine(Protocol):
     """What a start asks of a machine: `softstart.drive.Drive` and `softstart.chain.Chain` are both one."""
 
@@ -46,6 +45,11 @@ class Machine(Protocol):
     def shaft_names(self) -> tuple[str, ...]: ...
     def changed(self, gaps: float = ..., load_inertia: float = ...) -> Any:
         """The machine with so many times its gaps, and its load inertia."""
+
+
+def is_machine(given: object) -> bool:
+    """Whether this is a Drive or a Chain; a protocol with properties would compute them to find out."""
+    return hasattr(type(given), "design_drive")
 
 
 @overload
@@ -161,7 +165,7 @@ def simulate(
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
     if isinstance(drive, list | tuple) or getattr(drive, "shape", ()) != ():
-        if not isinstance(drive, Drive) and not (drive and all(isinstance(one, Machine) for one in drive)):
+        if not isinstance(drive, Drive) and not (drive and all(map(is_machine, drive))):
             raise InputError("drive: give one machine, a Drive with array fields, or a list, not empty.")
         if made is None:
             raise InputError("controller is missing: many starts need one.")
@@ -170,7 +174,7 @@ def simulate(
         ):
             raise InputError(f"workers = {workers!r}: give a whole number of 1 or more, or leave it out.")
         return simulate_many(drive, made, until, fitted_to, base, time_limit, max_events, workers)
-    if not isinstance(drive, Machine):
+    if not is_machine(drive):
         raise InputError("drive: give one Drive or Chain, a list of them, the path of a file, or a name.")
     positions = drive.positions
     given = {name: rows_of(one, time_limit, max_events, excitation) for name, one in positions.items()}
@@ -191,7 +195,7 @@ def _check_other(name: str, other: object, drive: object) -> None:
     """A machine given beside the simulated one: a single one, or one for each start of a batch."""
     if other is None:
         return
-    if not isinstance(other, Machine):
+    if not is_machine(other):
         raise InputError(f"{name} = {other!r}: give a Drive or a Chain; Drive.load reads one from a file.")
     shape, own = getattr(other, "shape", ()), getattr(drive, "shape", ())
     if shape not in {(), own}:

@@ -23,7 +23,6 @@ from softstart.start.batch import (
     Notes,
     array_starts,
     figures,
-    joined_notes,
     limits_of_each,
     prepared,
 )
@@ -141,17 +140,7 @@ def _notes(question: Question, drive: Drive, parameters: Mapping[str, Any], cont
     maker = question.maker
     fitted_to = None if question.fitted_to is None else question.fitted_to.design_drive
     made = maker.make(parameters, controller)
-    arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
-    if not arrays or isinstance(made, CompiledController):
-        if arrays and fitted_to is not None:  # its numbers go with arrays of parameters
-            fitted_to = fitted_to.replace(gap=np.full(drive.shape, fitted_to.gap))
-        return array_starts(drive, made, question.until, fitted_to, question.time_limit)
-    rows = []
-    for index, one in enumerate(drive.elements()):
-        own = {name: float(values[index]) for name, values in arrays.items()}
-        made = maker.make({**parameters, **own}, controller)
-        rows.append(array_starts(one, made, question.until, fitted_to, question.time_limit))
-    return joined_notes(rows)
+    return array_starts(drive, made, question.until, fitted_to, question.time_limit)
 
 
 def _of_chains(
@@ -160,15 +149,11 @@ def _of_chains(
     """One start after another where the controller's parameters differ, else one call for all."""
     chains = [_chain_of(question.drive, changes, index) for index in range(count)]
     starts = prepared(chains, question.time_limit)
-    base = np.array([(question.base or question.fitted_to or chain).mean_torque for chain in chains])
+    base = np.array([(question.base or chain).mean_torque for chain in chains])
     nominal = None if question.fitted_to is None else question.fitted_to.design_drive
-    drives = [nominal or chain.design_drive for chain in chains]
-    arrays = {name: values for name, values in parameters.items() if isinstance(values, np.ndarray)}
-    made = [
-        question.maker.make({**parameters, **{n: float(v[i]) for n, v in arrays.items()}}, controller)
-        for i in range(count if arrays else 1)
-    ]
-    return starts.figures(np.arange(count), made, drives, base, until=question.until)
+    made = question.maker.make(parameters, controller)
+    set_ups = made.set_ups(nominal or [chain.design_drive for chain in chains])
+    return starts.figures(np.arange(count), set_ups, base, until=question.until)
 
 
 def _chain_of(machine: Machine, changes: Mapping[str, Any], index: int) -> Chain:

@@ -16,12 +16,10 @@ from softstart import __version__
 from softstart.chain.machines import (
     Knob,
     Machine,
-    batch_of,
     here,
     knob,
     knobs,
     moved,
-    two_masses,
     with_values,
 )
 from softstart.chain.model import Chain
@@ -118,19 +116,16 @@ class Question:
         assert found is not None
         return float(found.value)
 
-    def fitted(self) -> Drive:
-        """The drives for which controllers are set up in the cells, as one batch."""
-        if isinstance(self.drive, Chain):
-            return batch_of([two_masses(self.drive_of(cell)) for cell in range(len(self.cells))])
-        gaps, inertias = (np.array(axis) for axis in zip(*self.cells, strict=True))
-        return self.drive.with_gap(gaps, load_inertia=inertias)
+    def fitted(self) -> list[Drive]:
+        """The drives for which controllers are set up in the cells."""
+        return [self.drive_of(cell).design_drive for cell in range(len(self.cells))]
 
     def declared(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Gaps and load inertias as the drives declare them for which controllers are set up."""
         if not isinstance(self.drive, Chain):
             return self.gaps, self.load_inertias
-        rows = [two_masses(moved(self.drive, gap, self.load_inertias[0])) for gap in self.gaps]
-        columns = [two_masses(moved(self.drive, self.gaps[0], one)) for one in self.load_inertias]
+        rows = [moved(self.drive, gap, self.load_inertias[0]).design_drive for gap in self.gaps]
+        columns = [moved(self.drive, self.gaps[0], one).design_drive for one in self.load_inertias]
         return tuple(float(one.gap) for one in rows), tuple(float(one.load_inertia) for one in columns)
 
     def neighbours(self, cell: int) -> tuple[int, ...]:

@@ -107,7 +107,8 @@ def between_table(trials: Trials, found: ScheduleFound) -> xarray.Dataset | None
         "schedule", trials.controller, *question.declared(),
         tuple((name, *gain) for name, gain in gains.items()),
     )  # fmt: skip
-    gains_there = schedule.gains_at(there.fitted.gap, there.fitted.load_inertia)
+    each = [schedule.gains_at(one.gap, one.load_inertia) for one in there.fitted]
+    gains_there = {name: np.array([gains[name] for gains in each]) for name in found.values}
     judged = there.to_the_end().of_pairs(gains_there, range(len(halves.cells)))
     return _dataset(there, _figures(there, judged, there.yardstick.own, there.yardstick.own_bound))
 

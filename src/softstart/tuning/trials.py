@@ -5,9 +5,8 @@ from __future__ import annotations
 import copy
 import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -15,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.chain.machines import Starts, starts_of, taken, two_masses
+from softstart.chain.machines import Starts, starts_of
 from softstart.chain.model import Chain
-from softstart.controller import Controller, PlainController, make_controller
+from softstart.controller import CompiledController, Controller, make_controller
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.quantities import nearest
@@ -69,14 +68,14 @@ class Trials:
         bases = [(question.base or question.drive_of(i)).mean_torque for i in range(len(gaps))]
         self.base_torque = np.array(bases, dtype=np.float64)
         self.fitted = question.fitted()
-        self.nominal = question.drive if isinstance(question.drive, Drive) else two_masses(question.drive)
-        self.own_defaults = self._defaults(self.fitted, len(gaps))
+        self.nominal = question.drive if isinstance(question.drive, Drive) else question.drive.design_drive
+        self.own_defaults = self._defaults(self.fitted)
         self.nominal_defaults = {
-            name: float(value[0]) for name, value in self._defaults(self.nominal, 1).items()
+            name: float(value[0]) for name, value in self._defaults([self.nominal]).items()
         }
         self.time_limit: float | None = None
         self.stopping: threading.Event | None = None  # set when nobody wants the answer any more
-        self.batched = not isinstance(self.controller, PlainController) and self._takes_arrays()
+        self.compiled = isinstance(self.controller.set_up(self.nominal)[0], CompiledController)
         self.yardstick = self._measured() if yardstick is None else yardstick
         self.time_limit = self.yardstick.time_limit
 
@@ -93,20 +92,18 @@ class Trials:
             found[name] = np.stack(columns, axis=1).ravel()
         return starts_of(question.drive, found)
 
-    def _defaults(self, drive: Drive, count: int) -> dict[str, Vector]:
-        """The tuned parameters as derived from the drives of all cells, or of the nominal one."""
-        plain = isinstance(self.controller, PlainController)
-        rows = [self.controller.set_up(one)[0].parameters for one in drive.elements()] if plain else []
-        fitted = {} if plain else self.controller.set_up(drive)[0].parameters
+    def _defaults(self, drives: Sequence[Drive]) -> dict[str, Vector]:
+        """The tuned parameters as derived from the drives."""
+        rows = [self.controller.set_up(one)[0].parameters for one in drives]
         found = {}
         for name in self.question.names:
-            value = [row[name] for row in rows] if plain else fitted[name]
-            if value is None or (plain and None in rows):
+            values = [row[name] for row in rows]
+            if None in values:
                 raise InputError(
                     f"free: the controller {self.question.recipe.label} derives no default for {name}; "
                     "tuning starts from the default, so give the parameter one."
                 )
-            found[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), (count,)).copy()
+            found[name] = np.array(values, dtype=np.float64)
         return found
 
     def _measured(self) -> Yardstick:
@@ -126,8 +123,8 @@ class Trials:
         """Start time of `direct` in every cell and scenario."""
         shape = (self.gap.size, len(self.question.scenarios))
         every = np.arange(math.prod(shape))
-        fitted = taken(self.fitted, np.repeat(np.arange(shape[0]), shape[1]))
-        figured = self.starts.figures(every, make_controller("direct"), fitted, 1.0)
+        direct = make_controller("direct")
+        figured = self.starts.figures(every, [direct.set_up(one) for one in self.fitted], 1.0)
         found: Vector = figured["start_time"][0].reshape(shape)
         if np.any(np.isnan(found)):
             gap, inertia = self.question.cells[int(np.argwhere(np.isnan(found))[0][0])]
@@ -165,66 +162,38 @@ class Trials:
         return self._judged(values, np.tile(np.arange(self.gap.size), (count, 1)), own=False)
 
     def _judged(self, values: Values, which: Cells, own: bool) -> Judged:
+        """Candidate k in the cells which[k] and all scenarios; NaN where the controller refuses it."""
         if self.stopping is not None and self.stopping.is_set():
             raise CancelledError
-        if self.batched:
-            try:
-                return self._batch(values, which, own)
-            except _RefusedError:  # which one?
-                if len(which) == 1:
-                    return self._refused(which)
-        rows = []
-        for k in range(len(which)):
-            one = {name: np.asarray(value)[k : k + 1] for name, value in values.items()}
-            try:
-                rows.append((self._batch if self.batched else self._single)(one, which[k : k + 1], own))
-            except _RefusedError:
-                rows.append(self._refused(which[k : k + 1]))
-        return Judged(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+        try:
+            figured = self._figured(values, which, own)
+        except InputError:
+            if not values:
+                raise  # the defaults are no candidate: the input is wrong
+            if len(which) == 1:
+                nothing = np.full((*which.shape, len(self.question.scenarios)), np.nan)
+                return Judged(nothing, nothing)
+            each = [
+                self._judged(
+                    {name: value[k : k + 1] for name, value in values.items()}, which[k : k + 1], own
+                )
+                for k in range(len(which))
+            ]
+            return Judged(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+        return self._read(figured, which)
 
-    def _refused(self, which: Cells) -> Judged:
-        nothing = np.full((*which.shape, len(self.question.scenarios)), np.nan)
-        return Judged(nothing, nothing)
-
-    def _batch(self, values: Values, which: Cells, own: bool) -> Judged:
-        """All starts in one call: candidate k in the cells which[k] and all scenarios."""
-        each = which.shape[1] * len(self.question.scenarios)
-        fit_to = self._set_up_for(which, own)
-        with _candidate():
-            ready, used = replace(self.controller, **values).set_up(fit_to)
-            spread = {
-                name: np.repeat(value, each)
-                for name, value in ready.parameters.items()
-                if isinstance(value, np.ndarray) and value.shape == fit_to.shape
-            }
-            wide = taken(used, np.repeat(np.arange(len(which)), each))
-            found = self._figures(which, replace(ready, **spread), wide)
-        return self._read(found, which)
-
-    def _single(self, values: Values, which: Cells, own: bool) -> Judged:
-        """One candidate after the other: for controllers whose parameters cannot be arrays."""
-        judged = []
-        for k, nominal in enumerate(self._set_up_for(which, own).elements()):
-            cells = which[k : k + 1]
-            with _candidate():
-                controller = single(self.controller, {name: value[k] for name, value in values.items()})
-                found = self._figures(cells, controller, nominal)
-            judged.append(self._read(found, cells))
-        return Judged(*(np.concatenate(parts) for parts in zip(*judged, strict=True)))
-
-    def _set_up_for(self, which: Cells, own: bool) -> Drive:
-        """The drives that the candidates are set up for."""
-        if own:
-            return taken(self.fitted, which[:, 0])
-        gap, inertia = (np.full(len(which), one) for one in (self.nominal.gap, self.nominal.load_inertia))
-        return self.nominal.with_gap(gap, load_inertia=inertia)
-
-    def _figures(self, which: Cells, controller: Controller, fitted: Drive) -> Figures:
-        """The figures of candidate k in the cells which[k] and all scenarios."""
+    def _figured(self, values: Values, which: Cells, own: bool) -> Figures:
+        """The figures of all starts, in one call."""
         scenarios = len(self.question.scenarios)
         starts = (which[..., None] * scenarios + np.arange(scenarios)).ravel()
+        set_ups = [
+            single(self.controller, {name: value[k] for name, value in values.items()}).set_up(
+                self.fitted[cell] if own else self.nominal
+            )
+            for k, cell in enumerate(which[:, 0].tolist())
+        ]
         base = np.repeat(self.base_torque[which.ravel()], scenarios)
-        return self.starts.figures(starts, controller, fitted, base, self.time_limit)
+        return self.starts.figures(starts, set_ups, base, self.time_limit)
 
     def _read(self, figured: Figures, which: Cells) -> Judged:
         shape = (*which.shape, len(self.question.scenarios))
@@ -245,31 +214,6 @@ class Trials:
                 f"of shape {numbers.shape}; it has to be one number a start."
             )
         return Judged(numbers.astype(np.float64).reshape(shape), found["start_time"].reshape(shape))
-
-    def _takes_arrays(self) -> bool:
-        """Whether the controller gives the same starts from arrays of parameters as from single ones."""
-        which = np.array([[0], [self.gap.size - 1]])
-        values = {name: value[which[:, 0]] for name, value in self.own_defaults.items()}
-        try:
-            together, alone = self._batch(values, which, True), self._single(values, which, True)
-        except (TypeError, ValueError):
-            return False
-        except _RefusedError as refused:
-            raise InputError(str(refused.__cause__)) from refused
-        return all(np.array_equal(a, b, equal_nan=True) for a, b in zip(together, alone, strict=True))
-
-
-class _RefusedError(Exception):
-    """The controller does not take the values of some candidate."""
-
-
-@contextmanager
-def _candidate() -> Iterator[None]:
-    """What is refused inside is a candidate, not the input."""
-    try:
-        yield
-    except InputError as error:
-        raise _RefusedError from error
 
 
 def single(controller: Controller, values: Values) -> Controller:

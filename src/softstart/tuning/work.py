@@ -173,9 +173,9 @@ class Workers:
 def pool_for(trials: Trials, workers: int | None, scheduler: str | None, starts: int) -> Pool:
     """Where to make about so many starts: threads for compiled controllers, else processes, or a cluster."""
     count = checked_workers(workers, scheduler)
-    if not trials.batched and starts < WORTH_SHARING:
+    if not trials.compiled and starts < WORTH_SHARING:
         count = 1
-    if scheduler is not None or (count > 1 and not trials.batched):
+    if scheduler is not None or (count > 1 and not trials.compiled):
         reason = why_not_sendable(trials.question)
         if reason and (workers is not None or scheduler is not None):
             given = f"workers = {workers}" if scheduler is None else "scheduler"
@@ -184,7 +184,7 @@ def pool_for(trials: Trials, workers: int | None, scheduler: str | None, starts:
                 "define it at the top level of a module, or give workers=1."
             )
         count = 1 if reason else count
-    return Pool(count, threads=trials.batched, scheduler=scheduler, describe=_described)
+    return Pool(count, threads=trials.compiled, scheduler=scheduler, describe=_described)
 
 
 def _described(part: Part) -> str:

@@ -73,7 +73,7 @@ class SwitchAtInstant(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(torque, full torque, instant)."""
-        return stack(drive, self.torque, self.full_torque, self.instant)
+        return stack(self.torque, self.full_torque, self.instant)
 
 
 @dataclass(frozen=True)
@@ -108,4 +108,4 @@ class SwitchAfterContact(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(torque, full torque, delay)."""
-        return stack(drive, self.torque, self.full_torque, self.delay)
+        return stack(self.torque, self.full_torque, self.delay)

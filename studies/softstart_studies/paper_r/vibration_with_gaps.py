@@ -19,10 +19,10 @@ from softstart.arrays import Vector, plain_fields
 from softstart.chain.elements import Mass, Shaft
 from softstart.chain.model import Chain, ChainArrays
 from softstart.chain.periodic_torque import PeriodicTorque
-from softstart.start.simulation import simulate
 from softstart.drive.checks import elastic_frequency
 from softstart.errors import InputError
 from softstart.quantities import Value
+from softstart.start.simulation import simulate
 from softstart.vibration import reduce_chain
 from softstart.views.drawing import COLOURS, drawing, new_figure
 from softstart_studies.paper_r.last_bits import natural_vibration
@@ -46,7 +46,7 @@ def backbone(J1: float, J2: float, c: float, gap: float, amplitude: Value) -> Va
     amplitudes: Vector = np.asarray(amplitude, np.float64)
     if not np.all(amplitudes > 0.0):
         raise InputError("amplitude: the largest twist of the spring must be above 0.")
-    Omega = elastic_frequency(J1, J2, c)
+    Omega: Vector = elastic_frequency(J1, J2, c)
     return Omega / (1.0 + gap / (math.pi * amplitudes))
 
 

@@ -12,9 +12,9 @@ from tests.softstart.kernel.pieces import Pieces
 
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.periodic_torque import PeriodicTorque
+from softstart.drive import Drive
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.drive import Drive
 
 NAMES = {
     "gap closed": "closed",

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.twin import plain
 
 from softstart import Drive, InputError, simulate
-from softstart import simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.controller import make_controller
 
@@ -62,7 +62,7 @@ def test_each_chain_has_its_own_controller_unless_one_is_given():
 
 def test_plain_controllers_have_the_same_bits():
     chains = various(3)
-    made = make_controller("ramp", {"time": 0.1}).as_plain(CRANE)
+    made = plain(make_controller("ramp", {"time": 0.1}), CRANE)
     found = simulate(chains, made, fitted_to=CRANE)
     assert found.k_dyn.values.tolist() == [simulate(c, made, fitted_to=CRANE).k_dyn for c in chains]
 

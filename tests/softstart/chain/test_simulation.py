@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import solve_ivp
+from tests import twin
 from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
 from softstart.balancing import Engine
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.periodic_torque import PeriodicTorque
+from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.start import metrics
 
 CRANE = Drive.load("crane-4amtkf")
 # what can differ between a drive and another, each with the two-mass plant's own closed forms
@@ -93,7 +94,7 @@ def test_plain_and_compiled_controllers_agree_to_the_bit():
 
     made = make_controller("ramp", None)
     compiled = simulate(chain, made, 0.15, fitted_to=CRANE)
-    plain = simulate(chain, made.as_plain(CRANE), 0.15, fitted_to=CRANE)
+    plain = simulate(chain, twin.plain(made, CRANE), 0.15, fitted_to=CRANE)
     for name in ("spans", "span_masses", "span_shafts", "events"):
         assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
 

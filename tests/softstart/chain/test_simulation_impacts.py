@@ -12,8 +12,8 @@ from tests.softstart.kernel.pieces import Pieces
 
 from softstart import Drive
 from softstart.chain import Chain, Mass, Motor, Shaft
-from softstart.start.simulation import simulate
 from softstart.errors import InputError
+from softstart.start.simulation import simulate
 
 CRANE = Drive.load("crane-4amtkf")  # what the pieces are set up for: they take nothing from it
 

@@ -12,9 +12,8 @@ import pytest
 from tests.controllers.several_gaps import random_chains
 
 from softstart import Drive, InputError, SimulationError, simulate
-from softstart import simulate
 from softstart.chain import Chain, Mass, reduce_chain, two_mass_error, verify_on_chain
-from softstart.chain.two_masses import drive_of, error_under, torques_to_try
+from softstart.chain.two_masses import error_under, torques_to_try
 
 CHAIN = Chain.load("crane-4-mass")
 DRIVE = reduce_chain(CHAIN).to_drive()

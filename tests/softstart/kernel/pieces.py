@@ -51,4 +51,4 @@ class TwoSteps(CompiledController):
 
     def vector(self, drive: Drive) -> Vector:
         """(first, switch, second)."""
-        return stack(drive, self.first, self.switch, self.second)
+        return stack(self.first, self.switch, self.second)

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.kernel.pieces import Pieces, TwoSteps
 from tests.softstart.kernel.test_against_oracle import case, in_other_units, run_of
+from tests.twin import plain
 
 from softstart import Drive, TorqueProfile, controller, simulate
 from softstart.kernel.records import BEYOND, OPEN
-
 
 SEEDS = st.integers(1_000, 100_000)
 
@@ -137,7 +137,7 @@ def test_a_plain_controller_equals_its_compiled_twin(strategy: Any) -> None:
     compiled = controller.make_controller(strategy)
     assert isinstance(compiled, controller.CompiledController)
     fast = simulate(drive.replace(gap=gaps), compiled, fitted_to=drive)
-    slow = simulate(drive.replace(gap=gaps), compiled.as_plain(drive))
+    slow = simulate(drive.replace(gap=gaps), plain(compiled, drive))
     np.testing.assert_array_equal(fast.k_dyn, slow.k_dyn)
     np.testing.assert_array_equal(fast.start_time, slow.start_time)
     np.testing.assert_array_equal(fast.gap_events, slow.gap_events)

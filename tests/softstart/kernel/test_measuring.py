@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
+from tests import twin
 
 from softstart import (
     Command,
@@ -21,8 +22,7 @@ from softstart import (
     simulate,
 )
 from softstart.controller import make_controller
-from softstart.plant.exchange import gauss
-from softstart.plant.vector import encoder_count
+from softstart.kernel.motor import encoder_count, gauss
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 LAGGING = CRANE.replace(torque_lag=0.002, torque_rate=20_000.0)
@@ -141,8 +141,8 @@ class Late(PlainController):
 @pytest.mark.parametrize("name", ["current-limit-feedback", "acceleration-delay"])
 def test_a_dead_time_of_whole_samples_is_a_queue_of_answers(samples, name):
     drive = LAGGING
-    twin = make_controller(name, {"period": 0.001}).as_plain(drive)
-    own = simulate(drive, Late(twin, samples), 0.15)
+    late = Late(twin.plain(make_controller(name, {"period": 0.001}), drive), samples)
+    own = simulate(drive, late, 0.15)
     delayed = simulate(drive.replace(computing_delay=samples * 0.001), name, 0.15, fitted_to=drive)
     # instants k h + d and (k + 1) h differ by rounding, so times and torques agree to that alone
     assert delayed.k_dyn == pytest.approx(own.k_dyn, rel=1e-9)
@@ -155,7 +155,7 @@ def test_single_batch_and_plain_starts_agree_under_a_dead_time():
     made = make_controller("current-limit-feedback")
     batch = simulate(drive, made).k_dyn.values.tolist()
     single = [simulate(one, made) for one in drive.elements()]
-    plain = [simulate(one, made.as_plain(one)) for one in drive.elements()]
+    plain = [simulate(one, twin.plain(made, one)) for one in drive.elements()]
     assert batch == [run.k_dyn for run in single] == [run.k_dyn for run in plain]
     assert len(set(batch)) == 3
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from tests.twin import plain
 
 from softstart import Drive, TorqueProfile, compare, simulate
 from softstart.cli import main
@@ -50,7 +51,7 @@ def test_batch_recorded_start_and_plain_twin_give_the_same_bits() -> None:
         controller = played(ABOVE)
         assert isinstance(controller, CompiledController)
         run = simulate(drive, controller, END)
-        twin = simulate(drive, controller.as_plain(drive), END)
+        twin = simulate(drive, plain(controller, drive), END)
         batch = simulate([drive], controller, END)
         assert run.clipped == twin.clipped
         assert run.clipped == (batch.torque_excess.item(), batch.torque_excess_time.item())

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.softstart.optimal.test_momentum import random_drive, random_torque, slack
 from tests.softstart.kernel.test_brake import HOIST
+from tests.softstart.optimal.test_momentum import random_drive, random_torque, slack
 
 from softstart import Drive, InputError, TorqueProfile, optimize, pareto, simulate
 from softstart.controller import ready_controller_names

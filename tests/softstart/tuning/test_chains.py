@@ -8,7 +8,7 @@ from tests.softstart.tuning.test_trials import trials
 
 from softstart import InputError, simulate, tune
 from softstart.chain import Chain
-from softstart.chain.machines import knob, moved, two_masses, with_values
+from softstart.chain.machines import knob, moved, with_values
 from softstart.controller import make_controller
 from softstart.tuning.question import gaps_of, inertias_of, scenarios_of
 
@@ -100,7 +100,7 @@ def test_gaps_and_inertias_of_a_chain():
         gaps_of(CHAIN.changed(gaps=0.0), ["0.5"])
     with pytest.raises(InputError, match=r"did you mean shaft\[2\].gap"):
         scenarios_of(CHAIN, {"shaft[2].gaps": "10 %"})
-    two = two_masses(moved(CHAIN, 1.0, 69.2))
+    two = moved(CHAIN, 1.0, 69.2).design_drive
     assert two.gap == 1.0
 
 

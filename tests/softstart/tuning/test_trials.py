@@ -28,7 +28,7 @@ def trials(name, drive=CRANE, tolerances=None, **change):
 @pytest.mark.parametrize("name", ["acceleration-delay", "current-limit-feedback", "s-curve"])
 def test_each_candidate_is_the_start_that_simulate_makes(name):
     tried = trials(name, tolerances={"load_torque": "20 %"})
-    assert tried.batched
+    assert tried.compiled
     places = np.random.default_rng(3).random((3, len(tried.question.ranges)))
     cells = np.array([0, 3, 1])
     values = {
