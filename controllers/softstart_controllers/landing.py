@@ -29,7 +29,6 @@ from typing import Any
 
 from softstart.controller.compiled import Vector, compiled, record
 from softstart.drive import Drive
-from softstart.kernel.jit import compiled
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
 from softstart_controllers.reduced import load_drift

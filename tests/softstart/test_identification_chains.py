@@ -11,7 +11,6 @@ from softstart import Chain, Drive, InputError, Log, identify, natural_vibration
 from softstart.identification.chains import chain_log, reduced_drive, reduction_note
 from softstart.identification.model import LogModel
 from softstart.identification.planning import made_up_log
-from softstart.start.simulation import simulate
 from softstart_studies.paper_r.lever import lever
 
 REVERSE = "two levels, then reverse"

@@ -12,7 +12,6 @@ from matplotlib.contour import QuadContourSet
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, natural_vibration, reduce_chain
-from softstart.start.simulation import simulate
 from softstart.study import Verdict, study_names
 from softstart.vibration import elastic_frequencies
 from softstart_studies.paper_r import PaperR, findings, four_to_two, free, locked, tables

@@ -461,7 +461,7 @@ class Drive(ParameterSet):
     # ---- what starts ask of any machine ------------------------------------------------------------------
 
     @property
-    def mean_torque(self) -> Value:
+    def mean_torque(self) -> float:
         """M12avg_base = (Ms J2 + J1 Mc)/(J1 + J2), N m, [G](16): the mean shaft torque under full torque.
 
         What the Coulomb friction of the motor takes does not reach the shaft: Ms - friction stands for Ms.

@@ -1,8 +1,8 @@
 """The event that ends a span: gaps that close and open, damping regimes, friction, the target speed.
 
 Events are first roots of Taylor polynomials on [0, 1], certified: at x, with f > 0 and |f'''| <= M3 up to the
-end, `f(x + d) >= f + f' d + f'' d^2/2 - M3 d^3/6`, so a step up to which this is above zero provably passes no
-zero of f. The steps shrink onto a simple zero, always from the left. The largest torque of each shaft is
+end, `f(x + d) >= f + f' d + f'' d^2/2 - M3 d^3/6`, so a step up to which this is above zero provably passes
+no zero of f. The steps shrink onto a simple zero, always from the left. The largest torque of each shaft is
 located in the same way, never read off a grid.
 """
 

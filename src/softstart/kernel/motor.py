@@ -1,4 +1,4 @@
-"""What passes between machine and controller, and the torque of the motor: encoder, noise, queue, limits, lag."""
+"""Between machine and controller: encoder, noise, queue and limits of the answers, the realised torque."""
 
 from __future__ import annotations
 

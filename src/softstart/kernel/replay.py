@@ -68,7 +68,7 @@ def states_at(
     work: Vector, tones: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
 ) -> None:  # fmt: skip
-    """The states at times[j] within span index[j]: angle of the load, torque of the motor, speeds, twists, torques."""
+    """The states at times[j] within span index[j]: load angle, motor torque, speeds, twists, torques."""
     s = work.view(WORK)[0]
     last = -1
     n = 0
@@ -164,7 +164,8 @@ def spring_energy(s: Record) -> float:
 def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
     """Work over all recorded spans but the last, by exact quadrature of their series, and what is stored.
 
-    The last span has no length: it is the state at the end. Into motor, exciting torques, loads, friction and damping to the ground, shafts, gears, and change of the
+    The last span has no length: it is the state at the end. Into motor, exciting
+    torques, loads, friction and damping to the ground, shafts, gears, and change of the
     elastic energy. Flanks may part while the spring is still loaded, and meet again: that energy goes, or
     comes, and is counted with the shafts.
     """
@@ -244,7 +245,7 @@ def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int
 
 @compiled_as(types.float64(_A, _M, _M, types.float64, types.float64))
 def load_settles(work: Vector, tones: Matrix, spans: Matrix, begin: float, floor: float) -> float:
-    """From when on, not before `begin`, the speed of the load is not below `floor`; NaN if it is at the end."""
+    """From when on, not before `begin`, the load speed is not below `floor`; NaN if it is at the end."""
     s = work.view(WORK)[0]
     settled, above = begin, True
     for row in range(spans.shape[0]):

@@ -16,7 +16,8 @@ from softstart.kernel.motor import (
     note_excess, sample, take_answer,
 )  # fmt: skip
 from softstart.kernel.records import (
-    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT, EVENT_LIMIT, LOWER, MASS, MEASURED, MOST_NOTED, NO_EVENT, NOT_FINITE,
+    ANSWER, ASK, BUFFER_FULL, CURVE, ENDED, EVENT, EVENT_LIMIT, LOWER, MASS, MEASURED, MOST_NOTED, NO_EVENT,
+    NOT_FINITE,
     NOT_LOCATED, N_NOTES, OF_MASS, OF_SHAFT, OPEN, BEYOND, PRESSED, SETTLE, SHAFT,
     SHAFT_NOTES, S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
     UNSOLVED, UPPER, WELDED, WORK, Record,
@@ -211,7 +212,7 @@ def rate_of(s: Record) -> float:
 
 @compiled
 def stands(s: Record, spans: Matrix, events: Matrix) -> int:
-    """Why the start does not go on from here: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
+    """Why the start does not go on: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
     if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + MOST_NOTED >= events.shape[0]):
         return BUFFER_FULL
     stop = s.t_end
@@ -320,11 +321,11 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
 def torque_now(s: Record, k: int, tones: Matrix) -> float:
     """The torque of shaft k in the present state; of rigid joints as a span of no length has it."""
     mode = s.mode[k]
-    if mode == OPEN or mode == BEYOND:
+    if mode in (OPEN, BEYOND):
         return 0.0
     if s.changed != 0.0:
         apply_modes(s)
-    if mode == PRESSED or mode == WELDED:
+    if mode in (PRESSED, WELDED):
         begin_torque(s)
         expand_all(s, tones, 0.0, 2)
         return float(s.torque[k, 0])
@@ -363,8 +364,8 @@ BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
 
 @compiled_as(BEGIN)
 def begin(
-    work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix, until: float,
-    on_gap: bool,
+    work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix,
+    until: float, on_gap: bool,
 ) -> None:  # fmt: skip
     """A start of this machine, at t = 0."""
     load_machine(work, machine, masses, shafts, curves, tones)

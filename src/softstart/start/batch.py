@@ -121,7 +121,7 @@ Ready = tuple[CompiledController, Matrix] | list[SetUp]
 
 
 def notes_of(rows: Rows, ready: Ready, until: float | None, workers: int = 1) -> Notes:
-    """The kernel's notes of starts; what `numbers_of` makes of set-ups serves all, one each, or as many in a row."""
+    """The kernel's notes of starts; set-ups, by `numbers_of`, serve all, one each, or as many in a row."""
     count = rows.machines.shape[0]
     if isinstance(ready, tuple):
         made, numbers = ready
@@ -143,7 +143,7 @@ def notes_of(rows: Rows, ready: Ready, until: float | None, workers: int = 1) ->
 def notes_under(
     rows: Rows, controller: Any, numbers: Matrix, until: float | None = None, workers: int = 1
 ) -> Notes:
-    """The kernel's notes of starts under a compiled controller with these numbers: a row each, or one for all."""
+    """The kernel's notes of starts under a compiled controller: numbers a row each, or one for all."""
     count = rows.machines.shape[0]
     notes = np.zeros((count, at.N_NOTES))
     of_shafts = np.zeros((count, rows.count - 1, at.size(at.SHAFT_NOTES)))

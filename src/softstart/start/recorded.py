@@ -38,8 +38,8 @@ class Recorder:
         """The state at t = 0; without an end `until` is infinite."""
         given = self.rows
         start.begin(
-            self.work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones, until,
-            on_gap,
+            self.work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones,
+            until, on_gap,
         )  # fmt: skip
 
     def advance(self) -> int:
@@ -131,7 +131,7 @@ class Recorded:
         return self.states[:-1]
 
     def of_shafts(self, what: int) -> Matrix:
-        """A column of all shafts at the beginning of each span and at the end: 0 twist, 1 mode, 2 side, 3 sign."""
+        """Of all shafts, as each span begins and at the end: 0 twist, 1 mode, 2 side, 3 sign."""
         return self.states[:, at.S_MASSES + at.OF_MASS * self.rows.count + what :: at.OF_SHAFT]
 
     def of_masses(self, what: int) -> Matrix:
@@ -170,7 +170,7 @@ class Recorded:
         self, knots: ArrayLike, times: ArrayLike = (), marks: ArrayLike = (), owners: ArrayLike | None = None,
         parts: slice = slice(None, -1),
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
-        """Of the torques of shafts at rising instants, and of the state at rising `marks`, to a demand's torques.
+        """Of shaft torques at rising instants, and of the state at rising `marks`, to a demand's torques.
 
         The demand is linear between its knots; a last axis is of them, or of those who own them, which rise.
         The `parts` of the state are twists, speeds, realised torque of the motor, and its angle.
@@ -186,14 +186,15 @@ class Recorded:
             np.zeros((begin.size, end - first, columns)),
         )
         sensitivity.sensitivities(
-            *self._loaded(), np.ascontiguousarray(self.spans), given, own, when, torques, begin, first, states,
-            np.zeros((size, columns)), np.zeros((size, columns)), np.zeros((2, columns)), np.zeros((2, count)),
+            *self._loaded(), np.ascontiguousarray(self.spans), given, own, when, torques, begin, first,
+            states, np.zeros((size, columns)), np.zeros((size, columns)), np.zeros((2, columns)),
+            np.zeros((2, count)),
             np.zeros((size + 1, size + 2, at.ORDERS)),
         )  # fmt: skip
         return torques, states
 
     def work(self) -> Vector:
-        """Work in J of motor, exciting torques, loads, friction, shafts, gears, and change of elastic energy."""
+        """Work, J, of motor, exciting torques, loads, friction, shafts, gears; change of elastic energy."""
         found = np.zeros(7)
         replay.work_of(*self._loaded(), self.states, found)
         return found
@@ -207,7 +208,7 @@ class Recorded:
         return rows[rows[:, 2] > rows[:, 1]]
 
     def turning_points(self, shaft: int, still: float) -> Matrix:
-        """Times, s, and torques, N m, at the reversals of a shaft's torque by more than `still`, and its ends."""
+        """Times, s, and torques, N m, at the reversals of a shaft's torque by more than `still`, and ends."""
         spans = np.ascontiguousarray(self.spans)
         room = 64 + spans.shape[0]
         while True:

@@ -44,7 +44,7 @@ SETTLING_PERIODS = 5.0  # elastic periods after the start time, over which a loa
 class Event(NamedTuple):
     """Something that happened at a located instant.
 
-    `value` is the flank, the sign of the motion, the speed reached, or what an impact loses in J; `place` is the
+    `value` is the flank, the sign of the motion, the speed reached, or what an impact loses in J; `place` the
     index of the shaft or mass; `impulse` that of an impact in N m s.
     """
 
@@ -439,7 +439,7 @@ class Run:
 
         Returns arrays of the shape of `times` under phi1, phi2, w1, w2 (of motor and load), theta (= phi1 -
         phi2), v (= w1 - w2), u, and T of a single shaft; phi, w have a last axis of masses, twist and T of
-        several a last axis of shafts. At an instant where something jumps the value is the one after the jump.
+        several a last axis of shafts. Where something jumps the value is the one after the jump.
         """
         when = np.asarray(times, dtype=np.float64)
         flat = np.ascontiguousarray(when.ravel())

@@ -121,7 +121,8 @@ def _main_line(chain: Chain, torques: Vector, shape: Vector, Omega: float, perio
     length = periods * 2.0 * math.pi / Omega
     run = simulate(Chain(masses, shafts), None, length)
     t = np.linspace(0.0, length, 64 * periods + 1)
-    relative = angles_of(run.at(t)["twist"])  # the rigid motion has no part in a shape
+    phi = run.at(t)["phi"]
+    relative = phi - phi[:, :1]  # the rigid motion has no part in a shape
     along = relative @ (arrays.J * shape)
     window = np.hanning(t.size)
     signal = (along - along.mean()) * window / window.sum()
@@ -316,7 +317,7 @@ def _steady(
     run = simulate(Chain(masses, shafts), None, end, excitation=acting)
     t = np.linspace(first * period, end, PERIODS * SAMPLES, endpoint=False)
     found = run.at(t)
-    swing = _about_mean(arrays, angles_of(found["twist"]))
+    swing = _about_mean(arrays, found["phi"] - found["phi"][:, :1])
     halves = np.array([_height(part) for part in np.split(swing, 2)])
     spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
     without_gaps: Vector = np.abs(_about_mean(arrays, linear[None, :])[0])

@@ -16,8 +16,6 @@ from softstart.balancing import Engine
 from softstart.chain import Chain, Mass, Motor, Shaft
 from softstart.chain.periodic_torque import PeriodicTorque
 from softstart.start import metrics
-from softstart.start.run import Run
-from softstart.start.simulation import simulate
 
 CRANE = Drive.load("crane-4amtkf")
 # what can differ between a drive and another, each with the two-mass plant's own closed forms

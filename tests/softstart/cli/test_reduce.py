@@ -103,7 +103,6 @@ def test_bad_input_in_one_sentence(run, nothing_left, arguments, said):
 
 def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
     from softstart import simulate
-    from softstart.start.simulation import simulate
 
     code, out, _ = run("reduce", "--verify", "direct,ramp", "--out", "found", "--json")
     assert code == 0
