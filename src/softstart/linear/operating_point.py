@@ -108,7 +108,7 @@ def _stiff(start: SampledStart) -> float:
     mass = start.rows.masses.view(at.MASS)[0, :, 0]
     target = float(drive.target_speed or 0.0)
     against = float((mass["Mc"] + mass["active"] + mass["friction"] + mass["ground"] * target).sum())
-    Ms = drive.motor.starting_torque
+    Ms = float(drive.motor.starting_torque)
     return float(mass["J"][np.isfinite(mass["J"])].sum()) * target / max(Ms - against, 0.01 * Ms)
 
 

@@ -229,14 +229,14 @@ class Batch:
         M12avg in N m, one or one a start.
         """
         sizes = np.diff(self.begins)[which]
-        if len(set(sizes.tolist())) > 1:
-            raise InputError("start_position: give all machines of one call a known position, or none.")
-        ready = numbers_of(set_ups)
+        ready, first = numbers_of(set_ups), self.begins[which]
+        places = [first + np.minimum(k, sizes - 1) for k in range(int(sizes.max(initial=1)))]
         notes = [
-            notes_of(self.rows.taken(self.begins[which] + k).limited(time_limit), ready, until, workers)
-            for k in range(int(sizes[0]))
+            notes_of(self.rows.taken(rows).limited(time_limit), ready, until, workers) for rows in places
         ]
-        return self.read(which, worst_of(notes) if len(notes) > 1 else notes[0], base, until)
+        worst = worst_of(notes) if len(notes) > 1 else notes[0]
+        worst.starts["position"][sizes == 1] = 0.0
+        return self.read(which, worst, base, until)
 
     def read(self, which: Which, notes: Notes, base: Any, until: float | None) -> Figures:
         """The figures in the kernel's notes."""
@@ -254,7 +254,7 @@ class Batch:
             used = 100.0 * np.nan_to_num(largest / self.permissible[which]).max(axis=1)
             meaning = "largest |T| over what its shaft permits"
             found["used_torque"] = (np.where(np.isnan(found["k_dyn"][0]), np.nan, used), "%", meaning)
-        found |= margins(found, first.limits)
+        found |= margins(found, limits_of_all([self.machines[i] for i in which]))
         return {**found, "status": status}
 
     def named(self) -> Figures:
@@ -359,13 +359,13 @@ def simulate_many(
         dims = ("start",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
         mean = np.broadcast_to((base or machines).mean_torque, shape).reshape(-1)
         found = figures(notes, mean, until, limits_of_each(machines))
-        coordinates = {
+        varied = {
             name: (dims, np.broadcast_to(values, shape).copy())
             for name in PARAMETERS
             if isinstance(values := getattr(machines, name), np.ndarray)
         }
         return _dataset(
-            {name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, coordinates
+            {name: (dims, one[0].reshape(shape), *one[1:]) for name, one in found.items()}, varied
         )
     listed = list(machines)
     nominal = [one.design_drive for one in ([fitted_to] if fitted_to is not None else listed)]
@@ -404,6 +404,16 @@ def _dataset(data: Mapping[str, Any], coordinates: Mapping[str, Any]) -> xarray.
          for name, (dims, values, unit, meaning) in data.items()},
         coords=coordinates,
     )  # fmt: skip
+
+
+def limits_of_all(machines: Sequence[Any]) -> Limits:
+    """The limits of each machine; one without a limit may have any figure."""
+
+    def each(name: str) -> Any:
+        own = [getattr(one.limits, name) for one in machines]
+        return None if all(one is None for one in own) else np.array([one or math.inf for one in own])
+
+    return Limits(each("shaft_torque"), each("start_time"), used_torque=machines[0].limits.used_torque)
 
 
 def limits_of_each(drive: Drive) -> Limits:

@@ -63,7 +63,7 @@ class Recorder:
         w, T = np.empty((*many, given.count)), np.empty((*many, given.count - 1))
         while replay.states_of_each(
             step, numbers, self.sees, on_gap, until, given.machines[0], given.masses[0], given.shafts[0],
-            self.curves, given.tones, self.work, self.spans, self.events, times,
+            given.curves[0], given.tones, self.work, self.spans, self.events, times,
             np.zeros(times.size, dtype=np.int64), np.empty((times.size, 2)), w,
             np.empty((times.size, given.count - 1)), T, self.measured, np.zeros(size),
             np.zeros(NEW_STATE + size),

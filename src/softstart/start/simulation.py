@@ -179,8 +179,7 @@ def simulate(
     positions = drive.positions
     given = {name: rows_of(one, time_limit, max_events, excitation) for name, one in positions.items()}
     check_end(drive, made, until, next(iter(given.values())))
-    nominal = None if made is None else (fitted_to or drive).design_drive
-    ready, own = (None, None) if made is None else made.set_up(nominal)
+    ready, own = (None, None) if made is None else made.set_up((fitted_to or drive).design_drive)
     of = "no motor torque" if ready is None else ready.name or type(ready).__name__
     runs = {}
     for name, rows in given.items():

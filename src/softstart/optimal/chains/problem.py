@@ -174,7 +174,7 @@ class ChainOptimum(Optimum):
     """The best start of a chain that was found: an `Optimum` whose `run` is a `Run`."""
 
     problem: ChainProblem
-    run: Run  # type: ignore[assignment]
+    run: Run
 
     @property
     def k_dyn(self) -> float:
