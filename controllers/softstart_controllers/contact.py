@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.kernel.jit import compiled
+from softstart.controller.compiled import compiled
 from softstart_controllers.shaft_filter import Free, N, Shaft, move
 
 HALVINGS = 40

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from softstart.controller import compiled_step
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record
-from softstart.kernel.jit import compiled
+from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, record
 from softstart_controllers.contact import (
     TIME_DEVIATION,
     lean,

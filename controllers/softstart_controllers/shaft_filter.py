@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.kernel.jit import compiled
+from softstart.controller.compiled import compiled
 from softstart.kernel.records import record
 
 Matrix = NDArray[np.float64]

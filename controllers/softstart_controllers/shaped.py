@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
+from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, record, size
 from softstart.drive import Drive
-from softstart.kernel.jit import compiled
 from softstart_controllers import landing
 from softstart_controllers.landing import (
     approach,

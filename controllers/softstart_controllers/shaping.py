@@ -50,7 +50,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from softstart.kernel.jit import compiled
+from softstart.controller.compiled import compiled
 
 ZV, ZVD = 2, 4  # number of levels before the last one
 ROUNDING = 1e-9  # of the last level, by which levels may fall

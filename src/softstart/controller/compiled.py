@@ -9,7 +9,8 @@ from typing import Any
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
 from softstart.kernel import motor, records
-from softstart.kernel.jit import compiled, compiled_as, drop_stale
+from softstart.kernel.jit import OPTIONS, compiled_as, drop_stale
+from softstart.kernel.jit import unfused as compiled
 from softstart.kernel.motor import STEP_SIGNATURE
 from softstart.kernel.records import MEASURED, Answer, record, size
 
@@ -96,4 +97,4 @@ def compiled_step(function: Callable[..., None]) -> Any:
     if in_a_file:
         own = _called(function, set())
         drop_stale({Path(file), *own}, INTERFACE)
-    return compiled_as(STEP_SIGNATURE, cache=in_a_file)(function)
+    return compiled_as(STEP_SIGNATURE, in_a_file, OPTIONS)(function)

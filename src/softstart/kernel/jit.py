@@ -6,7 +6,7 @@ count; take the option out and `softstart study benchmark-starts` shows what cou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,15 @@ from numba import types
 _njit: Any = numba.njit
 _cfunc: Any = numba.cfunc
 
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+FUSED = {**OPTIONS, "fastmath": {"contract"}}  # a x + b is rounded once: quicker, and more exact
 
-compiled: Any = _njit(**OPTIONS)
+compiled: Any = _njit(**FUSED)
+# the same digits as the same lines in Python, for controllers
+unfused: Any = _njit(**OPTIONS)
 
 
-def compiled_as(signature: Any, cache: bool = True) -> Any:
+def compiled_as(signature: Any, cache: bool = True, options: Mapping[str, Any] = FUSED) -> Any:
     """Compile with one explicit signature, as soon as the function is defined; it may be handed to a kernel.
 
     A kernel that calls a function by its address does not compile it again: LLVM would otherwise optimise
@@ -30,7 +33,7 @@ def compiled_as(signature: Any, cache: bool = True) -> Any:
     """
 
     def compile_now(function: Any) -> Any:
-        made = _njit(signature, **{**OPTIONS, "cache": cache})(function)
+        made = _njit(signature, **{**options, "cache": cache})(function)
         # the address, which numba would look up for each call: `__wrapper_address__` is its protocol for
         # functions that are passed to compiled ones. There is one signature, and so one result of compiling
         found = made.get_compile_result(signature)
@@ -51,7 +54,7 @@ def apart(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def declared(function: Callable[..., Any]) -> Any:
         symbol = f"{function.__module__}.{function.__qualname__}"
-        code = _cfunc(signature, **OPTIONS)(function)
+        code = _cfunc(signature, **FUSED)(function)
         llvmlite.binding.add_symbol(symbol, code.address)
         declaration: Any = types.ExternalFunction(symbol, signature)
         declaration.code = code  # kept for as long as it can be called
