@@ -55,7 +55,7 @@ def test_a_repeated_history_may_begin_anywhere() -> None:
 
 def dense(run: Run, points: int) -> Any:
     """Reversals of T of a trace of so many points and of both sides of every event."""
-    edges = np.concatenate([run.segments[:, 0], np.nextafter(run.segments[1:, 0], 0.0)])
+    edges = np.concatenate([run.recorded.spans[:, 0], np.nextafter(run.recorded.spans[1:, 0], 0.0)])
     t = np.unique(np.concatenate([np.linspace(0.0, run.end_time, points), edges, [run.end_time]]))
     T = run.at(t)["T"]
     steps = np.diff(T)
@@ -104,7 +104,7 @@ class Asks(PlainController):
 
 def test_life_does_not_depend_on_how_often_the_start_is_cut_or_sampled() -> None:
     whole, cut = simulate(CRANE, "direct"), simulate(CRANE, Asks())
-    assert cut.segments.shape[0] > 1000 * whole.segments.shape[0]
+    assert len(cut.recorded.spans) > 1000 * len(whole.recorded.spans)
     a, b = (damage_of(run, SNCurve(6.6)) for run in (whole, cut))
     np.testing.assert_allclose(a.spectrum, b.spectrum, rtol=1e-8, atol=1e-7)
     assert a.damage == pytest.approx(b.damage, rel=1e-9)

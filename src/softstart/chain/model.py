@@ -417,7 +417,7 @@ class Chain:
         columns = {"u [N*m]": states["u"]}
         for name, unit, parts in (
             ("phi", "rad", masses), ("w", "rad/s", masses), ("twist", "rad", self.shaft_names),
-            ("T", "N*m", self.shaft_names),
+            ("torques", "N*m", self.shaft_names),
         ):  # fmt: skip
             values = states[name].reshape(states["u"].size, -1)
             columns |= {f"{name} {part} [{unit}]": values[:, i] for i, part in enumerate(parts)}

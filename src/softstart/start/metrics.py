@@ -121,8 +121,8 @@ def energy_balance(recorded: Recorded) -> Energy:
     motor, exciting, load, ground, shafts, gears, elastic = recorded.work().tolist()
     masses = recorded.rows.masses[0].view(at.MASS)[:, 0]
     moves = np.isfinite(masses["J"])
-    w = recorded.of_masses(0)[:, moves]
-    kinetic = 0.5 * float(masses["J"][moves] @ (w[-1] ** 2 - w[0] ** 2))
+    gained = recorded.of_masses(0)[-1] ** 2 - masses["w0"] ** 2
+    kinetic = 0.5 * float(masses["J"][moves] @ gained[moves])
     struck = np.isin(recorded.events["kind"], [at.IMPACT, at.SETTLED])
     impacts = float(recorded.events["value"][struck].sum())
     residual = motor + exciting - kinetic - elastic - load - ground - shafts - gears - impacts

@@ -106,8 +106,8 @@ class Run:
         Twists of the shafts.
     u : array of shape (n,)
         Motor torque after limits and lag, N m.
-    T : array of shape (n,) or (n, N - 1)
-        Torque of the one shaft, or of each, N m.
+    torques : array of shape (n, N - 1)
+        Torques of the shafts, N m; `T` is that of a single one, of shape (n,), or the same.
     k_dyn, k_dyn_first_contact : float
         Dynamic coefficient of the whole run, and of stage 2 alone, of the shaft that is loaded most.
     k_dyns, utilisation : array of shape (N - 1,)
@@ -438,8 +438,8 @@ class Run:
         """States at any instants within the run, evaluated from the series of their spans.
 
         Returns arrays of the shape of `times` under phi1, phi2, w1, w2 (of motor and load), theta (= phi1 -
-        phi2), v (= w1 - w2), u, and T of a single shaft; phi, w have a last axis of masses, twist and T of
-        several a last axis of shafts. Where something jumps the value is the one after the jump.
+        phi2), v (= w1 - w2), u, and T of a single shaft; phi and w have a last axis of masses, twist, torques
+        and T of several a last axis of shafts. Where something jumps the value is the one after the jump.
         """
         when = np.asarray(times, dtype=np.float64)
         flat = np.ascontiguousarray(when.ravel())
@@ -453,12 +453,11 @@ class Run:
             "phi1": states["phi"][:, motor], "phi2": states["phi"][:, load], "w1": states["w"][:, motor],
             "w2": states["w"][:, load], "theta": between if motor < load else -between,
         }  # fmt: skip
-        found = {**states, **of_masses, "v": of_masses["w1"] - of_masses["w2"]}
-        single = self.recorded.rows.count == 2
+        single = states["T"][:, 0] if self.recorded.rows.count == 2 else states["T"]
+        v = of_masses["w1"] - of_masses["w2"]
+        found = {**states, **of_masses, "v": v, "torques": states["T"], "T": single}
         return {
-            name: values.reshape(when.shape)
-            if values.ndim == 1 or (single and name == "T")
-            else values.reshape(*when.shape, -1)
+            name: values.reshape(when.shape if values.ndim == 1 else (*when.shape, values.shape[1]))
             for name, values in found.items()
         }
 
@@ -489,6 +488,11 @@ class Run:
     def twist(self) -> Vector:
         """Twists of the shafts, rad."""
         return self._traces["twist"]
+
+    @property
+    def torques(self) -> Vector:
+        """Torques of the shafts, N m, a column for each."""
+        return self._traces["torques"]
 
     @property
     def T(self) -> Vector:

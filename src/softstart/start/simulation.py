@@ -164,9 +164,9 @@ def simulate(
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
-    if isinstance(drive, list | tuple) or getattr(drive, "shape", ()) != ():
-        if not isinstance(drive, Drive) and not (drive and all(map(is_machine, drive))):
-            raise InputError("drive: give one machine, a Drive with array fields, or a list, not empty.")
+    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive))):
+        raise InputError("drive: give a list of Drives or of Chains, not empty.")
+    if isinstance(drive, list | tuple) or (isinstance(drive, Drive) and drive.shape != ()):
         if made is None:
             raise InputError("controller is missing: many starts need one.")
         if workers is not None and (

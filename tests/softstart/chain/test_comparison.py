@@ -110,7 +110,7 @@ def test_permissible_torques_are_limits():
         (lambda: compare(Chain([Mass(1.0), Mass(1.0)], [Shaft(5.0)]), "direct"), r"\[motor\] is missing"),
         (lambda: compare("crane-4-mas"), "did you mean crane-4-mass"),
         (lambda: simulate("crane-4-mas", "direct"), "did you mean crane-4-mass"),
-        (lambda: simulate(CHAIN, "direct", fitted_to="x"), "give a single Drive, or a Chain"),
+        (lambda: simulate(CHAIN, "direct", fitted_to="x"), "give a Drive or a Chain"),
         (lambda: compare(CHAIN, "direct", worst_case="gap x5"), "worst_case"),
     ],
 )

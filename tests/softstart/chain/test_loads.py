@@ -78,7 +78,7 @@ def test_a_mass_on_a_shaft_to_ground():
         target_speed=1.0,
     )  # fmt: skip
     run = simulate(chain, "direct", 0.7, fitted_to=Chain.load("crane-4-mass"))
-    assert run.at(0.7)["T"][1] == pytest.approx(10.0 * (1.0 - math.cos(5.0 * 0.7)), rel=1e-13)
+    assert run.at(0.7)["torques"][1] == pytest.approx(10.0 * (1.0 - math.cos(5.0 * 0.7)), rel=1e-13)
     assert run.peak_torques[1] == pytest.approx(20.0, rel=1e-13)
     assert natural_vibration(chain).Omega[1] == pytest.approx(5.0, rel=1e-14)
 

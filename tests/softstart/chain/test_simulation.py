@@ -93,7 +93,7 @@ def test_plain_and_compiled_controllers_agree_to_the_bit():
     made = make_controller("ramp", None)
     compiled = simulate(chain, made, 0.15, fitted_to=CRANE)
     plain = simulate(chain, twin.plain(made, CRANE), 0.15, fitted_to=CRANE)
-    for name in ("spans", "span_masses", "span_shafts", "events"):
+    for name in ("states", "events"):
         assert np.array_equal(getattr(compiled.recorded, name), getattr(plain.recorded, name))
 
 
@@ -195,7 +195,7 @@ def test_a_spring_without_a_gap_pulls_too():
     Omega = math.sqrt(c * (1 / J1 + 1 / J2))
     run = simulate(Chain([Mass(J1), Mass(J2)], [Shaft(c, start_position=0.1)]), None, 7.0)
     times = np.linspace(0.0, 7.0, 50)
-    assert run.at(times)["T"][:, 0] == pytest.approx(4.0 * np.cos(Omega * times), abs=1e-12 * 4.0)
+    assert run.at(times)["torques"][:, 0] == pytest.approx(4.0 * np.cos(Omega * times), abs=1e-12 * 4.0)
     assert run.peak_torques[0] == pytest.approx(4.0, rel=1e-14)
 
 
@@ -238,7 +238,7 @@ def test_work_of_exciting_torques_by_quadrature():
     hum = PeriodicTorque(0.7, [0.5, 2.0], [0.3, -0.1], [0.2, 0.4], speed=30.0)
     run = simulate(chain, None, 1.0, excitation={"mass 3": hum, 0: hum})
     nodes, weights = leggauss(8)
-    starts, ends = run.recorded.spans["start"], run.recorded.spans["end"]
+    starts, ends = run.recorded.spans[:, 0], run.recorded.spans[:, 1]
     half = 0.5 * (ends - starts)
     times = starts[:, None] + half[:, None] * (1.0 + nodes)
     w = run.at(times)["w"]
@@ -272,8 +272,8 @@ def test_a_stuck_mass_in_the_middle_holds_the_chain_behind_it():
     starts = next(e for e in run.events if e.kind == "load starts")
     before = run.at(np.linspace(0.0, starts.time * (1 - 1e-9), 20))
     assert np.all(before["w"][:, 1:] == 0.0)
-    assert np.all(before["T"][:, 1] == 0.0)
-    assert run.at(np.nextafter(starts.time, 0.0))["T"][0] == pytest.approx(hold, rel=1e-12)
+    assert np.all(before["torques"][:, 1] == 0.0)
+    assert run.at(np.nextafter(starts.time, 0.0))["torques"][0] == pytest.approx(hold, rel=1e-12)
     assert starts.place == 1
     assert run.status.name == "REACHED"
 
@@ -357,7 +357,7 @@ def test_the_summary_is_plain_data_and_the_figure_draws():
     run = simulate("crane-4-mass", "direct", fitted_to=CRANE, until=0.1)
     told = json.loads(json.dumps(run.summary()))
     assert told["peak_torques"] == run.peak_torques.tolist()
-    assert told["assumed"] == run.chain.assumed
+    assert told["assumed"] == run.drive.assumed
     assert len(run.plot().axes) == 3
     with pytest.raises(ValueError, match="within the run"):
         run.at(0.2)

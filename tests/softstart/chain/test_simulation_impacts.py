@@ -100,7 +100,7 @@ def test_impacts_pile_up_at_the_known_instant(restitution):
     assert last["w"] == pytest.approx(3.0 * run.end_time / 3.0, rel=1e-12)
     assert last["w"][0] == last["w"][1]
     assert last["twist"][0] == 0.1
-    assert last["T"][0] == pytest.approx(2.0, rel=1e-13)  # what the second mass needs
+    assert last["torques"][0] == pytest.approx(2.0, rel=1e-13)  # what the second mass needs
     relative = 0.5 * (1.0 * 2.0 / 3.0) * (3.0 * first) ** 2
     if restitution == 0.0:
         assert run.energy.impacts == pytest.approx(relative, rel=1e-13)
@@ -127,7 +127,7 @@ def test_pressed_flanks_part_when_they_would_have_to_pull():
     run = simulate(chain, Pieces(pieces=((0.0, 3.0), (4.0, -3.0))), 7.0, fitted_to=CRANE)
     opened = [e for e in run.events if e.kind == "gap opened"]
     assert [e.time for e in opened] == pytest.approx([5.5], rel=1e-13)
-    assert run.at(5.5 * (1 - 1e-9))["T"][0] == pytest.approx(0.0, abs=1e-7)
+    assert run.at(5.5 * (1 - 1e-9))["torques"][0] == pytest.approx(0.0, abs=1e-7)
     assert run.at(5.6)["twist"][0] < 0.1
     # then 1/J of a torque of -2 s: -s^3/3 until the other flank, 0.2 rad away
     other = next(e for e in run.events if e.time > 5.6 and e.kind == "impact")
@@ -208,7 +208,7 @@ def test_friction_holds_a_body_of_pressed_masses_by_its_sum():
     starts = [e for e in run.events if e.kind == "load starts"]
     assert [(e.place, e.time) for e in starts] == [(0, pytest.approx(3.0)), (1, pytest.approx(3.0))]
     # friction is shared as it can hold: a third of the motor's torque stays at mass 1
-    assert run.at(1.5)["T"][0] == pytest.approx(1.0, rel=1e-12)
+    assert run.at(1.5)["torques"][0] == pytest.approx(1.0, rel=1e-12)
 
 
 def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
@@ -222,7 +222,7 @@ def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
     assert run.events[-1].time == 0.0
     found = run.at(np.linspace(0.0, 0.5, 101))
     assert not found["w"][:, :2].any()
-    assert np.abs(found["T"][:, 0] - 3.0 - found["T"][:, 1]).max() < 0.1  # but for what the gear holds
+    assert np.abs(found["torques"][:, 0] - 3.0 - found["torques"][:, 1]).max() < 0.1  # but for what the gear holds
 
 
 def test_a_blow_moves_a_stuck_mass():

@@ -25,7 +25,7 @@ def test_both_sides_are_the_starts_themselves(controller):
     alone = simulate(DRIVE, controller)
     assert found.drive.k_dyn == alone.k_dyn
     assert found.drive.start_time == alone.start_time
-    whole = simulate(CHAIN, controller, fitted_to=DRIVE)
+    whole = simulate(CHAIN, controller, fitted_to=DRIVE, base=DRIVE)
     assert found.chain.peak_torque == whole.peak_torque
     assert found.chain_k_dyn == whole.k_dyn
     assert found.error == pytest.approx(whole.k_dyn / alone.k_dyn - 1.0, rel=1e-14)

@@ -197,14 +197,16 @@ def test_a_torque_that_rises_again_is_no_fall_of_rounding() -> None:
 
 def compare_with_oracle(drawn: dict[str, Any], seed: int | str) -> None:
     """Same peak, events in the same order, same final state."""
-    if drawn["gap"] == 0.0 and drawn["w1_0"] == drawn["w2_0"] and drawn["theta0"] == 0.0:
-        return  # at rest with no gap at all, the flank of the first instant is a matter of rounding
+    joined = drawn["gap"] == 0.0
+    if joined:  # a spring that pulls too, which has no flanks
+        drawn = drawn | {"law": "dead-zone"}
     run, other = run_of(drawn), integrate(**drawn)
+    events = [one for one in other.events if not (joined and one[1] in ("closed", "opened"))]
     # within 1e-8; the floor is the torque of 1e-12 rad
     assert run.peak_torque == pytest.approx(abs(other.peak), rel=1e-8, abs=1e-12 * drawn["c"]), seed
-    assert [KINDS[event.kind] for event in run.events] == [kind for _, kind in other.events], seed
+    assert [KINDS[event.kind] for event in run.events] == [kind for _, kind in events], seed
     mine = np.array([event.time for event in run.events])
-    theirs = np.array([time for time, _ in other.events])
+    theirs = np.array([time for time, _ in events])
     # a shallow crossing amplifies the oracle's own 1e-11: the last events of long starts move most
     np.testing.assert_allclose(mine, theirs, rtol=1e-6, atol=1e-7 * drawn["t_end"], err_msg=str(seed))
     end = run.at(drawn["t_end"])

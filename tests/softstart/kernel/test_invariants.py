@@ -59,7 +59,7 @@ def test_total_momentum(seed: int) -> None:
         edges = np.linspace(row[0], row[1], pieces + 1)
         half = 0.5 * np.diff(edges)[:, None]
         times = edges[:-1, None] + half * (nodes + 1.0)
-        u = run.states_in(np.full(times.shape, index), times)["u"]
+        u = run.recorded.at(times.ravel(), np.full(times.size, index))["u"].reshape(times.shape)
         impulse += float(np.sum(half * (u * weights)))
         size += float(np.sum(half * np.abs(u * weights)))
     change = float(J1 * (end["w1"] - start["w1"]) + J2 * (end["w2"] - start["w2"]))

@@ -26,7 +26,7 @@ from softstart.kernel.motor import encoder_count, gauss
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 LAGGING = CRANE.replace(torque_lag=0.002, torque_rate=20_000.0)
-COUNT = encoder_count(CRANE)
+COUNT = encoder_count(CRANE.encoder_lines)
 
 
 @dataclass(frozen=True)
