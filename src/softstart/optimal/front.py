@@ -559,7 +559,7 @@ class _Chain:
 
 def _beside(run: Run, found: dict[tuple[Terminal, float], FrontPoint]) -> ControllerPoint:
     return ControllerPoint(
-        run.controller.name or type(run.controller).__name__, run.k_dyn, run.start_time, run.status.value,
+        run.controller_name, run.k_dyn, run.start_time, run.status.value,
         None if math.isnan(run.start_time) else found[YARDSTICK, run.start_time],
     )  # fmt: skip
 

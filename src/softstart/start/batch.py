@@ -143,7 +143,7 @@ def notes_of(rows: Rows, ready: Ready, until: float | None, workers: int = 1) ->
 def notes_under(
     rows: Rows, controller: Any, numbers: Matrix, until: float | None = None, workers: int = 1
 ) -> Notes:
-    """The kernel's notes of starts under a compiled controller with these numbers: a row each, or one for all."""
+    """The notes of starts under a compiled controller with these numbers: a row each, or one for all."""
     count = rows.machines.shape[0]
     notes = np.zeros((count, at.N_NOTES))
     of_shafts = np.zeros((count, rows.count - 1, at.size(at.SHAFT_NOTES)))
