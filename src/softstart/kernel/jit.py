@@ -22,15 +22,17 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, 
 compiled: Any = _njit(**OPTIONS)
 
 
-def compiled_as(signature: Any, cache: bool = True) -> Any:
+def compiled_as(signature: Any, cache: bool = True, contract: bool = True) -> Any:
     """Compile with one explicit signature, as soon as the function is defined; it may be handed to a kernel.
 
     A kernel that calls a function by its address does not compile it again: LLVM would otherwise optimise
-    what a function calls within each caller, and each caller of that one.
+    what a function calls within each caller, and each caller of that one. Without `contract` each product is
+    rounded before it is added to something, as in Python.
     """
+    options = OPTIONS | {"cache": cache, "fastmath": {"contract"} if contract else False}
 
     def compile_now(function: Any) -> Any:
-        made = _njit(signature, **{**OPTIONS, "cache": cache})(function)
+        made = _njit(signature, **options)(function)
         # the address, which numba would look up for each call: `__wrapper_address__` is its protocol for
         # functions that are passed to compiled ones. There is one signature, and so one result of compiling
         found = made.get_compile_result(signature)

@@ -1,15 +1,15 @@
 """How a recorded start answers to the torques of its demand: variational equations, exactly.
 
 The demand is linear between knots (two at one instant are a step), and column q belongs to the torque of the
-knots that q owns. Between two events the machine is linear, so that the sensitivity X of its state x (twists, speeds,
-realised motor torque and, if it is asked for, angle of the motor) follows
+knots that q owns. Between two events the machine is linear, so that the sensitivity X of its state x (twists,
+speeds, realised motor torque and, if it is asked for, angle of the motor) follows
 
     X' = A X + B r        r: the sensitivity of the demand, a hat about each knot of q
 
 with the A of the span's modes; it goes from one end of a span to the other by the same Taylor series as the
-start itself. Knots are control instants, so that r is a line in each span; while a demand that is constant is beyond the
-slew limiter, r stays as it was. At an event the instant moves with
-the torques, by dt = -dg/g' for the event function g, and
+start itself. Knots are control instants, so that r is a line in each span; while a demand that is constant is
+beyond the slew limiter, r stays as it was. At an event the instant moves with the torques, by dt = -dg/g' for
+the event function g, and
 
     X(+) = X(-) + (x'(-) - x'(+)) dt
 
@@ -95,7 +95,7 @@ def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
 def carried(
     series: Rows, n: int, x: float, X: Rows, hat: Rows, active: int, first: int, into: Rows
 ) -> None:  # fmt: skip
-    """X after the share x of the span, its rows from `first` on, into `into`; later columns have not begun."""
+    """X after the share x of the span, rows from `first` on, into `into`; later columns have not begun."""
     size = X.shape[0]
     for i in range(into.shape[0]):
         for q in range(active):
@@ -193,13 +193,14 @@ def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> N
 
 @compiled_as(types.void(_A, _M, _M, _A, _I, _A, _T, _A, types.int64, _T, _M, _M, _M, _M, _T))
 def sensitivities(
-    work: Vector, tones: Matrix, spans: Matrix, knots: Vector, owners: Owners, times: Vector,
-    torques: Rows, marks: Vector, first: int, states: Rows, X: Rows, next_X: Rows, hat: Rows, rates: Rows, series: Rows,
+    work: Vector, tones: Matrix, spans: Matrix, knots: Vector, owners: Owners, times: Vector, torques: Rows,
+    marks: Vector, first: int, states: Rows, X: Rows, next_X: Rows, hat: Rows, rates: Rows, series: Rows,
 ) -> None:  # fmt: skip
     """Of a recorded start: d T_k(times[j])/d u_q into torques[j, k, q], X(marks[j]) into states[j].
 
-    Knot k belongs to column `owners[k]`, which rise. Of X are given the rows from `first` on. `times` and `marks` rise and lie within the run. At an event the value is the one after it. The arrays
-    behind `states` are scratch.
+    Knot k belongs to column `owners[k]`, which rise. Of X are given the rows from `first` on. `times` and
+    `marks` rise and lie within the run. At an event the value is the one after it. The arrays behind `states`
+    are scratch.
     """
     s = work.view(WORK)[0]
     count = s.n
