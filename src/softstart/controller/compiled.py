@@ -8,7 +8,7 @@ from typing import Any
 
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
-from softstart.kernel import motor, records
+from softstart.kernel import jit, motor, records
 from softstart.kernel.jit import OPTIONS, compiled_as, drop_stale
 from softstart.kernel.jit import unfused as compiled
 from softstart.kernel.motor import STEP_SIGNATURE
@@ -60,7 +60,7 @@ def keep_state(state: Vector, command: Vector) -> None:
         command[STATE + i] = state[i]
 
 
-INTERFACE = (Path(__file__), Path(motor.__file__), Path(records.__file__))
+INTERFACE = tuple(Path(str(one.__file__)) for one in (jit, motor, records)) + (Path(__file__),)
 
 
 def _called(function: Any, seen: set[int]) -> set[Path]:

@@ -29,7 +29,6 @@ from softstart.optimal.lp.motion import MARGIN
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Candidate, LowerBound, OptimumError, heat_of
 from softstart.profile import TorqueProfile
-from softstart.start import metrics
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
@@ -504,7 +503,7 @@ def _contacts(run: Run, end_time: float, tolerance: float) -> Iterator[str]:
 
 def _figures(problem: Problem, run: Run, end_time: float, claimed: float, tolerance: float) -> Iterator[str]:
     """What was claimed, and the bounds of the problem on what is not minimised."""
-    k_dyn = _k_dyn(problem, run)
+    k_dyn = run.k_dyn
     heat = heat_of(run, end_time)
     short = not run.start_time <= end_time  # by so little that it passed as reached
     taken = end_time if short else run.start_time
@@ -527,7 +526,7 @@ def _figures(problem: Problem, run: Run, end_time: float, claimed: float, tolera
 def _against_bound(problem: Problem, run: Run, bound: LowerBound) -> Iterator[str]:
     if bound.kind == "none":
         return
-    k_dyn = _k_dyn(problem, run)
+    k_dyn = run.k_dyn
     if k_dyn < bound.k_dyn * (1.0 - BELOW):
         yield f"K_dyn is {k_dyn:.8g}, below its lower bound of {bound.k_dyn:.8g} ({bound.kind})."
     # a certificate is close to the optimum only where nothing but K_dyn and the torque's limits count
@@ -537,7 +536,3 @@ def _against_bound(problem: Problem, run: Run, bound: LowerBound) -> Iterator[st
             f"K_dyn is {k_dyn:.8g}, {100.0 * (k_dyn / bound.k_dyn - 1.0):.3g} % above its lower bound of "
             f"{bound.k_dyn:.8g}: a local optimum."
         )
-
-
-def _k_dyn(problem: Problem, run: Run) -> float:
-    return float(metrics.k_dyn(run.peak_torque, problem.base or problem.drive))

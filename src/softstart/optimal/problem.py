@@ -13,7 +13,6 @@ from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.late import late
 from softstart.quantities import to_si
-from softstart.start import metrics
 
 _collocation = late("softstart.optimal.collocation.search")  # a module above this one
 
@@ -241,7 +240,7 @@ class Problem:
     @property
     def base_torque(self) -> float:
         """M12avg_base in N m, the torque to which K_dyn refers."""
-        return float(metrics.base_torque(self.base or self.drive))
+        return float((self.base or self.drive).mean_torque)
 
     def casadi(self) -> Any:
         """The problem as one nonlinear program of CasADi, for your own solver, options or sensitivities.

@@ -15,7 +15,6 @@ from softstart.kernel import records as at
 from softstart.late import late
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
-from softstart.start import metrics
 from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
@@ -197,7 +196,7 @@ class Optimum:
     @property
     def k_dyn(self) -> float:
         """Dynamic coefficient of the whole run, re-simulated."""
-        return float(metrics.k_dyn(self.run.peak_torque, self.problem.base or self.problem.drive))
+        return self.run.k_dyn
 
     @property
     def minimised(self) -> float:
@@ -324,7 +323,7 @@ class RobustOptimum:
     @property
     def k_dyn_each(self) -> tuple[float, ...]:
         """Dynamic coefficient of each scenario's whole run."""
-        return tuple(float(metrics.k_dyn(run.peak_torque, self.base)) for run in self.runs)
+        return tuple(run.k_dyn for run in self.runs)
 
     @property
     def k_dyn(self) -> float:

@@ -16,7 +16,6 @@ from softstart import formulas
 from softstart.arrays import Matrix, Vector
 from softstart.controller.base import CompiledController, Controller, Sensor, SetUp, numbers_of
 from softstart.drive import PARAMETERS, UNKNOWN_POSITIONS, Drive, Limits
-from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.kernel import start as kernel
 from softstart.kernel.motor import N_MEASURED, NEW_STATE

@@ -104,7 +104,9 @@ def test_free_vibration_dies_in_a_gear_by_half_waves():
     run = simulate(chain, None, 4.5 * quarter)
     turned = [e.time for e in run.events if e.kind == "gear holds"]
     assert turned == pytest.approx([n * quarter for n in range(1, 5)], rel=1e-12)
-    assert np.abs(run.at(turned)["torques"][:, 0]) == pytest.approx([20.0 * eta**n for n in range(1, 5)], rel=1e-12)
+    assert np.abs(run.at(turned)["torques"][:, 0]) == pytest.approx(
+        [20.0 * eta**n for n in range(1, 5)], rel=1e-12
+    )
 
 
 def test_the_gear_stays_at_its_mass_when_the_chain_is_brought_to_one_shaft():

@@ -222,7 +222,9 @@ def test_a_gear_in_a_held_body_holds_no_more_than_it_can():
     assert run.events[-1].time == 0.0
     found = run.at(np.linspace(0.0, 0.5, 101))
     assert not found["w"][:, :2].any()
-    assert np.abs(found["torques"][:, 0] - 3.0 - found["torques"][:, 1]).max() < 0.1  # but for what the gear holds
+    assert (
+        np.abs(found["torques"][:, 0] - 3.0 - found["torques"][:, 1]).max() < 0.1
+    )  # but for what the gear holds
 
 
 def test_a_blow_moves_a_stuck_mass():

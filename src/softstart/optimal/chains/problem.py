@@ -140,11 +140,6 @@ class ChainProblem(Problem):
         assert self.drive.target_speed is not None
         return float(self.drive.target_speed)
 
-    @property
-    def base_torque(self) -> float:
-        """The mean torque to which K_dyn refers, N m."""
-        return (self.base or self.drive).mean_torque
-
     def casadi(self, run: Run | None = None) -> Any:
         """The problem in one order of contacts as a nonlinear program of CasADi: `Problem.casadi` of a chain.
 
@@ -171,15 +166,9 @@ class ChainProblem(Problem):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChainOptimum(Optimum):
-    """The best start of a chain that was found: an `Optimum` whose `run` is a `Run`."""
+    """The best start of a chain that was found: an `Optimum` of a `ChainProblem`."""
 
     problem: ChainProblem
-    run: Run
-
-    @property
-    def k_dyn(self) -> float:
-        """Largest torque of all shafts over the mean torque, re-simulated."""
-        return self.run.k_dyn
 
     @property
     def heat(self) -> float:

@@ -23,8 +23,8 @@ from softstart.start.rows import MAX_EVENTS, rows_of
 class Answer:
     """Sensitivities to the torques of the knots, a last axis of them.
 
-    `torques[j, k]` of the torque of shaft k at instant j, N m/(N m); `twists[i]` and `speeds[i]` of twists and
-    speeds at mark i.
+    `torques[j, k]` of the torque of shaft k at instant j, N m/(N m); `twists[i]` and `speeds[i]` of
+    twists and speeds at mark i.
     """
 
     torques: Vector
