@@ -60,7 +60,7 @@ def keep_state(state: Vector, command: Vector) -> None:
         command[STATE + i] = state[i]
 
 
-INTERFACE = tuple(Path(str(one.__file__)) for one in (jit, motor, records)) + (Path(__file__),)
+INTERFACE = (Path(__file__), *(Path(str(one.__file__)) for one in (jit, motor, records)))
 
 
 def _called(function: Any, seen: set[int]) -> set[Path]:
