@@ -35,8 +35,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # run by hand
 
-from softstart.plant import layout as at
-from softstart.plant.steady import GRAZE
+from softstart.kernel import records as at
+from softstart.kernel.events import GRAZE
 from tests.oracle import Start, integrate
 from tests.softstart.kernel.test_against_oracle import KINDS
 
@@ -269,19 +269,20 @@ def against(run: Run, other: Start) -> list[str]:
 def balances(run: Run) -> list[str]:
     """Whether energy and, of loads that slide and motors that are free, angular momentum are kept."""
     wrong = []
-    drive, energy, rows = run.drive, run.energy, run.segments
+    drive, energy, rows = run.drive, run.energy, run.recorded.spans
     first, last = run.at(0.0), run.at(run.end_time)
     stored = 0.5 * drive.J1 * np.max(run.w1**2) + 0.5 * drive.J2 * np.max(run.w2**2)
     stored += 0.5 * run.peak_torque**2 / drive.c
     scale = stored + abs(energy.motor) + abs(energy.load) + abs(energy.dissipated)
     if abs(energy.residual) > 1e-6 * scale:
         wrong.append(f"energy: {energy.residual / scale:.2g} of it is missing")
-    if np.all(rows[:, at.S_LOAD] != 0.0) and np.all(rows[:, at.S_HELD] == 0.0):
+    slides = run.recorded.of_masses(1)[:-1]
+    if np.all(slides != 0.0) and np.all(rows[:, at.S_BRAKED] == 0.0):
         h = rows[:, at.S_END] - rows[:, at.S_START]
-        lag = drive.torque_lag
+        lag, line = drive.torque_lag, rows[:, at.S_REF] - rows[:, at.S_SLOPE] * drive.torque_lag
         fade = -lag * np.expm1(-h / lag) if lag > 0.0 else 0.0
-        pushed = rows[:, at.S_UA] * h + 0.5 * rows[:, at.S_UB] * h * h + rows[:, at.S_UE] * fade
-        braked = rows[:, at.S_LOAD] * drive.Mc * h
+        pushed = line * h + 0.5 * rows[:, at.S_SLOPE] * h * h + (rows[:, at.S_U] - line) * fade
+        braked = slides[:, 1] * drive.Mc * h
         gained = drive.J1 * (last["w1"] - first["w1"]) + drive.J2 * (last["w2"] - first["w2"])
         size = drive.J1 * np.abs(run.w1).max() + drive.J2 * np.abs(run.w2).max()
         size += np.abs(pushed).sum() + np.abs(braked).sum()
@@ -300,7 +301,7 @@ def itself(case: Case, run: Run, controller: Controller) -> list[str]:
     if not np.all(np.isfinite([*figures, *run.w1, *run.w2, *run.T])):
         wrong.append("a figure is not finite")
     if isinstance(controller, Logged):
-        count = run.plant[at.ENCODER]
+        count = float(run.recorded.rows.machine["encoder"])
         seen = np.array([(t, angle) for t, angle, _ in controller.log if t <= run.end_time])
         off = np.abs(run.at(seen[:, 0])["phi1"] - seen[:, 1] - run.at(0.0)["phi1"] * 0.0).max()
         if off > 1.001 * max(count, 1e-9 * np.abs(seen[:, 1]).max()):

@@ -8,7 +8,6 @@ from types import FrameType
 
 import numpy as np
 import pytest
-from softstart.plant.layout import GAP_EVENTS
 
 from softstart import Drive, InputError, SimulationError, compare, simulate
 from softstart.controller import make_controller
@@ -143,7 +142,7 @@ def test_strides_over_repeated_contacts_keep_every_bit(strategy: str, kind: str,
     names = ("k_dyn", "start_time", "contacts", "gap_events", "end_time", "k_dyn_first_contact", "peak_time")
     for i, drive in enumerate(drives.elements()):
         run = simulate(drive, strategy, until)
-        single = dict(run.summary(), gap_events=run.final[GAP_EVENTS])
+        single = dict(run.summary(), gap_events=run.recorded.notes["gap_events"])
         for name in names:
             np.testing.assert_equal(float(data[name][i]), float(single[name]), err_msg=f"{name}, start {i}")
     assert float(data.contacts.max()) > 10

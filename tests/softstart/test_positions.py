@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from softstart.plant import layout
+from softstart.kernel.records import S_REF, S_SLOPE, S_START
 from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
 
@@ -132,8 +132,8 @@ def test_the_hoist_by_the_independent_integrator(where: str, name: str) -> None:
     """The torque that was played, handed to the oracle in pieces: same peak and start time."""
     drive = HOIST.replace(start_position=where)
     run = simulate(drive, name)
-    starts = run.segments[:, 0]
-    ua, ub = (run.segments[:, i] for i in (9, 10))  # without lag the torque is a line in each span
+    # without lag the torque is a line in each span
+    starts, ua, ub = (run.recorded.spans[:, i] for i in (S_START, S_REF, S_SLOPE))
     pieces = list(zip(starts.tolist(), ua.tolist(), ub.tolist(), strict=True))
     before = [(math.nan,) * 3, *pieces]
     goes_on = [
