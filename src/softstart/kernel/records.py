@@ -81,7 +81,8 @@ class Mass:
 
     J: float
     ground: float  # damping to the ground
-    active: float  # load torque that acts always, less the mean of exciting torques
+    active: float  # load torque that acts always
+    mean: float  # of the exciting torques
     Mc: float  # reactive load torque
     friction: float  # Coulomb friction of the motor
     w0: float

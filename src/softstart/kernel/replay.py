@@ -187,6 +187,7 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
                 turned += speed[o] / (o + 1.0)
             if s.tones != 0.0:
                 into[1] += h * product(s.outside[i], speed, n)
+            into[1] += h * s.mean[i] * turned
             into[2] += h * (s.direction[i] * s.Mc[i] + s.active[i]) * turned
             if s.points[i] > 0:
                 course = s.turned[i] if s.by_angle[i] != 0.0 else speed

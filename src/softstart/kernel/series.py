@@ -176,7 +176,7 @@ def apply_modes(s: Record) -> None:
             s.bodies = 1.0
         s.first[i] = first
         s.body_J[first] += s.J[i]
-        s.push[i] = -s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
+        s.push[i] = s.mean[i] - s.active[i] - s.direction[i] * (s.Mc[i] + s.friction[i])
         if s.points[i] > 0:
             s.push[i] -= s.offset[i]
         if s.rubs[i] != 0.0:

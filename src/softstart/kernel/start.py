@@ -50,6 +50,7 @@ def load_machine(
         s.J[i] = mass.J
         s.ground[i] = mass.ground
         s.active[i] = mass.active
+        s.mean[i] = mass.mean
         s.Mc[i] = mass.Mc
         s.friction[i] = mass.friction
         s.w0[i] = mass.w0

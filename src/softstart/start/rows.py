@@ -220,7 +220,7 @@ def _of_chain(chain: Chain, excitation: Mapping[str | int, Any]) -> tuple[Rows, 
     for place, torque in excitation.items():
         i = chain.index(place)
         brought = float(arrays.speed_ratio[i])
-        masses["active"][i] -= brought * torque.mean
+        masses["mean"][i] += brought * torque.mean
         for omega, cosine, sine in zip(torque.frequencies, torque.cosine, torque.sine, strict=True):
             tones.append((i, omega, brought * cosine, brought * sine))
     if tones:

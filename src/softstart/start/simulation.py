@@ -164,7 +164,8 @@ def simulate(
     until, time_limit, max_events = check_limits(until, time_limit, max_events, "drive")
     for name, other in (("fitted_to", fitted_to), ("base", base)):
         _check_other(name, other, drive)
-    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive))):
+    single = [getattr(one, "shape", ()) == () for one in drive] if isinstance(drive, list | tuple) else [True]
+    if isinstance(drive, list | tuple) and not (drive and all(map(is_machine, drive)) and all(single)):
         raise InputError("drive: give a list of Drives or of Chains, not empty.")
     if isinstance(drive, list | tuple) or (isinstance(drive, Drive) and drive.shape != ()):
         if made is None:

@@ -322,7 +322,7 @@ def _steady(
     spread = float(np.abs(halves[1] - halves[0]).max() / halves.max())
     without_gaps: Vector = np.abs(_about_mean(arrays, linear[None, :])[0])
     torque: Vector = np.abs(law * (linear[:-1] - linear[1:]))
-    return _height(swing), _height(found["T"]), without_gaps, torque, spread
+    return _height(swing), _height(found["torques"]), without_gaps, torque, spread
 
 
 def _about_mean(arrays: ChainArrays, angle: Any) -> Any:
