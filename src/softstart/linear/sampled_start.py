@@ -149,7 +149,8 @@ class SampledStart:
 
     def displacements(self, angle: float, speed: float) -> list[tuple[dict[Part, float], dict[str, float]]]:
         """Small motions in all directions: what they change of the plant, and of the rows of `Continuous`."""
-        motor, curves = int(self.rows.machine.motor), self.rows.curves[0].view(at.CURVE)[:, 0]
+        motor, load = int(self.rows.machine.motor), int(self.rows.machine.load)
+        curves = self.rows.curves[0].view(at.CURVE)[:, 0]
         curved = [int(curve.mass) for curve in curves if curve.by_angle]
         found: list[tuple[dict[Part, float], dict[str, float]]] = [
             ({("phi", 0): angle} | {("angle", i): angle for i in curved}, {"phi1": angle})
@@ -161,6 +162,8 @@ class SampledStart:
             else:
                 bodies.append([k + 1])
                 moves: dict[Part, float] = {("theta", k): angle}
+                if min(motor, load) <= k < max(motor, load):  # `phi` is the angle of the load
+                    moves["phi", 0] = -angle if motor <= k else angle
                 for i in curved:  # what lies behind the shaft turns, seen from the motor
                     if motor <= k < i or i <= k < motor:
                         moves["angle", i] = -angle if k < i else angle
