@@ -365,7 +365,7 @@ def _on_the_cycle(
     (w1, load_speed), (theta, _) = plant["w"], plant["theta"]
     changes: dict[Part, float] = {
         ("theta", 0): twist - theta,
-        ("phi", 0): phi1.imag,
+        ("phi", 0): phi1.imag - twist + theta,  # of the load
         ("w", 0): load_speed - w1 + (w2 + s * turn).imag,
         ("w", 1): w2.imag,
         ("mode", 0): at.OPEN - plant["mode"][0],

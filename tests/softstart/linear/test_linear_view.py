@@ -16,7 +16,7 @@ from softstart.linear.systems import at_points
 
 def motor_by(angle):
     """The motor turned by an angle, the load not."""
-    return {("phi", 0): angle, ("theta", 0): angle}
+    return {("theta", 0): angle}
 
 
 def test_the_law_of_a_linear_controller_is_found():
