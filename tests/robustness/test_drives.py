@@ -35,14 +35,14 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # run by hand
 
-from softstart.kernel import records as at
-from softstart.kernel.events import GRAZE
 from tests.oracle import Start, integrate
 from tests.softstart.kernel.test_against_oracle import KINDS
 
 from softstart import Drive, InputError, Run, SimulationError, Status, TorqueProfile, simulate
 from softstart.controller import Command, Controller, PlainController, make_controller
 from softstart.controller.base import Measured
+from softstart.kernel import records as at
+from softstart.kernel.events import GRAZE
 
 LONGEST = 10.0  # s of one start
 PATIENCE = 2.0  # s for the oracle

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from softstart.kernel.records import S_REF, S_SLOPE, S_START
 from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
 
@@ -15,6 +14,7 @@ from softstart.chain import reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
 from softstart.drive.doubts import doubts
+from softstart.kernel.records import S_REF, S_SLOPE, S_START
 from softstart.start.batch import array_starts
 from softstart.views import starts
 

@@ -7,18 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from softstart import formulas
 from softstart.drive import Drive
-from softstart.errors import InputError
 from softstart.kernel import records as at
 from softstart.start.recorded import Recorded
-
-if TYPE_CHECKING:
-    from softstart.start.run import Run
 
 REFERENCE = "direct"  # the strategy beside which start times and lives of the others stand
 # share of the target speed by which a load that has settled may still be below it
@@ -47,29 +43,12 @@ def k_dyn(peak_torque: Any, drive: Drive) -> Any:
     return formulas.dynamic_coefficient(peak_torque, base_torque(drive))
 
 
-def settling_time(run: Run, band: float) -> float:
-    """First instant from which |T - M12avg| <= band * M12avg_base holds with the gap closed, s.
-
-    T is the torque of the shaft beside the motor, M12avg the one under which all masses gain speed alike,
-    friction included. It must hold for one elastic period at least, to the end of the run; NaN otherwise.
-    """
-    if not 0.0 < band < math.inf:
-        raise InputError(f"band = {band}: the settling band is a share of the mean torque above 0, e.g. 0.1.")
-    if not run.stages or run.stages[-1].number % 2:
-        return math.nan
-    begin, last = run.stages[-1].start, run.end_time - run.elastic_period
-    if begin > last:
-        return math.nan  # too short to be called settled
-    found = run.recorded.torque_settles(run.motor_shaft, begin, band * run.base_torque)
-    return found if found <= last else math.nan
-
-
-def settled_time(run: Run, band: float = SETTLED_BAND) -> float:
+def settled_time(recorded: Recorded, target_speed: float, band: float = SETTLED_BAND) -> float:
     """First instant, not before the start time, from which on the load keeps its speed, s.
 
-    It keeps it where w2 >= (1 - band) target to the end of the run; NaN if it is below at the end. The start
-    time is a first passage: of two loads that swing, the one that swings further is there first, and falls
-    back. This is the settling time of control engineering with three changes:
+    It keeps it where w2 >= (1 - band) target_speed to the end of the run; NaN if it is below at the end. The
+    start time is a first passage: of two loads that swing, the one that swings further is there first, and
+    falls back. This is the settling time of control engineering with three changes:
 
     - The band is one-sided, as the torque of a start goes on beyond the target speed, where a speed
       controller takes over.
@@ -80,13 +59,13 @@ def settled_time(run: Run, band: float = SETTLED_BAND) -> float:
       21 ms later than with direct start.
 
     The shaft torque has no part in it: undamped it swings for all time under every strategy
-    (`settling_time` is for damped drives), and its size is what K_dyn judges. The crossing is located in the
-    polynomials of the spans.
+    (`Run.settling_time` is for damped drives), and its size is what K_dyn judges. The crossing is located in
+    the polynomials of the spans.
     """
-    start = run.start_time
+    start = float(recorded.notes["start_time"])
     if math.isnan(start):
         return math.nan
-    return run.recorded.load_settles(start, (1.0 - band) * float(run.drive.target_speed))
+    return recorded.load_settles(start, (1.0 - band) * target_speed)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from softstart import formulas
 from softstart.arrays import Vector
 from softstart.controller.base import Controller
 from softstart.drive import Drive
-from softstart.errors import SimulationError
+from softstart.errors import InputError, SimulationError
 from softstart.input.files import write_whole
 from softstart.kernel import records as at
 from softstart.start import metrics
@@ -318,7 +318,8 @@ class Run:
         Never before the start time. It is judged over five elastic periods after that, for which the run is
         computed further where it is shorter. See `metrics.settled_time` for the definition.
         """
-        return self._worst(lambda run: metrics.settled_time(run._continued))
+        target = float(self.drive.target_speed)
+        return self._worst(lambda run: metrics.settled_time(run._continued.recorded, target))
 
     @property
     def settling_end(self) -> float:
@@ -331,9 +332,25 @@ class Run:
         That of the load speed is `settled_time`.
 
         Settled: the gap stays closed and |T - M12avg| <= band * M12avg_base, where M12avg is the mean torque
-        of the shaft beside the motor under the torques of the instant, of a drive (u J2 + Mc J1)/(J1 + J2).
+        of the shaft beside the motor under the torques of the instant, of a drive (u J2 + Mc J1)/(J1 + J2),
+        friction included. It must hold for one elastic period at least, to the end of the run.
+
+        Raises:
+            InputError: If `band` is not a finite number above 0.
         """
-        return self._worst(lambda run: metrics.settling_time(run, band))
+        if not 0.0 < band < math.inf:
+            raise InputError(f"band = {band}: the band is a share of the mean torque above 0, e.g. 0.1.")
+
+        def settled(run: Run) -> float:
+            if not run.stages or run.stages[-1].number % 2:
+                return math.nan
+            begin, last = run.stages[-1].start, run.end_time - run.elastic_period
+            if begin > last:
+                return math.nan  # too short to be called settled
+            found = run.recorded.torque_settles(run.motor_shaft, begin, band * run.base_torque)
+            return found if found <= last else math.nan
+
+        return self._worst(settled)
 
     @property
     def elastic_period(self) -> float:

@@ -141,8 +141,8 @@ SEVERAL = {
     "sweep wrong.toml --axis gapp=1 --controller rmp --workers 0 --until soon": [
         "starting_torque", "gap = nan", "did you mean ramp?", "--workers", "--until"
     ],
-    "reduce --to 1 --method modl --factor -2 --set mass[9].inertia=3": [
-        "--to", "did you mean modal?", "--factor", "N from 1 to 4"
+    "reduce --factor -2 --verify rmp --set mass[9].inertia=3": [
+        "--factor", "did you mean ramp?", "N from 1 to 4"
     ],
     "balance --speed 50Hz --set cylinders.bore=1N --set masses.rotating=-1": [
         "--speed", "cylinders", "rotating"
