@@ -195,9 +195,9 @@ def entered(rng: np.random.Generator, drive: Drive) -> tuple[float, Vector] | No
     opened = [event.time for event in run.events if event.kind == "gap opened"]
     if not begins or (opened and opened[0] < begins[0]):
         return None
-    state = {name: float(value) for name, value in run.at(begins[0]).items()}
+    state = run.at(begins[0])
     z = float(drive.Mc / drive.c) if reactive else 0.0
-    return begins[0], np.array([z, state["v"], state["w2"], 0.0, 1.0])
+    return begins[0], np.array([z, float(state["v"]), float(state["w2"]), 0.0, 1.0])
 
 
 def random_start(rng: np.random.Generator, terminal: Terminal) -> Start | None:

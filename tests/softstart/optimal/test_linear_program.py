@@ -95,7 +95,7 @@ def test_the_exact_plant_agrees(given: dict[str, Any], end: float, terminal: Ter
     run = replay(problem.drive, ideal.assemble(problem, best), best.end_time)
     assert best.end_time <= end * (1.0 + 1e-12)
     assert run.contacts == 1
-    state = {name: float(value) for name, value in run.at(best.end_time).items()}
+    state = run.at(best.end_time)
     assert state["w2"] == pytest.approx(problem.target, rel=1e-6)
     if terminal != "reached":
         assert run.peak_torque == pytest.approx(best.P, rel=2e-4)

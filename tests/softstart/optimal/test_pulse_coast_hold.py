@@ -85,7 +85,7 @@ def checked(problem: Problem) -> float:
     best = solve(problem)
     drive = problem.drive
     run = replay(drive, best.profile, best.end_time + drive.elastic_period)
-    state = {name: float(value) for name, value in run.at(best.end_time).items()}
+    state = run.at(best.end_time)
     assert problem.start_time is not None
     assert best.end_time <= problem.start_time * (1 + 1e-12)
     assert run.start_time <= best.end_time
