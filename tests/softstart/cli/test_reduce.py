@@ -111,7 +111,7 @@ def test_a_start_designed_on_the_drive_is_verified_on_the_chain(run, place):
     drive = reduce_chain(Chain.load("crane-4-mass")).to_drive()
     for one in told:
         assert one["k_dyn"] == simulate(drive, one["controller"]).k_dyn
-        whole = simulate("crane-4-mass", one["controller"], fitted_to=drive)
+        whole = simulate("crane-4-mass", one["controller"], fitted_to=drive, base=drive)
         assert one["chain_k_dyn"] == whole.k_dyn
         assert one["chain_start_time"] == whole.start_time
         assert one["worst_shaft"] == "rotor - pinion"
