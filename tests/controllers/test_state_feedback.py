@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tests.controllers.starts import CRANE, index, traced
 
 from softstart import Drive, InputError, simulate
-from softstart.controller.base import rows_of
+from softstart.controller.base import numbers_of
 from softstart.drive import library
 from softstart.start.metrics import base_torque
 from softstart_controllers import contact_designs
@@ -120,7 +120,7 @@ def test_batch_has_the_numbers_of_its_drives() -> None:
         load_inertia=[0.07, 0.175, 1.0], encoder_lines=[0, 1024, 4096], torque_lag=[0, 1e-3, 0.01]
     )
     weights = {"torque_weight": np.array([1.0, 3.0, 10.0]), "rate_weight": np.array([0.5, 4.0, 2.0])}
-    _, together = rows_of(StateFeedback(**weights).set_ups(batch))  # type: ignore[arg-type, misc]
+    _, together = numbers_of(StateFeedback(**weights).set_ups(batch))  # type: ignore[arg-type, misc]
     for i, one in enumerate(batch.elements()):
         own = {name: float(values[i]) for name, values in weights.items()}
         assert np.array_equal(together[i], StateFeedback(**own).fitted(one).vector(one))

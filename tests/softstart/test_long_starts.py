@@ -18,7 +18,7 @@ from softstart import Drive, SimulationError, simulate
 from softstart.controller import Command, CompiledController, PlainController, compiled_step, make_controller
 from softstart.controller.base import Measured
 from softstart.controller.compiled import Vector
-from softstart.start import engine, metrics
+from softstart.start import engine
 
 CRANE = Drive.load("crane-4amtkf")
 HEAVY = CRANE.replace(load_inertia=35_000.0)  # 960,000 elastic periods to its target speed
@@ -65,19 +65,6 @@ def test_a_start_that_does_not_reach_its_target_is_not_too_long() -> None:
     """A hundred times a stiff start is beyond the bound here, ten times is not: that tells enough."""
     drive = CRANE.replace(load_inertia=300.0, damping=2.0)
     assert simulate([drive], make_controller("direct", {"torque": 6.0})).status.item() == "NOT_REACHED"
-
-
-@pytest.mark.parametrize("name", ["direct", "ramp", "s-curve"])
-def test_figures_taken_in_turns_are_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    drive = CRANE.replace(damping=2.0, torque_lag=0.004)
-    whole = simulate(drive, name, until=2.0)
-    monkeypatch.setattr(metrics, "AT_ONCE", 70)
-    parts = simulate(drive, name, until=2.0)
-    assert parts.settling_time() == whole.settling_time()
-    one, other = parts.energy, whole.energy
-    np.testing.assert_allclose(one.motor, other.motor, rtol=1e-13)
-    np.testing.assert_allclose(one.dissipated, other.dissipated, rtol=1e-12)
-    assert abs(one.residual) < 1e-9 * one.motor
 
 
 @dataclass(frozen=True)
