@@ -222,7 +222,8 @@ def replayed(problem: Problem, own: Claim) -> Replayed:
     times = own.edges[:-1, None] + width[:, None] * checks
     T = np.abs(run.at(times.clip(0.0, run.end_time))["T"])
     overshoot = T.max(axis=1) / max(own.peak, 1e-300) - 1.0
-    end = {name: float(values[0]) for name, values in run.at([own.end_time]).items()}
+    at_end = run.at([own.end_time])
+    end = {name: float(at_end[name][0]) for name in ("w2", "v", "T")}
     shortfall = 1.0 - end["w2"] / problem.target
     errors = [shortfall]
     if problem.terminal != "reached":
