@@ -137,6 +137,9 @@ def states_of_each(*starts: Any) -> int:
     return reason
 
 
+INVERSE = 1.0 / np.arange(1.0, 2.0 * ORDERS + 2.0)  # of n at n - 1
+
+
 @compiled
 def product(f: Vector, g: Vector, n: int) -> float:
     """The integral of f g over [0, 1]."""
@@ -144,7 +147,7 @@ def product(f: Vector, g: Vector, n: int) -> float:
     for i in range(n + 1):
         inner = 0.0
         for j in range(n + 1):
-            inner += g[j] / (i + j + 1.0)
+            inner += g[j] * INVERSE[i + j]
         total += f[i] * inner
     return total
 

@@ -187,7 +187,8 @@ class Row:
         found = []
         for limit in limits.each:
             values = {case: float(getattr(one, limit.figure)) for case, one in own.items()}
-            worst = max(values, key=lambda case: (math.isnan(values[case]), values[case]))
+            # of values that are equal but for rounding that of the machine as it is
+            worst = max(values, key=lambda case: (math.isnan(values[case]), float(f"{values[case]:.12g}")))
             found.append(Margin(limit, values[worst], worst))
         return tuple(found)
 

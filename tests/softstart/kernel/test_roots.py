@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numba import njit
 from numpy.polynomial.polynomial import polyfromroots, polymul, polyval
 
 from softstart.kernel.events import NONE, first_root, value
-from softstart.kernel.jit import compiled
 from softstart.kernel.records import N_WORK, WORK
 
 
-@compiled
+@njit
 def first_root_of(work, f, end, zeros, noise, faint):
     s = work.view(WORK)[0]
     for i in range(f.size):
