@@ -149,12 +149,12 @@ def first_root(s: Record, n: int, end: float, zeros: int, noise: float, faint: f
 # events of shafts -----------------------------------------------------------------------------------
 
 ROUNDING = 4.0 * EPS
-# a flank that is touched, or left, by less than this share of the gap is grazed: no event
-GRAZE = 1e-12
+# a flank that is touched with an overlap below this share of the gap is grazed: no contact
+GRAZE = 1e-9
 # impacts that pile up within this share of a span are over: the accumulation time is known
 PILED_UP = 1e-9
-# flanks as elastic as this may bounce indefinitely: once they rise by GRAZE of the gap or less, they rest
-ELASTIC = 0.999
+# flanks as elastic as this may bounce indefinitely: once they rise by this share of the gap they rest
+ELASTIC, FLAT = 0.999, 1e-12
 # `zeros` of a contact whose torque has just come back: it begins at zero
 REJOINED = 3
 
@@ -202,7 +202,7 @@ def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]
         press = side * twist[2]
         e = s.restitution[k]
         if press > faint and rebound >= 0.0:
-            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * GRAZE * half
+            flat = e > ELASTIC and rebound * rebound <= 8.0 * press * FLAT * half
             if flat or rebound <= PILED_UP * (1.0 - e) * press:
                 return SETTLE, 0.0
     event = NO_EVENT
