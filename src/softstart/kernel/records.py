@@ -174,7 +174,7 @@ class OfMasses:
     angle: float  # with a load curve
     rubs: float  # 1 where friction acts: reactive load, motor, a gear with losses
     push: float  # torque from outside that is constant within the span
-    # of the body, the masses that move as one: its first mass, and in the place of that mass the rest
+    # masses that move as one are a body: the index of its first mass, under which its other numbers stand
     first: float
     inverse: float  # one over its inertia; 0 while it is held
     body_J: float
@@ -222,7 +222,7 @@ class OfSpan:
     twist: float
     torque: float
     outside: float  # exciting torques
-    held: float  # torques on a mass, but for those of rigid joints; on its body in the place of the first
+    held: float  # torque on a mass without that of rigid joints; under the first mass, torque on the body
     turned: float  # angles with a load curve
 
 

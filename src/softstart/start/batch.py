@@ -85,11 +85,6 @@ class Notes:
         return np.array([status_of(int(one), True, False).finished for one in kinds], dtype=bool)[which]
 
 
-def joined_notes(notes: Sequence[Notes]) -> Notes:
-    """Those of all starts, in order."""
-    return Notes(np.concatenate([one.starts for one in notes]), np.concatenate([one.shafts for one in notes]))
-
-
 def worst_of(notes: Sequence[Notes]) -> Notes:
     """Of the same starts from several positions the worst, figure by figure.
 
