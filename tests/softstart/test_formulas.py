@@ -183,9 +183,10 @@ def test_direct_starts_are_those_of_the_simulation(position):
             target_speed=target, start_position=where,
         )  # fmt: skip
         run = simulate(drive, "direct")
-        start = DirectStarts(
-            J1=J1, J2=J2, c=c, gap=gap, Ms=Ms, Mc=Mc, target_speed=target, theta0=drive.theta0
-        )
+        given = {"J1": J1, "J2": J2, "c": c, "gap": gap, "Ms": Ms, "Mc": Mc, "target_speed": target}
+        start = DirectStarts(**given, theta0=drive.theta0)
+        # what one rounding of the twist changes, of which a shaft wound up by far less than its gap has little
+        rounded = DirectStarts(**given, theta0=np.nextafter(drive.theta0, math.inf))
         assert start.start_time == pytest.approx(run.start_time, rel=1e-11)
         if run.end_time > start.first_contact + start.contact_duration / 2:  # always with Mc >= 0
             assert start.k_dyn == pytest.approx(run.k_dyn, rel=1e-11)
@@ -193,8 +194,9 @@ def test_direct_starts_are_those_of_the_simulation(position):
             assert Mc < 0.0
         t = np.linspace(0.0, run.end_time, 50)
         state = run.at(t)
-        for name, values in start.at(t).items():
-            assert values == pytest.approx(state[name], abs=1e-11 * np.abs(state[name]).max())
+        for (name, values), other in zip(start.at(t).items(), rounded.at(t).values(), strict=True):
+            least = 2.0 * np.abs(values - other).max()
+            assert values == pytest.approx(state[name], abs=max(1e-11 * np.abs(state[name]).max(), least))
         if gap and position != "driving-flank":  # whose grazes the plant may count
             closed = sum(event.kind in {"gap closed", "gap opened"} for event in run.events)
             assert start.gap_events(run.end_time) == closed

@@ -395,10 +395,12 @@ class Run:
 
     @property
     def stage_durations(self) -> tuple[float, float]:
-        """Lengths of stages 1 and 2, s; NaN for a stage that does not end within the run or is not there."""
+        """Lengths of stages 1 and 2, s: 0 for stage 1 of a start in contact; NaN where one does not end."""
         by_number = {stage.number: stage for stage in self.stages}
         last = self.stages[-1].number if self.stages else 0
         first, second = (by_number[n].duration if n in by_number and n != last else math.nan for n in (1, 2))
+        if self.stages and self.stages[0].number == 2:
+            first = 0.0
         return first, second
 
     def _kind(self, event: Any) -> str:

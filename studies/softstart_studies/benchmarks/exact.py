@@ -28,7 +28,7 @@ class Kernel:
         """All arguments of the kernel; those after the results are its scratch."""
         drive, count = crane(gaps), len(gaps)
         controller = cast(CompiledController, controller_of(self.problem.strategy, drive))
-        own = np.ascontiguousarray(controller.vector(drive), dtype=np.float64)
+        own = np.atleast_2d(np.ascontiguousarray(controller.vector(drive), dtype=np.float64))
         size, rows = controller.state_size, rows_of(drive)
         return (
             type(controller).kernel, own, int(controller.sensors), bool(controller.sensors & Sensor.STAGE),

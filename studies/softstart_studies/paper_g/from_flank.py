@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from softstart import Drive, Run, simulate
+from softstart import Drive, Run, TorqueProfile, simulate
 from softstart.controller import Controller, make_controller
 from softstart.study import Claim, Table, Verdict
 from softstart_studies.paper_g.crane import (
@@ -37,6 +37,17 @@ def start(where: str, r: float, method: int, gap: float = GAP_1, inertias: int =
     """
     drive = crane(inertias, gap).replace(start_position=where)
     return simulated(drive, r, 1 if method == 1 else 2, base=CRANE)
+
+
+def reduced(where: str) -> float:
+    """K_dyn of the first contact under the reduced torque: from a flank the gap does not open, and it is all.
+
+    >>> [round(reduced(where), 4) for where in POSITIONS]
+    [1.2677, 0.5339, 1.6569]
+    """
+    drive = CRANE.replace(start_position=where)
+    held = make_controller("profile", {"profile": TorqueProfile([0.0, 60.0], [SHARE * CRANE.Ms] * 2)})
+    return simulate(drive, held, base=CRANE).k_dyn_first_contact
 
 
 def k_dyn(where: str, controller: str | Controller, gap: float = GAP_1, **changes: float) -> float:
@@ -77,7 +88,7 @@ def ratio(a: float, b: float) -> float:
 # number and words of the conclusion, the figure and what it is
 FIGURES: Sequence[tuple[int, str, str, Figure]] = (
     (1, "method 1 damps, never below 2", "method 1, r = 0.25: K", lambda p: start(p, SHARE, 1).k_dyn),
-    (2, "method 2 can go below 2", "first contact: K", lambda p: start(p, SHARE, 2).k_dyn_first_contact),
+    (2, "method 2 can go below 2", "first contact: K", reduced),
     (3, "method 2 is to be preferred", "method 2, whole start: K", lambda p: start(p, SHARE, 2).k_dyn),
     (4, "(not in [G]) raise at the peak", "whole start: K", at_peak),
     (5, "a wider gap raises K markedly", "direct, K at 2 rad over K at 0.5 rad",

@@ -45,14 +45,14 @@ def test_the_answer_replays_exactly(confirmed):
 
 def test_linear_programs_with_finer_torques_agree_within_a_thousandth(confirmed):
     """The collocation began at straight lines and has twice the torques of the programs, and more of them in
-    short phases: that is what lies between both answers."""
+    short phases: that is what lies between both answers. Each grid begins with the answer of the coarser one."""
     chain = three_masses()
     first = optimize(chain, START_TIME, time_limit=0.0).profile
-    answers = []
+    times, torques, answers = first.time, first.torque, []
     for finer in (2, 4):
         search = Search(ChainProblem(chain, START_TIME), Player(chain), finer=finer)
-        found = search.descended(np.interp(search.knots, first.time, first.torque), least=1e-5)
-        found = search.finished(found)
+        found = search.finished(search.descended(np.interp(search.knots, times, torques), least=1e-5))
+        times, torques = search.knots, found.torques
         assert found.miss.max() <= 1e-6
         answers.append(found.played.peak / search.problem.base_torque)
     assert confirmed.tried[-1].value == pytest.approx(answers[0], rel=5e-3)
