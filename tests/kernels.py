@@ -14,6 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
+from softstart.kernel.jit import compile_now
+
 Parts = dict[str, tuple[tuple[str, ...], Callable[[], None]]]
 
 PATIENCE = 900.0  # s that a worker waits for another one which compiles
@@ -22,22 +24,22 @@ PATIENCE = 900.0  # s that a worker waits for another one which compiles
 def steps() -> None:
     """The steps of all controllers."""
     for one in iter_modules(import_module("softstart_controllers").__path__, "softstart_controllers."):
-        import_module(one.name)
+        compile_now(import_module(one.name))
 
 
 def start() -> None:
     """The loop of starts."""
-    import_module("softstart.kernel.start")
+    compile_now(import_module("softstart.kernel.start"))
 
 
 def replay() -> None:
     """What is read back of a recorded start."""
-    import_module("softstart.kernel.replay")
+    compile_now(import_module("softstart.kernel.replay"))
 
 
 def sensitivity() -> None:
     """How a start answers to its demand."""
-    import_module("softstart.kernel.sensitivity")
+    compile_now(import_module("softstart.kernel.sensitivity"))
 
 
 def controllers() -> None:

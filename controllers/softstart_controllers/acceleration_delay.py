@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
 from softstart_controllers.reduced import (
     RAISE_AT,
@@ -71,10 +71,10 @@ COMMAND = record(Answer, State, ring=RING)
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The angle lost against a free motor, its second difference, and the wait after contact."""
-    p = parameters.view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
     keep_state(state, command)
     t, u = m.time, m.motor_torque
     sample = int(x.sample)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softstart.controller.compiled import compiled
+from softstart.controller.compiled import compiled, inner
 from softstart_controllers.shaft_filter import Free, N, Shaft, move
 
 HALVINGS = 40
@@ -94,7 +94,7 @@ def time_since_contact(
     return high
 
 
-@compiled
+@inner
 def since_contact(
     angle: float, s: float, speed: float, w2: float, b: float, drift: float, u: float, a: float, c: float,
     d: float, Mc: float, reactive: float,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, record, size
+from softstart.controller.compiled import MEASURED, Answer, Vector, keep_state, named, record, size
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
 from softstart_controllers.landing import horizon, over_dead_time, pole, shaft_torque_under
@@ -89,10 +89,10 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Estimate T and T', tell whether the gap is closed, set the torque."""
-    p = parameters.view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
     keep_state(state, command)
     t, u, h = m.time, m.motor_torque, p.period
     phase = x.phase

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import Answer, Vector, record
+from softstart.controller.compiled import Answer, Vector, named, record
 from softstart.drive import Drive
 
 
@@ -23,8 +23,8 @@ PARAMETERS, COMMAND = record(Parameters), record(Answer)
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """One torque, once and for all."""
-    y = command.view(COMMAND)[0]
-    y.torque = parameters.view(PARAMETERS)[0].torque
+    y = named(command, COMMAND)
+    y.torque = named(parameters, PARAMETERS).torque
     y.ask_again = math.inf
 
 

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from softstart.controller.compiled import Vector, compiled, record
+from softstart.controller.compiled import Vector, compiled, inner, record
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
 from softstart_controllers.acceleration_delay import RING, window
@@ -91,7 +91,7 @@ class State:
 PARAMETERS, STATE = record(Parameters), record(State, ring=RING)
 
 
-@compiled
+@inner
 def watch(p: Parameters, m: Any, x: State, y: State) -> tuple[float, float]:
     """Motor speed, and how far the second difference is beyond the trigger (-inf between two looks).
 
@@ -129,13 +129,13 @@ def watch(p: Parameters, m: Any, x: State, y: State) -> tuple[float, float]:
     return y.free_speed - y.slope, beyond
 
 
-@compiled
+@inner
 def drift(p: Parameters, x: State) -> float:
     """By how much the load slows down while the gap is open, rad/s^2."""
     return p.drift if x.contacts == 0.0 else p.pull
 
 
-@compiled
+@inner
 def load_speed(p: Parameters, x: State, t: float) -> float:
     """Speed of the load while the gap is open; a reactive load comes to rest."""
     began = p.load_speed if x.contacts == 0.0 else x.load_speed
@@ -145,13 +145,13 @@ def load_speed(p: Parameters, x: State, t: float) -> float:
     return speed
 
 
-@compiled
+@inner
 def sticks(p: Parameters, x: State) -> float:
     """1 where the load is at rest before contact and does not move until T > Mc."""
     return p.sticks if x.contacts == 0.0 else 0.0
 
 
-@compiled
+@inner
 def approach(p: Parameters, x: State, t: float, speed: float) -> float:
     """The torque that closes the gap, within 0 and the low torque."""
     if x.contacts == 0.0:
@@ -162,7 +162,7 @@ def approach(p: Parameters, x: State, t: float, speed: float) -> float:
     return min(max(p.J1 * (allowed - speed) / p.horizon, 0.0), p.low)
 
 
-@compiled
+@inner
 def open_again(t: float, motor_speed: float, load_speed_now: float, x: State, y: State) -> None:
     """The flanks have parted: watch anew, from the speeds of motor and load."""
     y.count = 0.0
@@ -172,19 +172,19 @@ def open_again(t: float, motor_speed: float, load_speed_now: float, x: State, y:
     y.left_at = t
 
 
-@compiled
+@inner
 def mean_twist(p: Parameters, u: float) -> float:
     """Twist about which the closed drive swings under the motor torque u, in rad."""
     return (u / p.J1 + p.pull) / (p.sigma * p.sigma + p.omega * p.omega)
 
 
-@compiled
+@inner
 def motor_torque(p: Parameters, twist: float) -> float:
     """The motor torque that keeps a twist: the inverse of `mean_twist`."""
     return p.J1 * (twist * (p.sigma * p.sigma + p.omega * p.omega) - p.pull)
 
 
-@compiled
+@inner
 def move(
     p: Parameters, z: float, v: float, stuck: float, u: float, s: float
 ) -> tuple[float, float, float, float, float]:
@@ -217,14 +217,14 @@ def move(
     return end_z, end_v, 0.0, moving, gained + moving * u / p.J1 - impulse
 
 
-@compiled
+@inner
 def over_dead_time(u: float, demand: float, lag: float, dead: float) -> tuple[float, float]:
     """Mean motor torque of the dead time, in which the last demand goes on acting, and that at its end."""
     left = math.exp(-dead / lag) if lag > 0.0 else 0.0
     return demand + (u - demand) * (1.0 - left) * lag / dead, demand + (u - demand) * left
 
 
-@compiled
+@inner
 def lost_angle(p: Parameters, s: float, u: float, v: float, stuck: float) -> float:
     """Angle lost to the shaft s after contact, in rad."""
     if s <= 0.0:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, compiled, record, size
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, compiled, named, record, size
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.profile import TorqueProfile
@@ -66,10 +66,10 @@ def play(numbers: Vector, begin: int, room: int, count: int, origin: float, knot
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """The line that holds now, of the first profile or of the second."""
-    p = parameters[:N_PARAMETERS].view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
+    p = named(parameters[:N_PARAMETERS], PARAMETERS)
+    m = named(measured, MEASURED)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
     t = m.time
     count_after = int(p.knots_after)
     room = int(p.room)

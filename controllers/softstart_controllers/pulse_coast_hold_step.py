@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from softstart.controller import compiled_step
-from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, record
+from softstart.controller.compiled import MEASURED, Answer, Vector, inner, keep_state, named, record
 from softstart_controllers.contact import (
     TIME_DEVIATION,
     lean,
@@ -109,7 +109,7 @@ PARTS |= dict.fromkeys(("angles", "means", "leans", "doubts"), RING)
 PARAMETERS, STATE, COMMAND = record(Parameters), record(State, **PARTS), record(Answer, State, **PARTS)
 
 
-@compiled
+@inner
 def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
     """The filter of the free motor goes on a sample, p.samples behind; from there to now by the torque."""
     h = p.period
@@ -131,7 +131,7 @@ def free_motion(p: Parameters, m: State, angle: float, mean: float, early: float
     free_after(p, m, kept + 1)
 
 
-@compiled
+@inner
 def free_after(p: Parameters, m: State, samples: int) -> None:
     """The free motor so many samples after the filter."""
     copy(m.free, m.now)
@@ -140,7 +140,7 @@ def free_after(p: Parameters, m: State, samples: int) -> None:
         free_predict(m.now, m.means[i], m.leans[i], p.period, noise)
 
 
-@compiled
+@inner
 def surely(p: Parameters, m: State) -> float:
     """Angle in rad by which the encoder must differ from the free motor to mean a contact."""
     by_inertia = m.now.p02 * m.now.p02 / m.now.p22 if m.now.p22 > 0.0 else 0.0
@@ -148,7 +148,7 @@ def surely(p: Parameters, m: State) -> float:
     return p.certainty * math.sqrt(rest) + J1_CERTAINTY * math.sqrt(by_inertia)
 
 
-@compiled
+@inner
 def drift_since(p: Parameters, m: State, t: float) -> float:
     """Impulse in N m s by which the load torque has slowed a load that it can move: w2 falls by it/J2."""
     if p.reactive == 0.0:
@@ -158,7 +158,7 @@ def drift_since(p: Parameters, m: State, t: float) -> float:
     return 0.0
 
 
-@compiled
+@inner
 def follow(p: Parameters, m: State, angle: float, mean: float, early: float, doubt: float) -> None:
     """The filter of the shaft goes on a sample."""
     h, a = p.period, m.free.inverse
@@ -182,7 +182,7 @@ def follow(p: Parameters, m: State, angle: float, mean: float, early: float, dou
     shaft_update(m.shaft, angle, p.rounding, p.b_least, p.b_most)
 
 
-@compiled
+@inner
 def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> None:
     """Tell when the gap closed, begin the filter of the shaft then, and let it see the samples since."""
     h = p.period
@@ -217,7 +217,7 @@ def contact(p: Parameters, m: State, t: float, behind: float, pulsing: bool) -> 
     m.level = 0.0
 
 
-@compiled
+@inner
 def opened(p: Parameters, m: State, t: float, u: float) -> None:
     """The gap is open again: as at the start, with what is known of motor and load by now."""
     P = m.shaft.P
@@ -235,13 +235,13 @@ def opened(p: Parameters, m: State, t: float, u: float) -> None:
     free_after(p, m, 0)
 
 
-@compiled
+@inner
 def full_load(p: Parameters, ratio: float) -> float:
     """Mean shaft torque in N m under Ms, [G](16), for J1/J2 = ratio."""
     return (p.Ms + p.Mc * ratio) / (1.0 + ratio)
 
 
-@compiled
+@inner
 def gentle_speed(p: Parameters, a: float, b: float) -> float:
     """Relative speed in rad/s: the coast speed, or less where the drive, coasting in contact with it, would
     swing to more than the share of the full load that may be held.
@@ -255,7 +255,7 @@ def gentle_speed(p: Parameters, a: float, b: float) -> float:
     return min(p.coast, max(math.sqrt(max(v, 0.0)), SOFTEST * p.coast))
 
 
-@compiled
+@inner
 def held_back(p: Parameters, m: State, u: float) -> float:
     """Impulse in N m s that is still to come when the demand goes to 0.
 
@@ -265,7 +265,7 @@ def held_back(p: Parameters, m: State, u: float) -> float:
     return m.held_back if p.slew == 0.0 else u * (p.delay + u * p.slew)
 
 
-@compiled
+@inner
 def pulse(p: Parameters, m: State, b: float, u: float) -> float:
     """Torque in N m of the next sample: what the motor needs to its speed, less what is still to come."""
     a = m.free.inverse
@@ -274,7 +274,7 @@ def pulse(p: Parameters, m: State, b: float, u: float) -> float:
     return min(max(missing / p.period, 0.0), p.Ms)
 
 
-@compiled
+@inner
 def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
     """Torque in N m of the next sample in contact, from the state that the shaft will have when it acts."""
     h, c, d, Mc, Ms, reactive = p.period, p.c, p.d, p.Mc, p.Ms, p.reactive
@@ -312,9 +312,9 @@ def hold(p: Parameters, m: State, u: float, catching: bool) -> float:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Pulse, coast, hold: see `PulseCoastHold`."""
-    p = parameters.view(PARAMETERS)[0]
-    m = command.view(COMMAND)[0]
-    seen = measured.view(MEASURED)[0]
+    p = named(parameters, PARAMETERS)
+    m = named(command, COMMAND)
+    seen = named(measured, MEASURED)
     keep_state(state, command)
     h, t, u, angle = p.period, seen.time, seen.motor_torque, seen.motor_angle
     sample = m.sample

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, record
+from softstart.controller.compiled import MEASURED, Answer, Vector, named, record
 from softstart.drive import Drive
 from softstart_controllers.sampled import PERIOD_DEFAULT, check, pulling_load, sample_period
 
@@ -33,10 +33,10 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """A straight line over time, sampled."""
-    p = parameters.view(PARAMETERS)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
-    t = measured.view(MEASURED)[0].time
+    p = named(parameters, PARAMETERS)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
+    t = named(measured, MEASURED).time
     y.sample = x.sample + 1.0
     if t < p.time:
         y.torque = p.initial + (p.full - p.initial) * (t / p.time)

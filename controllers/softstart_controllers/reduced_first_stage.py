@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
 from softstart.drive import Drive
 from softstart_controllers.reduced import reduced_torque
 
@@ -25,9 +25,9 @@ PARAMETERS, COMMAND = record(Parameters), record(Answer)
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced in stage 1; the stage number changes at the instant of contact."""
-    p = parameters.view(PARAMETERS)[0]
-    y = command.view(COMMAND)[0]
-    waiting = measured.view(MEASURED)[0].stage < 2.0
+    p = named(parameters, PARAMETERS)
+    y = named(command, COMMAND)
+    waiting = named(measured, MEASURED).stage < 2.0
     y.torque = p.reduced if waiting else p.full
     y.ask_again = math.inf if waiting else NEVER
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Sensor, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, record
+from softstart.controller.compiled import MEASURED, NEVER, Answer, Vector, named, record
 from softstart.drive import Drive
 from softstart_controllers.reduced import RAISE_AT, delay_of, raise_parameter, reduced_torque
 from softstart_controllers.sampled import check
@@ -33,10 +33,10 @@ PARAMETERS, STATE, COMMAND = record(Parameters), record(State), record(Answer, S
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Reduced until the gap opens again, or the deadline has passed."""
-    p = parameters.view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    y = command.view(COMMAND)[0]
-    y.deadline = state.view(STATE)[0].deadline
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    y = named(command, COMMAND)
+    y.deadline = named(state, STATE).deadline
     if m.stage >= 2.0 and y.deadline == 0.0:
         y.deadline = m.time + p.patience
     waiting = m.stage < 2.0 or (m.stage < 3.0 and m.time < y.deadline)

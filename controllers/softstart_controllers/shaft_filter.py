@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softstart.controller.compiled import compiled
+from softstart.controller.compiled import compiled, inner
 from softstart.kernel.records import record
 
 Matrix = NDArray[np.float64]
@@ -237,7 +237,7 @@ def shaft_update(x: Shaft, angle: float, variance: float, least: float, most: fl
     x.b = min(max(x.b, least), most)
 
 
-@compiled
+@inner
 def copy(m: Free, to: Free) -> None:
     """The filter of the free motor once more."""
     to.angle = m.angle

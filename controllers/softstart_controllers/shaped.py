@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, record, size
+from softstart.controller.compiled import (
+    MEASURED,
+    Answer,
+    Vector,
+    compiled,
+    inner,
+    keep_state,
+    named,
+    record,
+    size,
+)
 from softstart.drive import Drive
 from softstart_controllers import landing
 from softstart_controllers.landing import (
@@ -62,19 +72,19 @@ STATE = record(State, landing=landing.STATE, levels=4)
 COMMAND = record(Answer, State, landing=landing.STATE, levels=4)
 
 
-@compiled
+@inner
 def mean_level(p: landing.Parameters, u: float) -> float:
     """M = (u J2 + Mc J1)/(J1 + J2) in N m."""
     return p.c * mean_twist(p, u)
 
 
-@compiled
+@inner
 def torque_of(p: landing.Parameters, level: float) -> float:
     """The motor torque of a mean shaft torque, not below zero."""
     return max(0.0, motor_torque(p, level / p.c))
 
 
-@compiled
+@inner
 def follow(
     p: landing.Parameters, lag: float, z: float, v: float, stuck: float, u: float, demand: float, s: float,
     contact: bool, y: State,
@@ -105,7 +115,7 @@ def follow(
     y.D_imag = D.imag
 
 
-@compiled
+@inner
 def at_rest(p: landing.Parameters, u: float, stuck: float, y: State) -> None:
     """The shaft at rest under the motor torque u."""
     y.stuck = 1.0 if stuck != 0.0 and u <= p.Mc else 0.0
@@ -141,10 +151,10 @@ def prepare(p: Parameters, u: float, demand: float, y: State) -> int:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Close the gap, follow the swing by the model, plan the steps once, play them."""
-    p = parameters.view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
     keep_state(state, command)
     near, before, now = p.landing, x.landing, y.landing
     t, u = m.time, m.motor_torque

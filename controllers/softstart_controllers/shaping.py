@@ -50,7 +50,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from softstart.controller.compiled import compiled
+from softstart.controller.compiled import compiled, inner
 
 ZV, ZVD = 2, 4  # number of levels before the last one
 ROUNDING = 1e-9  # of the last level, by which levels may fall
@@ -97,7 +97,7 @@ def sensitivity(
     return inertia * v * (1.0 + 2.0 * pole * lag) + lag * (realised - torque)
 
 
-@compiled
+@inner
 def later(D: complex, W: complex, level: float, sigma: float, omega: float, s: float) -> complex:
     """D after the time s under the demand `level`; W is that of the beginning."""
     return cmath.exp(complex(sigma, omega) * s) * (D + s * (W + level))
@@ -126,7 +126,7 @@ def levels(order: int, W: complex, D: complex, last: float, sigma: float, omega:
     return A0 + B0 * m0, A1 - B0 * m1 + B1 * m0, B0 - B1 * m1, B1
 
 
-@compiled
+@inner
 def extremes(
     order: int, T: float, rate: float, M: Levels, sigma: float, omega: float, a: float
 ) -> tuple[float, float]:

@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from softstart.controller import CompiledController, Effort, compiled_step, parameter, stack
-from softstart.controller.compiled import MEASURED, Answer, Vector, compiled, keep_state, record, size
+from softstart.controller.compiled import (
+    MEASURED,
+    Answer,
+    Vector,
+    compiled,
+    inner,
+    keep_state,
+    named,
+    record,
+    size,
+)
 from softstart.drive import Drive
 from softstart.start.metrics import base_torque
 from softstart_controllers import landing
@@ -86,7 +96,7 @@ STATE = record(State, landing=landing.STATE)
 COMMAND = record(Answer, State, landing=landing.STATE)
 
 
-@compiled
+@inner
 def twist_under(p: Parameters, u: float, load: float) -> float:
     """Twist about which the closed drive swings, in rad, under the motor torque u and this load torque."""
     sigma, omega = p.landing.sigma, p.landing.omega
@@ -136,10 +146,10 @@ def feedback(p: Parameters, u: float, before: float, y: State) -> float:
 @compiled_step
 def step(parameters: Vector, measured: Vector, state: Vector, command: Vector) -> None:
     """Close the gap; from contact on estimate the state and feed it back."""
-    p = parameters.view(PARAMETERS)[0]
-    m = measured.view(MEASURED)[0]
-    x = state.view(STATE)[0]
-    y = command.view(COMMAND)[0]
+    p = named(parameters, PARAMETERS)
+    m = named(measured, MEASURED)
+    x = named(state, STATE)
+    y = named(command, COMMAND)
     keep_state(state, command)
     near, before, now = p.landing, x.landing, y.landing
     t, u = m.time, m.motor_torque

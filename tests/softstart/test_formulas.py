@@ -185,7 +185,7 @@ def test_direct_starts_are_those_of_the_simulation(position):
         run = simulate(drive, "direct")
         given = {"J1": J1, "J2": J2, "c": c, "gap": gap, "Ms": Ms, "Mc": Mc, "target_speed": target}
         start = DirectStarts(**given, theta0=drive.theta0)
-        # what one rounding of the twist changes, of which a shaft wound up by far less than its gap has little
+        # what one rounding of the twist changes: a shaft wound up by far less than its gap has few digits
         rounded = DirectStarts(**given, theta0=np.nextafter(drive.theta0, math.inf))
         assert start.start_time == pytest.approx(run.start_time, rel=1e-11)
         if run.end_time > start.first_contact + start.contact_duration / 2:  # always with Mc >= 0

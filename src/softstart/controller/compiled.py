@@ -9,8 +9,9 @@ from typing import Any
 from softstart.arrays import Vector
 from softstart.controller.base import NEVER
 from softstart.kernel import jit, motor, records
-from softstart.kernel.jit import OPTIONS, compiled_as, drop_stale
+from softstart.kernel.jit import OPTIONS, compiled_as, drop_stale, named
 from softstart.kernel.jit import unfused as compiled
+from softstart.kernel.jit import unfused_inner as inner
 from softstart.kernel.motor import STEP_SIGNATURE
 from softstart.kernel.records import MEASURED, Answer, record, size
 
@@ -47,13 +48,15 @@ __all__ = [
     "Vector",
     "compiled",
     "compiled_step",
+    "inner",
     "keep_state",
+    "named",
     "record",
     "size",
 ]
 
 
-@compiled
+@inner
 def keep_state(state: Vector, command: Vector) -> None:
     """The new state is the old one, until the step changes it."""
     for i in range(state.shape[0]):

@@ -13,7 +13,7 @@ import math
 from numba import types
 
 from softstart.arrays import Vector
-from softstart.kernel.jit import apart, compiled
+from softstart.kernel.jit import apart, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CONTACT, DEAD_ZONE, DOUBLED, EXIT, JOINED, LET_GO, LOWER,
     MODELICA, NO_EVENT, OPEN, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN, RELEASE, SETTLE, STOP,
@@ -30,7 +30,7 @@ CLEARLY = 1e4  # what is above so many times its rounding is not zero
 FAINT = 1e-10  # a leading coefficient below this share of what follows is taken for rounding
 
 
-@compiled
+@inner
 def value(f: Vector, n: int, x: float) -> float:
     """The polynomial f_0 + ... + f_n x^n."""
     square = x * x  # even and odd powers apart: each step waits for the one before it
@@ -44,7 +44,7 @@ def value(f: Vector, n: int, x: float) -> float:
     return even * square + f[0] + odd * x
 
 
-@compiled
+@inner
 def safe_step(y: float, dy: float, bend: float, third: float, room: float) -> float:
     """A step d <= room up to which y + dy x + bend x^2/2 - third x^3/6 is certainly above zero."""
     reach = room
@@ -159,7 +159,7 @@ ELASTIC, FLAT = 0.999, 1e-12
 REJOINED = 3
 
 
-@compiled
+@inner
 def swing(f: Vector, n: int) -> float:
     """How far a polynomial is from its beginning at most."""
     total = 0.0
@@ -168,7 +168,7 @@ def swing(f: Vector, n: int) -> float:
     return total * (1.0 + 1e-12)
 
 
-@compiled
+@inner
 def set_line(f: Vector, series: Vector, n: int, constant: float, factor: float) -> None:
     """F = constant + factor * series."""
     for o in range(n + 1):
@@ -176,19 +176,19 @@ def set_line(f: Vector, series: Vector, n: int, constant: float, factor: float) 
     f[0] += constant
 
 
-@compiled
+@inner
 def rounding_of_torque(s: Record, k: int) -> float:
     """Rounding errors of c times the overlap."""
     return ROUNDING * s.c[k] * (abs(s.theta[k]) + s.half[k])
 
 
-@compiled
+@inner
 def influence(s: Record, i: int) -> float:
     """The torques on the body of mass i over its inertia."""
     return s.scale[s.first[i]] / s.body_J[s.first[i]]
 
 
-@compiled
+@inner
 def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The flank of an open gap that is reached first, or the end of impacts that pile up on one."""
     half, theta = s.half[k], s.theta[k]
@@ -219,7 +219,7 @@ def flanks(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]
     return event, end
 
 
-@compiled
+@inner
 def set_damping_excess(s: Record, k: int, n: int, sign: float) -> None:
     """F = sign (c z - d z') of a contact, which says where `modelica` caps the damping."""
     for o in range(n + 1):
@@ -227,7 +227,7 @@ def set_damping_excess(s: Record, k: int, n: int, sign: float) -> None:
     s.f[0] -= sign * s.c[k] * s.slack[k]
 
 
-@compiled
+@inner
 def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     """The instant at which flanks in contact part, or at which the damping regime changes."""
     side = s.side[k]
@@ -262,7 +262,7 @@ def parting(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     return (EXIT, x) if x >= 0.0 else (event, end)
 
 
-@compiled
+@inner
 def returning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     """From overlapping flanks without torque: the torque comes back, or they part."""
     side = s.side[k]
@@ -283,7 +283,7 @@ def returning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     return (BACK, x) if x >= 0.0 else (event, end)
 
 
-@compiled
+@inner
 def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     """Rigid flanks part when they would have to pull."""
     if swing(s.torque[k], n) < s.side[k] * s.torque[k, 0]:
@@ -296,7 +296,7 @@ def releasing(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     return (RELEASE, x) if x >= 0.0 else (NO_EVENT, end)
 
 
-@compiled
+@inner
 def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
     """The instant at which the torque of a shaft that may pull changes its sign."""
     pulls = s.mode[k] == CONTACT and s.law[k] == DEAD_ZONE and s.d[k] > 0.0
@@ -314,7 +314,7 @@ def turning(s: Record, k: int, n: int, end: float) -> tuple[int, float]:
 # friction, brake, the target speed, and the first of all --------------------------------------------
 
 
-@compiled
+@inner
 def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """Breakaway or stop of the body that begins with mass i, or that its torque lets the brake go."""
     noise = ROUNDING * (s.scale[i] + s.hold[i])
@@ -357,7 +357,7 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     return (STOP, x) if x >= 0.0 else (event, end)
 
 
-@compiled
+@inner
 def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The next point of its load curve that mass i passes: the torque is continuous there, its slope not."""
     angular = s.by_angle[i] != 0.0
@@ -383,7 +383,7 @@ def next_point(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, fl
     return event, end
 
 
-@compiled
+@inner
 def event_of_shaft(s: Record, k: int, h: float, n: int, end: float) -> tuple[int, float]:
     """The next event of shaft k by its mode."""
     mode = s.mode[k]
@@ -443,7 +443,7 @@ def next_event(s: Record, h: float, n: int) -> int:
 SAME = 1e-12  # peaks that differ by less are equal but for rounding
 
 
-@compiled
+@inner
 def keep_peak(s: Record, k: int, torque: float, time: float) -> None:
     """Note a candidate for the largest |T|; of those equal but for rounding the first has the time."""
     largest = abs(s.peak[k])

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 
 from softstart.kernel.events import GRAZE, REJOINED
-from softstart.kernel.jit import apart, compiled
+from softstart.kernel.jit import apart, inner
 from softstart.kernel.records import (
     BACK, BEYOND, BREAK_BACK, BREAK_FORWARD, CLOSED, CONTACT, DEAD_ZONE, DOUBLED, EXIT, IMPACT, JOINED,
     LET_GO, LOWER, MODELICA, MOST_NOTED, OPEN, OPENED, POINT_ABOVE, POINT_BELOW, PRESSED, REACHED, REJOIN,
@@ -25,7 +25,7 @@ SLOW = 1e-10
 COLLAPSE = 100
 
 
-@compiled
+@inner
 def note(s: Record, time: float, kind: int, place: int, value: float, impulse: float) -> None:
     """One event, to be recorded before the next span."""
     s.events += 1.0
@@ -38,7 +38,7 @@ def note(s: Record, time: float, kind: int, place: int, value: float, impulse: f
         s.noted += 1
 
 
-@compiled
+@inner
 def turn_mass(s: Record, i: int, direction: float) -> None:
     """Friction holds mass i from now on (0), or lets it go in a direction."""
     if direction == 0.0:
@@ -48,7 +48,7 @@ def turn_mass(s: Record, i: int, direction: float) -> None:
     s.direction[i] = direction
 
 
-@compiled
+@inner
 def path_closed(s: Record, but: int) -> bool:
     """Whether no gap between motor and load is open, but for that of one shaft."""
     for k in range(s.path, s.path_end):
@@ -57,7 +57,7 @@ def path_closed(s: Record, but: int) -> bool:
     return True
 
 
-@compiled
+@inner
 def engage(s: Record, k: int, side: float) -> None:
     """The spring begins to act, in its damping regime."""
     s.side[k] = side
@@ -70,7 +70,7 @@ def engage(s: Record, k: int, side: float) -> None:
     s.sign[k] = -side if pulls else side
 
 
-@compiled
+@inner
 def begin_modes(s: Record) -> None:
     """The modes at t = 0."""
     for i in range(s.n):
@@ -105,7 +105,7 @@ def begin_modes(s: Record) -> None:
                 engage(s, k, math.copysign(1.0, theta))
 
 
-@compiled
+@inner
 def goes_with(s: Record, k: int, side: float, kind: int) -> bool:
     """Whether joint k takes the mass behind it along when a flank `side` beside it is struck.
 
@@ -116,7 +116,7 @@ def goes_with(s: Record, k: int, side: float, kind: int) -> bool:
     return s.mode[k] == WELDED
 
 
-@compiled
+@inner
 def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> None:
     """The rigid flanks of shaft k meet: new speeds by momentum and restitution, noted as an event `kind`.
 
@@ -174,14 +174,14 @@ def strike(s: Record, k: int, restitution: float, kind: int, time: float) -> Non
             note(s, s.time, OPENED, j, s.side[j], 0.0)
 
 
-@compiled
+@inner
 def settle(s: Record, k: int, rest: float) -> None:
     """Rigid flanks lie on each other from now on; `rest` is how much longer the last impacts take."""
     strike(s, k, 0.0, SETTLED, s.time + rest)
     s.mode[k] = PRESSED
 
 
-@compiled
+@inner
 def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
     """A flank is reached; `press` is the relative acceleration towards it."""
     v = side * (s.w[k] - s.w[k + 1])
@@ -207,7 +207,7 @@ def meet(s: Record, k: int, side: float, press: float, h: float) -> None:
         engage(s, k, side)
 
 
-@compiled
+@inner
 def part(s: Record, k: int) -> None:
     """The flanks of shaft k cease to act."""
     note(s, s.time, OPENED, k, s.side[k], 0.0)
@@ -219,7 +219,7 @@ def part(s: Record, k: int) -> None:
         s.theta[k] = s.side[k] * s.half[k]
 
 
-@compiled
+@inner
 def turn(s: Record, i: int, direction: float) -> None:
     """The body that begins with mass i is held by friction from now on (0), or moves in a direction."""
     for j in range(i, s.n):
@@ -231,7 +231,7 @@ def turn(s: Record, i: int, direction: float) -> None:
             s.w[j] = 0.0
 
 
-@compiled
+@inner
 def release(s: Record) -> None:
     """The brake lets the motor go; its friction may still hold it."""
     s.braked = 0.0
@@ -240,7 +240,7 @@ def release(s: Record) -> None:
     note(s, s.time, RELEASED, s.at_motor, s.u, 0.0)
 
 
-@compiled
+@inner
 def note_stage(s: Record, bounced: bool) -> None:
     """The path from motor to load has closed or opened, or both at once (`bounced`)."""
     if s.stage == 2.0 or (s.stage == 1.0 and bounced):
@@ -254,7 +254,7 @@ def note_stage(s: Record, bounced: bool) -> None:
         s.contacts += 1.0
 
 
-@compiled
+@inner
 def change(s: Record, event: int, k: int, rest: float) -> None:
     """Change of mode of shaft k, whose flanks are in contact or overlap."""
     if event == SETTLE:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from softstart.kernel.jit import compiled
+from softstart.kernel.jit import compiled, inner
 from softstart.kernel.records import (
     ASK, BAD_COMMAND, MEASURED, MOST_PENDING, QUEUE_FULL, Record, size,
 )  # fmt: skip
@@ -37,7 +37,7 @@ _30, _27, _31, _11, _2 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(
 _UNIT = 2.0**-53
 
 
-@compiled
+@inner
 def _mixed(z: np.uint64) -> np.uint64:
     z = (z ^ (z >> _30)) * _FIRST
     z = (z ^ (z >> _27)) * _SECOND
@@ -77,7 +77,7 @@ def encoder_count(lines: Any) -> Any:
 # the demand -----------------------------------------------------------------------------------------
 
 
-@compiled
+@inner
 def take_demand(s: Record, demand: float, slope: float) -> None:
     """From now on the demand is this line."""
     if s.demand_slope != 0.0 and s.ref == s.demand:
@@ -88,7 +88,7 @@ def take_demand(s: Record, demand: float, slope: float) -> None:
     s.demand_slope = slope
 
 
-@compiled
+@inner
 def next_in_queue(s: Record) -> None:
     """The answer that has waited longest takes effect."""
     take_demand(s, s.due_demand[0], s.due_slope[0])
@@ -99,7 +99,7 @@ def next_in_queue(s: Record) -> None:
         s.due_slope[i] = s.due_slope[i + 1]
 
 
-@compiled
+@inner
 def put(s: Record, at: float, demand: float, slope: float) -> bool:
     """A demand that takes effect at this instant, now or later; False if too many wait."""
     if at <= s.time:
@@ -118,7 +118,7 @@ def put(s: Record, at: float, demand: float, slope: float) -> bool:
     return True
 
 
-@compiled
+@inner
 def put_cut(s: Record, torque: float, slope: float, end: float, until: float) -> bool:
     """A demand beyond the torque limits: a line from `torque` to `end`, cut off at them; False as `put`.
 
@@ -149,7 +149,7 @@ def put_cut(s: Record, torque: float, slope: float, end: float, until: float) ->
     return room
 
 
-@compiled
+@inner
 def note_excess(s: Record) -> None:
     """Note how far and how long the last answer lay beyond the torque limits, up to now."""
     if s.over == 0.0:
@@ -167,7 +167,7 @@ def note_excess(s: Record) -> None:
     s.excess_time += length
 
 
-@compiled
+@inner
 def sample(s: Record, sees: int, measured: Record) -> None:
     """What the controller sees now: the encoder rounds, and what it has not declared is NaN.
 
@@ -196,7 +196,7 @@ def sample(s: Record, sees: int, measured: Record) -> None:
     measured.load_speed = s.w[s.at_load] if sees & SEES_LOAD_SPEED else math.nan
 
 
-@compiled
+@inner
 def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken.
 
@@ -231,7 +231,7 @@ def take_answer(s: Record, torque: float, ask_again: float, slope: float) -> int
 # the realised torque --------------------------------------------------------------------------------
 
 
-@compiled
+@inner
 def begin_torque(s: Record) -> None:
     """The course of the torque from now on: ref' = slope up to `slew_end`, u' = (ref - u)/lag.
 
@@ -259,7 +259,7 @@ def begin_torque(s: Record) -> None:
     along_line(s)
 
 
-@compiled
+@inner
 def along_line(s: Record) -> None:
     """Whether the realised torque is a line, and there the torque itself to the last digit."""
     s.follows = 1.0
@@ -271,7 +271,7 @@ def along_line(s: Record) -> None:
         s.follows = 0.0
 
 
-@compiled
+@inner
 def expand_torque(s: Record, h: float, n: int) -> None:
     """The Taylor coefficients of the motor torque."""
     u = s.torque_u
@@ -291,7 +291,7 @@ def expand_torque(s: Record, h: float, n: int) -> None:
         u[o] = term
 
 
-@compiled
+@inner
 def move_demand(s: Record, time: float) -> None:
     """Demand and slew limiter after so many seconds."""
     if s.demand_slope != 0.0:

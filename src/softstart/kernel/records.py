@@ -347,10 +347,10 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 # without torque; rigid flanks that press; a spring without a gap; a rigid joint
 OPEN, CONTACT, DOUBLED, BEYOND, PRESSED, JOINED, WELDED = range(7)
 
-# kinds of recorded events
+# kinds of recorded events; no Python integers, for each of which numba would compile what it is passed to
 (
     CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED,
-) = range(1, 9)  # fmt: skip
+) = np.arange(1, 9)  # fmt: skip
 
 # why `advance` came back
 ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)

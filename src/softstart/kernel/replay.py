@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.kernel.events import crossing, peak_within, set_line, value
-from softstart.kernel.jit import compiled, compiled_as
+from softstart.kernel.jit import compiled_as, inner, named
 from softstart.kernel.motor import along_line
 from softstart.kernel.records import (
     BEYOND, BUFFER_FULL, CONTACT, DOUBLED, ENDED, JOINED, NOT_LOCATED, OF_MASS, OF_SHAFT, OPEN, ORDERS,
@@ -28,7 +28,7 @@ _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
 
 
-@compiled
+@inner
 def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
     """The state at the start of a recorded span, and its series; returns how many coefficients."""
     span = spans[row]
@@ -69,7 +69,7 @@ def states_at(
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
 ) -> None:  # fmt: skip
     """The states at times[j] within span index[j]: load angle, motor torque, speeds, twists, torques."""
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     last = -1
     n = 0
     for j in range(times.shape[0]):
@@ -102,7 +102,7 @@ def states_of_all(  # type: ignore[no-untyped-def]
 
     Returns ENDED, or BUFFER_FULL: call again with larger buffers.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     for r in range(parameters.shape[0]):
         state[:] = 0.0
         begin_one(work, machine, masses, shafts, curves, tones, until, on_gap)
@@ -131,28 +131,34 @@ def states_of_all(  # type: ignore[no-untyped-def]
     return ENDED
 
 
-def states_of_each(*starts: Any) -> int:
+def states_of_each(step: Any, *starts: Any) -> int:
     """The arguments of `states_of_all` from the step on."""
-    reason: int = states_of_all(run_on, advance, measure, begin, states_at, *starts)
+    parts = (run_on, advance, measure, begin, states_at, step)
+    reason: int = states_of_all(*(one.dispatcher for one in parts), *starts)
     return reason
 
 
 INVERSE = 1.0 / np.arange(1.0, 2.0 * ORDERS + 2.0)  # of n at n - 1
 
 
-@compiled
-def product(f: Vector, g: Vector, n: int) -> float:
+@inner
+def product(f: Vector, g: Vector, n: int, scratch: Vector) -> float:
     """The integral of f g over [0, 1]."""
+    last = n
+    while last > 0 and f[last] == 0.0:  # a torque on a line has two coefficients
+        last -= 1
+    for i in range(last + 1):
+        scratch[i] = 0.0
+    for j in range(n + 1):
+        for i in range(last + 1):
+            scratch[i] += g[j] * INVERSE[i + j]
     total = 0.0
-    for i in range(n + 1):
-        inner = 0.0
-        for j in range(n + 1):
-            inner += g[j] * INVERSE[i + j]
-        total += f[i] * inner
+    for i in range(last + 1):
+        total += f[i] * scratch[i]
     return total
 
 
-@compiled
+@inner
 def spring_energy(s: Record) -> float:
     """What the springs that act hold, J."""
     total = 0.0
@@ -172,32 +178,32 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
     elastic energy. Flanks may part while the spring is still loaded, and meet again: that energy goes, or
     comes, and is counted with the shafts.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     rows = spans.shape[0] - 1
     restore(s, tones, spans, rows)
     stored = spring_energy(s)  # at the end
-    f, g = s.f, s.held[0]
+    f, g, scratch = s.f, s.held[0], s.held[1]
     after = stored
     elastic = stored
     for row in range(rows - 1, -1, -1):
         n = restore(s, tones, spans, row)
         h = spans[row, S_END] - spans[row, S_START]
-        into[0] += h * product(s.torque_u, s.speed[s.at_motor], n)
+        into[0] += h * product(s.torque_u, s.speed[s.at_motor], n, scratch)
         for i in range(s.n):
             speed = s.speed[i]
             turned = speed[0]
             for o in range(1, n + 1):
                 turned += speed[o] / (o + 1.0)
             if s.tones != 0.0:
-                into[1] += h * product(s.outside[i], speed, n)
+                into[1] += h * product(s.outside[i], speed, n, scratch)
             into[1] += h * s.mean[i] * turned
             into[2] += h * (s.direction[i] * s.Mc[i] + s.active[i]) * turned
             if s.points[i] > 0:
                 course = s.turned[i] if s.by_angle[i] != 0.0 else speed
-                into[2] += h * (s.offset[i] * turned + s.incline[i] * product(course, speed, n))
+                into[2] += h * (s.offset[i] * turned + s.incline[i] * product(course, speed, n, scratch))
             into[3] += h * s.direction[i] * s.friction[i] * turned
             if s.ground[i] != 0.0:
-                into[3] += h * s.ground[i] * product(speed, speed, n)
+                into[3] += h * s.ground[i] * product(speed, speed, n, scratch)
         begin = spring_energy(s)
         for k in range(s.n - 1):
             if s.mode[k] != CONTACT and s.mode[k] != DOUBLED and s.mode[k] != JOINED:
@@ -206,11 +212,11 @@ def work_of(work: Vector, tones: Matrix, spans: Matrix, into: Vector) -> None:
                 f[o] = s.torque[k, o] - s.c[k] * s.twist[k, o]
                 g[o] = s.speed[k, o] - s.speed[k + 1, o]
             f[0] += s.c[k] * s.slack[k]
-            into[4] += h * product(f, g, n)
+            into[4] += h * product(f, g, n, scratch)
             if s.before[k] != 1.0:
-                into[5] += h * (s.before[k] - 1.0) * product(s.torque[k], s.speed[k], n)
+                into[5] += h * (s.before[k] - 1.0) * product(s.torque[k], s.speed[k], n, scratch)
             if s.after[k] != 1.0:
-                into[5] += h * (1.0 - s.after[k]) * product(s.torque[k], s.speed[k + 1], n)
+                into[5] += h * (1.0 - s.after[k]) * product(s.torque[k], s.speed[k + 1], n, scratch)
             s.theta[k] = value(s.twist[k], n, 1.0)
         into[4] += spring_energy(s) - after  # of the springs that act in this span, beside the next one
         after = begin
@@ -224,7 +230,7 @@ def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int
 
     Returns ENDED, or why it cannot be told. Stages that take no time have no row.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     at = -1
     for row in range(spans.shape[0]):
         if row == 0 or spans[row, S_STAGE] != spans[row - 1, S_STAGE]:
@@ -250,7 +256,7 @@ def stage_peaks(work: Vector, tones: Matrix, spans: Matrix, into: Matrix) -> int
 @compiled_as(types.float64(_A, _M, _M, types.float64, types.float64))
 def load_settles(work: Vector, tones: Matrix, spans: Matrix, begin: float, floor: float) -> float:
     """From when on, not before `begin`, the load speed is not below `floor`; NaN if it is at the end."""
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     settled, above = begin, True
     for row in range(spans.shape[0]):
         start, end = spans[row, S_START], spans[row, S_END]
@@ -277,7 +283,7 @@ def torque_settles(
 
     The mean is what it carries while all masses speed up alike under the torques of the instant.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     J = 0.0
     for i in range(s.n):
         J += s.J[i]
@@ -324,7 +330,7 @@ def torque_settles(
     return settled if within else math.nan
 
 
-@compiled
+@inner
 def turn(kept: Vector, points: Matrix, time: float, torque: float, still: float) -> None:
     """The next value of T; kept = (number of points, direction, time and torque of what may be the next)."""
     n = int(kept[0])
@@ -359,7 +365,7 @@ def turning_points(
     are roots of T'; T may jump between spans. Reversals by no more than `still` are passed over: they are
     rounding. `kept` (four zeros) is scratch.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     f = s.f
     for row in range(spans.shape[0]):
         n = restore(s, tones, spans, row)

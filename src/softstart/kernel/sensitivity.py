@@ -26,7 +26,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.kernel.jit import compiled, compiled_as
+from softstart.kernel.jit import compiled_as, inner, named
 from softstart.kernel.records import (
     CONTACT, DEAD_ZONE, MODELICA, OF_MASS, OF_SHAFT, OPEN, ORDERS, S_END, S_MASSES, S_START, WORK, Record,
 )  # fmt: skip
@@ -42,7 +42,7 @@ _M = types.Array(types.float64, 2, "C")
 _T = types.Array(types.float64, 3, "C")
 
 
-@compiled
+@inner
 def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
     """Taylor coefficients over a span of length h of the answers to a unit of each part of the state.
 
@@ -91,7 +91,7 @@ def transition(s: Record, h: float, n: int, size: int, series: Rows) -> None:
                 series[joints + i, j, o + 1] = share * total * s.inverse[i]
 
 
-@compiled
+@inner
 def carried(
     series: Rows, n: int, x: float, X: Rows, hat: Rows, active: int, first: int, into: Rows
 ) -> None:  # fmt: skip
@@ -110,7 +110,7 @@ def carried(
                 into[i, q] += share * (X[j, q] if j < size else hat[j - size, q])
 
 
-@compiled
+@inner
 def carried_torque(
     s: Record, k: int, series: Rows, n: int, x: float, X: Rows, hat: Rows, active: int, into: Rows, row: int
 ) -> None:
@@ -132,7 +132,7 @@ def carried_torque(
             into[row, k, q] += share * (X[j, q] if j < size else hat[j - size, q])
 
 
-@compiled
+@inner
 def demand_hats(s: Record, knots: Vector, owners: Owners, at: int, t: float, h: float, hat: Rows) -> int:
     """The hats at t and their rise until t + h; returns the knot before, sought from `at` on."""
     middle = t + 0.5 * h
@@ -155,7 +155,7 @@ def demand_hats(s: Record, knots: Vector, owners: Owners, at: int, t: float, h: 
     return at
 
 
-@compiled
+@inner
 def pass_event(s: Record, span: Vector, rates: Rows, X: Rows, columns: int) -> None:
     """X across the event between a recorded span and the next one, at whose beginning the state is.
 
@@ -203,7 +203,7 @@ def sensitivities(
     `marks` rise and lie within the run. At an event the value is the one after it. The arrays behind `states`
     are scratch.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     count = s.n
     joints = count - 1
     size = X.shape[0]

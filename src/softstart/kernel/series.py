@@ -28,7 +28,7 @@ import numpy as np
 from numba import types
 
 from softstart.arrays import Matrix
-from softstart.kernel.jit import apart, compiled
+from softstart.kernel.jit import apart, inner, named
 from softstart.kernel.motor import expand_torque
 from softstart.kernel.records import (
     CONTACT,
@@ -50,7 +50,7 @@ LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
 # load curves, bodies and gears ----------------------------------------------------------------------
 
 
-@compiled
+@inner
 def set_piece(s: Record, i: int, piece: int) -> None:
     """The straight piece of its load curve on which mass i is: `piece` of the points lie before it."""
     s.piece[i] = piece
@@ -69,7 +69,7 @@ def set_piece(s: Record, i: int, piece: int) -> None:
             s.offset[i] = 0.0
 
 
-@compiled
+@inner
 def find_piece(s: Record, i: int) -> None:
     """The same by the present speed or angle, as at the start and where a blow has changed the speed."""
     if s.points[i] == 0:
@@ -82,7 +82,7 @@ def find_piece(s: Record, i: int) -> None:
     set_piece(s, i, piece)
 
 
-@compiled
+@inner
 def set_gear(s: Record, k: int) -> None:
     """The share of the torque of shaft k that acts on the masses beside it, in the present directions."""
     s.before[k] = 1.0
@@ -100,7 +100,7 @@ def set_gear(s: Record, k: int) -> None:
         s.after[k] = s.eta[k] if forward > 0.0 else 1.0 / s.eta[k]
 
 
-@compiled
+@inner
 def grip(s: Record, i: int, direction: float, o: int) -> float:
     """The coefficient of order o of the friction of the gears at the body i, were it to move so."""
     total = 0.0
@@ -117,7 +117,7 @@ def grip(s: Record, i: int, direction: float, o: int) -> float:
 # the length of a span -------------------------------------------------------------------------------
 
 
-@compiled
+@inner
 def fastest_rate(s: Record) -> float:
     """An upper bound of the rates of the machine in its present modes, 1/s.
 
@@ -221,7 +221,7 @@ def largest_reach(n: int) -> float:
 REACHES = np.array([largest_reach(n) for n in range(LEAST, MOST)])
 
 
-@compiled
+@inner
 def orders(reach: float) -> int:
     """How many coefficients a span of so many inverse rates needs: `needed`, from a table."""
     n = LEAST
@@ -233,14 +233,14 @@ def orders(reach: float) -> int:
 # the series -----------------------------------------------------------------------------------------
 
 
-@compiled
+@inner
 def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
     """The coefficients of the exciting torques."""
     for i in range(s.n):
         for o in range(n + 1):
             s.outside[i, o] = 0.0
     for row in range(tones.shape[0]):
-        tone = tones[row].view(TONE)[0]
+        tone = named(tones[row], TONE)
         i = int(tone.mass)
         phase = tone.omega * s.time
         cos = math.cos(phase)
@@ -256,7 +256,7 @@ def expand_tones(s: Record, tones: Matrix, h: float, n: int) -> None:
                 odd *= -turn * turn / ((o + 2.0) * (o + 3.0))
 
 
-@compiled
+@inner
 def curve_torque(s: Record, i: int, o: int, share: float) -> float:
     """The coefficient of order o of the load curve's torque; the next one of the angle follows too."""
     if s.by_angle[i] != 0.0:
@@ -267,7 +267,7 @@ def curve_torque(s: Record, i: int, o: int, share: float) -> float:
     return s.incline[i] * s.speed[i, o]
 
 
-@compiled
+@inner
 def join(s: Record, o: int, share: float) -> None:
     """The masses of each body move as one, and its rigid joints carry what the masses before them leave.
 
@@ -298,7 +298,7 @@ def join(s: Record, o: int, share: float) -> None:
         i = end
 
 
-@compiled
+@inner
 def note_scale(s: Record) -> None:
     """The sum of the absolute torques on each body, which is the scale of its rounding."""
     i = 0

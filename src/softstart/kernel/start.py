@@ -9,7 +9,7 @@ from numba import types
 
 from softstart.arrays import Matrix, Vector
 from softstart.kernel.events import next_event, peak_within, value
-from softstart.kernel.jit import compiled, compiled_as
+from softstart.kernel.jit import compiled_as, inner, named
 from softstart.kernel.modes import begin_modes, handle, path_closed, release
 from softstart.kernel.motor import (
     NEW_STATE, SEES_SHAFT_TORQUE, STEP_SIGNATURE, begin_torque, move_demand, next_in_queue,
@@ -31,12 +31,12 @@ STEP = types.FunctionType(STEP_SIGNATURE)
 FIRST_MACHINE = N_NOTES  # place of the machine's numbers in the work of a start
 
 
-@compiled_as(types.void(_A, _A, _M, _M, _M, _M))
+@inner
 def load_machine(
     work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix
 ) -> None:
     """Put what is given into the work of a start."""
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     for j in range(machine.shape[0]):
         work[FIRST_MACHINE + j] = machine[j]
     s.n = masses.shape[0]
@@ -46,7 +46,7 @@ def load_machine(
     s.path_end = max(s.at_motor, s.at_load)
     s.motor_shaft = s.at_motor if s.at_load > s.at_motor or s.at_motor == 0 else s.at_motor - 1
     for i in range(s.n):
-        mass = masses[i].view(MASS)[0]
+        mass = named(masses[i], MASS)
         s.J[i] = mass.J
         s.ground[i] = mass.ground
         s.active[i] = mass.active
@@ -57,7 +57,7 @@ def load_machine(
         s.rubs[i] = 1.0 if mass.Mc > 0.0 or mass.friction > 0.0 else 0.0
         s.points[i] = 0
     for k in range(s.n - 1):
-        shaft = shafts[k].view(SHAFT)[0]
+        shaft = named(shafts[k], SHAFT)
         s.c[k] = shaft.c
         s.d[k] = shaft.d
         s.half[k] = shaft.half
@@ -71,7 +71,7 @@ def load_machine(
             s.rubs[k + int(shaft.gear)] = 1.0
     s.curves = 0.0
     for row in range(curves.shape[0]):
-        curve = curves[row].view(CURVE)[0]
+        curve = named(curves[row], CURVE)
         if curve.mass >= 0.0:
             i = int(curve.mass)
             s.curves += 1.0
@@ -83,13 +83,13 @@ def load_machine(
     s.tones = tones.shape[0]
     s.tone_rate = 0.0
     for row in range(tones.shape[0]):
-        s.tone_rate = max(s.tone_rate, tones[row].view(TONE)[0].omega)
+        s.tone_rate = max(s.tone_rate, named(tones[row], TONE).omega)
 
 
-@compiled
+@inner
 def begin_start(work: Vector, until: float, on_gap: bool) -> None:
     """The state at t = 0; until = inf ends the start one elastic period after the target speed."""
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     for j in range(N_NOTES):
         work[j] = 0.0
     s.pending = 0.0
@@ -127,7 +127,7 @@ def begin_start(work: Vector, until: float, on_gap: bool) -> None:
                 s.impact_speed = s.side[k] * (s.w[k] - s.w[k + 1])
 
 
-@compiled
+@inner
 def note_span(s: Record, row: Vector, h: float) -> None:
     """What is needed to evaluate any instant of this span again."""
     row[S_START] = s.time
@@ -152,7 +152,7 @@ def note_span(s: Record, row: Vector, h: float) -> None:
         row[at + 3] = s.sign[k]
 
 
-@compiled
+@inner
 def move(s: Record, n: int, x: float, time: float) -> None:
     """The state after the share x of the span, `time` seconds later."""
     for i in range(s.n):
@@ -170,7 +170,7 @@ def move(s: Record, n: int, x: float, time: float) -> None:
     s.time += time
 
 
-@compiled
+@inner
 def pressing(twist: Vector, n: int, x: float, h: float, side: float) -> float:
     """The relative acceleration towards the flank `side`, rad/s^2."""
     total = 0.0
@@ -179,12 +179,12 @@ def pressing(twist: Vector, n: int, x: float, h: float, side: float) -> float:
     return side * total / (h * h)
 
 
-@compiled
+@inner
 def note_events(s: Record, events: Matrix) -> None:
     """Record what has been noted since the last span."""
     if events.shape[0] > 0:
         for j in range(s.noted):
-            event = events[int(s.n_events)].view(EVENT)[0]
+            event = named(events[int(s.n_events)], EVENT)
             event.time = s.note_time[j]
             event.kind = s.note_kind[j]
             event.place = s.note_place[j]
@@ -194,7 +194,7 @@ def note_events(s: Record, events: Matrix) -> None:
     s.noted = 0
 
 
-@compiled
+@inner
 def expand_all(s: Record, tones: Matrix, h: float, n: int) -> None:
     """All coefficients of the span, those of exciting torques first."""
     if s.tones != 0.0:
@@ -202,7 +202,7 @@ def expand_all(s: Record, tones: Matrix, h: float, n: int) -> None:
     expand(s, h, n)
 
 
-@compiled
+@inner
 def rate_of(s: Record) -> float:
     """An upper bound of all rates of the span, 1/s."""
     if s.changed != 0.0:
@@ -211,7 +211,7 @@ def rate_of(s: Record) -> float:
     return rate if s.follows != 0.0 else max(rate, 1.0 / s.lag)
 
 
-@compiled
+@inner
 def stands(s: Record, spans: Matrix, events: Matrix) -> int:
     """Why the start does not go on: ENDED, ASK, ...; -1 if it does. Answers that are due take effect."""
     if spans.shape[0] > 0 and (s.n_spans >= spans.shape[0] or s.n_events + MOST_NOTED >= events.shape[0]):
@@ -235,7 +235,7 @@ def stands(s: Record, spans: Matrix, events: Matrix) -> int:
     return -1
 
 
-@compiled
+@inner
 def horizon(s: Record) -> float:
     """The instant up to which nothing changes from outside."""
     stop = s.t_end
@@ -259,7 +259,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
 
     `spans` and `events` are filled row by row; with no rows nothing is recorded.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     while True:
         reason = stands(s, spans, events)
         if reason >= 0:
@@ -318,7 +318,7 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
             return EVENT_LIMIT
 
 
-@compiled
+@inner
 def torque_now(s: Record, k: int, tones: Matrix) -> float:
     """The torque of shaft k in the present state; of rigid joints as a span of no length has it."""
     mode = s.mode[k]
@@ -328,7 +328,7 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
         apply_modes(s)
     if mode in (PRESSED, WELDED):
         begin_torque(s)
-        expand_all(s, tones, 0.0, 2)
+        expand_all(s, tones, 0.0, orders(0.0))
         return float(s.torque[k, 0])
     return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
@@ -340,8 +340,8 @@ MEASURES = types.FunctionType(_MEASURE)
 @compiled_as(_MEASURE)
 def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
     """What the controller sees now."""
-    s = work.view(WORK)[0]
-    seen = measured.view(MEASURED)[0]
+    s = named(work, WORK)
+    seen = named(measured, MEASURED)
     sample(s, sees, seen)
     if sees & SEES_SHAFT_TORQUE:
         sign = 1.0 if s.at_motor <= s.motor_shaft else -1.0
@@ -351,13 +351,13 @@ def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
 @compiled_as(types.int64(_A, types.float64, types.float64, types.float64))
 def answer(work: Vector, torque: float, ask_again: float, slope: float) -> int:
     """Take the controller's answer; returns ASK, or why it cannot be taken."""
-    return take_answer(work.view(WORK)[0], torque, ask_again, slope)
+    return take_answer(named(work, WORK), torque, ask_again, slope)
 
 
 @compiled_as(types.void(_A, _A))
 def note_state(work: Vector, row: Vector) -> None:
     """The present state, as a span of no length."""
-    note_span(work.view(WORK)[0], row, 0.0)
+    note_span(named(work, WORK), row, 0.0)
 
 
 BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
@@ -381,8 +381,8 @@ def run_on(  # type: ignore[no-untyped-def]
     go_on, look, step, parameters, sees, work, tones, spans, events, measured, state, command
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
-    s = work.view(WORK)[0]
-    told = command[:NEW_STATE].view(ANSWER)[0]
+    s = named(work, WORK)
+    told = named(command[:NEW_STATE], ANSWER)
     while True:
         reason = go_on(work, tones, spans, events)
         if reason == ASK:
@@ -397,9 +397,9 @@ def run_on(  # type: ignore[no-untyped-def]
             state[j] = command[NEW_STATE + j]
 
 
-def run(*start: Any) -> int:
+def run(step: Any, *start: Any) -> int:
     """One start from where it stands to its end: the arguments of `run_on` from the step on."""
-    reason: int = run_on(advance, measure, *start)
+    reason: int = run_on(advance.dispatcher, measure.dispatcher, step.dispatcher, *start)
     return reason
 
 
@@ -418,7 +418,7 @@ def run_all(  # type: ignore[no-untyped-def]
     What is noted goes to notes[i] and shaft_notes[i]. The arrays from `work` on are scratch: the kernel
     allocates nothing.
     """
-    s = work.view(WORK)[0]
+    s = named(work, WORK)
     nothing = curves[0, :0]
     for i in range(notes.shape[0]):
         for j in range(state.shape[0]):
@@ -429,13 +429,14 @@ def run_all(  # type: ignore[no-untyped-def]
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):
-            shaft = shaft_notes[i, k].view(SHAFT_NOTES)[0]
+            shaft = named(shaft_notes[i, k], SHAFT_NOTES)
             shaft.peak = s.peak[k]
             shaft.peak_time = s.peak_time[k]
             shaft.impulse = s.impulse[k]
             shaft.first_peak = s.first_peak[k]
 
 
-def run_many(*starts: Any) -> None:
+def run_many(step: Any, *starts: Any) -> None:
     """Many starts to their ends: the arguments of `run_all` from the step on."""
-    run_all(run_on, advance, measure, begin, *starts)
+    parts = (run_on, advance, measure, begin, step)
+    run_all(*(one.dispatcher for one in parts), *starts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,9 +143,10 @@ class Recorded:
     def _loaded(self) -> tuple[Vector, Matrix]:
         """Work of the kernel with this machine, and its tones."""
         work, given = np.zeros(at.N_WORK), self.rows
-        start.load_machine(
-            work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones
-        )
+        start.begin(
+            work, given.machines[0], given.masses[0], given.shafts[0], given.curves[0], given.tones,
+            math.inf, False,
+        )  # fmt: skip
         return work, given.tones
 
     def index(self, times: Vector) -> NDArray[np.int64]:

@@ -45,7 +45,7 @@ def test_the_answer_replays_exactly(confirmed):
 
 def test_linear_programs_with_finer_torques_agree_within_a_thousandth(confirmed):
     """The collocation began at straight lines and has twice the torques of the programs, and more of them in
-    short phases: that is what lies between both answers. Each grid begins with the answer of the coarser one."""
+    short phases: that is what lies between both answers. Each grid begins with what the coarser one found."""
     chain = three_masses()
     first = optimize(chain, START_TIME, time_limit=0.0).profile
     times, torques, answers = first.time, first.torque, []
