@@ -18,6 +18,8 @@ from numba.extending import lower_builtin, type_callable
 
 _njit: Any = numba.njit
 _cfunc: Any = numba.cfunc
+_type_callable: Any = type_callable
+_lower_builtin: Any = lower_builtin
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 FUSED = {**OPTIONS, "fastmath": {"contract"}}  # a x + b is rounded once: quicker, and more exact
@@ -84,12 +86,12 @@ def named(row: Any, dtype: Any) -> Any:
     return row[: dtype.itemsize // row.itemsize].view(dtype)[0]
 
 
-@type_callable(named)
+@_type_callable(named)
 def _typed(_: Any) -> Any:
     return lambda row, dtype: dtype.dtype
 
 
-@lower_builtin(named, types.Array, types.DType)
+@_lower_builtin(named, types.Array, types.DType)
 def _lowered(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     data = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.bitcast(data, context.get_value_type(signature.return_type))

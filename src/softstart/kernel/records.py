@@ -348,9 +348,8 @@ NO_PULL, DEAD_ZONE, MODELICA = 0.0, 1.0, 2.0
 OPEN, CONTACT, DOUBLED, BEYOND, PRESSED, JOINED, WELDED = range(7)
 
 # kinds of recorded events; no Python integers, for each of which numba would compile what it is passed to
-(
-    CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED,
-) = np.arange(1, 9)  # fmt: skip
+_kinds: Any = np.arange(1, 9)
+CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED = _kinds
 
 # why `advance` came back
 ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG = range(9)
