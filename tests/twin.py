@@ -1,4 +1,4 @@
-"""A compiled controller in plain Python: the same lines, not compiled."""
+"""The same twice: a compiled controller in plain Python, a drive as a chain."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from softstart import Command, Drive, PlainController
+from softstart import Chain, Command, Drive, PlainController
+from softstart.chain import Mass, Motor, Shaft
 from softstart.controller import Measured, Sensor
 from softstart.controller.compiled import STATE
 
@@ -39,3 +40,23 @@ def plain(controller: Any, drive: Drive) -> PlainTwin:
     """The twin of a compiled controller that is set up for a drive."""
     fitted = controller.fitted(drive)
     return PlainTwin(fitted, tuple(fitted.vector(drive).tolist()))
+
+
+def chain_of(drive: Drive) -> Chain:
+    """The chain of two masses that a drive without brake and friction is."""
+    assert drive.brake == "none", "a chain has no brake"
+    assert drive.frictions == (0.0, 0.0, 0.0), "a chain has no such friction"
+    rotor = Mass(drive.J1, name="motor", initial_speed=drive.initial_motor_speed)
+    load = Mass(
+        drive.J2, name="load", torque=drive.Mc, kind=drive.load_kind, initial_speed=drive.initial_load_speed
+    )
+    unknown = len(drive.positions) > 1
+    where = None if unknown else drive.theta0 or None
+    shaft = Shaft(
+        drive.c, damping=drive.d, gap=drive.gap, contact_law=drive.contact_law, start_position=where
+    )
+    motor = Motor(**{key: getattr(drive, key) for key in Motor.PARAMETERS if key in Drive.PARAMETERS})
+    return Chain(
+        (rotor, load), (shaft,), motor, target_speed=drive.target_speed, name=drive.name, source=drive.source,
+        assumed=drive.assumed, position="unknown" if unknown else "mid-gap", units=drive.units,
+    )  # fmt: skip

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, Log, identify, natural_vibration, simulate
 from softstart.identification.chains import chain_log, reduced_drive, reduction_note
@@ -52,7 +53,7 @@ def test_a_chain_of_two_masses_logs_what_its_drive_does(torque_is: str, signal: 
         encoder_lines=0,
     )
     log = made_up_log(drive, REVERSE, log_period=2e-3, torque_is=torque_is, signal=signal)  # type: ignore[arg-type]
-    whole = chain_log(Chain.from_drive(drive), log, 0.0)
+    whole = chain_log(chain_of(drive), log, 0.0)
     assert whole.values == pytest.approx(LogModel(log, drive).signals([{}])[0], abs=1e-11)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from tests.oracle import integrate
 from tests.softstart.kernel.test_brake import HOIST
+from tests.twin import chain_of
 
-from softstart import Chain, Drive, InputError, compare, linear_view, simulate
+from softstart import Drive, InputError, compare, linear_view, simulate
 from softstart.chain import reduce_chain
 from softstart.controller import make_controller
 from softstart.drive import UNKNOWN_POSITIONS
@@ -233,7 +234,7 @@ def test_an_unnamed_position_of_a_reactive_load_is_the_worst_of_three() -> None:
     notes = starts.remarks(compare(plain, ["ramp"]))
     assert any(f"ramp {run.position}" in note for note in notes)
     assert any("give start.position" in note for note in notes)
-    chain = Chain.from_drive(plain)
+    chain = chain_of(plain)
     assert chain.position == "unknown"
     assert reduce_chain(chain).to_drive().start_position == "unknown"
     view, mid = (linear_view(one, "state-feedback") for one in (plain, named.replace(start_position=0.0)))

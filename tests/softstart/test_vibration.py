@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from tests.twin import chain_of
 
 from softstart import Drive, compare
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration, reduce_chain
@@ -155,7 +156,7 @@ def test_two_masses_have_frequency_node_inertia_gap_and_load_of_the_chain(seed: 
     squares, modes = eigh(stiffness_matrix(arrays.c), np.diag(arrays.J))
     first, last = modes[[0, -1], 1]
     assert drive.Omega == pytest.approx(math.sqrt(squares[1]), rel=1e-6)
-    two = natural_vibration(Chain.from_drive(drive)).shape[1]
+    two = natural_vibration(chain_of(drive)).shape[1]
     assert two[1] / two[0] == pytest.approx(last / first, rel=1e-5)
     assert pytest.approx(arrays.J.sum(), rel=1e-12) == drive.J1 + drive.J2
     assert drive.gap == pytest.approx(arrays.gap.sum(), rel=1e-12)
@@ -165,7 +166,7 @@ def test_two_masses_have_frequency_node_inertia_gap_and_load_of_the_chain(seed: 
 def test_the_damping_of_the_mode_is_kept() -> None:
     """Decay rate of the first elastic mode, from the eigenvalues of the damped systems."""
     chain = Chain.load("tractor-like")
-    two = Chain.from_drive(reduce_chain(chain).to_drive())
+    two = chain_of(reduce_chain(chain).to_drive())
     assert _decay(two) == pytest.approx(_decay(chain), rel=2e-3)  # light damping: first order
 
 

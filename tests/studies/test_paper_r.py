@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.contour import QuadContourSet
+from tests.twin import chain_of
 
 from softstart import Command, Drive, PlainController, simulate
 from softstart.chain import Chain, natural_vibration, reduce_chain
@@ -37,7 +38,7 @@ class Full(PlainController):
 
 @pytest.mark.parametrize("amplitude", [0.02, 0.5])
 def test_free_vibration_of_two_masses_is_the_backbone(amplitude):
-    chain = Chain.from_drive(CRANE)
+    chain = chain_of(CRANE)
     w = float(backbone(0.035, 0.175, 368.465, 0.5, amplitude))
     period = 2.0 * math.pi / w
     motion = moved(chain, released(chain, np.array([368.465 * amplitude])), 5 * period, period / 8)
@@ -50,7 +51,7 @@ def test_a_start_of_two_masses_is_that_of_the_exact_plant(damping):
     drive = CRANE.replace(damping=damping, target_speed=1e6)
     run = simulate(drive, Full(), until=0.3)
     torque = np.array([62.0, -7.16])
-    motion = moved(Chain.from_drive(drive), np.zeros(1), 0.3, 0.3 / 4000, torque=torque, damped=True)
+    motion = moved(chain_of(drive), np.zeros(1), 0.3, 0.3 / 4000, torque=torque, damped=True)
     assert np.abs(motion.torque[:, 0]).max() == pytest.approx(run.peak_torque, rel=1e-5)
     assert motion.w[-1, 0] == pytest.approx(run.w1[-1], rel=1e-8)
     assert motion.twist[-1, 0] == pytest.approx(run.phi1[-1] - run.phi2[-1], rel=1e-7)

@@ -195,30 +195,6 @@ class Chain:
             raise InputError(wrong)
         return chain
 
-    @classmethod
-    def from_drive(cls, drive: Drive) -> Self:
-        """The chain of two masses that a single drive is.
-
-        >>> drive = Drive.load("crane-4amtkf")
-        >>> Chain.from_drive(drive).at_motor_shaft().c
-        array([368.465])
-        """
-        if drive.shape != ():
-            raise InputError(f"{drive.name}: a batch of shape {drive.shape} is not one chain.")
-        if wrong := list(drive.without_friction("a chain has no such friction")):
-            raise InputError(wrong)
-        of: Any = drive  # one number for each parameter
-        rotor = Mass(of.J1, name="motor", initial_speed=of.initial_motor_speed)
-        load = Mass(of.J2, name="load", torque=of.Mc, kind=of.load_kind, initial_speed=of.initial_load_speed)
-        unknown = len(drive.positions) > 1
-        where = None if unknown else of.theta0 or None
-        shaft = Shaft(of.c, damping=of.d, gap=of.gap, contact_law=of.contact_law, start_position=where)
-        motor = Motor(**{key: getattr(of, key) for key in Motor.PARAMETERS if key in Drive.PARAMETERS})
-        return cls(
-            (rotor, load), (shaft,), motor, target_speed=of.target_speed, name=of.name, source=of.source,
-            assumed=of.assumed, position="unknown" if unknown else "mid-gap", units=of.units,
-        )  # fmt: skip
-
     def to_toml(self) -> str:
         """The chain as TOML text in SI, without defaults, which `from_toml` reads back to an equal chain."""
         start = {"load": self.load_mass, "target_speed": self.target_speed, "position": self.position}
@@ -329,8 +305,8 @@ class Chain:
     def lumped(self) -> TwoMasses:
         """The chain as two masses: each split between motor and load by compliance (lever rule).
 
-        >>> round(Chain.from_drive(Drive.load("crane-4amtkf")).lumped.J2, 6)
-        0.175
+        >>> round(Chain.load("crane-4-mass").lumped.J2, 6)
+        0.175026
         """
         at, motor = self.at_motor_shaft(), self.motor
         path = list(at.path)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.twin import chain_of
 
 from softstart import Chain, Drive, InputError, fatigue, simulate
 from softstart.chain import chain_fatigue
@@ -25,7 +26,7 @@ def chain() -> Chain:
 def test_a_chain_of_two_masses_lives_as_its_drive(name: str) -> None:
     """The plant locates its turning points in closed forms, the chain in its series."""
     run = simulate(CRANE, name)
-    other = simulate(Chain.from_drive(CRANE), name, fitted_to=CRANE)
+    other = simulate(chain_of(CRANE), name, fitted_to=CRANE)
     mine, theirs = turning_points(run), shaft_turning_points(other)[0]
     assert mine.shape == theirs.shape
     np.testing.assert_allclose(theirs, mine, rtol=1e-7, atol=1e-7 * run.peak_torque)

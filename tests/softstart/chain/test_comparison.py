@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.twin import chain_of
 
 from softstart import Command, Drive, InputError, PlainController, compare, simulate
 from softstart.chain import Chain, Mass, Motor, Shaft
@@ -26,7 +27,7 @@ def test_a_chain_of_two_masses_compares_as_its_drive(changes):
     """The same rows as from the closed forms of the two-mass plant, changed gaps and loads too."""
     drive = CRANE.replace(**changes)
     strategies = ["direct", "ramp", "pulse-coast-hold"]
-    ours = compare(Chain.from_drive(drive), strategies, fitted_to=drive)
+    ours = compare(chain_of(drive), strategies, fitted_to=drive)
     theirs = compare(drive, strategies)
     for one, other in zip(ours.rows, theirs.rows, strict=True):
         assert one.run.k_dyn == pytest.approx(other.run.k_dyn, rel=1e-9)

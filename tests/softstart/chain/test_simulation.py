@@ -10,6 +10,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.integrate import solve_ivp
 from tests import twin
 from tests.softstart.kernel.pieces import Pieces
+from tests.twin import chain_of
 
 from softstart import Command, Drive, InputError, PlainController, Run, SimulationError, simulate
 from softstart.balancing import Engine
@@ -56,7 +57,7 @@ def same_as_plant(run: Run, plant: Run) -> None:
 @pytest.mark.parametrize("kind", DRIVES)
 def test_two_masses_are_the_two_mass_plant(kind, controller):
     drive = CRANE.replace(**DRIVES[kind])
-    run = simulate(Chain.from_drive(drive), controller, fitted_to=drive)
+    run = simulate(chain_of(drive), controller, fitted_to=drive)
     same_as_plant(run, simulate(drive, controller))
     assert abs(run.energy.residual) < 1e-12 * abs(run.energy.motor)
 
@@ -82,7 +83,7 @@ def test_the_shaft_torque_the_load_speed_and_the_stage_are_seen():
             torque = 60.0 - 0.1 * measured.shaft_torque - 0.2 * measured.load_speed + 0.5 * measured.stage
             return Command(torque, measured.time + 0.003)
 
-    run = simulate(Chain.from_drive(CRANE), Seeing(), fitted_to=CRANE)
+    run = simulate(chain_of(CRANE), Seeing(), fitted_to=CRANE)
     same_as_plant(run, simulate(CRANE, Seeing()))
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.controllers.several_gaps import random_chains
+from tests.twin import chain_of
 
 from softstart import Drive, InputError, SimulationError, simulate
 from softstart.chain import Chain, Mass, reduce_chain, two_mass_error, verify_on_chain
@@ -33,7 +34,7 @@ def test_both_sides_are_the_starts_themselves(controller):
 
 def test_a_chain_of_two_masses_verifies_itself():
     drive = Drive.load("crane-4amtkf").replace(gap=1.0)
-    found = verify_on_chain(Chain.from_drive(drive), drive, "ramp", parameters={"time": "0.2 s"})
+    found = verify_on_chain(chain_of(drive), drive, "ramp", parameters={"time": "0.2 s"})
     assert found.error == pytest.approx(0.0, abs=1e-12)
     assert (found.worst_shaft, found.worst_place) == (0, "motor - load")
     assert found.chain_k_dyn == found.chain.k_dyn
@@ -62,7 +63,7 @@ def test_a_batch_is_refused():
 
 
 def test_a_chain_of_two_masses_is_its_own_drive():
-    chain = Chain.from_drive(Drive.load("crane-4amtkf"))
+    chain = chain_of(Drive.load("crane-4amtkf"))
     found = two_mass_error(chain, controllers=["direct", "ramp", "shaped"])
     assert found.error < 1e-9
     assert found.enough

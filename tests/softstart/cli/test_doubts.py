@@ -6,6 +6,7 @@ import json
 import math
 
 import pytest
+from tests.twin import chain_of
 
 from softstart import Chain, Drive, simulate
 from softstart.chain.elements import LIBRARY, Mass, Motor, Shaft
@@ -41,7 +42,7 @@ def test_each_limit_on_both_sides(
     ((name, value),) = at_limit.items()
     inward = 1.0 + 1e-3 * math.copysign(1.0, 1.0 - beyond)
     within, without = (CRANE.replace(**{name: share * value}, **others) for share in (inward, beyond))
-    for of in (lambda drive: drive, Chain.from_drive):
+    for of in (lambda drive: drive, chain_of):
         assert not any(about in one for one in doubts(of(within)))
         (found,) = (one for one in doubts(of(without)) if about in one)
         assert found.endswith(("?", ".")), "the likeliest mistake comes last"

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 import pytest
+from tests.twin import chain_of
 
 from softstart import Drive
 from softstart.chain import Chain, Mass, Shaft, reduce_chain
@@ -134,7 +135,7 @@ def test_another_order_on_the_chain_is_told(run, place):
     assert "On the chain ramp is gentler than pulse-coast-hold (K_dyn 3.27 and 4.05)" in verdict["said"]
     assert "pulse-coast-hold has K_dyn 4.05 on the chain and 0.981 on them" in verdict["said"]
     assert verdict["said"] in (place / "found" / "report.md").read_text().replace("\\_", "_")
-    (place / "two.toml").write_text(Chain.from_drive(Drive.load("crane-4amtkf")).to_toml())
+    (place / "two.toml").write_text(chain_of(Drive.load("crane-4amtkf")).to_toml())
     out = run("reduce", "two.toml", "--verify", "pulse-coast-hold,ramp").out
     assert "verified on the chain" in out
     assert "Two masses are enough: K_dyn of pulse-coast-hold, ramp and under 128 torques" in out
@@ -142,7 +143,7 @@ def test_another_order_on_the_chain_is_told(run, place):
 
 
 def test_a_command_for_drives_takes_a_chain_that_two_masses_stand_for(place, refused):
-    two = Chain.from_drive(Drive.load("crane-4amtkf"))
+    two = chain_of(Drive.load("crane-4amtkf"))
     motor, load = two.masses
     light = Mass(0.01 * motor.inertia, name="coupling")
     stiff = two.shafts[0].replace(stiffness=300.0 * two.shafts[0].stiffness, gap=0.0, damping_ratio=0.02)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.softstart.linear.speed_loops import SpeedPI
+from tests.twin import chain_of
 
 from softstart import Drive, InputError, linear_view
 from softstart.chain import Chain, Mass, Motor, Shaft, natural_vibration
@@ -27,7 +28,7 @@ CHAIN = Chain.from_toml(
     ],
 )
 def test_two_masses_have_the_loop_of_their_drive(drive, controller):
-    chain = Chain.from_drive(drive)
+    chain = chain_of(drive)
     few = {"inertias": (2.5,), "stiffnesses": (), "limit_cycles": False}
     one = linear_view(drive, controller, **few)
     two = linear_view(chain, controller, fitted_to=drive, **few)
