@@ -322,6 +322,8 @@ def friction(s: Record, i: int, h: float, n: int, end: float) -> tuple[int, floa
     if s.braked != 0.0 and s.first[s.at_motor] == i:
         if s.release_at < math.inf:  # released by time
             return event, end
+        if s.held[i, 0] >= -noise:  # a torque that just holds the load is proved
+            return LET_GO, 0.0
         set_line(s.f, s.held[i], n, 0.0, -1.0)
         x = first_root(s, n, end, 0, noise, noise)
         if x < NONE:

@@ -26,17 +26,18 @@ FUSED = {**OPTIONS, "fastmath": {"contract"}}  # a x + b is rounded once: quicke
 
 compiled: Any = _njit(**FUSED)
 # called by compiled functions alone, a fifth less to compile: Python that calls it crashes
-inner: Any = _njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **FUSED)
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner: Any = _njit(**FUSED, **INNER)
 # the same digits as the same lines in Python, for controllers
 unfused: Any = _njit(**OPTIONS)
-unfused_inner: Any = _njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
+unfused_inner: Any = _njit(**OPTIONS, **INNER)
 
 
 class Compiled:
-    """A function with one explicit signature, compiled when it is first needed; kernels may be handed it.
+    """A function with one explicit signature, compiled when it is first needed.
 
-    A kernel that calls a function by its address does not compile it again: LLVM would otherwise optimise
-    what a function calls within each caller, and each caller of that one.
+    Compiled functions may call it by its name, or be handed it: a kernel that calls a step by its address
+    does not compile it again.
     """
 
     def __init__(self, function: Callable[..., Any], signature: Any, options: Mapping[str, Any]) -> None:
@@ -46,7 +47,7 @@ class Compiled:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What numba made of it: compiled functions are called with it, and have it among their arguments."""
+        """What Python calls, and what compiled functions are handed."""
         made = _njit(self.signature, **self.options)(self.function)
         # the address, which numba would look up for each call: `__wrapper_address__` is its protocol for
         # functions that are passed to compiled ones. There is one signature, and so one result of compiling
@@ -56,8 +57,15 @@ class Compiled:
         made.get_compile_result = lambda _: found
         return made
 
-    def __call__(self, *args: Any) -> Any:
-        return self.dispatcher(*args)
+    @cached_property
+    def _numba_type_(self) -> Any:
+        """What numba takes its name for in a compiled function: that one has a copy of its own."""
+        self._copy = _njit(**self.options, **INNER)(self.function)  # numba does not keep it
+        return types.Dispatcher(self._copy)
+
+    def __call__(self, first: Any, *args: Any) -> Any:
+        """Call it; one that is handed another one has it first."""
+        return self.dispatcher(first.dispatcher if type(first) is Compiled else first, *args)
 
 
 def compiled_as(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import types
@@ -18,9 +17,7 @@ from softstart.kernel.records import (
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, WORK, Record,
 )  # fmt: skip
 from softstart.kernel.series import orders, set_piece
-from softstart.kernel.start import (
-    ADVANCES, BEGIN, MEASURES, RUN, STEP, advance, begin, expand_all, measure, rate_of, run_on,
-)  # fmt: skip
+from softstart.kernel.start import STEP, begin, expand_all, rate_of, run
 
 _A = types.Array(types.float64, 1, "C")
 _I = types.Array(types.int64, 1, "C")
@@ -60,10 +57,7 @@ def restore(s: Record, tones: Matrix, spans: Matrix, row: int) -> int:
     return n
 
 
-_STATES = types.void(_A, _M, _M, _I, _A, _M, _M, _M, _M)
-
-
-@compiled_as(_STATES)
+@compiled_as(types.void(_A, _M, _M, _I, _A, _M, _M, _M, _M))
 def states_at(
     work: Vector, tones: Matrix, spans: Matrix, index: NDArray[np.int64], times: Vector,
     motor: Matrix, w: Matrix, twist: Matrix, T: Matrix,
@@ -89,14 +83,13 @@ def states_at(
 
 @compiled_as(
     types.int64(
-        types.FunctionType(RUN), ADVANCES, MEASURES, types.FunctionType(BEGIN), types.FunctionType(_STATES),
         STEP, _M, types.int64, types.boolean, types.float64, _A, _M, _M, _M, _M, _A, _M, _M, _A, _I, _M,
         _T, _M, _T, _A, _A, _A,
     )
 )  # fmt: skip
-def states_of_all(  # type: ignore[no-untyped-def]
-    run_one, go_on, look, begin_one, look_at, step, parameters, sees, on_gap, until, machine, masses, shafts,
-    curves, tones, work, spans, events, times, index, motor, w, twist, T, measured, state, command,
+def states_of_each(  # type: ignore[no-untyped-def]
+    step, parameters, sees, on_gap, until, machine, masses, shafts, curves, tones, work, spans, events,
+    times, index, motor, w, twist, T, measured, state, command,
 ) -> int:  # fmt: skip
     """Speeds and shaft torques of one machine at rising times, under each row of a controller's parameters.
 
@@ -105,21 +98,9 @@ def states_of_all(  # type: ignore[no-untyped-def]
     s = named(work, WORK)
     for r in range(parameters.shape[0]):
         state[:] = 0.0
-        begin_one(work, machine, masses, shafts, curves, tones, until, on_gap)
-        reason = run_one(
-            go_on,
-            look,
-            step,
-            parameters[r],
-            sees,
-            work,
-            tones,
-            spans,
-            events,
-            measured,
-            state,
-            command,
-        )
+        begin(work, machine, masses, shafts, curves, tones, until, on_gap)
+        own = parameters[r]
+        reason = run(step, own, sees, work, tones, spans, events, measured, state, command)
         if reason == BUFFER_FULL:
             return BUFFER_FULL
         row, last = 0, int(s.n_spans) - 1
@@ -127,15 +108,8 @@ def states_of_all(  # type: ignore[no-untyped-def]
             while row < last and spans[row + 1, S_START] <= times[j]:
                 row += 1
             index[j] = row
-        look_at(work, tones, spans, index, times, motor, w[r], twist, T[r])
+        states_at(work, tones, spans, index, times, motor, w[r], twist, T[r])
     return ENDED
-
-
-def states_of_each(step: Any, *starts: Any) -> int:
-    """The arguments of `states_of_all` from the step on."""
-    parts = (run_on, advance, measure, begin, states_at, step)
-    reason: int = states_of_all(*(one.dispatcher for one in parts), *starts)
-    return reason
 
 
 INVERSE = 1.0 / np.arange(1.0, 2.0 * ORDERS + 2.0)  # of n at n - 1

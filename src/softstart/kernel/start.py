@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from numba import types
 
@@ -249,11 +248,7 @@ def horizon(s: Record) -> float:
     return until
 
 
-_ADVANCE = types.int64(_A, _M, _M, _M)
-ADVANCES = types.FunctionType(_ADVANCE)
-
-
-@compiled_as(_ADVANCE)
+@compiled_as(types.int64(_A, _M, _M, _M))
 def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
     """Go on until the controller must be asked, the start has ended, or something stands in the way.
 
@@ -333,11 +328,7 @@ def torque_now(s: Record, k: int, tones: Matrix) -> float:
     return float(s.stiff[k] * (s.theta[k] - s.slack[k]) + s.damp[k] * (s.w[k] - s.w[k + 1]))
 
 
-_MEASURE = types.void(_A, types.int64, _M, _A)
-MEASURES = types.FunctionType(_MEASURE)
-
-
-@compiled_as(_MEASURE)
+@compiled_as(types.void(_A, types.int64, _M, _A))
 def measure(work: Vector, sees: int, tones: Matrix, measured: Vector) -> None:
     """What the controller sees now."""
     s = named(work, WORK)
@@ -360,10 +351,7 @@ def note_state(work: Vector, row: Vector) -> None:
     note_span(named(work, WORK), row, 0.0)
 
 
-BEGIN = types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean)
-
-
-@compiled_as(BEGIN)
+@compiled_as(types.void(_A, _A, _M, _M, _M, _M, types.float64, types.boolean))
 def begin(
     work: Vector, machine: Vector, masses: Matrix, shafts: Matrix, curves: Matrix, tones: Matrix,
     until: float, on_gap: bool,
@@ -373,20 +361,17 @@ def begin(
     begin_start(work, until, on_gap)
 
 
-RUN = types.int64(ADVANCES, MEASURES, STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A)
-
-
-@compiled_as(RUN)
-def run_on(  # type: ignore[no-untyped-def]
-    go_on, look, step, parameters, sees, work, tones, spans, events, measured, state, command
+@compiled_as(types.int64(STEP, _A, types.int64, _A, _M, _M, _M, _A, _A, _A))
+def run(  # type: ignore[no-untyped-def]
+    step, parameters, sees, work, tones, spans, events, measured, state, command
 ) -> int:
     """One start from where it stands to its end, or until a buffer is full: call again with larger ones."""
     s = named(work, WORK)
-    told = named(command[:NEW_STATE], ANSWER)
+    told = named(command, ANSWER)
     while True:
-        reason = go_on(work, tones, spans, events)
+        reason = advance(work, tones, spans, events)
         if reason == ASK:
-            look(work, sees, tones, measured)
+            measure(work, sees, tones, measured)
             told.slope = 0.0
             step(parameters, measured, state, command)
             reason = take_answer(s, told.torque, told.ask_again, told.slope)
@@ -397,21 +382,14 @@ def run_on(  # type: ignore[no-untyped-def]
             state[j] = command[NEW_STATE + j]
 
 
-def run(step: Any, *start: Any) -> int:
-    """One start from where it stands to its end: the arguments of `run_on` from the step on."""
-    reason: int = run_on(advance.dispatcher, measure.dispatcher, step.dispatcher, *start)
-    return reason
-
-
 @compiled_as(
     types.void(
-        types.FunctionType(RUN), ADVANCES, MEASURES, types.FunctionType(BEGIN), STEP, _M, types.int64,
-        types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A,
+        STEP, _M, types.int64, types.boolean, types.float64, _M, _T, _T, _T, _M, _T, _A, _A, _A, _A,
     )
 )  # fmt: skip
-def run_all(  # type: ignore[no-untyped-def]
-    run_one, go_on, look, begin_one, step, parameters, sees, on_gap, until, machines, masses, shafts, curves,
-    notes, shaft_notes, work, measured, state, command,
+def run_many(  # type: ignore[no-untyped-def]
+    step, parameters, sees, on_gap, until, machines, masses, shafts, curves, notes, shaft_notes, work,
+    measured, state, command,
 ) -> None:  # fmt: skip
     """Start i has row i of machines, masses, shafts, curves and parameters (one row serves all).
 
@@ -423,9 +401,9 @@ def run_all(  # type: ignore[no-untyped-def]
     for i in range(notes.shape[0]):
         for j in range(state.shape[0]):
             state[j] = 0.0
-        begin_one(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
+        begin(work, machines[i], masses[i], shafts[i], curves[i], nothing, until, on_gap)
         own = parameters[i if parameters.shape[0] > 1 else 0]
-        run_one(go_on, look, step, own, sees, work, nothing, nothing, nothing, measured, state, command)
+        run(step, own, sees, work, nothing, nothing, nothing, measured, state, command)
         for j in range(notes.shape[1]):
             notes[i, j] = work[j]
         for k in range(s.n - 1):
@@ -434,9 +412,3 @@ def run_all(  # type: ignore[no-untyped-def]
             shaft.peak_time = s.peak_time[k]
             shaft.impulse = s.impulse[k]
             shaft.first_peak = s.first_peak[k]
-
-
-def run_many(step: Any, *starts: Any) -> None:
-    """Many starts to their ends: the arguments of `run_all` from the step on."""
-    parts = (run_on, advance, measure, begin, step)
-    run_all(*(one.dispatcher for one in parts), *starts)
