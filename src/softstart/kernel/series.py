@@ -43,7 +43,7 @@ from softstart.kernel.records import (
 )
 
 REACH = 3.0
-TRUNCATION = 1e-18
+TRUNCATION = 1e-17
 LEAST, MOST = 4, ORDERS - 2  # coefficients of a span
 
 
@@ -203,10 +203,10 @@ def needed(reach: float) -> int:
     """How many coefficients a span of so many inverse rates needs."""
     n = 0
     term = 1.0
-    while term > TRUNCATION and n < MOST - 2:
+    while term > TRUNCATION and n < MOST - 1:
         n += 1
         term *= reach / n
-    return max(n + 2, LEAST)
+    return max(n + 1, LEAST)
 
 
 def largest_reach(n: int) -> float:
